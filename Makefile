@@ -4,20 +4,23 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# The environment has what running, pictures and analysis need (NEEDED), or everything
+# (STAMP), which also serves `make demo`.
+NEEDED := $(VENV)/.installed-needed
 STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.docs-installed
+# All of them write to one environment.
+.NOTPARALLEL:
 
 # Settings of `make demo`; to change them: make SEED=2 BIRTHS=3000 demo.
 SEED ?= 1
-BIRTHS ?= 1500
-DEMO = $(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) \
-	--out runs/demo-$$(date +%Y%m%d-%H%M%S)-$$$$
+BIRTHS ?= 1000
 
 .PHONY: help demo compiled test test-long test-many test-fresh bench lint format check proto \
 	constraints clean
 
 help:
-	@echo 'make demo         evolve robots for about a minute'
+	@echo 'make demo         evolve robots for a minute: film, fitness curve, report'
 	@echo 'make test         run all tests'
 	@echo 'make test-long    run the tests that are too long for CI: about an hour, as root'
 	@echo 'make bench        check the performance targets, on an idle machine'
@@ -30,8 +33,20 @@ help:
 	@echo 'make docs-serve   build the docs site and show it on this machine; Ctrl-C ends'
 	@echo 'make clean        remove the environment and all caches'
 
-demo: $(STAMP)
-	@$(DEMO)
+demo: $(NEEDED)
+	@set -e; run=runs/demo-$$(date +%Y%m%d-%H%M%S)-$$$$; \
+	$(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) --out $$run; \
+	echo; \
+	robustness=$$($(BIN)/revolve robot simulate $$run/best.yaml --robustness); \
+	printf 'best robot: '; echo "$$robustness" | tail -n 1; \
+	$(BIN)/revolve robot render $$run/best.yaml $$run/best.gif --width 480; \
+	$(BIN)/revolve analyze $$run --out $$run/report > $$run/report.txt \
+		|| { cat $$run/report.txt; exit 1; }; \
+	cp $$run/report/figures/*6.3*.png $$run/fitness.png; \
+	echo; echo 'To look at:'; \
+	echo "  $$run/best.gif            the best robot, moving"; \
+	echo "  $$run/fitness.png         fitness over births"; \
+	echo "  $$run/report/report.html  all figures and measures, for a browser"
 
 # Tests start hundreds of processes. Where Python is configured to write no bytecode,
 # each of them would compile all modules again.
@@ -46,7 +61,7 @@ test: compiled
 # Tests that are too long for CI: run them before a release and report the results.
 test-long: test-many bench test-fresh
 
-test-many: compiled
+test-many: compiled $(DOCS_STAMP)
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m long
 
 # To test one release of Debian only: make SUITES=sid test-fresh.
@@ -104,7 +119,13 @@ clean:
 		.pytest_cache .ruff_cache MUJOCO_LOG.TXT
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(STAMP): pyproject.toml constraints.txt
+$(NEEDED): EXTRAS := pictures,analysis
+$(NEEDED): SIZE := 1 GB
+$(STAMP): EXTRAS := all,dev
+$(STAMP): SIZE := 2 GB
+# Dots are packages. Modules are compiled by all cores, which pip does not do; tests of
+# packages are not compiled.
+$(NEEDED) $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' \
 		|| { echo 'Python 3.11, 3.12, 3.13 or 3.14 is needed, and "$(PYTHON)" is' \
 		"$$($(PYTHON) --version 2>/dev/null || echo missing)." \
@@ -112,9 +133,13 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
 		|| { echo '"$(PYTHON)" lacks venv: install it (Debian: python3-venv)' >&2; \
 		exit 1; }
-	@echo 'Making $(VENV): about 1.7 GB on disk, a minute or two ...'
+	@echo 'Making $(VENV): about $(SIZE) on disk, a minute or two.'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-		-c constraints.txt -e '.[view,analysis,cluster,dev]'
+	@{ $(BIN)/python -m pip install --disable-pip-version-check --no-compile \
+		--progress-bar off -c constraints.txt -e '.[$(EXTRAS)]'; echo "ended $$?"; } \
+		| awk 'BEGIN { printf "Downloading " } /Downloading|Using cached/ { printf "." } \
+			/^Installing/ { printf "\nInstalling ...\n" } { fflush() } \
+			END { if (!/^ended 0$$/) print ""; exit !/^ended 0$$/ }'
+	@$(BIN)/python -m compileall -q -j 0 -x '/tests?/' $(VENV)/lib || true
 	@echo '$(VENV) is ready.'
-	@touch $@
+	@touch $(NEEDED) $@

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from schema.agent.extras import install_advice
 from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.errors import RevolveError
 from schema.plugins.permission import allow
@@ -27,8 +28,7 @@ def _extra(what: str, extra: str) -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        install = f"pip install 'revolve-islands[{extra}]'"
-        raise MissingExtra(f"{what} {error.name}: {install}") from None
+        raise MissingExtra(f"{what} {error.name}: {install_advice(extra)}") from None
 
 
 def main(arguments: list[str]) -> int:

@@ -30,6 +30,7 @@ from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import access_of, check_load, connect_of, tls_of
+from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
 from schema.agent.log import start_log, tell_user
 from schema.agent.screen import missing_screen
@@ -236,8 +237,9 @@ def _check_window(folder: Path) -> None:
         NetworkError: the viewer is not installed, or there is no screen.
     """
     if find_spec("rerun") is None:
-        install = "pip install 'revolve-islands[view]'"
-        raise NetworkError(f"--view: the viewer is not installed: {install}")
+        raise NetworkError(
+            f"--view: the viewer is not installed: {install_advice('view')}"
+        )
     if why := missing_screen():
         beside = command_line("view", "--connect", folder, "--serve")
         raise NetworkError(f"--view: {why}: run without it, and beside it: {beside}")

@@ -8,15 +8,12 @@ import re
 from pathlib import Path
 
 import msgspec
-from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
-from sphinx.environment import BuildEnvironment
-from sphinx.util.nodes import make_refnode
 
 _PROJECT = msgspec.toml.decode(
     (Path(__file__).parents[1] / "pyproject.toml").read_bytes()
 )["project"]
-_PATTERN = re.compile(r"[\w/*]+\*")
+_TOP_FILE = re.compile(r"\]\(((?:\.\./)*)\.\./(CHANGELOG|CONTRIBUTING)\.md")
 
 project = "Revolve Islands"
 version = release = _PROJECT["version"]
@@ -37,33 +34,13 @@ html_show_copyright = False
 html_show_sphinx = False
 
 
-def _folder_page(
-    app: Sphinx, environment: BuildEnvironment, reference: pending_xref, shown: object
-) -> object:
-    """Return a link to the first page of a folder, for a link to the folder."""
-    folder = Path(reference["refdoc"]).parent / reference["reftarget"]
-    top = Path(app.srcdir)
-    if not (top / folder).is_dir():
-        return None
-    name = (top / folder).resolve().relative_to(top.resolve()).as_posix()
-    pages = sorted(page for page in environment.all_docs if page.startswith(f"{name}/"))
-    page = f"{name}/README" if f"{name}/README" in pages else next(iter(pages), None)
-    if page is None:
-        return None
-    return make_refnode(app.builder, reference["refdoc"], page, "", [shown])
-
-
-def _without_empty_patterns(app: Sphinx, page: str, source: list[str]) -> None:
-    """Drop patterns of the navigation that match no page."""
-    if page == "index":
-        source[0] = "\n".join(
-            line
-            for line in source[0].splitlines()
-            if not _PATTERN.fullmatch(line) or [*Path(app.srcdir).glob(f"{line}.*")]
-        )
+def _link_to_included(_app: Sphinx, _page: str, source: list[str]) -> None:
+    """Turn links to files of the top folder into links to the pages that show them."""
+    source[0] = _TOP_FILE.sub(
+        lambda match: f"]({match[1]}about/{match[2].lower()}.md", source[0]
+    )
 
 
 def setup(app: Sphinx) -> None:
-    """Connect the events."""
-    app.connect("source-read", _without_empty_patterns)
-    app.connect("missing-reference", _folder_page)
+    """Connect the event."""
+    app.connect("source-read", _link_to_included)

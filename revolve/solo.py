@@ -7,6 +7,7 @@ import msgspec
 
 from revolve.messages import Outcome, Task, problem_of
 from revolve.trace import pack_trace
+from schema.agent.extras import install_advice
 from schema.errors import (
     FitnessUndefined,
     RevolveError,
@@ -70,7 +71,7 @@ def _picture(
         from analysis.render.picture import RobotRenderer  # noqa: PLC0415
     except ImportError as error:
         raise RevolveError(
-            f"pictures need {error.name}: pip install 'revolve-islands[pictures]'"
+            f"pictures need {error.name}: {install_advice('pictures')}"
         ) from None
     file = io.BytesIO()
     with RobotRenderer(robot, settings, size=size) as renderer:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Protocol, Self
 
 from coordinator.dispatch.faults import MEANINGS
+from schema.agent.extras import install_advice
 from schema.errors import NetworkError
 from schema.wire.status import Status
 
@@ -19,8 +20,7 @@ try:
     from prometheus_client.registry import CollectorRegistry
 except ImportError:
     raise NetworkError(
-        "--metrics needs the package prometheus-client: "
-        "pip install 'revolve-islands[cluster]'"
+        f"--metrics needs the package prometheus-client: {install_advice('cluster')}"
     ) from None
 
 _ADDRESS = re.compile(r"(?:(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):)?(\d{1,5})")

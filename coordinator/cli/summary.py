@@ -1,22 +1,25 @@
 """Summary of a finished run: best robot, failures, where the results are."""
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.arena.arena import Arena
-from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.selection import fittest_first
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
 from schema.errors import counted
 from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
+from schema.experiment.document import Simulation, body_space
 from schema.formats.files import write_robot
+from schema.robot.ids import BirthId
 from schema.tables.files import read_table
+from schema.wire.born import robot_of_birth
+from schema.wire.updates import individual
 
 BEST = "best.yaml"
 
@@ -58,37 +61,81 @@ def conclude(run: RunSession) -> Conclusion:
 
 
 def _results(run: RunSession) -> list[str]:
-    """Describe the last population; write its best robot to a file."""
-    file, islands = run.held.path / BEST, run.loop.islands.values()
-    births = sum(island.births for island in islands)
-    alive = [
-        each for each in islands if not (isinstance(each, Arena) and each.is_extinct)
-    ]
+    """Describe the last recorded population; write its best robot to a file.
+
+    The tables, not the living: robots of an arena have newer windows at the end of a
+    run than the last population has, which status and report show.
+    """
+    folder, islands = run.held.path, run.loop.islands
+    births = counted(sum(island.births for island in islands.values()), "birth")
+    alive = {
+        number
+        for number, each in islands.items()
+        if not (isinstance(each, Arena) and each.is_extinct)
+    }
     if not alive:
-        return [
-            f"extinct after {counted(births, 'birth')}: too few robots are left to mate"
-        ]
-    judged = [one for island in alive for one in island.judged]
+        return [f"extinct after {births}: too few robots are left to mate"]
+    judged = _last_judged(folder, alive)
     if not judged:
-        return [
-            f"{counted(births, 'birth')}; no robot of the last population has a fitness"
-        ]
-    best = fittest_first(judged)[0]
-    mean = sum(one.fitness for one in judged) / len(judged)
-    space = body_space(run.experiment.space)
-    kinds = neuron_kinds(run.experiment.brain, run.experiment.space)
-    robot = encoding_of(run.experiment).develop(best.genome)
-    write_robot(robot, file, space, kinds=kinds)
-    motors = sum(space[part.kind].outputs for part in robot.parts)
-    where = f" of island {best.birth.island}" if len(islands) > 1 else ""
+        return [f"{births}; no robot of the last population has a fitness"]
+    best = min(judged, key=lambda row: (-row["fitness"], individual(row)))
+    mean = sum(row["fitness"] for row in judged) / len(judged)
+    lines = [
+        f"{births}; mean fitness of the last population {mean:.4f}",
+        *_best_robot(run, individual(best), best["fitness"]),
+    ]
+    if any(isinstance(islands[number], Arena) for number in alive):
+        lines[2:2] = _windows(folder, run.experiment.simulation)
+    return lines
+
+
+def _last_judged(folder: Path, islands: Collection[int]) -> list[dict[str, Any]]:
+    """Return the population rows of some islands' last populations with a fitness."""
+    rows = read_table(folder, "population")
+    newest = rows.group_by("island").aggregate([("births", "max")]).to_pylist()
+    last = {(row["island"], row["births_max"]) for row in newest}
     return [
-        f"{counted(births, 'birth')}; mean fitness of the last population {mean:.4f}",
+        row
+        for row in rows.filter(pc.is_valid(rows["fitness"])).to_pylist()
+        if row["island"] in islands and (row["island"], row["births"]) in last
+    ]
+
+
+def _best_robot(run: RunSession, birth: BirthId, fitness: float) -> list[str]:
+    """Describe a robot; write it to a file."""
+    folder, space = run.held.path, body_space(run.experiment.space)
+    births = read_table(folder, "births")
+    is_it = pc.and_(
+        pc.equal(births["island"], birth.island),
+        pc.equal(births["birth"], birth.number),
+    )
+    (row,) = births.filter(is_it).select(["genome", "robot", "rank"]).to_pylist()
+    robot = robot_of_birth(row["genome"], row["robot"], run.experiment)
+    kinds = neuron_kinds(run.experiment.brain, run.experiment.space)
+    write_robot(robot, folder / BEST, space, kinds=kinds)
+    motors = sum(space[part.kind].outputs for part in robot.parts)
+    where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
+    what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
+    line = f"best robot: birth {birth.number}{where}, fitness {fitness:.4f}"
+    return [f"{line}, rank {row['rank']}, {what}", f"its file: {folder / BEST}"]
+
+
+def _windows(folder: Path, simulation: Simulation) -> list[str]:
+    """Return a line about the windows in which robots of arenas were judged."""
+    windows = read_table(folder, "fitness")
+    best = windows.filter(windows["is_mature"]).sort_by([("fitness", "descending")])
+    window_s = simulation.window_steps * simulation.timestep_s
+    what = f"a robot's last {window_s:g} s before the last birth"
+    line = f"in arenas fitness is that of {what}"
+    if not best.num_rows:
+        return [line]
+    (row,) = best.slice(0, 1).to_pylist()
+    birth = individual(row)
+    return [
         (
-            f"best robot: birth {best.birth.number}{where}, fitness "
-            f"{best.fitness:.4f}, rank {best.rank}, "
-            f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
-        ),
-        f"its file: {file}",
+            f"{line}; the best such window of the run: {birth.island}:{birth.number}, "
+            f"fitness {row['fitness']:.4f}, up to {row['sim_time_s']:g} s"
+        )
     ]
 
 

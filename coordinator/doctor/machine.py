@@ -5,6 +5,7 @@ from pathlib import Path
 from time import gmtime, strftime
 
 from coordinator.doctor.finding import Finding
+from schema.agent.extras import install_advice
 from schema.agent.platform_tag import cpu_class
 
 GIB = 1 << 30
@@ -124,9 +125,7 @@ def check_viewer(*, has_package: bool, display: str) -> Finding:
         display: name of the screen, empty without one.
     """
     if not has_package:
-        return Finding(
-            "warn", "viewer", "not installed", "pip install 'revolve-islands[view]'"
-        )
+        return Finding("warn", "viewer", "not installed", install_advice("view"))
     if not display:
         advice = "use revolve view --serve here, and rerun --connect where one is"
         return Finding("warn", "viewer", "installed, but there is no display", advice)

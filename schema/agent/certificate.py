@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from schema.agent.extras import install_advice
 from schema.agent.network import Tls
 from schema.errors import NetworkError
 
@@ -17,8 +18,7 @@ try:
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 except ImportError:
     raise NetworkError(
-        "certificates need the package cryptography: "
-        "pip install 'revolve-islands[cluster]'"
+        f"certificates need the package cryptography: {install_advice('cluster')}"
     ) from None
 
 

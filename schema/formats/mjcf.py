@@ -29,6 +29,7 @@ from schema.experiment.document import body_space
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.formats.files import read_text
+from schema.formats.mjcf_export import add_sensors, portable
 from schema.limits import MOST_MJCF_BYTES, MOST_OTHERS
 from schema.mjcf.model import solo_spec
 from schema.robot.robot import Robot, check_number, check_robot
@@ -41,7 +42,8 @@ SETTINGS = "revolve_settings"
 _ALLOWED = (
     *("mujoco", "compiler", "option", "flag", "size", "default", "asset", "hfield"),
     *("worldbody", "body", "joint", "freejoint", "inertial", "geom", "site"),
-    *("light", "camera", "actuator", "general", "custom", "text"),
+    *("light", "camera", "actuator", "general", "velocity", "custom", "text"),
+    *("sensor", "accelerometer", "gyro", "touch"),
     *("statistic", "visual", "global", "quality", "headlight", "map", "scale", "rgba"),
 )
 """Elements that are allowed: none reads another file or makes more elements."""
@@ -73,6 +75,7 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
     space = body_space(settings.space)
     check_robot(robot, space, neuron_kinds(settings.brain, settings.space))
     spec = solo_spec(robot, space, settings.simulation, settings.environment)
+    add_sensors(spec, robot, space)
     spec.modelname = "robot"
     for name, data in (
         (ROBOT, encode_robot(robot)),
@@ -81,7 +84,7 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
         text = spec.add_text()
         text.name, text.data = name, base64.b64encode(data).decode("ascii")
     spec.compile()
-    return str(spec.to_xml())
+    return portable(spec.to_xml())
 
 
 def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
@@ -107,9 +110,11 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         space = body_space(settings.space)
         check_number(robot)
         check_robot(robot, space, neuron_kinds(settings.brain, settings.space))
-        built = solo_spec(
-            robot, space, settings.simulation, settings.environment
-        ).compile()
+        spec = solo_spec(robot, space, settings.simulation, settings.environment)
+        # Earlier files have no sensors.
+        if root.find("sensor") is not None:
+            add_sensors(spec, robot, space)
+        built = spec.compile()
     except (MalformedMessage, ExperimentError, InvalidRobot, ValueError) as error:
         raise InvalidRobot(f"{where}: {one_line(error)}") from None
     _check_counts(root, built, where)
@@ -157,6 +162,7 @@ def _check_counts(root: ET.Element, built: mujoco.MjModel, where: str) -> None:
         "njnt": inside["joint"] + inside["freejoint"],
         "nsite": inside["site"],
         "nu": sum(len(element) for element in root.iter("actuator")),
+        "nsensor": sum(len(element) for element in root.iter("sensor")),
         "nhfield": sum(1 for _ in root.iter("hfield")),
     }
     if differing := [name for name in found if found[name] != getattr(built, name)]:

@@ -20,6 +20,7 @@ from schema.experiment.settings import (
     VettingSettings,
 )
 from schema.parts import BUILT_IN
+from schema.tables.columns import TABLES
 
 TOP = Path(__file__).parents[2]
 
@@ -61,10 +62,6 @@ def test_rows_of_settings_have_type_default_unit_and_meaning() -> None:
     for row in (
         "`tournament_size` | whole number >= 1 | `4` |  | individuals per tournament",
         "`timestep_s` | number > 0 | `0.005` | s | physics step",
-        (
-            "`fitness` | [`[fitness]`](#fitness) | not given |  | fitness function of"
-            " these islands"
-        ),
         (
             '`duplicable_size` | `"mean"`, `"sum"` | `"mean"` |  | size of subtrees in'
             " that number: their `mean` or `sum`"
@@ -115,6 +112,18 @@ def test_every_flag_of_every_command_is_listed() -> None:
         assert listed == flags, name
     row = "| `--births N` | the experiment's | number of births |"
     assert row in page.splitlines()
+
+
+def test_every_column_of_every_table_is_listed() -> None:
+    parts = re.split(r"^## ", _page("columns.md"), flags=re.MULTILINE)
+    for name, schema in TABLES.items():
+        (part,) = (part for part in parts if part.startswith(f"`{name}`\n"))
+        listed = re.findall(r"^\| `(\w+)` \| (\S.*?) \|", part, re.MULTILINE)
+        assert [column for column, _ in listed] == schema.names
+        for field in schema:
+            assert dict(listed)[field.name].endswith(", null") == field.nullable
+    row = "`z` | float32 | m | z of the centre of the core, world frame, z up"
+    assert f"| {row} |" in _page("columns.md").splitlines()
 
 
 def test_every_field_of_every_protobuf_message_is_listed() -> None:

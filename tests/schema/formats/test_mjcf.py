@@ -11,9 +11,13 @@ from hypothesis.strategies import DataObject, SearchStrategy
 from msgspec.structs import replace
 
 from schema.errors import InvalidRobot
+from schema.experiment.bounded import parse_xml
 from schema.experiment.environment import Environment, relief
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.mjcf import robot_from_mjcf, robot_to_mjcf
+from schema.limits import MOST_MJCF_BYTES
+from schema.mjcf.model import solo_spec
+from schema.parts import BUILT_IN
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
 
@@ -63,7 +67,7 @@ def test_mjcf_holds_the_environment() -> None:
     assert model.opt.gravity.tolist() == pytest.approx(gravity, rel=1e-5)
     shares = model.hfield_data.reshape(21, 21)
     assert shares == pytest.approx(relief(environment), abs=1e-5)
-    assert model.geom("scenery/0").pos.tolist() == [0.5, 0.0, 0.1]
+    assert model.geom("scenery_0").pos.tolist() == [0.5, 0.0, 0.1]
 
 
 def test_mjcf_holds_objects_that_move() -> None:
@@ -75,7 +79,7 @@ def test_mjcf_holds_objects_that_move() -> None:
     text = robot_to_mjcf(ARM, wild)
     assert robot_from_mjcf(text, "it") == (ARM, wild)
     model = mujoco.MjModel.from_xml_string(text)
-    assert model.body("scenery/1").mass.item() == pytest.approx(8.0)
+    assert model.body("scenery_1").mass.item() == pytest.approx(8.0)
 
 
 def test_edited_body_is_refused() -> None:
@@ -84,7 +88,7 @@ def test_edited_body_is_refused() -> None:
     assert heavier != text
     with pytest.raises(InvalidRobot, match=r"^it: its body differs .*body_mass.*YAML"):
         robot_from_mjcf(heavier, "it")
-    fewer = re.sub(r'<geom name="2/body".*?/>', "", text)
+    fewer = re.sub(r'<geom name="2_body".*?/>', "", text)
     assert fewer != text
     with pytest.raises(InvalidRobot, match=r"^it: its body differs .*\(ngeom\)"):
         robot_from_mjcf(fewer, "it")
@@ -119,3 +123,76 @@ def test_mjcf_files(tmp_path: Path) -> None:
         read_robot(path)
     with pytest.raises(InvalidRobot, match=r"none\.xml: cannot be read: No such file"):
         read_robot(tmp_path / "none.xml")
+
+
+def standing(text: str) -> mujoco.MjData:
+    """Return the state of a robot at rest, after 10 s on the face of its slot 0."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    # A quarter turn about x: slot 0, which faces -y, then faces the ground.
+    data.qpos[:7] = (0.0, 0.0, 0.056, 0.5**0.5, 0.5**0.5, 0.0, 0.0)
+    mujoco.mj_step(model, data, nstep=2000)
+    return data
+
+
+def test_sensors_for_other_tools() -> None:
+    """Feelers carry a core of 90 g and themselves, 9 g; an imu reads 9.81 upwards."""
+    parts = (
+        Part("Core", -1, -1, -1, 0, GREY),
+        Part("TouchSensor", 0, 0, 0, 0, GREY),
+        Part("TouchSensor", 0, 1, 0, 0, GREY),
+    )
+    senses = tuple(Neuron("input", INPUT, part) for part in (0,) * 6 + (1, 1, 2, 2))
+    text = robot_to_mjcf(Robot(parts, Brain(senses)), SETTINGS)
+    data = standing(text)
+    assert data.qpos[2] == pytest.approx(0.045 + 0.0105, abs=1e-3)
+    weight = (0.09 + 0.009 + 0.009) * 9.81
+    left, right = (data.sensor(f"1_{side}_touch").data[0] for side in ("left", "right"))
+    assert left + right == pytest.approx(weight, rel=1e-3)
+    assert left == pytest.approx(right, rel=0.05)
+    assert data.sensor("2_left_touch").data[0] == 0.0
+    upwards = data.sensor("0_accelerometer").data
+    assert upwards == pytest.approx([0.0, 9.81, 0.0], abs=0.01)
+    assert data.sensor("0_gyro").data == pytest.approx([0.0] * 3, abs=1e-3)
+
+
+def test_names_and_servos_that_other_tools_read() -> None:
+    robot = Robot(
+        (
+            Part("Core", -1, -1, -1, 0, GREY),
+            Part("ActiveHinge", 0, 2, 0, 0, GREY),
+        ),
+        Brain((*ARM.brain.neurons, Neuron("output", "Simple", 1, (0.0, 0.5)))),
+    )
+    scenery = '<mujoco><worldbody><geom size="0.1 0.1 0.1"/></worldbody></mujoco>'
+    wild = replace(SETTINGS, environment=Environment(scenery=scenery))
+    text = robot_to_mjcf(robot, wild)
+    root = parse_xml(text, MOST_MJCF_BYTES)
+    assert not [e for e in root.iter() if "/" in e.get("name", "")]
+    (servo,) = root.iterfind("actuator/velocity")
+    assert (servo.get("kv"), servo.get("input")) == ("1", None)
+    model = mujoco.MjModel.from_xml_string(text)
+    ours = solo_spec(robot, BUILT_IN, wild.simulation, wild.environment).compile()
+    for name in ("biasprm", "gainprm", "forcerange", "biastype", "dyntype", "trntype"):
+        found, expected = (
+            getattr(each, f"actuator_{name}").tolist() for each in (model, ours)
+        )
+        assert found == expected, name
+
+
+def test_files_without_sensors_are_read() -> None:
+    """As written before: names with a slash, general servos, no sensors."""
+    spec = solo_spec(ARM, BUILT_IN, SETTINGS.simulation, SETTINGS.environment)
+    spec.compile()
+    texts = "".join(re.findall("<text .*?/>", robot_to_mjcf(ARM, SETTINGS)))
+    old = spec.to_xml().replace("</mujoco>", f"<custom>{texts}</custom></mujoco>")
+    assert 'name="2/body"' in old
+    assert robot_from_mjcf(old, "it") == (ARM, SETTINGS)
+
+
+def test_a_file_without_one_sensor_is_refused() -> None:
+    text = robot_to_mjcf(ARM, SETTINGS)
+    fewer = re.sub("<gyro .*?/>", "", text)
+    assert fewer != text
+    with pytest.raises(InvalidRobot, match=r"its body differs .*\(nsensor\)"):
+        robot_from_mjcf(fewer, "it")

@@ -1,0 +1,56 @@
+"""Advice on installing an extra of this package as the package itself is installed."""
+
+import shlex
+import sys
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import msgspec
+
+NAME = "revolve-islands"
+
+
+class _Source(msgspec.Struct):
+    """Content of ``direct_url.json``; a package of a registry has no such file.
+
+    Source: Python Packaging User Guide, "Recording the Direct URL Origin".
+    """
+
+    url: str
+    dir_info: dict[str, bool] | None = None
+
+
+def install_advice(extra: str) -> str:
+    """Return the command that installs an extra into this environment.
+
+    Args:
+        extra: such as ``view``.
+    """
+    try:
+        found = distribution(NAME)
+    except PackageNotFoundError:
+        return f"pip install '{NAME}[{extra}]'"
+    flag, place = _origin(found)
+    python = shlex.quote(sys.executable)
+    install = f"{python} -m pip install"
+    # Environments that uv makes have no pip.
+    if (found.read_text("INSTALLER") or "").strip() == "uv":
+        install = f"uv pip install --python {python}"
+    return f"{install} {flag}{shlex.quote(f'{place}[{extra}]')}"
+
+
+def _origin(found: Distribution) -> tuple[str, str]:
+    """Return a flag, and the folder or wheel that a package came from, or its name."""
+    try:
+        source = msgspec.json.decode(
+            found.read_text("direct_url.json") or "", type=_Source
+        )
+    except msgspec.MsgspecError:
+        return "", NAME
+    url = urlsplit(source.url)
+    path = Path(unquote(url.path))
+    if url.scheme != "file" or not path.exists():
+        return "", NAME
+    is_editable = (source.dir_info or {}).get("editable", False)
+    return "-e " if is_editable else "", str(path)

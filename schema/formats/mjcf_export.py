@@ -1,0 +1,86 @@
+"""World of a robot as other tools read it: names, sensors and servos.
+
+dm_control reserves ``/`` in names, so that ``3/servo`` becomes ``3_servo``. The
+sensors are only for other tools: our own readings follow from positions, velocities
+and contacts. MuJoCo has no sensor of light.
+"""
+
+from itertools import chain
+from xml.etree import ElementTree as ET
+
+import mujoco
+
+from schema.parts import BodySpace, Sensor
+from schema.robot.robot import Robot
+
+_PAD_M = 0.001
+"""Margin of the site of a touch sensor about its box [m]: contacts lie on its faces."""
+
+
+def add_sensors(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
+    """Add the sensors of a robot, and rename all elements with ``/`` in their names.
+
+    An imu becomes ``{p}_accelerometer`` and ``{p}_gyro``, where p is the index of its
+    part, and a touch sensor ``{p}_{box}_touch``.
+
+    Args:
+        spec: world of the robot.
+        robot: as built in it.
+        space: its part types.
+    """
+    _rename(spec)
+    for index, part in enumerate(robot.parts):
+        for sensor in space[part.kind].sensors:
+            if not isinstance(sensor, Sensor):
+                continue
+            if sensor.kind == "imu":
+                kinds = mujoco.mjtSensor
+                site = f"{index}_imu"
+                _add(spec, kinds.mjSENS_ACCELEROMETER, site, f"{index}_accelerometer")
+                _add(spec, kinds.mjSENS_GYRO, site, f"{index}_gyro")
+            elif sensor.kind == "touch":
+                name = f"{index}_{sensor.box}_touch"
+                _add_pad(spec.geom(f"{index}_{sensor.box}"), name)
+                _add(spec, mujoco.mjtSensor.mjSENS_TOUCH, name, name)
+
+
+def portable(text: str) -> str:
+    """Return MJCF whose servos are ``velocity`` elements.
+
+    MuJoCo 4 writes them as ``general`` elements with an attribute ``input``, which
+    MuJoCo 3.3 and earlier do not know. Both give the same model.
+    """
+    root = ET.fromstring(text)  # noqa: S314 - MuJoCo wrote it
+    for servo in root.iterfind("actuator/general[@input='vel']"):
+        servo.tag = "velocity"
+        servo.set("kv", servo.attrib.pop("gainprm", "1"))
+        for name in ("input", "biastype", "biasprm"):
+            del servo.attrib[name]
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _rename(spec: mujoco.MjSpec) -> None:
+    """Replace ``/`` in all names."""
+    elements = [*chain(spec.bodies, spec.joints, spec.geoms, spec.sites)]
+    taken = {element.name for element in elements}
+    for element in elements:
+        if "/" in element.name:
+            name = element.name.replace("/", "_")
+            while name in taken:
+                name += "_"
+            taken.add(name)
+            element.name = name
+
+
+def _add(spec: mujoco.MjSpec, kind: mujoco.mjtSensor, site: str, name: str) -> None:
+    sensor = spec.add_sensor()
+    sensor.name, sensor.type = name, kind
+    sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_SITE, site
+
+
+def _add_pad(geom: mujoco.MjsGeom, name: str) -> None:
+    """Add the site within which a touch sensor feels contacts of its box."""
+    site = geom.parent.add_site()
+    site.name, site.type = name, geom.type
+    site.pos, site.quat = geom.pos, geom.quat
+    site.size = [size + _PAD_M for size in geom.size]

@@ -1,0 +1,151 @@
+"""Runs the code of the tutorials, and checks the links of all pages below docs/."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.docs.page_runner import PageError, blocks, run_page
+
+TOP = Path(__file__).parents[2]
+DOCS = TOP / "docs"
+TUTORIALS = DOCS / "tutorials"
+PAGES = sorted(
+    page
+    for folder in ("tutorials", "concepts", "gallery", "notebooks")
+    for page in (DOCS / folder).glob("*.md")
+) + [DOCS / f"{name}.md" for name in ("faq", "comparison", "benchmarks")]
+
+pytestmark = pytest.mark.system
+
+
+def _run(page: Path, folder: Path, *numbers: str) -> None:
+    script = Path(__file__).with_name("page_runner.py")
+    paths = os.pathsep.join(map(str, (folder, TOP)))
+    done = subprocess.run(
+        [sys.executable, str(script), str(page), *numbers],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.split()[-2]) >= 2
+
+
+@pytest.mark.parametrize(
+    ("name", "births"), [("04-part", "150=20"), ("07-tables", "60=20")]
+)
+def test_tutorial_runs_with_fewer_births(
+    name: str, births: str, tmp_path: Path
+) -> None:
+    _run(TUTORIALS / f"{name}.md", tmp_path, births)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "01-first-run",
+        "02-your-own-experiment",
+        "03-fitness",
+        "05-arenas",
+        "06-islands",
+        "09-thesis-figure",
+    ],
+)
+def test_tutorial_runs(name: str, tmp_path: Path) -> None:
+    _run(TUTORIALS / f"{name}.md", tmp_path)
+
+
+def test_commands_of_the_gallery_run(tmp_path: Path) -> None:
+    (tmp_path / "docs").symlink_to(DOCS)
+    _run(DOCS / "gallery" / "README.md", tmp_path)
+
+
+def test_every_tutorial_is_in_the_list_of_tutorials() -> None:
+    listed = re.findall(
+        r"\]\((\d\d-[\w-]+\.md)\)", (TUTORIALS / "README.md").read_text()
+    )
+    assert listed == [page.name for page in sorted(TUTORIALS.glob("[0-9]*.md"))]
+
+
+def _anchors(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as code hosts make them."""
+    text = re.sub(
+        r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {
+        re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles
+    }
+
+
+@pytest.mark.parametrize(
+    "page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}"
+)
+def test_links_have_targets(page: Path) -> None:
+    text = re.sub(
+        r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in link:
+            continue
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name) if name else page
+        assert target.exists(), link
+        assert not anchor or anchor in _anchors(target), link
+
+
+def test_a_page_that_says_something_wrong_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```python\nx = 20 + 1\n```\ntext\n```python\nprint(x, 'of', x)\n```\n"
+    )
+    good = page.read_text() + "```text\n21 ... 21\n```\n"
+    page.write_text(good)
+    assert len(blocks(page)) == 3
+    assert run_page(page, {}) == 3
+    page.write_text(good.replace("21 ...", "22 ..."))
+    with pytest.raises(PageError, match="not in the output: 22"):
+        run_page(page, {})
+    page.write_text(good.replace("x = 20", "x = y"))
+    with pytest.raises(PageError, match="NameError"):
+        run_page(page, {})
+    page.write_text(
+        "```python\n# mine.py\nz = 1\n```\n```sh\npython mine.py  # fails\n```\n"
+    )
+    with pytest.raises(PageError, match="exit code 0"):
+        run_page(page, {})
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("name", ["first-evolution", "own-analysis"])
+def test_notebook_runs(name: str, tmp_path: Path) -> None:
+    """Its code cells run in order, as a program without a screen."""
+    notebook = json.loads((DOCS / "notebooks" / f"{name}.ipynb").read_text("utf-8"))
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] for cell in cells)
+    program = "\n".join("".join(cell["source"]) for cell in cells)
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(TOP), "MPLBACKEND": "agg",
+             "TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert len(cells) >= 5
+    assert re.search(r"(?:parents|difference) [+-]?\d\.\d{4}", done.stdout)
