@@ -74,7 +74,7 @@ def test_pictures_are_embedded_and_nothing_is_loaded(read: Reader) -> None:
     )
     assert len(figures) == 2
     for source in figures:
-        stored = base64.b64decode(source.removeprefix("data:image/webp;base64,"))
+        stored = base64.b64decode(source.removeprefix("data:image/png;base64,"))
         with Image.open(io.BytesIO(stored)) as picture:
             assert picture.size == (1400, 140)
             assert picture.convert("RGB").getpixel((700, 70)) == (255, 0, 0)
