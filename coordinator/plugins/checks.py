@@ -171,6 +171,8 @@ def check_here(
                     uses = list(_uses(word, kinds, kind))
                 for name, use in uses:
                     check(word, name, use)
+                if not uses:
+                    say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
                 is_fine = False
                 say("fault", one_line(error))
@@ -208,6 +210,8 @@ def _uses(
         ExperimentError: it cannot be loaded, or is of no kind.
     """
     place, colon, attribute = word.rpartition(":")
+    if word.endswith(".py"):
+        raise ExperimentError(f"{word}: name a function or class: {word}:NAME")
     if not colon:
         folder = Path(word)
         is_folder = is_campaign(folder) or holds_run(folder)

@@ -125,6 +125,26 @@ def test_each_fault_is_one_line(lab: Callable[[str], Path], fault: str) -> None:
     assert re.search(pattern, line), line
 
 
+def test_experiment_without_own_plug_ins_is_in_order(tmp_path: Path) -> None:
+    document = tmp_path / "small.toml"
+    document.write_text('name = "small"\nbirths = 12\n')
+    lines: list[str] = []
+    assert check_apart(["scenario1", str(document)], lines.append) == []
+    assert lines == [
+        "scenario1: in order, no plug-ins of its own",
+        f"{document}: in order, no plug-ins of its own",
+    ]
+
+
+def test_file_without_a_name_is_asked_for_one(lab: Callable[[str], Path]) -> None:
+    file = lab(GOOD)
+    step, line = checked(str(file))[-1]
+    assert (step, line) == (
+        "fault",
+        f"{file}: name a function or class: {file}:NAME",
+    )
+
+
 def test_kind_may_be_said(lab: Callable[[str], Path]) -> None:
     file = lab("def f(a):\n    return 1.0")
     step, line = checked(f"{file}:f", kind="fitness")[-1]
