@@ -58,7 +58,7 @@ def _entry(name: str) -> Iterator[str]:
 
 def _text(found: object, call: str) -> Iterator[str]:
     """Yield call and docstring of a name as Markdown."""
-    yield from ("```python", call, "```", "")
+    yield from ("```", call, "```", "")
     for block in (inspect.getdoc(found) or "").replace("``", "`").split("\n\n"):
         title, _, rest = block.partition("\n")
         if title.rstrip(":") in _LISTS and title.endswith(":"):
