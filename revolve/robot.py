@@ -50,7 +50,9 @@ class Robot:
 
         Args:
             path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
-            experiment: whose part types are allowed; None: the built-in ones.
+            experiment: whose part types are allowed, and whose simulation and fitness
+                apply; None: the built-in part types, and those of ``scenario1``, also
+                if the file lies in a run folder.
 
         Raises:
             InvalidRobot: the file holds no robot that is well formed.

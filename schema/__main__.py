@@ -7,8 +7,8 @@ from schema.agent.flags import Flags, add_plugins
 from schema.errors import RevolveError, counted
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
-from schema.experiment.file import read_experiment
 from schema.formats.files import read_robot, settings_of, write_robot
+from schema.formats.run_world import experiment_of
 from schema.parts import BUILT_IN, BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import neuron_names
@@ -31,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
     words = ["robot", *sys.argv[1:]] if argv is None else argv
     options = parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
     allow(options.plugins)
-    experiment = read_experiment(options.experiment) if options.experiment else None
+    experiment = experiment_of(options.file, options.experiment)
     space, kinds = BUILT_IN, BUILT_IN_KINDS
     if experiment:
         space = body_space(experiment.space)
@@ -84,8 +84,8 @@ def parser(_command: str = "robot") -> Flags:
         command.add_argument(
             "--experiment",
             metavar="NAME|FILE.toml",
-            help="experiment whose settings to use (default: all built-in part types "
-            "and the default world)",
+            help="experiment whose settings to use (default: that of the run folder "
+            "that holds the file, else all built-in part types and the default world)",
         )
         add_plugins(command)
     return flags

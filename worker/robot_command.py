@@ -6,10 +6,10 @@ from pathlib import Path
 from schema.agent.flags import Flags, add_plugins
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
-from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import MJCF_ENDING, read_robot, settings_of
 from schema.formats.mjcf import read_mjcf
+from schema.formats.run_world import experiment_of
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
@@ -76,7 +76,8 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
     """Return a file's robot and its settings; those of an MJCF file are the default."""
     if path.suffix.lower() == MJCF_ENDING and experiment is None:
         return read_mjcf(path)
-    settings = settings_of(read_experiment(experiment) if experiment else None)
+    found = experiment_of(path, experiment, tells_default=True)
+    settings = settings_of(found)
     kinds = neuron_kinds(settings.brain, settings.space)
     return read_robot(path, body_space(settings.space), kinds), settings
 
@@ -95,8 +96,8 @@ def parser(_command: str = "robot simulate") -> Flags:
     flags.add_argument(
         "--experiment",
         metavar="NAME|FILE.toml",
-        help="experiment whose settings to use (default: those in an MJCF file, or "
-        "those of the thesis's off-line experiments)",
+        help="experiment whose settings to use (default: those in an MJCF file, "
+        "else those of the run folder that holds the file, else those of scenario1)",
     )
     flags.add_argument(
         "--robustness",

@@ -18,8 +18,8 @@ from analysis.render.picture import (
 )
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
-from schema.experiment.file import read_experiment
 from schema.formats.files import read_robot, settings_of
+from schema.formats.run_world import experiment_of
 from schema.plugins.permission import allow
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.results import Floats
@@ -53,11 +53,13 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
         raise NoPictures(f"{out}: must end in one of {allowed}, got {out.suffix!r}")
     if is_film and options.gait:
         raise NoPictures(f"{out}: --gait needs a {PICTURE_ENDING} file")
-    named = options.experiment
-    settings = settings_of(read_experiment(named) if named else None)
+    experiment = experiment_of(options.file, options.experiment, tells_default=True)
+    settings = settings_of(experiment)
     world = settings.simulation
     _check_gait(options.gait, world)
-    kinds = neuron_kinds(settings.brain, settings.space) if named else BUILT_IN_KINDS
+    kinds = BUILT_IN_KINDS
+    if experiment:
+        kinds = neuron_kinds(settings.brain, settings.space)
     robot = read_robot(options.file, body_space(settings.space), kinds)
     size = (options.width, options.width * 3 // 4)
     with RobotRenderer(robot, settings, size=size) as renderer:

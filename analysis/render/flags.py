@@ -37,8 +37,8 @@ def parser(_command: str = "robot render") -> Flags:
     flags.add_argument(
         "--experiment",
         metavar="NAME|FILE.toml",
-        help="experiment whose settings to use (default: those of the thesis's "
-        "off-line experiments)",
+        help="experiment whose settings to use (default: that of the run folder "
+        "that holds the file, else scenario1)",
     )
     add_plugins(flags)
     return flags

@@ -12,7 +12,7 @@ pyrevolve/revolve_bot in ci-group/revolve), and its examples.
 
 from schema.errors import shown
 from schema.formats.yaml_node import Table
-from schema.formats.yaml_reader import FULL_TURN, Reader
+from schema.formats.yaml_reader import FULL_TURN, OTHER_TYPES, Reader
 from schema.robot.brain import INPUT, LAYERS, NEURON_TYPES, Brain, Layer, Neuron
 
 _KINDS = {"CoreComponent": "Core"}
@@ -45,7 +45,7 @@ class RevolveReader(Reader):
         """Return the type of a part by its name in Revolve."""
         kind = _KINDS.get(table.text("type"), table.text("type"))
         if kind not in self.space:
-            table.refuse_word("type", self.space)
+            table.refuse_word("type", self.space, OTHER_TYPES)
         return kind
 
     def own_slot(self, table: Table) -> int:

@@ -93,12 +93,21 @@ class Table:
         """Raise ``InvalidRobot`` about a key."""
         self._fail(self._at(key), message, self._key_lines.get(key, self.line))
 
-    def refuse_word(self, key: str, allowed: Collection[str]) -> NoReturn:
-        """Raise ``InvalidRobot`` about a word that is none of some words."""
+    def refuse_word(
+        self, key: str, allowed: Collection[str], hint: str = ""
+    ) -> NoReturn:
+        """Raise ``InvalidRobot`` about a word that is none of some words.
+
+        Args:
+            key: of the word.
+            allowed: the words; a similar one is named.
+            hint: end of the message if none is similar.
+        """
         word = self.text(key)
         line = self._key_lines[key]
         problem = f"{self._at(key)} {shown(word)} is not supported"
-        self._fail("", f"{problem}: {_one_of(allowed)}{nearest(word, allowed)}", line)
+        end = nearest(word, allowed) or hint
+        self._fail("", f"{problem}: {_one_of(allowed)}{end}", line)
 
     def refuse_others(self, *allowed: str) -> None:
         """Raise unless all keys are allowed; the message names the nearest key.

@@ -24,6 +24,8 @@ from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Part, Robot, check_number, check_robot
 
 FULL_TURN = 360
+OTHER_TYPES = " (name the experiment with its part types: --experiment FILE.toml)"
+"""End of the message about an unknown part type."""
 _WRITTEN: tuple[Layer, ...] = ("output", "hidden")
 _INDEXED = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.\w+)?")
 
@@ -134,7 +136,7 @@ class Reader:
         """Return the type of a part."""
         kind = table.text("type")
         if kind not in self.space:
-            table.refuse_word("type", self.space)
+            table.refuse_word("type", self.space, OTHER_TYPES)
         return kind
 
     def own_slot(self, table: Table) -> int:

@@ -29,7 +29,7 @@ def path(tmp_path: Path) -> Path:
 
 def test_check(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robot", "check", str(path)]) == 0
-    assert "well formed; 3 parts, 6 inputs, 1 outputs" in capsys.readouterr().out
+    assert "well formed; 3 parts, 6 inputs, 1 output," in capsys.readouterr().out
 
 
 def test_check_of_a_wrong_file(path: Path) -> None:

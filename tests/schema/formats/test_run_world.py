@@ -1,0 +1,137 @@
+"""Robot files in run folders: the experiment of the run applies."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from schema.__main__ import main
+from schema.errors import ExperimentError, InvalidRobot, RunFolderError
+from schema.experiment.file import experiment_text, parse_experiment, read_experiment
+from schema.experiment.settings import evaluation_settings_of
+from schema.formats.files import settings_of
+from schema.formats.run_world import experiment_of
+from schema.plugins import permission
+from schema.plugins.kept import kept_file, plugins_to_keep
+from schema.tables.description import Description, description_text
+
+BUMPY = 'name = "bumpy"\n[environment]\nroughness_m = 0.04\n'
+PADDLES = """
+name = "p"
+[space]
+part_types = ["schema.parts:CORE", "schema.parts:ACTIVE_HINGE", "MODULE:PADDLE"]
+"""
+PART = "from schema.parts import HINGE\nfrom dataclasses import replace\n"
+
+
+@pytest.fixture(autouse=True)
+def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(permission, "_allowed", {})
+
+
+def written(folder: Path, text: str) -> Path:
+    """Write the description of a run; return the path of a robot file beside it."""
+    folder.mkdir(exist_ok=True)
+    document = experiment_text(parse_experiment(text, str(folder.parent / "x.toml")))
+    kept = plugins_to_keep(document)
+    for name, (_, source) in kept.items():
+        kept_file(folder, name).parent.mkdir()
+        kept_file(folder, name).write_bytes(source)
+    notes = {name: note for name, (note, _) in kept.items()}
+    found = Description("bumpy", 0, 7, document, plugins=notes)
+    (folder / "run.json").write_text(description_text(found))
+    return folder / "best.yaml"
+
+
+def test_file_in_a_run_folder_has_the_world_of_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path / "run", BUMPY)
+    found = experiment_of(file, None)
+    assert found is not None
+    assert found.environment.roughness_m == 0.04
+    line = f"revolve: in the world of {tmp_path / 'run'} (bumpy)\n"
+    assert capsys.readouterr() == ("", line)
+
+
+def test_named_experiment_comes_before_that_of_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path / "run", BUMPY)
+    assert experiment_of(file, "scenario2") == read_experiment("scenario2")
+    assert capsys.readouterr().err == ""
+
+
+def test_file_elsewhere_has_the_world_of_scenario1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert experiment_of(tmp_path / "a.yaml", None) is None
+    assert capsys.readouterr().err == ""
+    assert experiment_of(tmp_path / "a.yaml", None, tells_default=True) is None
+    assert "in the world of scenario1;" in capsys.readouterr().err
+    shipped = evaluation_settings_of(read_experiment("scenario1"))
+    default = settings_of(None)
+    assert (shipped.simulation, shipped.fitness) == (
+        default.simulation,
+        default.fitness,
+    )
+    assert shipped.environment == default.environment
+
+
+@pytest.mark.parametrize(
+    ("changed", "is_said"),
+    [("", False), ("[islands.simulation]\nfriction = 0.5", True)],
+)
+def test_islands_of_different_worlds_are_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], changed: str, *, is_said: bool
+) -> None:
+    text = f'name = "two"\n[[islands]]\n[[islands]]\n{changed}\n'
+    experiment_of(written(tmp_path / "run", text), None)
+    assert ("island 0: others differ" in capsys.readouterr().err) == is_said
+
+
+def test_damaged_description_is_refused(tmp_path: Path) -> None:
+    file = written(tmp_path / "run", BUMPY)
+    (tmp_path / "run" / "run.json").write_text("{}")
+    with pytest.raises(RunFolderError, match=r"run\.json: damaged"):
+        experiment_of(file, None)
+
+
+@pytest.fixture
+def paddle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a robot file with an own part type in a run folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    module = tmp_path.name.replace("-", "_")
+    text = f'{PART}PADDLE = replace(HINGE, name="Paddle")\n'
+    (tmp_path / f"{module}.py").write_text(text)
+    file = written(tmp_path / "run", PADDLES.replace("MODULE", module))
+    file.write_text(
+        "body: {type: Core, children: {0: {slot: 0, type: Paddle}}}\nbrain: {}\n"
+    )
+    (tmp_path / f"{module}.py").unlink()
+    # As in another process.
+    del sys.modules[module]
+    permission._allowed.clear()
+    return file
+
+
+def test_own_part_types_of_the_run_are_known(
+    paddle: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["robot", "show", str(paddle)]) == 0
+    assert "part-1 Paddle" in capsys.readouterr().out
+
+
+def test_plug_in_of_another_user_is_not_imported(
+    paddle: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(paddle.parents[1] / "another"))
+    with pytest.raises(ExperimentError, match="was not written by a run of yours"):
+        main(["robot", "show", str(paddle)])
+
+
+def test_unknown_part_type_elsewhere_asks_for_the_experiment(paddle: Path) -> None:
+    moved = paddle.rename(paddle.parents[1] / "moved.yaml")
+    message = r"'Paddle' is not supported: must be .*\(name the experiment with its"
+    with pytest.raises(InvalidRobot, match=message):
+        main(["robot", "show", str(moved)])
