@@ -72,7 +72,7 @@ def imported(path: Path) -> Iterator[str]:
 
 def is_composition_root(path: Path) -> bool:
     """Return whether a file may import several rooms."""
-    return path.parent == ROOT / "revolve" or path.name == "__main__.py"
+    return ROOT / "revolve" in path.parents or path.name == "__main__.py"
 
 
 def relative(path: Path) -> str:
