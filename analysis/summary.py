@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from analysis.progress import print_line
+from schema.errors import rounded
 
 _FITNESS = ("fitness", "fitness_best")
 _BORDERS, _BORDER = 3, 1
@@ -90,7 +91,7 @@ def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
             Path(row["folder"]).name + (f" {row['island']}" if row["island"] else ""),
             str(row["births"]),
             str(row["judged"]),
-            *("-" if row[name] is None else f"{row[name]:.4f}" for name in _FITNESS),
+            *("-" if row[name] is None else rounded(row[name]) for name in _FITNESS),
         )
         for row in rows.sort_by([(key, "ascending") for key in keys]).to_pylist()
     ]

@@ -10,6 +10,7 @@ import schema.experiment.kinds
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser as run_flags
+from coordinator.cli.flags import resume_flags
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.encodings import encoding_of
@@ -78,7 +79,7 @@ def main(arguments: list[str]) -> int:
     if command == "resume":
         folder = Path(options.folder)
         deployment = _deployment(options, refuse_faulty_of(folder), folder)
-        return _stoppable(folder, lambda: resume(folder, deployment))
+        return _stoppable(folder, deployment, lambda: resume(folder, deployment))
     experiments = _experiments(options)
     is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
     name = "+".join(
@@ -90,13 +91,17 @@ def main(arguments: list[str]) -> int:
     deployment = _deployment(options, experiments, folder)
     if not is_campaign_wanted:
         return _stoppable(
-            folder, lambda: start(folder, experiments[0], options.seed, deployment)
+            folder,
+            deployment,
+            lambda: start(folder, experiments[0], options.seed, deployment),
         )
     repeats = options.repeats or 1
     if repeats > MOST_REPEATS:
         flags.error(f"--repeats: must be <= {MOST_REPEATS}, got {repeats}")
     campaign = Campaign(experiments, repeats, options.seed)
-    return _stoppable(folder, lambda: start_campaign(folder, campaign, deployment))
+    return _stoppable(
+        folder, deployment, lambda: start_campaign(folder, campaign, deployment)
+    )
 
 
 def parser(command: str) -> Flags:
@@ -126,16 +131,21 @@ def plugin_kinds() -> tuple[Kind, ...]:
     )
 
 
-def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
+def _stoppable(
+    folder: Path,
+    deployment: Deployment,
+    execute: Callable[[], int],
+) -> int:
     """Execute a folder's runs; after Ctrl-C say how to resume them."""
+    flags = deployment.resume_flags
     try:
         return execute()
     except HubLost as error:
-        tell_user(f"{error}; to resume: {command_line('resume', folder)}")
+        tell_user(f"{error}; to resume: {command_line('resume', folder, *flags)}")
         return 1
     except KeyboardInterrupt:
         if is_campaign(folder) or holds_run(folder):
-            advise(stopped(folder))
+            advise(stopped(folder, flags))
         tell_stopped()
         return STOPPED
 
@@ -227,6 +237,7 @@ def _deployment(
         checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
         metrics=options.metrics,
+        resume_flags=tuple(resume_flags(options)),
     )
 
 

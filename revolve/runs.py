@@ -13,7 +13,7 @@ from revolve.children import plugins as allowed_plugins
 from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
-from schema.errors import RevolveError, RunFolderError
+from schema.errors import RevolveError, RunFolderError, rounded
 from schema.experiment.document import island_experiment
 from schema.experiment.file import own_experiment
 from schema.tables.description import (
@@ -204,7 +204,7 @@ class Run:
             "seed": self.seed,
             "state": self.state,
             "births": f"{self.births.num_rows} of {self.experiment.births} per island",
-            "best fitness": "-" if fitness is None else f"{fitness:.4f}",
+            "best fitness": "-" if fitness is None else rounded(fitness),
         }
         cells = (
             f"<tr><th>{key}</th><td>{html.escape(str(value))}</td></tr>"

@@ -152,6 +152,18 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def rounded(value: float, digits: int = 4) -> str:
+    """Return a number with so many significant digits, also if it is small.
+
+    Args:
+        value: any number, such as 0.0002; from 1 / 10000 on without exponent.
+        digits: significant digits; whole numbers keep all of theirs.
+    """
+    if abs(value) >= 10**digits - 0.5:
+        return f"{value:.0f}"
+    return f"{value:#.{digits}g}".rstrip(".")
+
+
 def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
     """Return ``; did you mean 'x'?`` for the nearest word, or an empty text."""
     # The search takes quadratic time.

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins
+from schema.errors import rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
@@ -69,7 +70,7 @@ def _share(found: float | None, fitness: float) -> str:
     if found is None:
         return "failed"
     share = f" ({100 * found / fitness:.0f} %)" if fitness > 0 else ""
-    return f"{found:.4f}{share}"
+    return f"{rounded(found)}{share}"
 
 
 def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings]:

@@ -32,6 +32,7 @@ from analysis.viewer.watch import watch
 from schema.agent.command import connect_of, tls_of
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
+from schema.errors import rounded
 from schema.experiment.file import own_experiment
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
@@ -146,7 +147,7 @@ def _wanted(options: argparse.Namespace) -> list[BirthId]:
     if None not in options.robot:
         return list(options.robot)
     best, fitness = best_evaluated(options.run)
-    tell_user(f"best ever evaluated: {name_of(best)}, fitness {fitness:.4f}")
+    tell_user(f"best ever evaluated: {name_of(best)}, fitness {rounded(fitness)}")
     return [best if birth is None else birth for birth in options.robot]
 
 

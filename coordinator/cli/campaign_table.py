@@ -10,7 +10,7 @@ from rich.table import Table
 
 from coordinator.cli.format import duration
 from coordinator.storage.folder_status import folder_status
-from schema.errors import RevolveError
+from schema.errors import RevolveError, rounded
 from schema.tables.files import read_table
 
 _WIDEST = 1000
@@ -72,9 +72,9 @@ def _row(name: str, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
     return (
         name,
         str(len(runs)),
-        f"{max(bests):.4f}" if bests else "-",
-        f"{fmean(bests):.4f}" if bests else "-",
-        f"{stdev(bests):.4f}" if len(bests) > 1 else "-",
+        rounded(max(bests)) if bests else "-",
+        rounded(fmean(bests)) if bests else "-",
+        rounded(stdev(bests)) if len(bests) > 1 else "-",
         duration(fmean(times_s)) if times_s else "-",
         str(sum(run.has_failed for run in runs)),
     )

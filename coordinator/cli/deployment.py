@@ -48,6 +48,7 @@ class Deployment:
         give_up_after_s: time without the hub at ``connect`` after which to stop [s].
         allows_drift: an arena may continue on another platform if its own is gone.
         metrics: address at which to serve metrics; None: nowhere.
+        resume_flags: with which ``revolve resume`` has the same agents again.
     """
 
     workers: int
@@ -69,6 +70,7 @@ class Deployment:
     allows_drift: bool = False
     give_up_after_s: float = math.inf
     metrics: str | None = None
+    resume_flags: tuple[str, ...] = ()
 
 
 @contextmanager

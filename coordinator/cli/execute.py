@@ -101,7 +101,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
 def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     """Execute the run of a locked folder, print its summary, return the exit code."""
     conclusions: list[Conclusion] = []
-    advise(stopped(folder))
+    advise(stopped(folder, deployment.resume_flags))
     with held:
         status = unbegun_status(folder, held.details)
         try:
@@ -206,7 +206,7 @@ def _execute_campaign(
         failed: folders of finished runs in which all evaluations failed.
         deployment: processes and network.
     """
-    advise(stopped(folder))
+    advise(stopped(folder, deployment.resume_flags))
     finished = sum(one.is_finished for one in planned)
     if finished:
         tell_user(f"{finished} of {counted(len(planned), 'run')} already finished")

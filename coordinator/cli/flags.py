@@ -3,7 +3,7 @@
 import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
-from schema.agent.address import FORMS
+from schema.agent.address import FORMS, HUB
 from schema.agent.command import (
     add_access,
     add_give_up,
@@ -20,6 +20,7 @@ from schema.agent.flags import (
     share,
     whole_number,
 )
+from schema.agent.network import DEFAULT_FLEET
 from schema.experiment.file import shipped_experiments
 
 _COMMANDS = {
@@ -88,6 +89,33 @@ def parser(command: str) -> Flags:
     flags.set_defaults(command=command)
     _add_deployment(flags, command)
     return flags
+
+
+def resume_flags(options: argparse.Namespace) -> list[str]:
+    """Return the flags with which ``revolve resume`` has the same agents again.
+
+    Args:
+        options: of ``run``, ``coordinator`` or ``resume``.
+    """
+    given: dict[str, object] = {
+        "--workers": options.workers,
+        "--listen": options.listen,
+        "--connect": options.connect,
+        "--fleet": None if options.fleet == DEFAULT_FLEET else options.fleet,
+        "--access": options.access,
+        "--tls-ca": options.tls_ca,
+        "--tls-certificate": options.tls_certificate,
+        "--tls-key": options.tls_key,
+    }
+    if options.command == "coordinator" and not options.connect:
+        given["--listen"] = options.listen or HUB
+    words = [
+        str(word)
+        for flag, value in given.items()
+        if value is not None
+        for word in (flag, value)
+    ]
+    return [*words, *(["--in-process"] if options.in_process else [])]
 
 
 def _add_bench(flags: argparse.ArgumentParser) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from schema.errors import rounded
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 _MOST_PEERS = 5
@@ -35,9 +36,9 @@ def best_of(counted: RunStatus | IslandStatus) -> str:
     if not judged:
         return "best -"
     if 1 < len(bests) <= 8:  # noqa: PLR2004 - as many as a line holds
-        each = " ".join("-" if best is None else f"{best:.3f}" for best in bests)
+        each = " ".join("-" if best is None else rounded(best, 3) for best in bests)
         return f"best {each}"
-    return f"best {max(judged):.3f}"
+    return f"best {rounded(max(judged), 3)}"
 
 
 def missing_agents(status: Status) -> list[str]:

@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 from coordinator.arena.arena import Arena
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
-from schema.errors import counted
+from schema.errors import counted, rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
 from schema.formats.files import write_robot
@@ -81,7 +81,7 @@ def _results(run: RunSession) -> list[str]:
     best = min(judged, key=lambda row: (-row["fitness"], individual(row)))
     mean = sum(row["fitness"] for row in judged) / len(judged)
     lines = [
-        f"{births}; mean fitness of the last population {mean:.4f}",
+        f"{births}; mean fitness of the last population {rounded(mean)}",
         *_best_robot(run, individual(best), best["fitness"]),
     ]
     if any(isinstance(islands[number], Arena) for number in alive):
@@ -116,7 +116,7 @@ def _best_robot(run: RunSession, birth: BirthId, fitness: float) -> list[str]:
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
     what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
-    line = f"best robot: birth {birth.number}{where}, fitness {fitness:.4f}"
+    line = f"best robot: birth {birth.number}{where}, fitness {rounded(fitness)}"
     return [f"{line}, rank {row['rank']}, {what}", f"its file: {folder / BEST}"]
 
 
@@ -134,7 +134,7 @@ def _windows(folder: Path, simulation: Simulation) -> list[str]:
     return [
         (
             f"{line}; the best such window of the run: {birth.island}:{birth.number}, "
-            f"fitness {row['fitness']:.4f}, up to {row['sim_time_s']:g} s"
+            f"fitness {rounded(row['fitness'])}, up to {row['sim_time_s']:g} s"
         )
     ]
 

@@ -17,12 +17,11 @@ def no_hub(connect: str, why: str, *, is_wanted: bool) -> Finding:
         why: there is no connection.
         is_wanted: the user has named it; else this user needs none.
     """
-    text = f"{connect}: {why}"
     if is_wanted:
         advice = "start the hub, or check --connect, name service and firewall"
-        return Finding("fail", "hub", text, advice)
-    advice = "revolve run needs none; for several terminals start revolve hub"
-    return Finding("warn", "hub", text, advice)
+        return Finding("fail", "hub", f"{connect}: {why}", advice)
+    text = "none is running: revolve run needs none, revolve coordinator starts one"
+    return Finding("ok", "hub", text)
 
 
 def refused(connect: str, error: str) -> Finding:

@@ -1,6 +1,7 @@
 """Commands that messages suggest to the user."""
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -9,6 +10,11 @@ def command(*words: object) -> str:
     return shlex.join(["revolve", *map(str, words)])
 
 
-def stopped(folder: Path) -> str:
-    """Return the message after a run or campaign was stopped."""
-    return f"stopped; to resume: {command('resume', folder)}"
+def stopped(folder: Path, flags: Sequence[str] = ()) -> str:
+    """Return the message after a run or campaign was stopped.
+
+    Args:
+        folder: of the run or campaign.
+        flags: with which ``revolve resume`` has the same agents again.
+    """
+    return f"stopped; to resume: {command('resume', folder, *flags)}"

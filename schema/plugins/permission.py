@@ -128,7 +128,9 @@ def how_to_allow(module: str) -> str:
     if not _may_be_plugin(module):
         return f"plug-ins are {', '.join(BUILT_IN)} and modules of users"
     names = ", ".join(dict.fromkeys([*_allowed, *_installed_modules()])) or "none"
-    return f"allowed with {FLAG} are {names}; if you trust it, add {FLAG} {module}"
+    is_file = "." not in module and _source(module) is None
+    entry = f"PATH/{module}.py" if is_file else module
+    return f"allowed with {FLAG} are {names}; if you trust it, add {FLAG} {entry}"
 
 
 def import_allowed(module: str) -> ModuleType:

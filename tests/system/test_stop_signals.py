@@ -45,9 +45,11 @@ COMMANDS = {
     "bench": ("bench", "evaluate", "--robots", "10000"),
     "bench dispatch": ("bench", "dispatch", "--seconds", "100"),
 }
-ADVICE = dict.fromkeys(
-    ("run", "in-process", "coordinator"), "to resume: revolve resume run"
-)
+ADVICE = {
+    "run": "to resume: revolve resume run --workers 2",
+    "in-process": "to resume: revolve resume run --in-process",
+    "coordinator": "to resume: revolve resume run --workers 0 --listen hub",
+}
 
 
 @pytest.fixture(autouse=True)
@@ -157,7 +159,7 @@ def cases() -> Iterator[Any]:
             yield pytest.param(name, number, id=f"{name}-{number.name}", marks=marks)
 
 
-@pytest.mark.parametrize(("name", "number"), cases())
+@pytest.mark.parametrize(("name", "number"), [*cases()])
 def test_a_signal_ends_a_command_with_its_children(
     tmp_path: Path, until: Until, name: str, number: signal.Signals
 ) -> None:
@@ -259,4 +261,5 @@ def test_a_lost_hub_is_told_once_and_its_return(
     second.terminate()
     assert coordinator.wait(60) == 1
     *_, last = coordinator.stderr.read().splitlines()
-    assert last.endswith("(--give-up-after); to resume: revolve resume run")
+    again = f"revolve resume run --workers 0 --connect {place}"
+    assert last.endswith(f"(--give-up-after); to resume: {again}")

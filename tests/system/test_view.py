@@ -17,6 +17,7 @@ from rerun.chunk import RrdReader
 
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME
+from schema.errors import rounded
 from schema.tables.checksums import digest_of
 from schema.tables.description import description_text, read_description
 from schema.tables.files import read_table
@@ -252,7 +253,7 @@ def test_resimulated_off_line_robot_moves_as_recorded(
         for row in read_table(undisturbed, "evaluations").to_pylist()
     )
     (line,) = [one for one in out.splitlines() if one.startswith("best ever")]
-    assert line == f"best ever evaluated: {line.split()[3]} fitness {best:.4f}"
+    assert line == f"best ever evaluated: {line.split()[3]} fitness {rounded(best)}"
     assert "moves as recorded, equal to the last bit" in out
     assert "DIFFERS" not in out
 

@@ -154,7 +154,7 @@ def test_long_names_of_runs_are_refused_and_not_kept() -> None:
 def test_agent_without_a_plugin_is_unfit() -> None:
     reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
     assert reply.reason.startswith(f"{UNFIT}has no plug-in 'nowhere_to_be_found' among")
-    assert reply.reason.endswith("add --plugins nowhere_to_be_found")
+    assert reply.reason.endswith("add --plugins PATH/nowhere_to_be_found.py")
 
 
 @settings(derandomize=True, deadline=None)

@@ -135,6 +135,18 @@ def test_module_that_is_not_allowed_is_not_imported(folder: Path) -> None:
     assert len(list(folder.rglob("*.ran"))) == 2
 
 
+def test_advice_names_the_file_of_a_module_that_is_not_installed(
+    folder: Path,
+) -> None:
+    (folder / "installed_advice.py").write_text("")
+    for module, entry in (
+        ("installed_advice", "installed_advice"),
+        ("elsewhere_advice", "PATH/elsewhere_advice.py"),
+    ):
+        with pytest.raises(PluginDiffers, match=rf"; if .*, add --plugins {entry}$"):
+            check_plugins(f"{module}=1234")
+
+
 def test_list_of_plug_ins_is_limited_before_it_is_read() -> None:
     with pytest.raises(PluginDiffers, match="must have <= 10000 characters, got 10001"):
         check_plugins("a" * 10_001)
