@@ -171,7 +171,7 @@ def test_a_forged_update_is_counted_and_changes_nothing(
     seen(tmp_path / "run.rrd", WHOLE, forged, news(4, (0, 2)), Ended())
     lines = capsys.readouterr().err.splitlines()
     assert lines[1:3] == [
-        "dropped 1 messages: malformed, or not of this run",
+        "dropped 1 message: malformed, or not of this run",
         "the run has ended",
     ]
 

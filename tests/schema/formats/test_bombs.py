@@ -200,7 +200,7 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "quoted.toml": (lambda: "' '." * 15_000 + "b = 1", "<= 16 parts"),
     "digits.toml": (lambda: "births = " + "9" * 900_000, "<= 1000 digits"),
     "hex.toml": (lambda: "births = 0x" + "f" * 900_000, "<= 1000 digits"),
-    "count64.toml": (lambda: "name = 'x'\nbirths = 0x" + "f" * 900, "births: Exp"),
+    "count64.toml": (lambda: "name = 'x'\nbirths = 0x" + "f" * 900, "births: must be"),
     "float.toml": (
         lambda: "name = 'x'\n[simulation]\ngravity = 1e999999",
         "must be finite",
