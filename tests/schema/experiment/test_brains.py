@@ -75,10 +75,9 @@ def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
         settings = evaluation_settings_of(experiment)
         write_robot(robot, file, settings=settings, kinds=kinds)
         assert read_robot(file, kinds=kinds) == robot
-        with pytest.raises(
-            Exception, match=r"'Adapting' is not supported: must be one of Simple, "
-        ):
+        with pytest.raises(RevolveError, match="one of Simple, ") as caught:
             read_robot(file)
+        assert "'Adapting'" in str(caught.value)
     assert "fatigue: 0.1" in (tmp_path / "robot.yaml").read_text()
 
 
