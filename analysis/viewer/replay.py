@@ -35,7 +35,7 @@ def shown_run(folder: Path) -> Run:
     try:
         return read_run(folder)
     except RunFolderError as error:
-        raise RunFolderError(f"{folder}: no run found: {error}") from None
+        raise RunFolderError(f"no run found: {error}") from None
 
 
 def read_news(run: Run) -> Update:

@@ -127,7 +127,7 @@ def test_gravity_pulls_downhill() -> None:
         ("roughness_m = 0.1\npatch_m = 9.0", "multiple of environment.patch_m = 9,"),
         ("roughness_m = 0.1\npatch_m = 0.01", "patch_m: must be >= 2 environment"),
         ('scenery = "none.xml"', "environment.scenery: none.xml: cannot be read: "),
-        ("scenery = 3", "environment.scenery: Expected `str`, got `int`"),
+        ("scenery = 3", "environment.scenery: Expected `str`, got 3"),
         (
             'scenery = "<mujoco>"',
             "environment.scenery: not valid XML: no element found",
