@@ -7,6 +7,7 @@ from schema.errors import rounded
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 _MOST_PEERS = 5
+_MEANINGS = {str(kind): meaning for kind, meaning in MEANINGS.items()}
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 
 
@@ -87,7 +88,7 @@ def fault_lines(faults: Sequence[PeerFault]) -> list[str]:
         peers = ", ".join(f"{each.peer} {each.count}" for each in of_kind[:_MOST_PEERS])
         more = f" and {len(of_kind) - _MOST_PEERS} more" * (len(of_kind) > _MOST_PEERS)
         # A coordinator of another version may have other kinds.
-        meaning = {**MEANINGS}.get(kind, "")
+        meaning = _MEANINGS.get(kind, "")
         when = f"{meaning}; since the start" if meaning else "since the start"
         lines.append(f"not used: {total} {kind}: {peers}{more} ({when})")
     return lines
