@@ -252,8 +252,7 @@ def gait_strip(
 
     Args:
         pictures: pictures of one size; at least one.
-        times_s: simulated time of each, which is written below it [s]; empty: nothing is
-            written.
+        times_s: simulated time of each, written below it [s]; empty: none is written.
         columns: most pictures in a row.
     """
     if times_s:
