@@ -55,7 +55,7 @@ compiled: $(STAMP)
 
 # Unit tests, two at a time; then system tests, which start processes and often wait.
 test: compiled
-	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark'
+	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark and not long'
 	$(BIN)/python -m pytest -q -n 4 --dist worksteal -m 'system and not long'
 
 # Tests that are too long for CI: run them before a release and report the results.

@@ -3,13 +3,11 @@
 import argparse
 import re
 from collections.abc import Iterator
-from contextlib import redirect_stdout, suppress
-from importlib import import_module
-from io import StringIO
 from typing import Any
-from unittest.mock import patch
 
+from revolve.cli.parsers import actions, parser_of
 from revolve.command import COMMANDS
+from schema.agent.flags import Flags
 
 _HEAD = """# Commands
 
@@ -38,53 +36,23 @@ def page() -> str:
     return _HEAD + "\n".join([*rows, "", *texts]).rstrip() + "\n"
 
 
-def parser_of(name: str) -> argparse.ArgumentParser | None:
-    """Return the parser of a command's arguments; None if it has none."""
-    return _asked(name)[0]
-
-
-def _asked(name: str) -> tuple[argparse.ArgumentParser | None, str]:
-    """Return the parser that prints a command's help, and what is printed without."""
-    found: list[argparse.ArgumentParser] = []
-
-    def note(parser: argparse.ArgumentParser, _file: object = None) -> None:
-        found.append(parser)
-
-    main = import_module(COMMANDS[name][0]).main
-    printed = StringIO()
-    with (
-        patch.object(argparse.ArgumentParser, "print_help", note),
-        redirect_stdout(printed),
-        suppress(SystemExit),
-    ):
-        main([name, "--help"])
-    return next(iter(found), None), printed.getvalue()
-
-
 def _command(name: str) -> Iterator[str]:
     """Yield the lines about a command."""
     yield f"## `revolve {name}`\n"
-    parser, printed = _asked(name)
-    if parser is None:
-        yield from ("```", printed.rstrip(), "```", "")
-    else:
-        yield from _parser(parser, f"revolve {name}", 3)
+    yield from _parser(parser_of(name), f"revolve {name}", 3)
 
 
-def _parser(parser: argparse.ArgumentParser, name: str, level: int) -> Iterator[str]:
+def _parser(parser: Flags, name: str, level: int) -> Iterator[str]:
     """Yield the lines about a parser and those of its subcommands."""
     if parser.description:
         yield f"{_sentence(parser.description)}\n"
     rows = [_row(action, parser) for action in arguments(parser)]
     if rows:
         yield from ("| argument | default | meaning |", "|---|---|---|", *rows, "")
-    if parser.epilog:
-        yield from ("```", parser.epilog.replace("%%", "%"), "```", "")
-    for action in parser._actions:  # noqa: SLF001 - argparse has no public list
-        if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001
-            for word, inner in action.choices.items():
-                yield f"{'#' * level} `{name} {word}`\n"
-                yield from _parser(inner, f"{name} {word}", level + 1)
+    yield from ("```", *parser.examples, "```", "")
+    for word, inner in actions(parser).items():
+        yield f"{'#' * level} `{name} {word}`\n"
+        yield from _parser(inner, f"{name} {word}", level + 1)
 
 
 def arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:

@@ -4,13 +4,16 @@ The pages stay plain Markdown that reads well on a code host, too. docs/index.md
 navigation. Notebooks show the output that is stored in them; tests run them.
 """
 
+import re
 from pathlib import Path
 
 import msgspec
+from sphinx.application import Sphinx
 
 _PROJECT = msgspec.toml.decode(
     (Path(__file__).parents[1] / "pyproject.toml").read_bytes()
 )["project"]
+_TOP_FILE = re.compile(r"\]\(((?:\.\./)*)\.\./(CHANGELOG|CONTRIBUTING)\.md")
 
 project = "Revolve Islands"
 version = release = _PROJECT["version"]
@@ -29,3 +32,15 @@ html_css_files = ["site.css"]
 html_copy_source = False
 html_show_copyright = False
 html_show_sphinx = False
+
+
+def _link_to_included(_app: Sphinx, _page: str, source: list[str]) -> None:
+    """Turn links to files of the top folder into links to the pages that show them."""
+    source[0] = _TOP_FILE.sub(
+        lambda match: f"]({match[1]}about/{match[2].lower()}.md", source[0]
+    )
+
+
+def setup(app: Sphinx) -> None:
+    """Connect the event."""
+    app.connect("source-read", _link_to_included)

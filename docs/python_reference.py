@@ -18,6 +18,9 @@ Written from the docstrings by `python -m docs.python_reference`. [Python](pytho
 is the introduction.
 
 """
+_LISTS = ("Args", "Attributes", "Raises")
+_TEXTS = ("Returns", "Yields")
+"""Parts of a docstring: lists of names with a text each, and mere texts."""
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 
 
@@ -54,8 +57,25 @@ def _entry(name: str) -> Iterator[str]:
 
 
 def _text(found: object, call: str) -> Iterator[str]:
-    """Yield call and docstring of a name as text of fixed width."""
-    yield from ("```", call, "", inspect.getdoc(found) or "", "```", "")
+    """Yield call and docstring of a name as Markdown."""
+    yield from ("```", call, "```", "")
+    for block in (inspect.getdoc(found) or "").replace("``", "`").split("\n\n"):
+        title, _, rest = block.partition("\n")
+        if title.rstrip(":") in _LISTS and title.endswith(":"):
+            yield from (f"**{title.rstrip(':')}**", "")
+            yield from map(_item, re.split(r"\n(?= {4}\S)", rest))
+        elif title.rstrip(":") in _TEXTS and title.endswith(":"):
+            yield f"**{title.rstrip(':')}**: {' '.join(rest.split())}"
+        else:
+            yield block
+        yield ""
+
+
+def _item(entry: str) -> str:
+    """Return an entry of a list of a docstring as an item of Markdown."""
+    names, _, text = " ".join(entry.split()).partition(": ")
+    shown = ", ".join(f"`{name}`" for name in names.split(", "))
+    return f"- {shown}: {text}"
 
 
 def _signature(found: object) -> str:

@@ -3,6 +3,7 @@
 The class of an exception names the source of the fault, which decides its handling.
 """
 
+import re
 from difflib import get_close_matches
 from typing import Any, Literal
 
@@ -36,6 +37,16 @@ class RunFolderError(RevolveError):
 class NetworkError(RevolveError):
     """An address that cannot be listened on or reached."""
 
+
+_TYPES = {
+    "int": "a whole number",
+    "float": "a number",
+    "str": "a text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+}
+"""Names that msgspec gives to types, in words."""
 
 MessageFault = Literal["malformed", "too large", "stale", "impossible", "differs"]
 """What is wrong with a message, for counts.
@@ -115,6 +126,20 @@ def unreadable(error: OSError | UnicodeDecodeError) -> str:
     if isinstance(error, UnicodeDecodeError):
         return f"cannot be read: not UTF-8 at byte {error.start}"
     return f"cannot be read: {error.strerror or error}"
+
+
+def expectation(message: str) -> str:
+    """Return a message of msgspec in words, such as "must be a number, got a text"."""
+    text = message.replace("Expected ", "must be ")
+    return re.sub(r"`(\w+(?: \| \w+)*)`", _types_in_words, text)
+
+
+def _types_in_words(found: re.Match[str]) -> str:
+    """Return the types of a message in words; TOML has no null."""
+    kinds = [kind for kind in found[1].split(" | ") if kind != "null"]
+    if not all(kind in _TYPES for kind in kinds):
+        return found[0]
+    return " or ".join(_TYPES[kind] for kind in kinds)
 
 
 def counted(number: int, noun: str) -> str:

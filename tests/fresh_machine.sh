@@ -10,6 +10,13 @@ readonly PACKAGES=python3,python3-venv,make,git,ca-certificates
 readonly CERTIFICATES=/etc/ssl/certs/ca-certificates.crt
 # Variables that say how a registry is reached.
 readonly NETWORK='^(PIP_[A-Z_]*|SSL_CERT_FILE|REQUESTS_CA_BUNDLE|CURL_CA_BUNDLE)='
+# What make demo must leave: a film, a curve, a report, and a small environment.
+# shellcheck disable=SC2016 # the shell in the clone expands it
+readonly CHECKS='set -e; set -- runs/demo-*; test $# -eq 1
+head -c 6 "$1/best.gif" | grep -q GIF89a
+head -c 4 "$1/fitness.png" | grep -q PNG
+grep -q "</html>" "$1/report/report.html"
+test "$(du -sm .venv | cut -f 1)" -le 1050; du -sm .venv'
 readonly PROXIES='^((http|https|no|all)_proxy|(HTTP|HTTPS|NO|ALL)_PROXY)='
 
 usage() {
@@ -126,8 +133,11 @@ try_suite() {
         | tee -a "$place/report"
 
     step "$suite" "$root" make demo || result=1
+    step "$suite" "$root" sh -c "$CHECKS" || result=1
     if [ -n "$pytest" ]; then
-        step "$suite" "$root" sh -c ".venv/bin/python -m pytest $pytest" || result=1
+        # make demo installs no pytest.
+        step "$suite" "$root" sh -c \
+            "make compiled && .venv/bin/python -m pytest $pytest" || result=1
     elif [ -z "$demo_only" ]; then
         step "$suite" "$root" make test || result=1
     fi

@@ -1,6 +1,6 @@
 """Renders the best robots, their gaits and their families."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -26,7 +26,7 @@ EVERY_S = 0.5
 """Pictures of a gait, and the time between two of them [s]."""
 FILM_EVERY_S = 0.1
 """Time between two pictures of a film [s]; it lasts as long as the gait."""
-_LARGE, _SMALL = (400, 300), (300, 225)
+_LARGE, _SMALL, _FILMED = (400, 300), (300, 225), (320, 240)
 _WIDE, _CLOSE = (0.15, 0.15, 0.0), (0.26, 0.14, 0.1)
 _FILM = (0.12, 0.03, 0.0)
 """Shares of a picture that are cut off: of the height above and below, of the width at
@@ -164,14 +164,15 @@ def _motion(
     chosen = range(first, len(poses), step)[:FRAMES]
     filmed = range(first, min(len(poses), first + FRAMES * step), film_step)
     middle = np.mean([poses[at][:3] for at in chosen], axis=0)
-    with RobotRenderer(robot, settings, size=_LARGE) as renderer:
-        pictures = {
-            at: renderer.picture(poses[at], look_at=middle)
-            for at in sorted({*chosen, *filmed})
-        }
-    return (
-        tuple(_cut(pictures[at], _WIDE) for at in chosen),
-        tuple((at - first) * tick_s for at in chosen),
-        tuple(_cut(pictures[at], _FILM) for at in filmed),
-        film_step * tick_s,
-    )
+
+    def drawn(
+        ticks: Iterable[int], size: tuple[int, int], cut: tuple[float, float, float]
+    ) -> tuple[Picture, ...]:
+        with RobotRenderer(robot, settings, size=size) as renderer:
+            return tuple(
+                _cut(renderer.picture(poses[at], look_at=middle), cut) for at in ticks
+            )
+
+    times_s = tuple((at - first) * tick_s for at in chosen)
+    film = drawn(filmed, _FILMED, _FILM)
+    return drawn(chosen, _LARGE, _WIDE), times_s, film, film_step * tick_s

@@ -19,8 +19,8 @@ Row = Mapping[str, Any]
 _MANY_RUNS = 40
 """Runs from which on only the best robot of each is marked."""
 _MOST_DOTS = 3000
-_NAME = 14
-"""Characters of an experiment's name along an axis."""
+_NAME, _NAMED = 14, 3
+"""Characters of names along an axis, and their number; others are in a legend."""
 
 
 class RunName(NamedTuple):
@@ -171,11 +171,10 @@ def last_populations(tables: Tables) -> str:
     for place, experiment in enumerate(shown):
         mine = living.filter(pc.field("experiment") == experiment)
         marks.append(painted(paint[experiment], *_columns(axes, mine, names, place)))
-    ticks = [
-        (place + 0.5, text if len(text) <= _NAME else f"{text[: _NAME - 1]}…")
-        for place, text in enumerate(map(label, shown))
-    ]
-    return plot(
+    is_named = len(shown) <= _NAMED and max(map(len, map(label, shown))) <= _NAME
+    ticks = [(place + 0.5, label(name)) for place, name in enumerate(shown)] * is_named
+    names_above = "" if is_named else legend(shown, [*paint])
+    return names_above + plot(
         axes,
         marks,
         description="Fitness of the last populations",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from html import escape
 
 WIDTH, HEIGHT = 560, 360
-_LEFT, _RIGHT, _TOP, _BOTTOM = 66, 14, 34, 52
+_LEFT, _RIGHT, _TOP, _BOTTOM = 66, 24, 34, 52
 _MOST_BREAKS = 5
 
 

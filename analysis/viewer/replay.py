@@ -35,7 +35,8 @@ def shown_run(folder: Path) -> Run:
     try:
         return read_run(folder)
     except RunFolderError as error:
-        raise RunFolderError(f"no run found: {error}") from None
+        why = str(error).removeprefix(f"{folder}: ")
+        raise RunFolderError(f"{folder}: no run found: {why}") from None
 
 
 def read_news(run: Run) -> Update:

@@ -22,7 +22,7 @@ from coordinator.storage.journal import (
 )
 from schema.agent.flags import Flags, add_count, whole_number
 from schema.errors import RunFolderError
-from schema.tables.description import read_state
+from schema.tables.description import check_folder, read_state
 
 POLL_S = 0.5
 """Time between two looks at a journal that is followed [s]."""
@@ -64,8 +64,7 @@ def _journal_of(folder: Path, *, is_followed: bool) -> Path:
         RunFolderError: there is no journal, and no unfinished run to wait for.
     """
     path = folder / NAME
-    if not folder.is_dir():
-        raise RunFolderError(f"{folder}: no such folder")
+    check_folder(folder)
     if path.exists() or (is_followed and holds_run(folder)):
         return path
     if is_campaign(folder):

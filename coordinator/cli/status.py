@@ -7,7 +7,13 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.format import duration, fault_lines, run_details, state_of
+from coordinator.cli.format import (
+    duration,
+    fault_lines,
+    missing_agents,
+    run_details,
+    state_of,
+)
 from coordinator.cli.status_json import Source, status_json
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, is_campaign, read_campaign
@@ -22,7 +28,7 @@ from schema.agent.flags import Flags
 from schema.agent.log import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.limits import printable
-from schema.tables.description import DETAILS
+from schema.tables.description import DETAILS, check_folder
 from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.operator import (
     GetStatus,
@@ -127,6 +133,7 @@ def _by_folder(folder: Path) -> Status:
     Raises:
         RunFolderError: there is no run and no campaign.
     """
+    check_folder(folder)
     planned: dict[Path, RunDetails] = {}
     runs: list[RunStatus] = []
     for path in _below(folder, CAMPAIGN):
@@ -197,13 +204,14 @@ def _show(source: Source) -> None:
         source.folder or source.coordinator or "",
         f"{done} of {runs} finished, {births}",
     ]
-    if is_live:
+    if status.workers or status.analyzers:
         lines.append(
             f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}, "
             f"{counted(status.analyzers, 'analyzer')}, {duration(status.left_s)} left"
         )
     elif done < len(status.runs):
-        lines.append(_without_coordinator(status, root))
+        waiting = f"waiting for {' and '.join(missing_agents(status))}"
+        lines.append(waiting if is_live else _without_coordinator(status, root))
     lines += [printable(line, _WIDEST) for line in fault_lines(status.faults)]
     # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)

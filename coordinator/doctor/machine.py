@@ -150,8 +150,8 @@ def check_pictures(code: int | None, output: str) -> Finding:
         "warn",
         "pictures",
         why,
-        "runs do not need them; install 'revolve-islands[pictures]', or set MUJOCO_GL "
-        "to disable if a graphics driver is broken",
+        f"runs do not need them; {install_advice('pictures')}, or set MUJOCO_GL to "
+        "disable if a graphics driver is broken",
     )
 
 

@@ -154,6 +154,18 @@ def _sync(path: Path, flags: int) -> None:
         os.close(descriptor)
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, unless it is there.
+
+    Raises:
+        RunFolderError: a file is in its place, or the disk refuses it.
+    """
+    if path.is_file():
+        raise RunFolderError(f"{path}: must be a folder, got a file")
+    with storage_errors(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
 @contextlib.contextmanager
 def storage_errors(path: Path) -> Iterator[None]:
     """Raise the errors of a failed write as errors for the user.

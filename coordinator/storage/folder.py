@@ -18,7 +18,12 @@ from typing import Self
 
 from msgspec import structs
 
-from coordinator.storage.disk import replace_durably, replace_text, storage_errors
+from coordinator.storage.disk import (
+    make_folder,
+    replace_durably,
+    replace_text,
+    storage_errors,
+)
 from coordinator.storage.hints import command
 from coordinator.storage.journal import MOST_RECORDED_EPOCH, newest_epoch
 from coordinator.storage.journal import NAME as JOURNAL
@@ -97,8 +102,8 @@ class RunFolder:
         if details is None:
             read_details(path)
         else:
+            make_folder(path)
             with storage_errors(path):
-                path.mkdir(parents=True, exist_ok=True)
                 _refuse_foreign(path)
         self._lock = FolderLock(path)
         try:

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import Self
 
-from coordinator.storage.disk import storage_errors
+from coordinator.storage.disk import make_folder, storage_errors
 from schema.errors import RunFolderError
 from schema.limits import printable
 
@@ -29,8 +29,8 @@ class FolderLock:
         Raises:
             RunFolderError: another process holds it (named), or the disk fails.
         """
+        make_folder(folder)
         with storage_errors(folder):
-            folder.mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC
             self._descriptor = os.open(folder / LOCK, flags, 0o644)
             try:

@@ -17,12 +17,20 @@ def parser_of(command: str) -> Flags:
     return parser
 
 
-def actions(parser: Flags) -> dict[str, Flags]:
-    """Return the parsers of a command's actions, such as ``list`` of ``arena``."""
+def subparsers_of(
+    parser: argparse.ArgumentParser,
+) -> "argparse._SubParsersAction[Flags] | None":
+    """Return what holds the actions of a parser; None if it has none."""
     for action in parser._actions:  # noqa: SLF001 - argparse has no public access
         if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - the same
-            return dict(action.choices)
-    return {}
+            return action
+    return None
+
+
+def actions(parser: Flags) -> dict[str, Flags]:
+    """Return the parsers of a command's actions, such as ``list`` of ``arena``."""
+    found = subparsers_of(parser)
+    return {} if found is None else dict(found.choices)
 
 
 def all_parsers() -> dict[str, Flags]:

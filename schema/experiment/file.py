@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args, get_origin
 import msgspec
 from msgspec import Struct
 
-from schema.errors import ExperimentError, cut, nearest, shown, unreadable
+from schema.errors import ExperimentError, cut, expectation, nearest, shown, unreadable
 from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, references
@@ -344,13 +344,12 @@ def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
         kind = _type_of(kind, word)
         for place in places:
             value = value[int(place)] if isinstance(value, list) else None
+    message = expectation(message)
     if not key:
         return message
     choices = get_args(kind) if get_origin(kind) is Literal else ()
     if not choices:
-        # The value says more than its type.
-        expected = message.partition(", got `")[0]
-        return f"{key}: {expected}, got {shown(value)}"
+        return f"{key}: {message.partition(', got ')[0]}, got {shown(value)}"
     allowed = ", ".join(map(repr, choices))
     return (
         f"{key}: must be one of {allowed}, got {shown(value)}{nearest(value, choices)}"

@@ -28,7 +28,7 @@ def is_of_revolve(document: Table) -> bool:
     """Return whether a document has the form of the published Revolve."""
     if document.has("revolve_robot"):
         return False
-    if not document.has("brain") or document.has("id") or document.has("parents"):
+    if document.is_null("brain") or document.has("id") or document.has("parents"):
         return True
     brain = document.table("brain")
     return brain.has("params") or brain.has("type") or brain.is_mapping("neurons")

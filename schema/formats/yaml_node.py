@@ -20,6 +20,7 @@ from schema.limits import MOST_TEXT_BYTES
 T = TypeVar("T", int, float)
 
 _SLOT = re.compile("0|[1-9][0-9]{0,3}")
+_NULL = ("", "~", "null", "Null", "NULL")
 # Most allowed words that a message lists.
 _MOST_WORDS = 40
 
@@ -75,6 +76,13 @@ class Table:
     def is_mapping(self, key: str) -> bool:
         """Return whether the value of a key is a mapping."""
         return isinstance(self._values.get(key), yaml.MappingNode)
+
+    def is_null(self, key: str) -> bool:
+        """Return whether a key is missing or its value is YAML's null."""
+        node = self._values.get(key)
+        return node is None or (
+            isinstance(node, yaml.ScalarNode) and node.value in _NULL
+        )
 
     def is_empty(self, key: str) -> bool:
         """Return whether a key is missing or has no value."""

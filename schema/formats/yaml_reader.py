@@ -81,7 +81,7 @@ class Reader:
                     "revolve_robot", f"must be {VERSION}, got {shown(version)}"
                 )
         self._read_part(document.table("body"), -1, -1)
-        brain = document.table("brain") if document.has("brain") else None
+        brain = None if document.is_null("brain") else document.table("brain")
         robot = Robot(tuple(self.parts), self.brain(brain))
         try:
             check_number(robot)
@@ -126,7 +126,7 @@ class Reader:
             gene=table.integer("gene", 0),
         )
         self.parts.append(part)
-        if table.has("children"):
+        if not table.is_null("children"):
             children = table.table("children")
             for slot in sorted(map(children.key_as_slot, children.keys)):
                 _check_slot(children, slot, kind, part)

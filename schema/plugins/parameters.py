@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from schema.errors import ExperimentError, nearest, shown
+from schema.errors import ExperimentError, expectation, nearest, shown
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -39,7 +39,7 @@ def read_parameters(table: Mapping[str, Any], kind: type[T], where: str) -> T:
     except msgspec.ValidationError as error:
         message, _, path = str(error).partition(" - at `$.")
         raise ExperimentError(
-            f"{where}{'.' if path else ''}{path.rstrip('`')}: {message}"
+            f"{where}{'.' if path else ''}{path.rstrip('`')}: {expectation(message)}"
         ) from None
 
 

@@ -216,9 +216,9 @@ BIRTHS = _table(
     _column(
         "body",
         pa.list_(_inner("item", PART)),
-        "parts, core first: number (idx), number of the parent (-1: core), slots of "
-        "parent and child (-1: core), part type (kind), orientation in degrees "
-        "(rot), parameters (params), innovation number (gene)",
+        "parts, core first: number (idx), number of the parent (-1 of the core), slots "
+        "of parent and child (-1 of the core), part type (kind), orientation in "
+        "degrees (rot), parameters (params), innovation number (gene)",
         unit="params: by part type; lengths and radii of built-in parts in mm, "
         "angles in rad, colours 1",
     ),

@@ -72,6 +72,7 @@ def read_description(folder: Path) -> Description:
     try:
         data = read_small(file, MOST_DESCRIPTION)
     except FileNotFoundError:
+        check_folder(folder)
         raise RunFolderError(
             f"{folder}: no run is there ({DETAILS} is missing)"
         ) from None
@@ -86,6 +87,18 @@ def read_description(folder: Path) -> Description:
             f"{file}: damaged: {printable(why, 200)}; restore a copy of the file"
         )
     return found
+
+
+def check_folder(folder: Path) -> None:
+    """Raise unless a folder is there.
+
+    Raises:
+        RunFolderError: nothing is there, or a file.
+    """
+    if not folder.exists():
+        raise RunFolderError(f"{folder}: no such folder")
+    if not folder.is_dir():
+        raise RunFolderError(f"{folder}: must be a folder, got a file")
 
 
 def run_columns(folder: Path) -> dict[str, int | str | None]:

@@ -16,8 +16,6 @@ from urllib.parse import quote, unquote
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.dataset
-from pyarrow.dataset import ParquetFileFormat, ParquetFragmentScanOptions
 from pyarrow.fs import LocalFileSystem
 from pyarrow.parquet import ParquetFile, read_schema
 
@@ -232,7 +230,7 @@ def read_table(folder: Path, table: str) -> pa.Table:
         raise RunFolderError(f"{path}: cannot be read: {error}") from None
 
 
-def campaign(root: Path, table: str) -> pa.dataset.Dataset:
+def campaign(root: Path, table: str) -> "pa.dataset.Dataset":
     """Return one table of all finished runs below a folder.
 
     Args:
@@ -245,20 +243,23 @@ def campaign(root: Path, table: str) -> pa.dataset.Dataset:
     Raises:
         RunFolderError: no finished run, or a damaged file.
     """
+    # Imports pandas if that is installed, which takes as long as the start of a run.
+    from pyarrow import dataset  # noqa: PLC0415
+
     files = sorted(root.glob(f"**/{FINISHED}/*/*/{table}.parquet"))
     if not files:
         raise RunFolderError(f"{root}: no finished run in this folder or below")
     for file in files:
         finished_path(file.parents[3], table)
-    options = ParquetFragmentScanOptions(page_checksum_verification=True)
-    reader = ParquetFileFormat(default_fragment_scan_options=options)
+    options = dataset.ParquetFragmentScanOptions(page_checksum_verification=True)
+    reader = dataset.ParquetFileFormat(default_fragment_scan_options=options)
     disk = LocalFileSystem()
     # A fragment's expression gives the columns that its file lacks.
     fragments = [
         reader.make_fragment(str(file), disk, partition_expression=_lacking(file))
         for file in files
     ]
-    return pa.dataset.FileSystemDataset(fragments, _in_campaign(table), reader, disk)
+    return dataset.FileSystemDataset(fragments, _in_campaign(table), reader, disk)
 
 
 def _in_campaign(table: str) -> pa.Schema:

@@ -38,6 +38,7 @@ def _run(page: Path, folder: Path, *numbers: str) -> None:
     assert int(done.stdout.split()[-2]) >= 2
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize(
     ("name", "births"), [("04-part", "150=20"), ("07-tables", "60=20")]
 )
@@ -48,7 +49,7 @@ def test_tutorial_runs_with_fewer_births(
 
 
 @pytest.mark.long
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize(
     "name",
     [
@@ -129,7 +130,7 @@ def test_a_page_that_says_something_wrong_is_found(
 
 
 @pytest.mark.long
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", ["first-evolution", "own-analysis"])
 def test_notebook_runs(name: str, tmp_path: Path) -> None:
     """Its code cells run in order, as a program without a screen."""

@@ -8,9 +8,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from docs import commands_reference, messages_reference, settings_reference
+from docs import messages_reference, settings_reference
 from docs.reference_pages import PAGES
 from docs.struct_tables import attributes, rows
+from revolve.cli.parsers import parser_of
 from revolve.command import COMMANDS
 from schema.experiment.document import Experiment
 from schema.experiment.section import PluginSection, Section
@@ -104,10 +105,7 @@ def test_every_flag_of_every_command_is_listed() -> None:
     parts = re.split(r"^## ", page, flags=re.MULTILINE)
     for name in COMMANDS:
         (part,) = (part for part in parts if part.startswith(f"`revolve {name}`\n"))
-        parser = commands_reference.parser_of(name)
-        if parser is None:
-            continue
-        flags = {flag for flag in _flags(parser) if flag != "--help"}
+        flags = {flag for flag in _flags(parser_of(name)) if flag != "--help"}
         listed = set(re.findall(r"^\| `(?:-\w, )?(--[a-z-]+)", part, re.MULTILINE))
         assert listed == flags, name
     row = "| `--births N` | the experiment's | number of births |"

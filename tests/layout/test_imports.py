@@ -7,6 +7,8 @@ revolve/ and reports file and library directly.
 
 import ast
 import importlib
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -70,7 +72,7 @@ def imported(path: Path) -> Iterator[str]:
 
 def is_composition_root(path: Path) -> bool:
     """Return whether a file may import several rooms."""
-    return path.parent == ROOT / "revolve" or path.name == "__main__.py"
+    return ROOT / "revolve" in path.parents or path.name == "__main__.py"
 
 
 def relative(path: Path) -> str:
@@ -134,6 +136,21 @@ def test_no_file_uses_type_checking_imports() -> None:
         if path.name != "revolve_pb2.py" and "TYPE_CHECKING" in path.read_text("utf-8")
     ]
     assert found == []
+
+
+def test_a_run_starts_without_libraries_that_it_does_not_use() -> None:
+    """Each of them delays the first line on the screen; pyarrow.dataset has pandas."""
+    modules = "coordinator.__main__, worker.serve.service, analyzer.service"
+    script = f"import sys, {modules}; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    unused = {"cryptography", "matplotlib", "networkx", "numba", "pandas", "PIL"}
+    assert unused & {*done.stdout.split()} == set()
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -66,7 +66,7 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
         rv.run("scenario1", births=15, out=done.folder)
     with pytest.raises(rv.RunFolderError, match="no run is there"):
         rv.read(tmp_path)
-    with pytest.raises(rv.RunFolderError, match="no run is there"):
+    with pytest.raises(rv.RunFolderError, match="missing: no such folder"):
         rv.resume(tmp_path / "missing")
     with pytest.raises(rv.RunFolderError, match="holds several runs; read one of a"):
         rv.read(done.folder.parent)

@@ -166,7 +166,7 @@ def test_three_commands_of_one_user_need_no_address(
         workspace.start(role, "--processes", "1", environment=place)
     wait_until(lambda: size(workspace.folder / "run") > 0, "the run begins")
     told = workspace.start("status", environment=place).communicate()[0]
-    assert "1 workers, 1 analyzers" in told
+    assert "1 worker, 1 analyzer" in told
     second = workspace.start(
         "coordinator", *RUN[:-1], "second", environment=place
     ).communicate()[1]

@@ -176,7 +176,7 @@ def test_status_of_all_coordinators_of_a_hub(
     assert "left" not in workspace.run("status", "one")
     workspace.start("worker", "--connect", address, "--processes", "1")
     until(
-        lambda: "1 workers, 0 analyzers" in workspace.run("status", "one"), "it answers"
+        lambda: "1 worker, 0 analyzers" in workspace.run("status", "one"), "it answers"
     )
     assert first.poll() is None
 

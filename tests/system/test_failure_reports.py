@@ -299,7 +299,7 @@ def test_status_follows_a_link_to_a_run(
     (tmp_path / "again").symlink_to(tmp_path)
     assert status(["status", str(tmp_path)]) == 0
     output = capsys.readouterr().out
-    assert "1 of 1 runs finished, 12 of 12 births" in output
+    assert "1 of 1 run finished, 12 of 12 births" in output
 
 
 def test_arena_without_any_fitness_reports_the_reason(workspace: Workspace) -> None:

@@ -79,7 +79,7 @@ TOGETHER = {
 }
 
 
-def _document(text: str, added: str, births: int) -> str:
+def document(text: str, added: str, births: int) -> str:
     """Return an experiment with a plug-in; tables of one name are joined."""
     text = re.sub(r"births = \d+", f"births = {births}", text)
     for table in re.split(r"^(?=\[)", added.strip(), flags=re.MULTILINE):
@@ -133,10 +133,10 @@ def commands(workspace: Workspace, installed: Path) -> Commands:
     return Commands(workspace, installed)
 
 
-def _is_equal_after_a_kill(commands: Commands, document: str, until: Until) -> None:
+def _is_equal_after_a_kill(commands: Commands, own: str, until: Until) -> None:
     """Run in one process, and on two workers of which one is killed; compare."""
     folder = commands.folder
-    (folder / "mine.toml").write_text(document)
+    (folder / "mine.toml").write_text(own)
     words = ("mine.toml", "--seed", "5", "--quiet", "--out")
     commands.run("run", *words, "one", "--in-process")
     whole = (folder / "one" / "journal.bin").stat().st_size
@@ -180,8 +180,7 @@ def test_a_strangers_plug_ins_evolve_on_two_workers_of_which_one_is_killed(
     commands: Commands, until: Until, name: str, text: str
 ) -> None:
     births = 12 if text is SMALL_ARENA else 30
-    document = _document(text, TOGETHER[name], births)
-    _is_equal_after_a_kill(commands, document, until)
+    _is_equal_after_a_kill(commands, document(text, TOGETHER[name], births), until)
     _check_births(commands.folder / "one", births)
     if name == "bodies":
         rows = read_table(commands.folder / "one", "births").to_pylist()
@@ -199,8 +198,7 @@ def test_each_plug_in_alone_evolves_60_births(
 ) -> None:
     if name == "survivors" and text is SMALL_ARENA:
         pytest.skip("the removal of robots from an arena depends on their fitness")
-    document = _document(text, PLUGINS[name], 60)
-    _is_equal_after_a_kill(commands, document, until)
+    _is_equal_after_a_kill(commands, document(text, PLUGINS[name], 60), until)
     _check_births(commands.folder / "one", 60)
     commands.run("run", "mine.toml", "--seed", "5", "--quiet", "--workers", "2",
                  "--out", "three")  # fmt: skip

@@ -279,7 +279,10 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
     ("words", "message"),
     [
         (("view", "x", "--connect", "hub"), "give either a run folder or --connect"),
-        (("view", "nowhere", "--save", "a.rrd"), "no run found"),
+        (
+            ("view", "nowhere", "--save", "a.rrd"),
+            "nowhere: no run found: no such folder",
+        ),
         (
             ("view", "--connect", "tcp/127.0.0.1:1", "--save", "a.rrd"),
             "no coordinator at",

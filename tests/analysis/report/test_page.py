@@ -2,10 +2,7 @@
 
 import base64
 import io
-from datetime import UTC, datetime
 from html.parser import HTMLParser
-from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -13,14 +10,9 @@ import pytest
 from PIL import Image
 
 from analysis.comparison.progression import progression
-from analysis.figures.catalogue import DrawnFigure, Figure
-from analysis.figures.family_tree import Best
-from analysis.figures.figure_writer import Drawings, Film
-from analysis.measures.outputs import schema
-from analysis.report.page import report
+from analysis.figures.figure_writer import Drawings
+from tests.analysis.reported import NOTHING, drawings, page, tables
 
-FILM = b"GIF89a nothing more"
-NOTHING = Drawings([], [], {}, [])
 VOID = {"meta", "img", "br", "link"}
 
 
@@ -61,95 +53,28 @@ class Reader(HTMLParser):
         return " ".join(" ".join(self.words).split())
 
 
-RUNS: list[dict[str, Any]] = [
-    {"experiment": "soft", "folder": f"soft-{n}", "run": n, "seed": 7, "births": 60,
-     "state": "finished", "islands": 1, "differs": "", "function": "worker.fitness:f",
-     "failures": n, "duration_s": 60.0 + n}
-    for n in range(2)
-] + [
-    {"experiment": "hard & <b>", "folder": "hard-0", "run": 0, "seed": 8, "births": 45,
-     "state": "stopped", "islands": 1, "differs": "births: 1 instead of 2",
-     "function": "", "failures": None, "duration_s": None},
-]  # fmt: skip
-
-
-def tables() -> dict[str, pa.Table]:
-    rows: dict[str, list[dict[str, Any]]] = {
-        "runs": RUNS,
-        "populations": [
-            {"experiment": run["experiment"], "folder": run["folder"], "island": 0,
-             "births": births, "fitness": 0.1 * (n + 1) * births / 30,
-             "fitness_best": 0.5 * n}
-            for n, run in enumerate(RUNS)
-            for births in (15, 30)
-        ],
-        "robots": [
-            {"experiment": run["experiment"], "folder": run["folder"],
-             "birth_island": 0, "birth": birth, "fitness": fitness,
-             "is_last": birth > 0, "parts": 9, "active_joints": 3, "hidden": 2}
-            for run in RUNS
-            for birth, fitness in enumerate((0.2, 0.1, 0.3))
-        ],
-        "comparison": [
-            {"measure": "fitness", "a": "hard & <b>", "b": "soft", "births": 30,
-             "runs_a": 2, "runs_b": 2, "mean_a": 0.2, "mean_b": 0.15,
-             "difference": 0.05, "difference_low": 0.01, "difference_high": 0.09,
-             "effect": 1.0, "p": 0.3, "q": 0.4},
-            {"measure": "fitness_best", "a": "hard & <b>", "b": "soft", "births": 30,
-             "runs_a": 2, "runs_b": 1, "mean_a": 0.2, "mean_b": 0.15,
-             "difference": -0.05, "difference_low": -0.1, "difference_high": 0.02,
-             "effect": 1.0, "p": 1.0, "q": 1.0},
-        ],
-        "findings": [
-            {"figure": "6.2", "claim": "a <b> fitter", "expected": ">", "runs_a": 2,
-             "runs_b": 3, "mean_a": 0.25, "effect": -1.0, "q": 0.01,
-             "verdict": "not reproduced", "why": "so"},
-            {"figure": "6.3", "claim": "levels off", "expected": "<",
-             "verdict": "undecided", "why": "there is no finished run"},
-        ],
-        "left_out": [
-            {"folder": "", "what": "figure 6.1", "why": "no benchmark"},
-            {"folder": "runs/x", "what": "run", "why": "broken & gone"},
-        ],
-    }  # fmt: skip
-    found = {name: pa.Table.from_pylist(r, schema(name)) for name, r in rows.items()}
-    return {**found, "progression": progression(found["populations"])}
-
-
-def read_page(given: dict[str, pa.Table], drawings: Drawings = NOTHING) -> Reader:
-    when = datetime(2020, 1, 1, tzinfo=UTC)
-    page = report(given, drawings, "revolve analyze runs", when, {"numpy": "9.9"})
-    assert page.startswith("<!DOCTYPE html>")
+def read_page(given: dict[str, pa.Table], drawn: Drawings = NOTHING) -> Reader:
+    text = page(given, drawn)
+    assert text.startswith("<!DOCTYPE html>")
     reader = Reader()
-    reader.feed(page)
+    reader.feed(text)
     assert reader.open == []
     return reader
 
 
 @pytest.fixture(scope="module")
 def read(tmp_path_factory: pytest.TempPathFactory) -> Reader:
-    folder = tmp_path_factory.mktemp("figures")
-    Image.new("RGB", (1600, 160), "red").save(folder / "one.png")
-    (folder / "one.gif").write_bytes(FILM)
-    figures = [
-        DrawnFigure(
-            Figure(number, f"Title {number}", "", (source,), lambda _: None, "bodies"),
-            "What & why.",
-            folder / "one.png",
-        )
-        for number, source in (("6.9", "outcomes"), ("A", "<a> file"))
-    ]
-    films = [Film(Best("soft", Path("soft-1"), 0, 2, 0.3), folder / "one.gif")]
-    reasons = {"hard & <b>": "no driver <x>"}
-    return read_page(tables(), Drawings(figures, films, reasons, []))
+    return read_page(tables(), drawings(tmp_path_factory.mktemp("figures")))
 
 
 def test_pictures_are_embedded_and_nothing_is_loaded(read: Reader) -> None:
     film, *figures = read.sources
-    assert base64.b64decode(film.removeprefix("data:image/gif;base64,")) == FILM
+    assert (
+        base64.b64decode(film.removeprefix("data:image/gif;base64,"))[:6] == b"GIF89a"
+    )
     assert len(figures) == 2
     for source in figures:
-        stored = base64.b64decode(source.removeprefix("data:image/webp;base64,"))
+        stored = base64.b64decode(source.removeprefix("data:image/png;base64,"))
         with Image.open(io.BytesIO(stored)) as picture:
             assert picture.size == (1400, 140)
             assert picture.convert("RGB").getpixel((700, 70)) == (255, 0, 0)

@@ -85,12 +85,12 @@ def test_an_unknown_name_is_refused_with_the_nearest(name: str, nearest: str) ->
         (
             "cppn",
             {"p_weight": 1.5},
-            "encoding.parameters.p_weight: Expected `float` <=",
+            "encoding.parameters.p_weight: must be a number <=",
         ),
         (
             "cppn",
             {"max_nodes": "many"},
-            "encoding.parameters.max_nodes: Expected `int`",
+            "encoding.parameters.max_nodes: must be a whole number",
         ),
     ],
 )

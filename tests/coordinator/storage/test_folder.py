@@ -232,8 +232,8 @@ def test_an_epoch_that_the_journal_cannot_number_is_damaged(tmp_path: Path) -> N
 
 
 def test_a_folder_without_a_run_is_refused_and_nothing_is_made(tmp_path: Path) -> None:
-    for path in (tmp_path / "none", tmp_path):
-        with pytest.raises(RunFolderError, match="no run is there"):
+    for path, why in ((tmp_path / "none", "no such f"), (tmp_path, "no run is there")):
+        with pytest.raises(RunFolderError, match=why):
             RunFolder(path)
     assert list(tmp_path.iterdir()) == []
 

@@ -91,7 +91,10 @@ def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
         ('[brain]\ntype = "my_brains:np"', "expected a class, got an object of type"),
         ('[brain]\ntype = "my_brains:Adapting"', "expected a class of 2 arguments"),
         ("[brain]\nparameters = {a = 1}", r"brain\.parameters\.'a': no such key"),
-        (WAVES.replace("2", '"fast"'), r"brain\.parameters\.frequency_hz: Expected"),
+        (
+            WAVES.replace("2", '"fast"'),
+            r"brain\.parameters\.frequency_hz: must be a number",
+        ),
         ("[space]\nneuron_types = []", "must name at least one type"),
         ('[space]\nneuron_types = ["Simpel"]', "did you mean 'Simple'"),
         (

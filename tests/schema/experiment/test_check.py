@@ -63,7 +63,7 @@ def test_limits_of_the_allowed_values_are_accepted(text: str) -> None:
             "[selection]\nkeep_parents = false\n[selection.reevaluation]",
             "selection.reevaluation: no individual outlives its brood",
         ),
-        ("[selection.reevaluation]\nshare = 0", "share: Expected `float` > 0"),
+        ("[selection.reevaluation]\nshare = 0", "share: must be a number > 0"),
         ("[selection.reevaluation]\nintervall = 3", "did you mean 'interval'"),
         ("[simulation]\nevaluation_s = [11.9, 30]", "must be >= 12 s, .* got 11.9"),
         (
@@ -71,7 +71,7 @@ def test_limits_of_the_allowed_values_are_accepted(text: str) -> None:
             "must be >= 15 s",
         ),
         ("[simulation]\nevaluation_s = [30, 20]", r"\[shortest, longest\], got \[30"),
-        ("[simulation]\nevaluation_s = [30]", "length 2, got 1"),
+        ("[simulation]\nevaluation_s = [30]", r"length 2, got \[30\]"),
         ("[simulation]\nevaluation_s = [12, inf]", "must be finite"),
         ("[arena]\n[selection.culling]", "selection.culling: arenas have"),
         ("[arena]\n[selection.reevaluation]", "selection.reevaluation: arenas"),

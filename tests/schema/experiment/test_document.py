@@ -74,7 +74,7 @@ def test_window_may_be_smaller_than_a_generation() -> None:
         ("[space]\nmax_part = 9", r"space.max_part: .* 'max_parts'\?; allowed: part_"),
         ("[selektion]\nwindow = 1", "did you mean 'selection'"),
         ("zzzz = 1", "zzzz: no such key; allowed: name, births"),
-        ('births = "many"', r"births: Expected `int`, got 'many'"),
+        ('births = "many"', r"births: must be a whole number, got 'many'"),
         ("births = 0", r"births: .*>= 1.*, got 0"),
         ("births = 2.5", "births: "),
         ("[variation]\nbody_epsilon = 1.5", r"variation.body_epsilon: .*, got 1.5"),

@@ -118,16 +118,16 @@ def test_gravity_pulls_downhill() -> None:
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("slope_deg = 45.0", "slope_deg: Expected `float` < 45.0, got 45.0"),
-        ("slope_deg = -1.0", "slope_deg: Expected `float` >= 0.0, got -1.0"),
-        ("roughness_m = -0.1", "roughness_m: Expected `float` >= 0.0, got -0.1"),
-        ("ground_seed = -1", "ground_seed: Expected `int` >= 0, got -1"),
+        ("slope_deg = 45.0", "slope_deg: must be a number < 45.0, got 45.0"),
+        ("slope_deg = -1.0", "slope_deg: must be a number >= 0.0, got -1.0"),
+        ("roughness_m = -0.1", "roughness_m: must be a number >= 0.0, got -0.1"),
+        ("ground_seed = -1", "ground_seed: must be a whole number >= 0, got -1"),
         ("rougness_m = 0.1", "no such key; did you mean 'roughness_m'?"),
         ("roughness_m = 0.1\npatch_m = 0.3", "multiple of environment.patch_m = 0.3"),
         ("roughness_m = 0.1\npatch_m = 9.0", "multiple of environment.patch_m = 9,"),
         ("roughness_m = 0.1\npatch_m = 0.01", "patch_m: must be >= 2 environment"),
         ('scenery = "none.xml"', "environment.scenery: none.xml: cannot be read: "),
-        ("scenery = 3", "environment.scenery: Expected `str`, got 3"),
+        ("scenery = 3", "environment.scenery: must be a text, got 3"),
         (
             'scenery = "<mujoco>"',
             "environment.scenery: not valid XML: no element found",

@@ -91,11 +91,13 @@ def counts_in(text: str) -> tuple[int, int, int, int]:
         (BODY, (5, 2, 9, 0)),
         (f"---\nid: example_spider\n{BODY}", (5, 2, 9, 0)),
         (f"{BODY}id: 26\nparents: [3, 7]\n", (5, 2, 9, 0)),
+        (f"id: babyA\n{BODY}brain: null\n", (5, 2, 9, 0)),
+        (BODY.replace("label: ''", "children: ") + "brain:\n", (5, 2, 9, 0)),
         (f"id: robot_0\n{BODY}{BRAIN}", (5, 2, 10, 3)),
         (BODY + BRAIN.replace("  type: neural-network\n", ""), (5, 2, 10, 3)),
         (f"{BODY}brain: {{neurons: {{}}, connections: []}}", (5, 2, 9, 0)),
     ],
-    ids=["body", "id", "parents", "brain", "no type", "no params"],
+    ids=["body", "id", "parents", "null", "empty", "brain", "no type", "no params"],
 )
 def test_forms_that_are_read(text: str, expected: tuple[int, ...]) -> None:
     robot = read(text)

@@ -24,8 +24,8 @@ def test_defaults_complete_the_table() -> None:
     [
         ({"radius": 1.0, "spoke": 3}, "w.'spoke': no such key; did you mean 'spokes'?"),
         ({}, "w: Object missing required field `radius`"),
-        ({"radius": -1.0}, "w.radius: Expected `float` > 0.0"),
-        ({"radius": "x"}, "w.radius: Expected `float`, got `str`"),
+        ({"radius": -1.0}, "w.radius: must be a number > 0.0"),
+        ({"radius": "x"}, "w.radius: must be a number, got a text"),
         ({"radius": float("nan")}, "w.radius: must be finite"),
         ({"radius": 1.0, "spokes": [0, {"a": float("inf")}]}, "w.spokes.1.a: must be"),
     ],
