@@ -28,7 +28,7 @@ from analysis.progress import bars
 from analysis.render.picture import Simulate
 from analysis.report.page import report
 from analysis.summary import show
-from schema.errors import RunFolderError
+from schema.errors import RunFolderError, counted
 
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
 _ALWAYS = ("populations", "robots", "extremities")
@@ -65,7 +65,9 @@ def analyze(
     except OSError as error:
         why = f"cannot be written: {error.strerror}"
         raise RunFolderError(f"{options.out}: {why}") from None
-    with bars(f"measuring runs: {len(runs)}", *columns, TimeRemainingColumn()) as bar:
+    with bars(
+        f"measuring {counted(len(runs), 'run')}", *columns, TimeRemainingColumn()
+    ) as bar:
         tables, left_out = _measured(runs, options, bar)
         left_out = [*unread, *not_benchmarks, *left_out]
         # Before the figures: one that fails must not cost the measures.

@@ -9,11 +9,13 @@ from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.run_world import experiment_of
-from schema.parts import BUILT_IN, BodySpace
+from schema.parts import BUILT_IN, PARAMETRIC_BAR_JOINT, BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import neuron_names
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot
+
+_BAR_UNITS = {"connection_length": "mm", "alpha": "rad", "beta": "rad"}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -120,6 +122,8 @@ def _show(robot: Robot, space: BodySpace, title: str) -> None:
         own = space[part.kind].own_parameters
         for parameter, value in zip(own, part.parameters, strict=False):
             label += f", {parameter.name} {value:g}"
+            if part.kind == PARAMETRIC_BAR_JOINT.name:
+                label += f" {_BAR_UNITS[parameter.name]}"
         trees.append(Tree(Text(label)))
         if index:
             trees[part.parent].children.append(trees[index])

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -93,12 +94,20 @@ def _draw_motion(
 ) -> None:
     """Write an animation of an evaluation, or a strip of some of its ticks."""
     poses: list[Floats] = []
+    times_s: list[float] = []
     look_at = None
+
+    def watch(data: Any) -> None:  # noqa: ANN401 - of a library imported later
+        poses.append(data.qpos.copy())
+        times_s.append(data.time)
+
     with bars(f"simulating and rendering {out}") as bar:
-        live(watch=lambda data: poses.append(data.qpos.copy()))
+        live(watch=watch)
         if gait is not None:
             # From the middle on, when the first fall is over.
-            poses = poses[len(poses) // 2 :][:gait]
+            shown_from = len(poses) // 2
+            poses = poses[shown_from:][:gait]
+            times_s = times_s[shown_from:][:gait]
             # A fixed camera, so that the robot moves in the pictures.
             look_at = np.mean([pose[:3] for pose in poses], axis=0)
         shown = bar.track(poses, description="rendering")
@@ -106,4 +115,4 @@ def _draw_motion(
     if gait is None:
         save_animation(pictures, out, tick_s)
     else:
-        save_picture(gait_strip(pictures), out)
+        save_picture(gait_strip(pictures, times_s), out)

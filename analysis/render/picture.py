@@ -16,7 +16,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from schema.agent.log import tell_user
 from schema.errors import RevolveError, one_line
@@ -245,13 +245,19 @@ def _furnish(
     )
 
 
-def gait_strip(pictures: Sequence[Picture], *, columns: int = 5) -> Picture:
+def gait_strip(
+    pictures: Sequence[Picture], times_s: Sequence[float] = (), *, columns: int = 5
+) -> Picture:
     """Return pictures side by side in rows; the rest of the last row is white.
 
     Args:
         pictures: pictures of one size; at least one.
+        times_s: simulated time of each, written below it [s]; empty: none is written.
         columns: most pictures in a row.
     """
+    if times_s:
+        marked = zip(pictures, times_s, strict=True)
+        pictures = [_with_time(each, time_s) for each, time_s in marked]
     height, width, _ = pictures[0].shape
     columns = min(columns, len(pictures))
     rows = -(-len(pictures) // columns)
@@ -259,6 +265,19 @@ def gait_strip(pictures: Sequence[Picture], *, columns: int = 5) -> Picture:
     cells[: len(pictures)] = pictures
     strip = cells.reshape(rows, columns, height, width, 3).swapaxes(1, 2)
     return strip.reshape(rows * height, columns * width, 3)
+
+
+def _with_time(picture: Picture, time_s: float) -> Picture:
+    """Return a picture with its time below, in black on white."""
+    height, width, _ = picture.shape
+    size = max(10, width // 16)
+    image = Image.new("RGB", (width, height + 3 * size // 2), "white")
+    image.paste(Image.fromarray(picture))
+    font = ImageFont.load_default(size)
+    middle = (width / 2, height + 3 * size / 4)
+    text = f"{time_s:.2f} s"
+    ImageDraw.Draw(image).text(middle, text, "black", font, anchor="mm")
+    return np.asarray(image)
 
 
 def save_picture(picture: Picture, path: Path) -> None:

@@ -87,7 +87,10 @@ def _replay(
     motions = _motions(options, run, simulators)
     moving = [each.birth for each in motions]
     blueprint = layout(scene, follow=options.follow, motions=moving)
-    name = f"{news.experiment}-{folder.name}"
+    # The folder's name usually starts with that of the experiment.
+    name = folder.resolve().name
+    if not name.startswith(news.experiment):
+        name = f"{news.experiment}-{name}"
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         recording.add_scene(scene)
         show = Show(recording, scene.space)

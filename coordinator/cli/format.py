@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 
+from coordinator.dispatch.faults import MEANINGS
 from schema.errors import rounded
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 _MOST_PEERS = 5
+_MEANINGS = {str(kind): meaning for kind, meaning in MEANINGS.items()}
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 
 
@@ -85,5 +87,8 @@ def fault_lines(faults: Sequence[PeerFault]) -> list[str]:
         total = sum(each.count for each in of_kind)
         peers = ", ".join(f"{each.peer} {each.count}" for each in of_kind[:_MOST_PEERS])
         more = f" and {len(of_kind) - _MOST_PEERS} more" * (len(of_kind) > _MOST_PEERS)
-        lines.append(f"not used: {total} {kind}: {peers}{more}")
+        # A coordinator of another version may have other kinds.
+        meaning = _MEANINGS.get(kind, "")
+        when = f"{meaning}; since the start" if meaning else "since the start"
+        lines.append(f"not used: {total} {kind}: {peers}{more} ({when})")
     return lines

@@ -79,13 +79,18 @@ def check_source(source: str, shipped: Collection[str]) -> None:
         and_missing = "" if path.is_file() else ", and there is no such file"
         raise ExperimentError(
             f"{source}: the file of an experiment must end in .toml, got "
-            f"{path.suffix!r}{and_missing}"
+            f"{path.suffix!r}{and_missing}{'' if path.is_file() else _near(path)}"
         )
     near = nearest(source, [*shipped, *([beside] if Path(beside).is_file() else ())])
     raise ExperimentError(
         f"{source}: no such experiment{near}; shipped are {', '.join(shipped)}, or "
         "give a path to a .toml file"
     )
+
+
+def _near(missing: Path) -> str:
+    """Return ``; did you mean 'x'?`` for a TOML file with a similar name beside it."""
+    return nearest(str(missing), [str(each) for each in missing.parent.glob("*.toml")])
 
 
 def shipped_experiments() -> list[str]:
@@ -196,7 +201,8 @@ def _text(source: str) -> str:
     try:
         return read_bytes(Path(source)).decode()
     except (OSError, UnicodeDecodeError) as error:
-        raise ExperimentError(f"{source}: {unreadable(error)}") from None
+        near = _near(Path(source)) if isinstance(error, FileNotFoundError) else ""
+        raise ExperimentError(f"{source}: {unreadable(error)}{near}") from None
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

@@ -218,7 +218,8 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
         ExperimentError: not a function of a trace and its parameters.
     """
     where = "fitness.function"
-    return load_function(full_name(fitness.function, where, FITNESS), where, 2)
+    path = full_name(fitness.function, where, FITNESS)
+    return load_function(path, where, 2, "trace, parameters")
 
 
 @lru_cache(maxsize=64)

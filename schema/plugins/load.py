@@ -12,7 +12,7 @@ from functools import lru_cache
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
-from schema.errors import ExperimentError, UnknownPlugin, nearest, shown
+from schema.errors import ExperimentError, UnknownPlugin, counted, nearest, shown
 from schema.plugins.origin import where_named, where_raised
 from schema.plugins.permission import (
     how_to_allow,
@@ -100,13 +100,16 @@ def full_name(path: str, where: str, built_in: Mapping[str, str]) -> str:
     return built_in[path]
 
 
-def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:
+def load_function(
+    path: str, where: str, arguments: int, names: str = ""
+) -> Callable[..., Any]:
     """Return the function that a dotted path names.
 
     Args:
         path: ``package.module:attribute``.
         where: the key that holds it, for messages.
         arguments: number of positional arguments that it must take.
+        names: of the arguments, for messages, such as ``trace, parameters``.
 
     Raises:
         UnknownPlugin: as for ``load_instance``; a function that was defined in a
@@ -127,11 +130,19 @@ def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:
     try:
         inspect.signature(found).bind(*range(arguments))
     except (TypeError, ValueError) as error:
-        raise ExperimentError(
-            f"{where}: {place_of(path)}: {path!r} must take {arguments} arguments: "
-            f"{error}"
-        ) from None
+        wanted = f"{path!r} must take {counted(arguments, 'argument')}"
+        given = f" ({names}), this one takes {_taken(found)}" if names else f": {error}"
+        raise ExperimentError(f"{where}: {place_of(path)}: {wanted}{given}") from None
     return found
+
+
+def _taken(function: Callable[..., Any]) -> str:
+    """Return the arguments of a function as its definition has them."""
+    try:
+        names = inspect.signature(function).parameters
+    except ValueError:
+        return "others"
+    return f"{len(names)} ({', '.join(names)})" if names else "none"
 
 
 def _load(path: str, where: str) -> object:

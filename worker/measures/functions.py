@@ -105,7 +105,8 @@ def _measure(name: str, table: dict[str, Any] | None, where: str) -> Measure:
         raise ExperimentError(f"{where_named}: {name!r} is not a function")
     kind = parameters_type(found, where_named)
     if ":" in name:
-        load_function(name, where_named, 1 if kind is None else 2)
+        names = "trace" if kind is None else "trace, parameters"
+        load_function(name, where_named, 1 if kind is None else 2, names)
     if kind is None:
         if table is not None:
             raise ExperimentError(

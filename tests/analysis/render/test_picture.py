@@ -127,11 +127,21 @@ def test_a_pose_moves_the_robot_before_a_fixed_camera(
 
 
 def test_a_strip_fills_rows_of_five() -> None:
-    pictures = [np.full((2, 3, 3), 10 * number, np.uint8) for number in range(7)]
-    strip = gait_strip(pictures)
-    assert strip.shape == (4, 15, 3)
-    assert strip[0, ::3, 0].tolist() == [0, 10, 20, 30, 40]
-    assert strip[2, ::3, 0].tolist() == [50, 60, 255, 255, 255]
+    pictures = [np.full((20, 80, 3), 10 * number, np.uint8) for number in range(7)]
+    strip = gait_strip(pictures, [0.1 * number for number in range(7)])
+    assert strip.shape == (2 * 35, 5 * 80, 3)
+    assert strip[0, ::80, 0].tolist() == [0, 10, 20, 30, 40]
+    assert strip[35, ::80, 0].tolist() == [50, 60, 255, 255, 255]
+
+
+def test_a_strip_has_the_time_below_each_picture() -> None:
+    picture = np.full((20, 80, 3), 128, np.uint8)
+    strip = gait_strip([picture] * 3, [1.25, 1.5, 1.25])
+    assert (strip[:20] == 128).all()
+    first, other, again = np.split(strip[20:], 3, axis=1)
+    assert (first < 100).any()
+    assert (first != other).any()
+    assert (first == again).all()
 
 
 def test_files_open_again(tmp_path: Path) -> None:

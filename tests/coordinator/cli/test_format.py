@@ -23,10 +23,15 @@ FAULTS = (
 
 def test_faults_are_summed_by_kind_with_the_most_frequent_peers() -> None:
     late, malformed = fault_lines(FAULTS)
-    assert late == "not used: 4 late: b 3, a 1"
-    assert malformed == (
-        "not used: 16 malformed: peer0 2, peer1 2, peer2 2, peer3 2, peer4 2 and 3 more"
+    assert late == (
+        "not used: 4 late: b 3, a 1 (late or second answers, dropped; since the start)"
     )
+    assert malformed == (
+        "not used: 16 malformed: peer0 2, peer1 2, peer2 2, peer3 2, peer4 2 and 3 "
+        "more (malformed messages, dropped; since the start)"
+    )
+    (other,) = fault_lines((PeerFault("newer", "a", 1),))
+    assert other == "not used: 1 newer: a 1 (since the start)"
     assert fault_lines(()) == []
 
 

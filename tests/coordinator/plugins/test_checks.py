@@ -149,7 +149,8 @@ def test_kind_may_be_said(lab: Callable[[str], Path]) -> None:
     file = lab("def f(a):\n    return 1.0")
     step, line = checked(f"{file}:f", kind="fitness")[-1]
     assert step == "fault"
-    assert f"{file.name}:1: '{file.stem}:f' must take 2 arguments" in line
+    wanted = "must take 2 arguments (trace, parameters), this one takes 1 (a)"
+    assert line.endswith(f"{file.name}:1: '{file.stem}:f' {wanted}")
 
 
 def test_plug_in_that_prints_does_not_disturb_the_report(

@@ -69,7 +69,7 @@ def test_own_measures_have_parameters(own: str) -> None:
         ("hight", {}, UnknownPlugin, r"measures.names: .* did you mean 'height'\?"),
         ("{}:lipm", {}, UnknownPlugin, r"did you mean '\w+:limp'\?"),
         ("{}:nothing", {}, ExperimentError, "is not a function"),
-        ("{}:loose", {}, ExperimentError, "must take 1 arguments"),
+        ("{}:loose", {}, ExperimentError, "must take 1 argument \\(trace\\), this"),
         ("{}:high", {"high": {"abov_m": 1}}, ExperimentError, "did you mean 'above_m'"),
         ("{}:high", {"high": {"above_m": "a"}}, ExperimentError, "must be a number"),
         ("height", {"height": {"a": 1}}, ExperimentError, "height has no parameters"),

@@ -83,7 +83,7 @@ def test_modules_that_are_not_allowed_are_not_called(function: str) -> None:
 def test_unfit_functions_and_requests_are_refused() -> None:
     with pytest.raises(UnknownPlugin, match="did you mean 'lab_of_calls:double'"):
         answer_call(request("lab_of_calls:duble", 1))
-    with pytest.raises(RevolveError, match="must take 1 arguments"):
+    with pytest.raises(RevolveError, match="must take 1 argument: "):
         answer_call(request("lab_of_calls:two", 1))
     with pytest.raises(MalformedMessage):
         answer_call(b"nothing")
