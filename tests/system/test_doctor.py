@@ -45,7 +45,7 @@ def test_a_machine_without_a_hub(workspace: Workspace, tmp_path: Path) -> None:
     here = {"XDG_RUNTIME_DIR": runtime_directory(tmp_path)}
     code, lines = lines_of(workspace, environment=here)
     assert code == 0, lines
-    assert lines["hub"].startswith("warn")
+    assert lines["hub"].startswith("ok    hub           none is running: ")
     assert lines["versions"].startswith("ok")
     code, lines = lines_of(workspace, "--connect", free_address())
     assert code == 1
