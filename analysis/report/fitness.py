@@ -1,6 +1,7 @@
 """Interactive plots of fitness: over births, and of the last populations."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,7 +94,7 @@ def _records(robots: pa.Table, *, few: bool) -> pa.Table:
     folders = np.asarray(born["folder"].combine_chunks().dictionary_encode().indices)
     starts = np.flatnonzero(np.diff(folders, prepend=-1))
     kept = []
-    for start, end in zip(starts, [*starts[1:], len(fitness)], strict=True):
+    for start, end in pairwise([*starts, len(fitness)]):
         best = np.maximum.accumulate(fitness[start:end])
         is_record = np.diff(best, prepend=-np.inf) > 0
         places = start + np.flatnonzero(is_record)

@@ -52,8 +52,10 @@ class Flags(argparse.ArgumentParser):
             word = unknown[0].partition("=")[0]
             if not word.startswith("-"):
                 self.error(f"unexpected argument {word[:80]!r}")
-            known = self._option_string_actions
-            self.error(f"no flag {word[:80]!r}{nearest(word, known)}")
+            # Dashes, which all flags share, would make any two of them similar.
+            known = [flag.lstrip("-") for flag in self._option_string_actions]
+            near = nearest(word.lstrip("-"), known).replace(" '", " '--")
+            self.error(f"no flag {word[:80]!r}{near}")
         return found, []
 
 

@@ -137,7 +137,7 @@ def test_agents_do_not_outlive_their_command() -> None:
         ("--connect tcp/h:1 --processes 0", "must be a whole number >= 1, got '0'"),
         ("--connect tcp/h:1 --name a/b", "--name: must be 1 to 96 letters"),
         ("--connect tcp/h:1 --fleet *", "--fleet: must be 1 to 96 letters"),
-        ("--connect tcp/h:1 --slots 2", "unrecognized arguments: --slots 2"),
+        ("--connect tcp/h:1 --slots 2", "no flag '--slots' (see revolve "),
     ],
 )
 def test_wrong_flag_is_reported_in_one_line(

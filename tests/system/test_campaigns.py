@@ -185,7 +185,7 @@ def test_status_of_all_coordinators_of_a_hub(
     ("words", "complaint"),
     [
         (("status", "x", "--connect", HUB), "either a folder or --connect"),
-        (("status", "nowhere"), "no run and no campaign"),
+        (("status", "nowhere"), "nowhere: no such folder"),
         (("run", "thesis", "scenario1"), "must have different names"),
         (("run", "scenario1", "--repeats", "0"), "must be a whole number >= 1"),
         (("run", "scenario1", "--connect", HUB, "--listen", HUB), "exclude each other"),

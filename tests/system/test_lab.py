@@ -85,7 +85,7 @@ def test_commands_of_the_page(network: Network, lab: Path, undisturbed: Path) ->
     network["laptop"].install(lab / "members" / "operator")
     status = [network[name].start("status") for name in ("laptop", "hub")]
     for each in status:
-        assert "3 workers, 1 analyzers" in each.end()
+        assert "3 workers, 1 analyzer" in each.end()
     coordinator.end()
     assert compare(folder, undisturbed) == []
 
