@@ -8,7 +8,7 @@ from schema.errors import RevolveError, counted
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.formats.files import read_robot, settings_of, write_robot
-from schema.formats.run_world import experiment_of
+from schema.formats.run_settings import experiment_of
 from schema.parts import BUILT_IN, PARAMETRIC_BAR_JOINT, BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import neuron_names

@@ -20,7 +20,7 @@ from analysis.render.picture import (
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
 from schema.formats.files import read_robot, settings_of
-from schema.formats.run_world import experiment_of
+from schema.formats.run_settings import experiment_of
 from schema.plugins.permission import allow
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.results import Floats

@@ -10,7 +10,7 @@ from schema.errors import ExperimentError, InvalidRobot, RunFolderError
 from schema.experiment.file import experiment_text, parse_experiment, read_experiment
 from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import settings_of
-from schema.formats.run_world import experiment_of
+from schema.formats.run_settings import experiment_of
 from schema.plugins import permission
 from schema.plugins.kept import kept_file, plugins_to_keep
 from schema.tables.description import Description, description_text
@@ -50,7 +50,7 @@ def test_file_in_a_run_folder_has_the_world_of_the_run(
     found = experiment_of(file, None)
     assert found is not None
     assert found.environment.roughness_m == 0.04
-    line = f"revolve: in the world of {tmp_path / 'run'} (bumpy)\n"
+    line = f"revolve: with the settings of {tmp_path / 'run'} (bumpy)\n"
     assert capsys.readouterr() == ("", line)
 
 
@@ -68,7 +68,7 @@ def test_file_elsewhere_has_the_world_of_scenario1(
     assert experiment_of(tmp_path / "a.yaml", None) is None
     assert capsys.readouterr().err == ""
     assert experiment_of(tmp_path / "a.yaml", None, tells_default=True) is None
-    assert "in the world of scenario1;" in capsys.readouterr().err
+    assert "with the settings of scenario1;" in capsys.readouterr().err
     shipped = evaluation_settings_of(read_experiment("scenario1"))
     default = settings_of(None)
     assert (shipped.simulation, shipped.fitness) == (
@@ -87,7 +87,7 @@ def test_islands_of_different_worlds_are_said(
 ) -> None:
     text = f'name = "two"\n[[islands]]\n[[islands]]\n{changed}\n'
     experiment_of(written(tmp_path / "run", text), None)
-    assert ("island 0: others differ" in capsys.readouterr().err) == is_said
+    assert ("island 0; other islands differ" in capsys.readouterr().err) == is_said
 
 
 def test_damaged_description_is_refused(tmp_path: Path) -> None:

@@ -34,18 +34,18 @@ def experiment_of(
     folder = file.parent
     if not (folder / DETAILS).is_file():
         if tells_default:
-            _tell("in the world of scenario1; --experiment names another one")
+            _tell("with the settings of scenario1; --experiment names others")
         return None
     allow_plugins_of(folder)
     experiment = own_experiment(read_description(folder).document)
     first = island_experiment(experiment, 0)
-    where = f"in the world of {folder} ({experiment.name})"
+    where = f"with the settings of {folder} ({experiment.name})"
     if any(
         evaluation_settings_of(island_experiment(experiment, number))
         != evaluation_settings_of(first)
         for number in range(1, island_count(experiment))
     ):
-        where += ", island 0: others differ; --experiment names another one"
+        where += ", island 0; other islands differ: --experiment names others"
     _tell(where)
     return first
 
