@@ -174,8 +174,8 @@ def test_wheel_works_outside_the_tree(
     assert (births, again) == ("15", recorded)
     # Each command that needs an extra names the command that installs it.
     for command in (
-        ("analyze", "one", "--out", "report"),
         ("robot", "render", "one/best.yaml", "best.png"),
+        ("analyze", "one", "--out", "report"),
         ("view", "one", "--save", "one.rrd"),
     ):
         _follow_advice(its, command, limits)
@@ -212,7 +212,7 @@ def _follow_advice(
     its: Environment, command: tuple[str, ...], limits: list[str]
 ) -> None:
     """Run a command that lacks a library, then what it advises, then it again."""
-    (line,) = its.run("revolve", *command, code=2).strip().splitlines()
+    *_, line = its.run("revolve", *command, code=2).strip().splitlines()
     found = re.fullmatch(
         r"revolve: .* needs? \w+: (\S+ -m pip install '.*\[\w+\]')", line
     )
