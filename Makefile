@@ -46,7 +46,8 @@ demo: $(NEEDED)
 	echo; echo 'To look at:'; \
 	echo "  $$run/best.gif            the best robot, moving"; \
 	echo "  $$run/fitness.png         fitness over births"; \
-	echo "  $$run/report/report.html  all figures and measures, for a browser"
+	echo "  $$run/report/report.html  all figures and measures, for a browser"; \
+	echo 'To type `revolve ...` as above: . $(BIN)/activate'
 
 # Tests start hundreds of processes. Where Python is configured to write no bytecode,
 # each of them would compile all modules again.

@@ -20,7 +20,12 @@ from coordinator.storage.campaign import campaign_plugins, is_campaign, read_cam
 from coordinator.storage.folder import holds_run, read_details
 from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
 from schema.experiment.document import Experiment, references
-from schema.experiment.file import draft_experiment, own_experiment, own_references
+from schema.experiment.file import (
+    draft_experiment,
+    own_experiment,
+    own_references,
+    read_experiment,
+)
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
 from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
@@ -118,7 +123,7 @@ def check_apart(
             tell(text)
         elif step == "fault":
             problems.append(text)
-    if not begun and child.returncode in (0, 1):
+    if not begun and child.returncode == (1 if problems else 0):
         return problems
     if threads := _LATE.findall(child.stderr):
         file, line = threads[-1]
@@ -171,12 +176,20 @@ def check_here(
                     uses = list(_uses(word, kinds, kind))
                 for name, use in uses:
                     check(word, name, use)
+                if ":" not in word and not _is_folder(Path(word)):
+                    # What the run would refuse besides plug-ins.
+                    read_experiment(word)
                 if not uses:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
                 is_fine = False
                 say("fault", one_line(error))
     return is_fine
+
+
+def _is_folder(folder: Path) -> bool:
+    """Return whether a path is the folder of a run or campaign."""
+    return is_campaign(folder) or holds_run(folder)
 
 
 def _placed(error: ExperimentError, word: str, use: Use) -> ExperimentError:
@@ -214,7 +227,7 @@ def _uses(
         raise ExperimentError(f"{word}: name a function or class: {word}:NAME")
     if not colon:
         folder = Path(word)
-        is_folder = is_campaign(folder) or holds_run(folder)
+        is_folder = _is_folder(folder)
         experiments = (
             _experiments_of(folder) if is_folder else (draft_experiment(word),)
         )

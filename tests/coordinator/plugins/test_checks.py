@@ -127,7 +127,7 @@ def test_each_fault_is_one_line(lab: Callable[[str], Path], fault: str) -> None:
 
 def test_experiment_without_own_plug_ins_is_in_order(tmp_path: Path) -> None:
     document = tmp_path / "small.toml"
-    document.write_text('name = "small"\nbirths = 12\n')
+    document.write_text('name = "small"\nbirths = 20\n')
     lines: list[str] = []
     assert check_apart(["scenario1", str(document)], lines.append) == []
     assert lines == [
@@ -198,3 +198,12 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
     with pytest.raises(ExperimentError, match=expected):
         refuse_faulty(["scenario1", str(document)])
     assert permission.allowed() == ()
+
+
+def test_check_refuses_what_a_run_would_refuse(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(
+        'name = "mine"\n[space]\nmin_parts = 20\nmax_parts = 4\n'
+    )
+    (problem,) = check_apart([str(tmp_path / "mine.toml")])
+    assert "min_parts" in problem
+    assert "in order" not in problem
