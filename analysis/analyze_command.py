@@ -29,6 +29,7 @@ from analysis.render.picture import Simulate
 from analysis.report.page import report
 from analysis.summary import show
 from schema.errors import RunFolderError, counted
+from schema.tables.description import check_folder
 
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
 _ALWAYS = ("populations", "robots", "extremities")
@@ -53,9 +54,9 @@ def analyze(
     Raises:
         RunFolderError: no run is found, or the output folder cannot be written.
     """
-    folders = [path for path in options.runs if path.is_dir() or not path.is_file()]
+    folders = [path for path in options.runs if not path.is_file()]
     if not folders:
-        raise RunFolderError(f"{options.runs[0]}: must be a folder, got a file")
+        check_folder(options.runs[0])
     found, unread = read_runs(folders)
     runs = with_distinct_names(found)
     benchmark, not_benchmarks = read_benchmarks(options.runs)
