@@ -299,7 +299,8 @@ class Fitness(PluginSection, frozen=True):
         function: short name of a built-in function, or ``module:attribute``.
         path_weight, straight_weight: weights of the velocities along the path and
             between its ends, of the function ``locomotion``.
-        limit: greatest realistic fitness [m/s]; above it, fitness is 0.
+        limit: greatest realistic fitness of the function ``locomotion`` [m/s]; above
+            it, fitness is 0.
         parameters: parameters of a function that has a Struct of its own.
     """
 
@@ -496,12 +497,6 @@ def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
     """Return the position of the light of a world [m]; None is no light."""
     own = None if arena is None else arena.light
     return own or environment.light
-
-
-def with_births(experiment: Experiment, births: int) -> Experiment:
-    """Return an experiment with another number of births on each island."""
-    islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
-    return structs.replace(experiment, births=births, islands=islands)
 
 
 def references(experiment: Experiment) -> list[str]:
