@@ -143,7 +143,7 @@ class Robot:
         return f"<Robot: {counted(len(self.parts), 'part')}, {neurons}, {edges}>"
 
 
-def plain(robot: Robot | PlainRobot) -> PlainRobot:
+def plain(robot: object) -> PlainRobot:
     """Return a robot as the rooms have it.
 
     Raises:
