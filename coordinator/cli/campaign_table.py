@@ -87,7 +87,7 @@ def _row(name: str, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
     )
 
 
-def show(outcomes: Sequence[RunOutcome]) -> None:
+def show(outcomes: Iterable[RunOutcome]) -> None:
     """Print the table on standard output, with a line that explains it.
 
     Args:
@@ -96,13 +96,14 @@ def show(outcomes: Sequence[RunOutcome]) -> None:
     table = Table(box=None, pad_edge=False)
     for number, head in enumerate(_HEADS):
         table.add_column(head, justify="right" if number else "left", no_wrap=True)
-    for cells in rows(outcomes):
+    known = list(outcomes)
+    for cells in rows(known):
         table.add_row(*cells)
     # Wide: a narrow terminal wraps lines, but nothing is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
     console.print(table)
     console.print("fitness of each run's best robot in its last population")
-    functions = {run.experiment: run.function for run in outcomes if run.function}
+    functions = {run.experiment: run.function for run in known if run.function}
     if len(set(functions.values())) > 1:
         lists = ", ".join(f"{name} {text}" for name, text in functions.items())
         console.print(f"not comparable, as fitness functions differ: {lists}")

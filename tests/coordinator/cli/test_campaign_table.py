@@ -52,7 +52,7 @@ def test_different_fitness_functions_are_named(
     )
     show([one, one])
     assert "comparable" not in capsys.readouterr().out
-    show([one, other])
+    show(iter([one, other]))
     assert capsys.readouterr().out.splitlines()[-1] == (
         "not comparable, as fitness functions differ: a locomotion, b goals:far"
     )
