@@ -39,7 +39,8 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
         for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
             axis.imshow(picture)
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
-        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}"
+        way = f"{100 * one.moved_m:.2g} cm from the first to the last picture"
+        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}; {way}"
         row[0].set_title("")
         row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=6)
     return figure

@@ -1,5 +1,8 @@
 """Figures of single robots, their ancestors, and the findings of the thesis."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import plotnine as p9
 import pyarrow as pa
@@ -158,7 +161,7 @@ def lineages(tables: Tables) -> p9.ggplot:
         )
         + scales(rows["experiment"].to_pylist(), is_filled=False)
         + p9.scale_y_continuous(breaks=integer_breaks)
-        + p9.labs(x="number of birth", y="rank")
+        + p9.labs(x="number of birth", y="rank (founders 1, children one more)")
         + theme_of_size(4.2)
     )
 
@@ -176,7 +179,7 @@ def effects(tables: Tables) -> p9.ggplot:
     if not rows.num_rows:
         raise NothingToDraw("no finding has two finished runs of each experiment")
     claims = [
-        f"{row['figure']}  {row['claim']}  ({row['expected']})"
+        f"{row['figure']}  {_in_words(row)}  ({row['expected']})"
         for row in rows.to_pylist()
     ]
     named = rows.append_column("text", pa.array(claims))
@@ -196,3 +199,11 @@ def effects(tables: Tables) -> p9.ggplot:
         return figure
     ends = p9.aes(ymin="effect_low", ymax="effect_high")
     return figure + p9.geom_linerange(ends, data=sure.to_pandas(), size=0.7)
+
+
+def _in_words(finding: Mapping[str, Any]) -> str:
+    """Return the claim of a finding with the labels of its experiments."""
+    text = str(finding["claim"])
+    for name in filter(None, (finding["a"], finding["b"])):
+        text = text.replace(name, label(name))
+    return text

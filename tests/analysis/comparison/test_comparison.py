@@ -118,9 +118,9 @@ def test_fitness_is_compared_only_with_the_same_function() -> None:
             made.append(replace(one, run=replace(one.run, fitness=function)))
     outcomes = Outcomes(made)
     rows = comparison(outcomes).to_pylist()
-    found = {(row["a"], row["b"]): set() for row in rows}
+    found: dict[tuple[str, str], set[str]] = {}
     for row in rows:
-        found[row["a"], row["b"]].add(row["measure"])
+        found.setdefault((row["a"], row["b"]), set()).add(row["measure"])
     assert {"fitness", "fitness_best", "parts"} <= found["a", "b"]
     for pair in (("a", "c"), ("b", "c")):
         assert not found[pair] & {"fitness", "fitness_best", "late_gain"}
