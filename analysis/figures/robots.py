@@ -98,6 +98,9 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     shown["at"] = shown["bin"] + start + _DODGE * width * aside
     panels = shown["population"].astype("category").cat.set_categories([*_POPULATIONS])
     shown["panel"] = panels.cat.rename_categories(_POPULATIONS)
+    of_line = shown.groupby(["experiment", "population"])["bin"]
+    # The library warns of lines of one point.
+    joined = shown[of_line.transform("size") > 1]
     return (
         p9.ggplot(shown, p9.aes("at", "fitness"))
         + p9.geom_linerange(
@@ -107,7 +110,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
             alpha=0.6,
             show_legend=False,
         )
-        + p9.geom_line(p9.aes(colour="experiment"), size=0.6)
+        + p9.geom_line(p9.aes(colour="experiment"), data=joined, size=0.6)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
         + p9.facet_wrap("panel", ncol=2)
         + scales(experiments, is_filled=False)
