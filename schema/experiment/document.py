@@ -5,6 +5,7 @@ refused with the nearest known one. Settings that cannot change a birth (workers
 folders, addresses) are flags of the commands, not keys.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 from math import pi
@@ -15,6 +16,7 @@ from msgspec import Meta, field, structs
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.migration import Migration
+from schema.experiment.robust import NoiseLevel, Robust
 from schema.experiment.section import (
     AtLeastOne,
     Count,
@@ -250,10 +252,6 @@ class Vetting(Section, frozen=True):
     tolerance_m: NotNegative = 1e-6
 
 
-NoiseLevel = Annotated[float, Meta(ge=0, le=1e6)]
-"""A standard deviation; within these bounds no arithmetic overflows."""
-
-
 class Simulation(Section, frozen=True):
     """Physics, noise, and clocks in physics steps.
 
@@ -276,6 +274,10 @@ class Simulation(Section, frozen=True):
             chatters above 2 servo_armature / timestep_s.
         contact_time_s: time constant of contacts [s].
         drop_m: height above the ground at the start [m].
+        start_deg: attitude of the core at the start, off-line: roll, pitch and yaw
+            about the world's x, y and z, in this order [degrees].
+        mass_factor: factor of all masses of robots.
+        torque_factor: factor of the greatest torque of all motors.
         evaluation_s: shortest and longest evaluation [s], warm-up included, off-line;
             each evaluation draws its own, and the window is its last part.
         sensor_noise: standard deviation of each reading [unit of the reading]: m/s2 and
@@ -283,6 +285,8 @@ class Simulation(Section, frozen=True):
         actuator_noise: standard deviation of each output before it is clipped to
             [0, 1], the range of its joint; the network's state has no noise.
     """
+
+    later: ClassVar = ("start_deg", "mass_factor", "torque_factor")
 
     timestep_s: Positive = 0.005
     brain_steps: AtLeastOne = 25
@@ -300,6 +304,9 @@ class Simulation(Section, frozen=True):
     evaluation_s: tuple[Positive, Positive] | None = None
     sensor_noise: NoiseLevel = 0.0
     actuator_noise: NoiseLevel = 0.0
+    start_deg: Vector = (0.0, 0.0, 0.0)
+    mass_factor: Positive = 1.0
+    torque_factor: Positive = 1.0
 
 
 class Fitness(PluginSection, frozen=True):
@@ -419,6 +426,7 @@ class Islands(Section, frozen=True):
         fitness: fitness function of these islands.
         arena: these islands are arenas.
         migration: exchange of migrants from and to these islands.
+        robust: evaluation of these islands' robots under drawn disturbances.
     """
 
     count: AtLeastOne = 1
@@ -431,6 +439,7 @@ class Islands(Section, frozen=True):
     fitness: Fitness | None = None
     arena: Arena | None = None
     migration: Migration | None = None
+    robust: Robust | None = None
 
 
 class Experiment(Section, frozen=True):
@@ -455,6 +464,8 @@ class Experiment(Section, frozen=True):
         measures: numbers recorded beside the fitness, on all islands.
         encoding: how genomes describe robots, on all islands.
         brain: type of the robots' brains, on all islands.
+        robust: evaluation under drawn disturbances, off-line; without it robots are
+            evaluated once.
     """
 
     name: str
@@ -473,6 +484,7 @@ class Experiment(Section, frozen=True):
     measures: Measures = Measures()
     encoding: Encoding = Encoding()
     brain: BrainSection = NETWORK
+    robust: Robust | None = None
 
     @property
     def window(self) -> int:
@@ -510,6 +522,15 @@ def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
     """Return the position of the light of a world [m]; None is no light."""
     own = None if arena is None else arena.light
     return own or environment.light
+
+
+def start_problems(simulation: Simulation) -> Iterator[str]:
+    """Yield what arenas do not support."""
+    if any(simulation.start_deg):
+        yield (
+            "simulation.start_deg: is for off-line evaluations; robots of an arena are "
+            "born upright with a drawn heading; remove it"
+        )
 
 
 def with_births(experiment: Experiment, births: int) -> Experiment:
