@@ -105,6 +105,9 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     shown["function"] = experiments.map(functions)
     in_panels = ["function", "panel"] if functions else "panel"
     lines = len(set(functions.values())) or 1
+    of_line = shown.groupby(["experiment", "population"])["bin"]
+    # The library warns of lines of one point.
+    joined = shown[of_line.transform("size") > 1]
     return (
         p9.ggplot(shown, p9.aes("at", "fitness"))
         + p9.geom_linerange(
@@ -114,7 +117,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
             alpha=0.6,
             show_legend=False,
         )
-        + p9.geom_line(p9.aes(colour="experiment"), size=0.6)
+        + p9.geom_line(p9.aes(colour="experiment"), data=joined, size=0.6)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
         + p9.facet_wrap(in_panels, ncol=2, scales="free_y" if functions else "fixed")
         + scales(experiments, is_filled=False)

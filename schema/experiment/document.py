@@ -121,8 +121,8 @@ class Variation(Section, frozen=True):
             are added, on average.
         body_epsilon: step size of the parameters of parts, as a share of the way to a
             random value.
-        brain_epsilon: step size of the parameters of neurons and connections, as a
-            share of the way to a random value.
+        brain_epsilon: step size of the parameters of neurons, of ``cpg`` brains also
+            of weights, as a share of the way to a random value.
         add_parts: ``loop`` may add several parts, ``once`` at most one; the expected
             number is what deletion removes, less what duplication adds.
         duplicable_size: size of subtrees in that number: their ``mean`` or ``sum``.
