@@ -14,6 +14,7 @@ from analysis.measures.measures import measure
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
+from schema.agent.import_path import safe_import_path
 
 _FEW = 3
 """Number of runs that are measured faster than another process starts."""
@@ -50,7 +51,8 @@ def measure_runs(
     if processes == 1 or len(runs) <= _FEW:
         yield from map(measure_run, runs, repeat(slots))
         return
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(processes, get_context("spawn"))
+    with safe_import_path(), pool:
         try:
             yield from pool.map(measure_run, runs, repeat(slots))
         except BaseException:

@@ -533,12 +533,6 @@ def start_problems(simulation: Simulation) -> Iterator[str]:
         )
 
 
-def with_births(experiment: Experiment, births: int) -> Experiment:
-    """Return an experiment with another number of births on each island."""
-    islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
-    return structs.replace(experiment, births=births, islands=islands)
-
-
 def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names.
 

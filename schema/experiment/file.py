@@ -32,16 +32,32 @@ _LONG_NUMBER = re.compile(rf"(?<!\w)[0-9][0-9A-Fa-f_xob]{{{MOST_DIGITS}}}")
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_KEY_PART}){{{MOST_KEY_PARTS}}}")
 
 
-def read_experiment(source: str) -> Experiment:
+def read_experiment(source: str, births: int | None = None) -> Experiment:
     """Return a shipped experiment by its name, or one from a TOML file.
 
     Args:
         source: ``scenario1``, or a path that ends in ``.toml``.
+        births: of ``--births``, in place of those of the document.
 
     Raises:
         ExperimentError: no such experiment or file, or an invalid document.
     """
-    return parse_experiment(*source_text(source))
+    tables, where = _tables(source, births)
+    named = where if births is None else f"{where} with --births {births}"
+    return _checked(_converted(tables, where), where, named)
+
+
+def _tables(source: str, births: int | None) -> tuple[dict[str, Any], str]:
+    """Return the tables of an experiment, with other births, and its path."""
+    text, where = source_text(source)
+    tables = parse_toml(text, where)
+    if births is not None:
+        tables["births"] = births
+        islands = tables.get("islands")
+        for island in islands if isinstance(islands, list) else ():
+            if isinstance(island, dict):
+                island.pop("births", None)
+    return tables, where
 
 
 def source_text(source: str) -> tuple[str, str]:
@@ -116,7 +132,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
         ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
             wrong type or outside its range; inconsistent values.
     """
-    return _checked(_converted(parse_toml(text, where), where), where)
+    return _checked(_converted(parse_toml(text, where), where), where, where)
 
 
 def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
@@ -129,13 +145,13 @@ def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
     Raises:
         ExperimentError: as for ``parse_experiment``.
     """
-    return _checked(_converted(document, where), where)
+    return _checked(_converted(document, where), where, where)
 
 
-def _checked(experiment: Experiment, where: str) -> Experiment:
+def _checked(experiment: Experiment, where: str, named: str) -> Experiment:
     """Return an experiment after the checks across its keys."""
     allow_references(references(experiment), Path(where).parent)
-    check_experiment(experiment, where)
+    check_experiment(experiment, named)
     return experiment
 
 
@@ -152,28 +168,30 @@ def own_experiment(text: str) -> Experiment:
     return experiment
 
 
-def draft_experiment(source: str) -> Experiment:
+def draft_experiment(source: str, births: int | None = None) -> Experiment:
     """Return an experiment before the checks across its keys; no plug-in is imported.
 
     The modules that it names may be imported by this process from now on.
 
     Args:
         source: as for ``read_experiment``.
+        births: as for ``read_experiment``.
 
     Raises:
         ExperimentError: as of ``own_references``.
     """
-    text, where = source_text(source)
-    experiment = _converted(parse_toml(text, where), where)
+    tables, where = _tables(source, births)
+    experiment = _converted(tables, where)
     allow_references(references(experiment), Path(where).parent)
     return experiment
 
 
-def own_references(source: str) -> list[str]:
+def own_references(source: str, births: int | None = None) -> list[str]:
     """Return the ``module:attribute`` that an experiment names; nothing is imported.
 
     Args:
         source: as for ``read_experiment``; a shipped one has none of its own.
+        births: as for ``read_experiment``.
 
     Raises:
         ExperimentError: the file cannot be read, or has an unknown key or a value of a
@@ -181,7 +199,7 @@ def own_references(source: str) -> list[str]:
     """
     if not source.endswith(".toml"):
         return []
-    return references(_converted(parse_toml(_text(source), source), source))
+    return references(_converted(*_tables(source, births)))
 
 
 def _converted(document: dict[str, Any], where: str) -> Experiment:
