@@ -49,6 +49,7 @@ from schema.experiment.document import (
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow, is_own
+from schema.tables.no_pandas import leave_out_pandas
 
 
 def main(arguments: list[str]) -> int:
@@ -68,6 +69,7 @@ def main(arguments: list[str]) -> int:
         return about_plugins(words, plugin_kinds())
     flags = run_flags(command)
     options = flags.parse_args(words)
+    leave_out_pandas()
     if command == "compare":
         return _compare(options)
     if command == "bench dispatch":
