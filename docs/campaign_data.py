@@ -252,3 +252,7 @@ class KeptOutcomes:
         found = np.asarray(self._rows[measure].to_numpy(), np.float64)[places]
         known: Numbers = found[~np.isnan(found)]
         return known
+
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the only fitness function: the kept runs have the thesis's."""
+        return ["locomotion"] if experiments else []

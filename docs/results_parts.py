@@ -196,8 +196,8 @@ def _grouped(tables: Tables, chosen: Callable[[Row], bool]) -> dict[Any, list[Ro
 
 def _name(row: Row) -> str:
     short = {"no-reproduction": "random", "no-selection": "drift"}
-    names: list[str] = [short.get(row[key], row[key]) for key in "ab" if row[key]]
-    return "/".join(name.removeprefix("scenario") for name in names)
+    names = [str(row[key]) for key in "ab" if row[key]]
+    return "/".join(short.get(name, name.removeprefix("scenario")) for name in names)
 
 
 def _topics(tables: Tables) -> str:

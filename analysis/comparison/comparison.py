@@ -1,5 +1,8 @@
 """Comparison of experiments with each other.
 
+Fitness is compared only between experiments with the same fitness function: numbers of
+different meanings have no difference.
+
 The unit is the run. Runs of different experiments with the same seed and number share
 their founders; treating them as independent, as is done here, is conservative.
 """
@@ -18,6 +21,9 @@ from analysis.measures.outputs import OUTCOME, schema
 from analysis.measures.population_table import Numbers
 from analysis.measures.study import MeasuredRun, reach
 
+OF_FITNESS = frozenset({"fitness", "fitness_best", "late_gain", "variability", "gain"})
+"""Measures whose values depend on the scale of the fitness function."""
+
 
 class RunOutcomes(Protocol):
     """Outcomes of the finished runs of experiments."""
@@ -31,6 +37,9 @@ class RunOutcomes(Protocol):
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
         """Return the runs' values of a measure; runs without a value are skipped."""
+
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the fitness functions of experiments, each once."""
 
 
 class Outcomes:
@@ -66,6 +75,11 @@ class Outcomes:
         values: Numbers = found[~np.isnan(found)]
         return values
 
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the fitness functions of experiments, each once."""
+        runs = (one.run for name in experiments for one in self._runs[name])
+        return list(dict.fromkeys(run.fitness for run in runs))
+
     def table(self) -> pa.Table:
         """Return the outcomes of all finished runs, at births that all reach."""
         rows: list[Row] = []
@@ -86,12 +100,16 @@ def comparison(outcomes: RunOutcomes) -> pa.Table:
 
     Returns:
         One row per measure and pair for which both experiments have values, with the
-        columns of ``outputs``.
+        columns of ``outputs``. Pairs with different fitness functions have no rows of
+        the measures ``OF_FITNESS``.
     """
     rows = []
     for a, b in combinations(outcomes.experiments, 2):
         births = outcomes.births(a, b)
+        is_alike = len(outcomes.fitness_functions(a, b)) == 1
         for measure in OUTCOME:
+            if measure in OF_FITNESS and not is_alike:
+                continue
             samples = [outcomes.values(name, measure, births) for name in (a, b)]
             if measure != "births" and all(map(len, samples)):
                 named = {"measure": measure, "a": a, "b": b, "births": births}

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.claims import ARENA, CLAIMS, Claim
-from analysis.comparison.comparison import RunOutcomes
+from analysis.comparison.comparison import OF_FITNESS, RunOutcomes
 from analysis.comparison.equivalence import (
     alike_p,
     alike_power,
@@ -54,6 +54,11 @@ class WithBenchmark:
             return self._outcomes.values(experiment, measure, births)
         return self._factors if measure == "real_time_factor" else np.empty(0)
 
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the fitness functions of experiments, each once; none of ``ARENA``."""
+        names = [name for name in experiments if name != ARENA]
+        return self._outcomes.fitness_functions(*names)
+
 
 def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     """Return the test of each finding of the thesis.
@@ -93,6 +98,10 @@ def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
         if name not in outcomes.experiments:
             why = f"no finished run of {name} could be measured"
             return {"verdict": "undecided", "why": why}
+    functions = outcomes.fitness_functions(*names)
+    if claim.measure in OF_FITNESS and len(functions) > 1:
+        why = f"different fitness functions: {', '.join(functions)}"
+        return {"verdict": "undecided", "why": why}
     births = outcomes.births(*names)
     if births < claim.births:
         why = f"means something from {claim.births} births on"
