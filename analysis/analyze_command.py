@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-from analysis.comparison.comparison import Outcomes, comparison, findings
+from analysis.comparison.comparison import Outcomes, comparison
+from analysis.comparison.findings import WithBenchmark, findings
 from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
@@ -70,7 +71,7 @@ def analyze(
     with bars(
         f"measuring {counted(len(runs), 'run')}", *columns, TimeRemainingColumn()
     ) as bar:
-        tables, left_out = _measured(runs, options, bar)
+        tables, left_out = _measured(runs, benchmark, options, bar)
         left_out = [*unread, *not_benchmarks, *left_out]
         # Before the figures: one that fails must not cost the measures.
         _write_measures(tables, left_out, options.out / MEASURES)
@@ -94,7 +95,7 @@ def analyze(
 
 
 def _measured(
-    runs: list[Run], options: argparse.Namespace, bar: Progress
+    runs: list[Run], benchmark: pa.Table, options: argparse.Namespace, bar: Progress
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     """Return the tables of all runs, and what was left out."""
     slots: SlotRule = "own" if options.slots == "own" else "parent"
@@ -107,7 +108,7 @@ def _measured(
     outcomes = Outcomes(measured)
     tables["outcomes"] = outcomes.table()
     tables["comparison"] = comparison(outcomes)
-    tables["findings"] = findings(outcomes)
+    tables["findings"] = findings(WithBenchmark(outcomes, benchmark))
     bar.remove_task(comparing)
     return tables, [one for run in measured for one in run.left_out]
 

@@ -182,7 +182,8 @@ FIGURES: tuple[Figure, ...] = (
     Figure("F", "The thesis's findings as effects",
            "Cliff's delta of a over b with its 95 % interval, or the rank-biserial "
            "correlation where an experiment is compared with a number. In brackets: "
-           "the thesis's finding (> greater, < smaller, = no large difference).",
+           "the thesis's finding (> greater, < smaller, = alike, != different). Each "
+           "mark of a line is a pair of experiments, or an experiment.",
            ("findings",), effects, "thesis"),
     Figure("H", "Measures over births",
            "Mean over the population of each measure that the experiment names. Each "

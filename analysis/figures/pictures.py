@@ -6,9 +6,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Rectangle
 
-from analysis.figures.family_tree import Family, ordered
+from analysis.figures.family_tree import ordered
 from analysis.figures.robot_pictures import FOUNDERS, Colour, RobotPicture
 from analysis.figures.style import label
+from analysis.measures.families import Family
 from schema.robot.ids import BirthId
 
 _INK, _FAINT = "#333333", "#9A9A9A"

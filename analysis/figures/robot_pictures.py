@@ -1,5 +1,6 @@
 """Renders the best robots, their gaits and their families."""
 
+import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ import numpy as np
 import pyarrow as pa
 from msgspec.structs import replace
 
-from analysis.figures.family_tree import Best, Family, family, lineage, row_of
+from analysis.figures.family_tree import LINEAGE, Best, lineage, row_of
+from analysis.measures.families import Family, family
 from analysis.render.picture import Picture, RobotRenderer, Simulate
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, island_experiment
@@ -107,8 +109,39 @@ def robot_picture(
     row = row_of(best, births)
     if row < 0:
         raise RunFolderError(f"{best.folder}: birth {best.birth} is not recorded")
+    found = family_picture(
+        best, births, family(births, row), experiment, simulate,
+        origin=origin, has_family=has_family,
+    )  # fmt: skip
+    return dataclasses.replace(found, lineage=lineage(births, best.experiment, row))
+
+
+def family_picture(
+    best: Best,
+    births: pa.Table,
+    relatives: Family,
+    experiment: Experiment,
+    simulate: Simulate,
+    *,
+    origin: Origin,
+    has_family: bool,
+) -> RobotPicture:
+    """Return pictures as ``robot_picture`` does, without the lineage.
+
+    Args:
+        best: the robot, the only one on the first level of its family.
+        births: ``island``, ``birth``, ``genome`` and ``robot`` of the family.
+        relatives: its family.
+        experiment: experiment of the run.
+        simulate: the worker's simulation.
+        origin: seed and run, which determine the noise.
+        has_family: render the family, too.
+
+    Raises:
+        SimulationDiverged: the physics diverged.
+    """
+    ((row,), *_) = relatives.levels
     settings = evaluation_settings_of(island_experiment(experiment, best.birth_island))
-    relatives = family(births, row)
     paint = dict(zip(relatives.founders, FOUNDERS, strict=False))
 
     def colour(gene: int) -> Colour:
@@ -141,7 +174,7 @@ def robot_picture(
         relatives if has_family else None,
         pictures,
         names,
-        lineage(births, best.experiment, row),
+        LINEAGE.empty_table(),
     )
 
 

@@ -1,6 +1,5 @@
 """Figures of single robots, their ancestors, and the findings of the thesis."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -181,32 +180,32 @@ def effects(tables: Tables) -> p9.ggplot:
     rows = tables["findings"].filter(pc.field("effect").is_valid())
     if not rows.num_rows:
         raise NothingToDraw("no finding has two finished runs of each experiment")
-    claims = [
-        f"{row['figure']}  {_in_words(row)}  ({row['expected']})"
-        for row in rows.to_pylist()
-    ]
-    named = rows.append_column("text", pa.array(claims))
+    shown = rows.filter(pc.field("expected") != "some").to_pylist()
+    if not shown:
+        raise NothingToDraw("no finding compares runs with each other or a number")
+    lines: dict[str, list[Any]] = {}
+    for row in shown:
+        text = f"{row['figure']}  {row['topic']}  ({row['expected']})"
+        lines.setdefault(text, []).append(row)
+    for height, group in enumerate(lines.values()):
+        for at, row in enumerate(group):
+            row["height"] = height + 0.7 * ((at + 0.5) / len(group) - 0.5)
+    named = pa.Table.from_pylist(shown)
     sure = named.filter(named["effect_low"].is_valid())
     figure = (
-        p9.ggplot(named.to_pandas(), p9.aes("text", "effect", colour="verdict"))
-        + p9.geom_hline(yintercept=0, colour="#999999", size=0.5)
-        + p9.geom_point(size=2)
-        + p9.scale_x_discrete(limits=claims[::-1])
+        p9.ggplot(named.to_pandas(), p9.aes("effect", "height", colour="verdict"))
+        + p9.geom_vline(xintercept=0, colour="#999999", size=0.5)
+        + p9.geom_point(size=1.4)
+        + p9.scale_y_reverse(
+            breaks=list(range(len(lines))), labels=list(lines), expand=(0, 0.6)
+        )
         + p9.scale_colour_manual(_VERDICTS, name="")
-        + p9.coord_flip(ylim=(-1, 1))
-        + p9.labs(x="", y="effect")
-        + theme_of_size(1.2 + 0.16 * len(claims), 9.0)
-        + p9.theme(axis_text_y=p9.element_text(size=8))
+        + p9.coord_cartesian(xlim=(-1, 1))
+        + p9.labs(x="effect", y="")
+        + theme_of_size(1.2 + 0.24 * len(lines), 9.0)
+        + p9.theme(axis_text_y=p9.element_text(size=7.5))
     )
     if not sure.num_rows:
         return figure
-    ends = p9.aes(ymin="effect_low", ymax="effect_high")
-    return figure + p9.geom_linerange(ends, data=sure.to_pandas(), size=0.7)
-
-
-def _in_words(finding: Mapping[str, Any]) -> str:
-    """Return the claim of a finding with the labels of its experiments."""
-    text = str(finding["claim"])
-    for name in filter(None, (finding["a"], finding["b"])):
-        text = text.replace(name, label(name))
-    return text
+    ends = p9.aes(x="effect_low", xend="effect_high", yend="height")
+    return figure + p9.geom_segment(ends, data=sure.to_pandas(), size=0.5)

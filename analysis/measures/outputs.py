@@ -12,6 +12,7 @@ _KINDS = {
     "island": pa.int32(),
     "birth_island": pa.int32(),
     "is_last": pa.bool_(),
+    "near_automatic": pa.bool_(),
 }
 _RUN = {
     "experiment": "name of the experiment",
@@ -53,6 +54,8 @@ POPULATION = {
     **{name: f"mean of judged robots: {what}" for name, what in BODY.items()},
     **{name: f"mean of judged robots: {what}" for name, what in PER_PART.items()},
     "without_touch": "share of judged robots without touch sensors",
+    "one_touch": "share of judged robots with one touch sensor",
+    "two_touch": "share of judged robots with two or more touch sensors",
 }
 """Measures of a population at a number of births."""
 
@@ -71,6 +74,14 @@ OUTCOME = {
     "variability": "median of the robots' variability (on-line)",
     "touched": "share of robots that ever touched another robot (on-line)",
     "between": "mean tree edit distance between islands",
+    "gain": "fitness of the last population minus that of the founders",
+    "size_mean": "mean over the run's births of the number of living robots",
+    "retention_fitness": "rank correlation of retention and fitness over births",
+    "parts_fitness": "rank correlation of fitness and parts, all robots",
+    "family_distance": "distance within the best robot's family / among founders",
+    "family_founders": "number of founders whose parts are in that family",
+    "touching": "contact time of robots divided by their lifetimes (on-line)",
+    "real_time_factor": "simulated by wall-clock time of 30 robots (bench arena)",
 }
 """Outcome of a run: one number per measure, by which experiments are compared."""
 
@@ -155,6 +166,14 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "within": "mean over islands of their diversity",
         "between": "mean tree edit distance of pairs on different islands",
     },
+    "families": {
+        **_ISLAND,
+        "birth": "number of birth of the fittest robot of the last population",
+        "members": "robots of its family: its ancestors of five levels, and itself",
+        "distance": "mean tree edit distance of pairs of the family",
+        "founder_distance": "mean tree edit distance of pairs of robots born first",
+        "founders": "founders whose parts are in the family; null if unknown",
+    },
     "migrants": {
         **_RUN,
         "epoch": "migration epoch",
@@ -198,11 +217,18 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "measure": "column of outcomes",
         "a": "experiment",
         "b": "experiment; empty if a is compared with a number",
-        "expected": "'>', '<' or '=' (no large difference) of a against b",
+        "expected": "'>', '<', '=' (alike), '!=' or 'some' (occurs) of a against b",
         "births": OUTCOME["births"],
         **_TWO_SAMPLES,
-        "verdict": "reproduced, not reproduced or undecided",
+        "verdict": "reproduced, not reproduced, undecided or does not apply",
         "why": "the rule of the verdict",
+        "topic": "the finding without the names of experiments",
+        "margin": "largest negligible effect, or difference if there is no b; with "
+        "'=', the largest that counts as alike",
+        "p_alike": "p of the equivalence test (two one-sided tests), with '='",
+        "q_alike": "p_alike, corrected for all equivalence tests of the table",
+        "power": "probability that this test finds equal experiments alike at 5 %",
+        "near_automatic": "whether the finding follows almost by construction",
     },
     "left_out": {
         "folder": "path of the run folder; empty for figures",
@@ -215,9 +241,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
              "runs_a", "runs_b", "failures", "deaths", "finding", "births",
-             "birth"}  # fmt: skip
+             "birth", "members", "founders"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
-          "figure", "claim", "expected", "verdict", "why", "what",
+          "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "differs", "function", "fitness_function", "plugins"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 

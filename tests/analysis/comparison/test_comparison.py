@@ -9,8 +9,10 @@ import pyarrow as pa
 import pytest
 
 from analysis.comparison.claims import CLAIMS, Claim
-from analysis.comparison.comparison import Outcomes, comparison, findings, verdict
+from analysis.comparison.comparison import Outcomes, comparison
+from analysis.comparison.findings import findings
 from analysis.comparison.outcomes import outcome
+from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
 from analysis.measures.load import IslandSettings, Run
 from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
 from analysis.measures.study import MeasuredRun
@@ -221,6 +223,8 @@ def test_the_rules_of_verdicts(
     expected: str, effect: float, q: float, ends: tuple[float, float], decided: str
 ) -> None:
     row = {"effect": effect, "q": q, "effect_low": ends[0], "effect_high": ends[1]}
+    row |= {"runs_b": 30, "margin": LARGE if expected == "=" else NEGLIGIBLE}
+    row["q_alike"] = 0.01 if max(map(abs, ends)) < LARGE else 0.2
     assert verdict(expected, row)[0] == decided
 
 
@@ -228,4 +232,10 @@ def test_claims_name_existing_measures() -> None:
     assert {claim.measure for claim in CLAIMS} <= set(OUTCOME)
     figures = [tuple(map(int, claim.figure.split("."))) for claim in CLAIMS]
     assert figures == sorted(figures)
-    assert {figure for _, figure in figures} == {*range(2, 10), 12, 14, 15, 16}
+    of_chapter_6 = {*range(2, 10), *range(11, 17), 18, 19, 20}
+    assert {*figures} == {
+        *((6, figure) for figure in of_chapter_6),
+        (7, 1, 2),
+        (7, 2, 1),
+    }
+    assert len({claim.text for claim in CLAIMS}) == len(CLAIMS)

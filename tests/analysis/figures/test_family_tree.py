@@ -10,7 +10,6 @@ from matplotlib.image import AxesImage
 from analysis.figures.family_tree import (
     Best,
     best_robots,
-    family,
     lineage,
     ordered,
     row_of,
@@ -18,6 +17,7 @@ from analysis.figures.family_tree import (
 from analysis.figures.pictures import family_tree, gaits
 from analysis.figures.robot_pictures import FOUNDERS, RobotPicture
 from analysis.figures.robots import lineages
+from analysis.measures.families import family
 from analysis.measures.outputs import schema
 from schema.robot.ids import BirthId
 from tests.analysis.bodies import Body, part
