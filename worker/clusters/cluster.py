@@ -7,6 +7,7 @@ an interval independently and keeps its states at the interval's moments.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import mujoco
 import numpy as np
@@ -17,7 +18,6 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.clusters.bounds import Indices
 from worker.robot.motors import Servos
 from worker.robot.recording import Probe, probed_channels, step_with
 from worker.robot.sensors import Sensors
@@ -114,6 +114,7 @@ class StateHistory:
         state: (K, W) all of ``Cluster.live``.
         qpos, qvel: positions and velocities of it, (K, Q) and (K, V).
         warnings: (K, N) the engine's counts of each of its warnings.
+        rows: views of the rows of all these, to which ``Cluster.views`` are copied.
         touching: pairs of members in contact, if they are recorded.
         probed: numbers of the members' probes, if there are any.
     """
@@ -124,25 +125,16 @@ class StateHistory:
         ends = np.cumsum(cluster.sizes).tolist()
         parts = np.split(self.state, ends[:-1], axis=1)
         self.qpos, self.qvel = parts[:2]
-        self._warning_counts: Indices = cluster.data.warning.number
-        self.warnings = np.zeros((count, len(self._warning_counts)), dtype=np.intp)
+        warnings = cluster.data.warning.number
+        self.warnings = np.zeros((count, len(warnings)), dtype=warnings.dtype)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
-        self._probes = cluster.probes
         self.probed: list[list[Floats]] = [[] for _ in range(count)]
-        # Copies between views of bytes are faster than between arrays.
-        self._live = [_bytes(array) for array in cluster.live]
-        self._rows = [[_bytes(array[k]) for array in parts] for k in range(count)]
+        # Copies between memory views are faster than between arrays.
+        kept = *parts, self.warnings
+        self.rows = [[array[k].data for array in kept] for k in range(count)]
 
     def __len__(self) -> int:
-        return len(self._rows)
-
-    def keep(self, moment: int) -> None:
-        """Copy the present state to the row of a moment."""
-        qpos, qvel, xpos, xmat = self._rows[moment]
-        qpos[:], qvel[:], xpos[:], xmat[:] = self._live
-        self.warnings[moment] = self._warning_counts
-        if self._probes:
-            self.probed[moment] = [probe.numbers.copy() for probe in self._probes]
+        return len(self.rows)
 
 
 class Cluster:
@@ -191,6 +183,8 @@ class Cluster:
         self.probes = [view.probe for view in self.views if view.probe is not None]
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
+        self._contacts = self.data.contact
+        self._live = [a.data for a in (*self.live, self.data.warning.number)]
         self.history = StateHistory(self, 0)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
@@ -209,7 +203,7 @@ class Cluster:
         """
         if len(self.history) < len(plan):
             self.history = StateHistory(self, len(plan))
-        model, data, keep = self.model, self.data, self.history.keep
+        model, data, live, rows = self.model, self.data, self._live, self.history.rows
         for moment in range(first, len(plan)):
             try:
                 step_with(self._working, model, data, plan[moment])
@@ -217,9 +211,12 @@ class Cluster:
                 self.failure, self.failed_at = one_line(error), moment
                 self.keep(range(moment, len(plan)))
                 return
-            for probe in self.probes:
-                probe.read()
-            keep(moment)
+            qpos, qvel, xpos, xmat, warnings = rows[moment]
+            qpos[:], qvel[:], xpos[:], xmat[:], warnings[:] = live
+            if self.probes:
+                for probe in self.probes:
+                    probe.read()
+                self._keep_probed(moment)
             if self._records_contacts:
                 self.history.touching[moment] = self.touching()
         self._read_touched()
@@ -229,9 +226,15 @@ class Cluster:
         if len(self.history) < moments.stop:
             self.history = StateHistory(self, moments.stop)
         for moment in moments:
-            self.history.keep(moment)
+            for row, live in zip(self.history.rows[moment], self._live, strict=True):
+                row[:] = live
+            self._keep_probed(moment)
             self.history.touching[moment] = self.touching()
         self._read_touched()
+
+    def _keep_probed(self, moment: int) -> None:
+        numbers = [probe.numbers.copy() for probe in self.probes]
+        self.history.probed[moment] = numbers
 
     def rewind(self, moment: int) -> None:
         """Set positions and velocities to those of a moment of the interval."""
@@ -248,20 +251,16 @@ class Cluster:
             return []
         owners = self._owners
         # Plain numbers, as contacts are few and most of them with the ground.
-        geoms: list[list[int]] = self.data.contact.geom.tolist()
+        geoms: list[list[int]] = self._contacts.geom.tolist()
         pairs = {(owners[first], owners[second]) for first, second in geoms}
         return sorted({(min(p), max(p)) for p in pairs if p[0] != p[1] and min(p) >= 0})
 
     def _read_touched(self) -> None:
         if self._has_pads:
-            geoms: list[int] = self.data.contact.geom.ravel().tolist()
-            self.touched = frozenset(geoms)
+            geoms: list[list[int]] = self._contacts.geom.tolist()
+            self.touched = frozenset(chain.from_iterable(geoms))
 
     def reset(self) -> None:
         """Reset the state to the model's initial one."""
         mujoco.mj_resetData(self.model, self.data)
         self.failure, self.failed_at = "", NEVER
-
-
-def _bytes(array: Floats) -> memoryview:
-    return array.data.cast("B")
