@@ -114,7 +114,6 @@ class StateHistory:
         state: (K, W) all of ``Cluster.live``.
         qpos, qvel: positions and velocities of it, (K, Q) and (K, V).
         warnings: (K, N) the engine's counts of each of its warnings.
-        rows: views of the rows of all these, to which ``Cluster.views`` are copied.
         touching: pairs of members in contact, if they are recorded.
         probed: numbers of the members' probes, if there are any.
     """
@@ -129,12 +128,29 @@ class StateHistory:
         self.warnings = np.zeros((count, len(warnings)), dtype=warnings.dtype)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
         self.probed: list[list[Floats]] = [[] for _ in range(count)]
-        # Copies between memory views are faster than between arrays.
-        kept = *parts, self.warnings
-        self.rows = [[array[k].data for array in kept] for k in range(count)]
+        # Copies between memory views are faster than between arrays, and one view of
+        # all rows is faster than one of each, as few of them stay in the caches.
+        self._cells = self.state.reshape(-1).data
+        self._counts = self.warnings.reshape(-1).data
+        self._live = [array.data for array in (*cluster.live, warnings)]
+        self._ends = *ends, len(warnings)
+        self._count = count
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return self._count
+
+    def keep(self, moment: int) -> None:
+        """Copy the present state and warnings to the rows of a moment."""
+        cells, counts = self._cells, self._counts
+        qpos, qvel, xpos, xmat, warnings = self._live
+        first, second, third, width, kinds = self._ends
+        at = moment * width
+        cells[at : at + first] = qpos
+        cells[at + first : at + second] = qvel
+        cells[at + second : at + third] = xpos
+        cells[at + third : at + width] = xmat
+        at = moment * kinds
+        counts[at : at + kinds] = warnings
 
 
 class Cluster:
@@ -184,7 +200,6 @@ class Cluster:
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
         self._contacts = self.data.contact
-        self._live = [a.data for a in (*self.live, self.data.warning.number)]
         self.history = StateHistory(self, 0)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
@@ -203,7 +218,7 @@ class Cluster:
         """
         if len(self.history) < len(plan):
             self.history = StateHistory(self, len(plan))
-        model, data, live, rows = self.model, self.data, self._live, self.history.rows
+        model, data, keep = self.model, self.data, self.history.keep
         for moment in range(first, len(plan)):
             try:
                 step_with(self._working, model, data, plan[moment])
@@ -211,8 +226,7 @@ class Cluster:
                 self.failure, self.failed_at = one_line(error), moment
                 self.keep(range(moment, len(plan)))
                 return
-            qpos, qvel, xpos, xmat, warnings = rows[moment]
-            qpos[:], qvel[:], xpos[:], xmat[:], warnings[:] = live
+            keep(moment)
             if self.probes:
                 for probe in self.probes:
                     probe.read()
@@ -226,8 +240,7 @@ class Cluster:
         if len(self.history) < moments.stop:
             self.history = StateHistory(self, moments.stop)
         for moment in moments:
-            for row, live in zip(self.history.rows[moment], self._live, strict=True):
-                row[:] = live
+            self.history.keep(moment)
             self._keep_probed(moment)
             self.history.touching[moment] = self.touching()
         self._read_touched()
