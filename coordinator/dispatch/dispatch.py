@@ -271,9 +271,7 @@ class Dispatch:
             self._faults.note("malformed", event.agent, str(error))
             return None, str(error)
 
-    def _learn(
-        self, pending: Pending, agent: AgentState, took_s: float | None
-    ) -> None:
+    def _learn(self, pending: Pending, agent: AgentState, took_s: float | None) -> None:
         """Note how long an agent took for a job, which it no longer holds.
 
         The time between ticks is at least a pause of the coordinator: it is too long
