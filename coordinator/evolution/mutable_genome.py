@@ -247,7 +247,10 @@ def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Size
         outputs, hidden = len(branch.outputs), len(branch.hidden)
         for child in branch.children.values():
             p, i, o, h = sums[child]
-            parts, inputs, outputs, hidden = parts + p, inputs + i, outputs + o, hidden + h
+            parts += p
+            inputs += i
+            outputs += o
+            hidden += h
         sums[branch] = SizeCounts(parts, inputs, outputs, hidden)
     return dict(reversed(sums.items()))
 

@@ -87,7 +87,7 @@ class Brain:
 
     def count(self, layer: Layer) -> int:
         """Return the number of neurons in a layer."""
-        return sum([neuron.layer == layer for neuron in self.neurons])
+        return sum(neuron.layer == layer for neuron in self.neurons)
 
 
 def check_brain(brain: Brain, part_count: int) -> None:

@@ -49,12 +49,10 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     return {
         "parts": len(robot.parts),
         "joints": sum(
-            [
-                kind.shape(part.parameters).joint is not None
-                for kind, part in zip(kinds, robot.parts, strict=True)
-            ]
+            kind.shape(part.parameters).joint is not None
+            for kind, part in zip(kinds, robot.parts, strict=True)
         ),
-        "motors": sum([kind.outputs for kind in kinds]),
+        "motors": sum(kind.outputs for kind in kinds),
         "extremities": len(robot.parts) + 1 - len(parents),
         "inputs": brain.count("input"),
         "outputs": brain.count("output"),

@@ -14,6 +14,7 @@ from coordinator.evolution.mutable_genome import (
     preorder,
     size_limits,
     size_of,
+    to_branches,
     to_genome,
     to_mutable,
 )
