@@ -31,6 +31,7 @@ COMMANDS = {
     "robot simulate": ("worker.robot_command", "simulate a robot and show its fitness"),
     "view": ("analysis.__main__", "view a run, live or from its tables"),
     "analyze": ("analysis.__main__", "compute measures, figures and a report"),
+    "robustness": ("revolve.cli.robustness", "re-evaluate a run under changes"),
     "completion": ("revolve.cli.completion", "print a completion script for a shell"),
     "bench": ("worker.__main__", "benchmark this machine"),
     "bench dispatch": (_COORDINATOR, "benchmark the coordinator"),
