@@ -44,6 +44,7 @@ from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow, is_own
+from schema.tables.arrow import skip_pandas
 
 
 def main(arguments: list[str]) -> int:
@@ -63,6 +64,7 @@ def main(arguments: list[str]) -> int:
         return about_plugins(words, plugin_kinds())
     flags = run_flags(command)
     options = flags.parse_args(words)
+    skip_pandas()
     if command == "compare":
         return _compare(options)
     if command == "bench dispatch":
