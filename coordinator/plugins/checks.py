@@ -21,10 +21,10 @@ from coordinator.storage.folder import holds_run, read_details
 from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
 from schema.experiment.document import Experiment, references
 from schema.experiment.file import (
-    draft_experiment,
+    draft_experiments,
+    experiments_of,
     own_experiment,
     own_references,
-    read_experiment,
 )
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
 from schema.plugins.kept import allow_kept
@@ -48,7 +48,7 @@ def refuse_faulty(sources: Iterable[str]) -> None:
     Built-in plug-ins are not checked: the tests of this project do that.
 
     Args:
-        sources: as for ``read_experiment``.
+        sources: as for ``experiments_of``.
 
     Raises:
         ExperimentError: one cannot be loaded, breaks its contract, takes too long or
@@ -178,7 +178,7 @@ def check_here(
                     check(word, name, use)
                 if ":" not in word and not _is_folder(Path(word)):
                     # What the run would refuse besides plug-ins.
-                    read_experiment(word)
+                    experiments_of(word)
                 if not uses:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
@@ -228,9 +228,7 @@ def _uses(
     if not colon:
         folder = Path(word)
         is_folder = _is_folder(folder)
-        experiments = (
-            _experiments_of(folder) if is_folder else (draft_experiment(word),)
-        )
+        experiments = _experiments_of(folder) if is_folder else draft_experiments(word)
         for each, experiment in product(kinds, experiments):
             for use in each.used(experiment):
                 if is_own(use.path):

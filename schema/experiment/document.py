@@ -25,6 +25,7 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
+from schema.experiment.sweep import Sweep
 from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
@@ -441,6 +442,8 @@ class Experiment(Section, frozen=True):
         measures: numbers recorded beside the fitness, on all islands.
         encoding: how genomes describe robots, on all islands.
         brain: type of the robots' brains, on all islands.
+        sweep: makes the document a campaign of experiments that differ in some
+            settings.
     """
 
     name: str
@@ -459,6 +462,7 @@ class Experiment(Section, frozen=True):
     measures: Measures = Measures()
     encoding: Encoding = Encoding()
     brain: BrainSection = NETWORK
+    sweep: Sweep | None = None
 
     @property
     def window(self) -> int:
