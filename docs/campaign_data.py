@@ -327,3 +327,7 @@ class KeptOutcomes:
         is_of = pc.field("experiment") == experiment
         rows = self._rows.filter(is_of & (pc.field("births") == births))
         return np.asarray(rows[measure].drop_null(), np.float64)
+
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the only fitness function: the kept runs have the thesis's."""
+        return ["locomotion"] if experiments else []

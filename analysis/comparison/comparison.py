@@ -1,5 +1,8 @@
 """Comparison of experiments with each other, and with the findings of the thesis.
 
+Fitness is compared only between experiments with the same fitness function: numbers of
+different meanings have no difference.
+
 The unit is the run. Runs of different experiments with the same seed and number share
 their founders; treating them as independent, as is done here, is conservative.
 """
@@ -29,6 +32,8 @@ from analysis.measures.study import MeasuredRun, reach
 SURE = 0.05
 NEGLIGIBLE, LARGE = 0.147, 0.474
 """Bounds of Cliff's delta. Source: Romano et al., 2006, after Cohen's d."""
+OF_FITNESS = frozenset({"fitness", "fitness_best", "late_gain", "variability"})
+"""Measures whose values depend on the scale of the fitness function."""
 
 Row = dict[str, Any]
 
@@ -45,6 +50,9 @@ class RunOutcomes(Protocol):
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
         """Return the runs' values of a measure; runs without a value are skipped."""
+
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the fitness functions of experiments, each once."""
 
 
 class Outcomes:
@@ -80,6 +88,11 @@ class Outcomes:
         known: Numbers = found[~np.isnan(found)]
         return known
 
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the fitness functions of experiments, each once."""
+        runs = (one.run for name in experiments for one in self._runs[name])
+        return list(dict.fromkeys(run.fitness for run in runs))
+
     def table(self) -> pa.Table:
         """Return the outcomes of all finished runs, at births that all reach."""
         rows: list[Row] = []
@@ -100,12 +113,16 @@ def comparison(outcomes: RunOutcomes) -> pa.Table:
 
     Returns:
         One row per measure and pair for which both experiments have values, with the
-        columns of ``outputs``.
+        columns of ``outputs``. Pairs with different fitness functions have no rows of
+        the measures ``OF_FITNESS``.
     """
     rows = []
     for a, b in combinations(outcomes.experiments, 2):
         births = outcomes.births(a, b)
+        is_alike = len(outcomes.fitness_functions(a, b)) == 1
         for measure in OUTCOME:
+            if measure in OF_FITNESS and not is_alike:
+                continue
             samples = [outcomes.values(name, measure, births) for name in (a, b)]
             if measure != "births" and all(map(len, samples)):
                 named = {"measure": measure, "a": a, "b": b, "births": births}
@@ -149,6 +166,10 @@ def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
         if name not in outcomes.experiments:
             why = f"no finished run of {name} could be measured"
             return {"verdict": "undecided", "why": why}
+    functions = outcomes.fitness_functions(*names)
+    if claim.measure in OF_FITNESS and len(functions) > 1:
+        why = f"different fitness functions: {', '.join(functions)}"
+        return {"verdict": "undecided", "why": why}
     births = outcomes.births(*names)
     samples = [outcomes.values(name, claim.measure, births) for name in names]
     if min(map(len, samples)) <= 1:

@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.statistics import half_interval
-from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables
+from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables, fitness_panels
 from analysis.figures.style import (
     in_order,
     integer_breaks,
@@ -71,7 +71,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     """Return the mean fitness of robots by their extremities, over runs.
 
     Args:
-        tables: ``extremities``.
+        tables: ``extremities``; ``runs`` for the panels of fitness functions.
         by: "count" or "per_part".
 
     Raises:
@@ -98,6 +98,10 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     shown["at"] = shown["bin"] + start + _DODGE * width * aside
     panels = shown["population"].astype("category").cat.set_categories([*_POPULATIONS])
     shown["panel"] = panels.cat.rename_categories(_POPULATIONS)
+    functions = fitness_panels(tables)
+    shown["function"] = experiments.map(functions)
+    in_panels = ["function", "panel"] if functions else "panel"
+    lines = len(set(functions.values())) or 1
     return (
         p9.ggplot(shown, p9.aes("at", "fitness"))
         + p9.geom_linerange(
@@ -109,11 +113,11 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         )
         + p9.geom_line(p9.aes(colour="experiment"), size=0.6)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
-        + p9.facet_wrap("panel", ncol=2)
+        + p9.facet_wrap(in_panels, ncol=2, scales="free_y" if functions else "fixed")
         + scales(experiments, is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x=axis, y="mean fitness")
-        + theme_of_size(3.6)
+        + theme_of_size(0.6 + 3.0 * lines)
     )
 
 

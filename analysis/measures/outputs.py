@@ -42,8 +42,8 @@ PER_PART = {
 POPULATION = {
     "size": "living robots",
     "judged": "living robots whose fitness counts: off-line all, on-line mature ones",
-    "fitness": "mean of judged robots [m/s]",
-    "fitness_best": "maximum of judged robots [m/s]",
+    "fitness": "mean of judged robots, in the unit of the fitness function",
+    "fitness_best": "maximum of judged robots, in the same unit",
     "rank": "mean of judged robots (thesis eq. 6.1)",
     "ancestors": "different ancestors of all judged robots together",
     "ancestors_per_robot": "ancestors divided by judged",
@@ -104,13 +104,19 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "function": "fitness function",
         "failures": "failed evaluations, and robots of arenas whose physics diverged",
         "duration_s": "time from the start to the end of the run, pauses included [s]",
+        "fitness_function": "fitness function, its parameters and the digest of its "
+        "source; only runs with the same text have comparable fitness",
+        "plugins": "plug-in modules and the digests of their sources",
+        "deaths": "robots of arenas that died; null without an arena",
+        "simulated_s": "simulated time of the arenas up to the last sample of fitness; "
+        "null without an arena [s]",
     },
     "populations": {**_ISLAND, **POPULATION},
     "robots": {
         **_RUN,
         **_ROBOT,
         "is_last": "whether it is judged in an island's last population",
-        "fitness": "last fitness; off-line 0 if the evaluation failed [m/s]",
+        "fitness": "last fitness; off-line 0 if the evaluation failed",
         "rank": "rank (thesis eq. 6.1)",
         "ancestors": "number of different ancestors",
         **BODY,
@@ -122,15 +128,15 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "by": "'count': by extremities; 'per_part': by extremities_per_part",
         "bin": "number of extremities, or lower end of a bin of width 0.1",
         "robots": "number of robots in the bin",
-        "fitness": "mean fitness of the bin [m/s]",
+        "fitness": "mean fitness of the bin",
     },
     "variability": {
         **_RUN,
         "island": "island that it lived on",
         **_ROBOT,
         "samples": "fitness samples of the mature robot",
-        "fitness_range": "greatest minus least of its fitness [m/s]",
-        "population_range": "range of all fitness samples during its life [m/s]",
+        "fitness_range": "greatest minus least of its fitness",
+        "population_range": "range of all fitness samples during its life",
         "variability": "fitness_range divided by population_range",
     },
     "interactions": {
@@ -155,7 +161,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         **_ROBOT,
         "island": "island that it left",
         "to": "island that it went to",
-        "fitness": "fitness when it left [m/s]",
+        "fitness": "fitness when it left",
         "descendants": "descendants born on island 'to'",
         "living": "descendants in that island's last population, itself included",
         "reached": "islands whose last population contains it or a descendant",
@@ -208,10 +214,11 @@ OUTPUTS: dict[str, dict[str, str]] = {
 
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
-             "runs_a", "runs_b", "failures", "finding", "births", "birth"}  # fmt: skip
+             "runs_a", "runs_b", "failures", "deaths", "finding", "births",
+             "birth"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
           "figure", "claim", "expected", "verdict", "why", "what",
-          "differs", "function"}  # fmt: skip
+          "differs", "function", "fitness_function", "plugins"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

@@ -107,6 +107,7 @@ def _wanted(run: Run) -> frozenset[str]:
 def _summary(
     run: Run, tables: Mapping[str, pa.Table], unread: frozenset[str]
 ) -> pa.Table:
+    has_arena = any(island.is_online for island in run.islands)
     row = {
         "run": run.number,
         "seed": run.seed,
@@ -116,10 +117,20 @@ def _summary(
         "islands": len(run.islands),
         "differs": run.differs,
         "function": run.function,
+        "fitness_function": run.fitness,
+        "plugins": " ".join(f"{name}={digest}" for name, digest in run.plugins.items()),
+        "deaths": tables["deaths"].num_rows if has_arena else None,
+        "simulated_s": _simulated_s(tables) if has_arena else None,
         "failures": None if unread & {"evaluations", "deaths"} else _failures(tables),
         "duration_s": read_duration_s(run.folder),
     }
     return pa.Table.from_pylist([row], run_schema("runs"))
+
+
+def _simulated_s(tables: Mapping[str, pa.Table]) -> float | None:
+    """Return the greatest time of a sample of fitness [s]; None without samples."""
+    latest: float | None = pc.max(tables["fitness"]["sim_time_s"]).as_py()
+    return latest
 
 
 def _failures(tables: Mapping[str, pa.Table]) -> int:

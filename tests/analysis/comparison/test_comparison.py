@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -105,6 +106,33 @@ def test_every_measure_of_every_pair_is_compared_once() -> None:
     assert first["p"] == pytest.approx(0.1)
     assert first["q"] >= first["p"]
     assert first["difference_low"] < 3 < first["difference_high"]
+
+
+def test_fitness_is_compared_only_with_the_same_function() -> None:
+    """The function of c is another one; sizes of its robots are compared."""
+    levels = [{"births": 15, "fitness": 0.1, "parts": 1.0, "fitness_best": 9.0}]
+    made = []
+    for name, function in (("a", "f"), ("b", "f"), ("c", "g")):
+        for number in range(2):
+            one = measured(name, number, tables(levels))
+            made.append(replace(one, run=replace(one.run, fitness=function)))
+    outcomes = Outcomes(made)
+    rows = comparison(outcomes).to_pylist()
+    found = {(row["a"], row["b"]): set() for row in rows}
+    for row in rows:
+        found[row["a"], row["b"]].add(row["measure"])
+    assert {"fitness", "fitness_best", "parts"} <= found["a", "b"]
+    for pair in (("a", "c"), ("b", "c")):
+        assert not found[pair] & {"fitness", "fitness_best", "late_gain"}
+        assert "parts" in found[pair]
+    claims = [Claim("1", "fitter", "fitness", "a", ">", "c"),
+              Claim("2", "larger", "parts", "a", ">", "c")]  # fmt: skip
+    fitter, larger = findings(outcomes, claims).to_pylist()
+    assert (fitter["verdict"], fitter["why"]) == (
+        "undecided",
+        "different fitness functions: f, g",
+    )
+    assert (fitter["p"], larger["p"]) == (None, 1.0)
 
 
 def test_experiments_are_compared_at_births_that_all_runs_reach() -> None:
