@@ -30,7 +30,15 @@ BIRTHS = "the births tables of the runs"
 _BENCHMARK = "the benchmark file"
 
 Section = Literal[
-    "fitness", "robots", "bodies", "diversity", "islands", "measures", "speed", "thesis"
+    "sweeps",
+    "fitness",
+    "robots",
+    "bodies",
+    "diversity",
+    "islands",
+    "measures",
+    "speed",
+    "thesis",
 ]
 """Section of the report that shows a figure."""
 

@@ -21,6 +21,7 @@ from analysis.figures.robot_pictures import (
     shown_document,
 )
 from analysis.figures.style import PICTURE_ENDING, in_order, label, save
+from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
@@ -87,7 +88,7 @@ class FigureWriter:
             folder: an existing folder.
         """
         self._folder = folder
-        for pattern in ("G-*.p??", f"{_FILM}*.gif", _EARLIER):
+        for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif", _EARLIER):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
@@ -160,6 +161,7 @@ def draw_figures(
     for figure in FIGURES:
         writer.add(figure, given)
         bar.advance(task)
+    _add_sweeps(writer, given)
     _add_gaits(writer, list(pictures.values()), problems)
     bar.advance(task)
     for name in trees:
@@ -172,6 +174,23 @@ def draw_figures(
     films = [writer.add_film(one) for one in pictures.values()]
     figures = sorted(writer.drawn, key=_place)
     return Drawings(figures, films, problems, writer.left_out)
+
+
+def _add_sweeps(writer: FigureWriter, tables: Tables) -> None:
+    """Draw the map of each sweep."""
+    if "sweeps" not in tables:
+        return
+    for name in in_order(tables["sweeps"]["experiment"].to_pylist()):
+        figure = Figure(
+            f"S-{name}",
+            f"Outcomes of the sweep {label(name)}",
+            partial(sweep_caption, experiment=name),
+            ("sweeps", "outcomes"),
+            partial(sweep_map, experiment=name),
+            "sweeps",
+            f"sweep-{name}",
+        )
+        writer.add(figure, tables)
 
 
 def _robot_pictures(

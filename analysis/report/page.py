@@ -125,6 +125,7 @@ def _sections(
 
     return {
         "overview": ("Overview", _overview(tables, courses)),
+        "sweeps": ("Sweeps", shown("sweeps")),
         "robots": ("Best robots", _films(tables, drawings) + shown("robots")),
         "fitness": ("Fitness", last + shown("fitness")),
         "comparison": ("Comparison", all_differences(tables)),

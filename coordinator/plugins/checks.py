@@ -27,10 +27,10 @@ from schema.experiment.document import (
     references,
 )
 from schema.experiment.file import (
-    draft_experiment,
+    draft_experiments,
+    experiments_of,
     own_experiment,
     own_references,
-    read_experiment,
 )
 from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
@@ -57,8 +57,8 @@ def refuse_faulty(sources: Iterable[str], births: int | None = None) -> None:
     Built-in plug-ins are not checked: the tests of this project do that.
 
     Args:
-        sources: as for ``read_experiment``.
-        births: as for ``read_experiment``.
+        sources: as for ``experiments_of``.
+        births: as for ``experiments_of``.
 
     Raises:
         ExperimentError: one cannot be loaded, breaks its contract, takes too long or
@@ -194,18 +194,21 @@ def check_here(
                 for name, use in uses:
                     check(word, name, use)
                 if ":" not in word and not _is_folder(Path(word)):
-                    # What the run would refuse besides plug-ins.
-                    experiment = read_experiment(word, births)
-                    with _time_limit(limit_s):
-                        for number in range(island_count(experiment)):
-                            own = island_experiment(experiment, number)
-                            check_fitness_keys(own.fitness)
+                    _check_document(word, births, limit_s)
                 if not uses:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
                 is_fine = False
                 say("fault", one_line(error))
     return is_fine
+
+
+def _check_document(source: str, births: int | None, limit_s: float) -> None:
+    """Raise what a run would refuse besides plug-ins."""
+    for experiment in experiments_of(source, births):
+        with _time_limit(limit_s):
+            for number in range(island_count(experiment)):
+                check_fitness_keys(island_experiment(experiment, number).fitness)
 
 
 def _is_folder(folder: Path) -> bool:
@@ -250,7 +253,7 @@ def _uses(
         folder = Path(word)
         is_folder = _is_folder(folder)
         experiments = (
-            _experiments_of(folder) if is_folder else (draft_experiment(word, births),)
+            _experiments_of(folder) if is_folder else draft_experiments(word, births)
         )
         for each, experiment in product(kinds, experiments):
             for use in each.used(experiment):

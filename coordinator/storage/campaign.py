@@ -31,7 +31,7 @@ from schema.experiment.file import (
     check_source,
     experiment_from_text,
     experiment_text,
-    read_experiment,
+    experiments_of,
     shipped_experiments,
 )
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
@@ -99,7 +99,7 @@ def read_experiments(
     for source in sources:
         check_source(source, [*shipped_experiments(), *shipped])
     words = [word for source in sources for word in shipped.get(source, (source,))]
-    experiments = tuple(read_experiment(word, births) for word in words)
+    experiments = tuple(each for word in words for each in experiments_of(word, births))
     _check_names(experiments)
     return experiments
 

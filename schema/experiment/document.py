@@ -27,6 +27,7 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
+from schema.experiment.sweep import Sweep
 from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
@@ -466,6 +467,8 @@ class Experiment(Section, frozen=True):
         brain: type of the robots' brains, on all islands.
         robust: evaluation under drawn disturbances, off-line; without it robots are
             evaluated once.
+        sweep: makes the document a campaign of experiments that differ in some
+            settings.
     """
 
     name: str
@@ -485,6 +488,7 @@ class Experiment(Section, frozen=True):
     encoding: Encoding = Encoding()
     brain: BrainSection = NETWORK
     robust: Robust | None = None
+    sweep: Sweep | None = None
 
     @property
     def window(self) -> int:
