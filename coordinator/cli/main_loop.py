@@ -99,7 +99,9 @@ def execute_runs(
                 server.serve(time.monotonic())
         scheduler.stop()
         _tell_faults(scheduler)
-    for line in fault_lines(scheduler.status(time.monotonic()).faults):
+    faults = scheduler.status(time.monotonic()).faults
+    # Late answers ask for nothing; ``revolve status`` shows them.
+    for line in fault_lines([each for each in faults if each.kind != "late"]):
         tell_user(line)
     return scheduler
 
