@@ -43,8 +43,9 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
     Raises:
         ExperimentError: slots that do not fit the arity; a name used twice; sizes,
             masses, ranges, axes, normals or tangents that are not what they must be;
-            segments without joint; a motor without joint; sensors of no box; a shape
-            that raises, differs from call to call, or is not hashable.
+            a slot that points into its own part; segments without joint; a motor
+            without joint; sensors of no box; a shape that raises, differs from call to
+            call, or is not hashable.
     """
     if problem := next(_problems(kind), ""):
         raise _refusal(kind, where, problem)
@@ -161,6 +162,8 @@ def _shape_problems(kind: PartType, values: tuple[float, ...]) -> Iterator[str]:
         yield f"boxes: two are named {shown(doubled)}"
     for number, box in enumerate(shape.boxes):
         yield from _box_problems(box, f"boxes[{number}] ({box.name})")
+    for number, slot in enumerate(shape.slots):
+        yield from _direction_problems(slot, shape.boxes, f"slots[{number}]")
     yield from _joint_problems(kind, shape)
     for number, sensor in enumerate(kind.sensors):
         if isinstance(sensor, Sensor) and sensor.box not in names:
@@ -212,6 +215,34 @@ def _slot_problems(slot: Slot, at: str) -> Iterator[str]:
         yield (
             f"{at}.tangent: must be at right angles to the normal {slot.normal}, "
             f"got {slot.tangent}"
+        )
+
+
+def _direction_problems(slot: Slot, boxes: Sequence[Box], at: str) -> Iterator[str]:
+    """Yield a line if most of the boxes around a slot is in front of it.
+
+    A slot may be sunk into a box, but by less than half. A cylinder counts as the box
+    around it.
+    """
+    ahead = behind = 0.0
+    name = ""
+    for box in boxes:
+        turn = np.array(box.rotation, dtype=np.float64).T
+        place = turn @ np.subtract(slot.position, box.position)
+        half = np.array(box.size) / 2.0
+        if box.segment != slot.segment or np.any(abs(place) > half + _ROUNDING):
+            continue
+        along = turn @ np.array(slot.normal)
+        axes = abs(along) > _ROUNDING
+        ends = (np.copysign(half, along) - place)[axes] / along[axes]
+        starts = (np.copysign(half, along) + place)[axes] / along[axes]
+        if ends.min() > ahead:
+            ahead, name = float(ends.min()), box.name
+        behind = max(behind, float(starts.min()))
+    if ahead > behind + _ROUNDING:
+        yield (
+            f"{at}.normal: must point out of the part, but {slot.normal} points into "
+            f"its box {shown(name)}, {1000 * ahead:.3g} mm deep"
         )
 
 

@@ -109,6 +109,10 @@ WRONG = {
         slotted(tangent=(0.0, 0.6, 0.8)),
         r"slots\[1\].tangent: must be at right angles .* got \(0.0, 0.6, 0.8\)",
     ),
+    "slot into its box": (
+        slotted(normal=(0.0, -1.0, 0.0)),
+        r"slots\[1\].normal: .* points into its box 'body', 41 mm deep",
+    ),
     "slot beyond": (slotted(segment=1), r"segment: must be 0 without a joint, got 1"),
     "third segment": (
         shaped(HINGE, changed(HINGED, slots=(
