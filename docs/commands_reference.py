@@ -28,12 +28,19 @@ _DEFAULT = re.compile(r"(?:\s*\(|; )default: (.*?)\)?$")
 
 def page() -> str:
     """Return the page."""
-    rows = [
-        f"| [`revolve {name}`](#revolve-{name.replace(' ', '-')}) | {what} |"
-        for name, (_, what) in COMMANDS.items()
-    ]
+    rows = [line for name in COMMANDS for line in _overview(name)]
     texts = [line for name in COMMANDS for line in _command(name)]
     return _HEAD + "\n".join([*rows, "", *texts]).rstrip() + "\n"
+
+
+def _overview(name: str) -> Iterator[str]:
+    """Yield the table rows of a command and of its actions."""
+    inner = actions(parser_of(name)).items()
+    texts = {f"{name} {word}": parser.description or "" for word, parser in inner}
+    for full, text in {name: COMMANDS[name][1], **texts}.items():
+        what = text.partition(". ")[0].removesuffix(".")
+        what = f"{what[:1].lower()}{what[1:]}"
+        yield f"| [`revolve {full}`](#revolve-{full.replace(' ', '-')}) | {what} |"
 
 
 def _command(name: str) -> Iterator[str]:

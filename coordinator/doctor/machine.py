@@ -25,7 +25,7 @@ def check_versions(versions: Mapping[str, str | None]) -> Finding:
     text = ", ".join(f"{name} {version or '-'}" for name, version in versions.items())
     missing = [name for name, version in versions.items() if version is None]
     if missing:
-        advice = "install them: pip install --upgrade revolve-islands"
+        advice = f"install them: {install_advice('')}"
         return Finding(
             "fail", "versions", f"{text}: {', '.join(missing)} missing", advice
         )

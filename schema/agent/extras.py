@@ -25,19 +25,20 @@ def install_advice(extra: str) -> str:
     """Return the command that installs an extra into this environment.
 
     Args:
-        extra: such as ``view``.
+        extra: such as ``view``; empty: the package with what it needs.
     """
+    wanted = f"[{extra}]" if extra else ""
     try:
         found = distribution(NAME)
     except PackageNotFoundError:
-        return f"pip install '{NAME}[{extra}]'"
+        return f"pip install {shlex.quote(f'{NAME}{wanted}')}"
     flag, place = _origin(found)
     python = shlex.quote(sys.executable)
     install = f"{python} -m pip install"
     # Environments that uv makes have no pip.
     if (found.read_text("INSTALLER") or "").strip() == "uv":
         install = f"uv pip install --python {python}"
-    return f"{install} {flag}{shlex.quote(f'{place}[{extra}]')}"
+    return f"{install} {flag}{shlex.quote(f'{place}{wanted}')}"
 
 
 def _origin(found: Distribution) -> tuple[str, str]:
