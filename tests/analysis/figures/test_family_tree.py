@@ -187,7 +187,7 @@ def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None
     figure = gaits([robot_picture, robot_picture])
     assert len(figure.axes) == 4
     assert figure.axes[0].get_title(loc="left") == (
-        "scenario 1, fitness 0.25; 3.1 cm from the first to the last picture"
+        "scenario 1, fitness 0.25, moved 3.1 cm"
     )
     assert figure.axes[3].get_title() == "0.5 s"
     assert shade(figure.axes[3].images[0]) == 1
