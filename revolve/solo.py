@@ -39,7 +39,7 @@ def _done(task: Task) -> Outcome:
         from analysis.render.picture import choose_engine  # noqa: PLC0415
 
         choose_engine()
-    from worker.robot.evaluation import judge, simulate  # noqa: PLC0415
+    from worker.robot.evaluation import evaluate, judge, simulate  # noqa: PLC0415
     from worker.serve.checks import checked_evaluation  # noqa: PLC0415
 
     # Before the robot, whose neurons may be those of a plug-in.
@@ -56,8 +56,10 @@ def _done(task: Task) -> Outcome:
     if not task.is_judged:
         return Outcome(packed)
     try:
+        if settings.robust is not None:
+            return Outcome(packed, evaluate(robot, settings))
         return Outcome(packed, judge(trace, settings))
-    except FitnessUndefined as error:
+    except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
         return Outcome(packed, failure=str(error))
 
 

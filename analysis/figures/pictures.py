@@ -6,9 +6,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Rectangle
 
-from analysis.figures.family_tree import Family, ordered
+from analysis.figures.family_tree import ordered
 from analysis.figures.robot_pictures import FOUNDERS, Colour, RobotPicture
 from analysis.figures.style import label
+from analysis.measures.families import Family
 from schema.robot.ids import BirthId
 
 _INK, _FAINT = "#333333", "#9A9A9A"
@@ -39,7 +40,8 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
         for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
             axis.imshow(picture)
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
-        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}"
+        way = f"{100 * one.moved_m:.2g} cm from the first to the last picture"
+        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}; {way}"
         row[0].set_title("")
         row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=6)
     return figure

@@ -19,7 +19,9 @@ from schema.experiment.document import (
     island_experiment,
     steps_of,
 )
+from schema.experiment.robust import robust_problems
 from schema.experiment.selection_rules import rule_problems
+from schema.experiment.sweep import sweep_problems
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
 _LONGEST_NAME = 200
@@ -35,7 +37,8 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             multiples of its clocks; off-line keys in an arena; an extent that is
             not a whole number of patches; invalid scenery; an unknown plug-in; a
             migration that can never happen; measures that are named twice, or
-            parameters of a measure that is not named.
+            parameters of a measure that is not named; a range that ends before it
+            begins, or disturbances in an arena.
     """
     if problem := next(_problems(experiment), ""):
         raise ExperimentError(f"{where}: {problem}")
@@ -43,6 +46,13 @@ def check_experiment(experiment: Experiment, where: str) -> None:
 
 def _problems(experiment: Experiment) -> Iterator[str]:
     """Yield what is wrong with an experiment; each check relies on those before it."""
+    if experiment.sweep is not None:
+        yield from sweep_problems(experiment.sweep)
+        if not experiment.sweep.chosen:
+            yield (
+                "sweep: stands for several experiments; only revolve run and "
+                "revolve check take all of them"
+            )
     first = 0
     for index, islands in enumerate(experiment.islands):
         for problem in _island_problems(island_experiment(experiment, first)):
@@ -75,6 +85,7 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _pose_problems(experiment.simulation, "window_steps")
     yield from _duration_problems(experiment)
     yield from world_problems(experiment)
+    yield from robust_problems(experiment.robust, is_arena=experiment.arena is not None)
     if experiment.arena is not None:
         yield from _arena_problems(experiment, experiment.arena)
         yield from _arena_clock_problems(experiment.arena, experiment.simulation)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import isclose
 
 from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, light_of
+from schema.experiment.document import Experiment, light_of, start_problems
 from schema.experiment.environment import arena_problems, ground_problems
 
 
@@ -13,6 +13,7 @@ def world_problems(experiment: Experiment) -> Iterator[str]:
     yield from ground_problems(experiment.environment)
     if experiment.arena is not None:
         yield from arena_problems(experiment.environment)
+        yield from start_problems(experiment.simulation)
     yield from _scenery_problems(experiment)
     yield from _push_problems(experiment)
     yield from _light_problems(experiment)

@@ -5,6 +5,7 @@ refused with the nearest known one. Settings that cannot change a birth (workers
 folders, addresses) are flags of the commands, not keys.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 from math import pi
@@ -15,6 +16,7 @@ from msgspec import Meta, field, structs
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.migration import Migration
+from schema.experiment.robust import NoiseLevel, Robust
 from schema.experiment.section import (
     AtLeastOne,
     Count,
@@ -25,6 +27,7 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
+from schema.experiment.sweep import Sweep
 from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
@@ -39,9 +42,11 @@ class Space(Section, frozen=True):
 
     Attributes:
         part_types: ``module:attribute`` of each; exactly one is a core.
-        min_parts, max_parts: least and greatest number of parts, core included.
-        max_inputs, max_outputs, max_hidden: greatest number of input, output and hidden
-            neurons.
+        min_parts: least number of parts, core included.
+        max_parts: greatest number of parts, core included.
+        max_inputs: greatest number of input neurons.
+        max_outputs: greatest number of output neurons, one for each motor.
+        max_hidden: greatest number of hidden neurons.
         planar: keep all parts in the plane of the core.
         neuron_types: types of output and hidden neurons: short names of built-in
             types, or ``module:attribute``; each is equally likely.
@@ -88,8 +93,8 @@ class Generation(Section, frozen=True):
     """Generation of random robots (thesis section 4.4.2).
 
     Attributes:
-        parts_mean, parts_sd: mean and standard deviation of the normal distribution
-            of the number of parts.
+        parts_mean: mean of the number of parts, which has a normal distribution.
+        parts_sd: standard deviation of the number of parts.
         p_connect_neurons: probability of each possible connection.
         hidden_on: parts that get hidden neurons: ``any``, or those that are
             ``wired`` (have a sensor or a motor).
@@ -107,10 +112,18 @@ class Variation(Section, frozen=True):
     """Mutation of offspring (thesis section 4.4.6).
 
     Attributes:
-        p_delete_subtree, p_duplicate_subtree, p_swap_subtree, p_delete_hidden_neuron,
-            p_remove_brain_connection: probability of the step of that name.
-        body_epsilon, brain_epsilon: step size of the parameters of bodies and brains,
-            as a share of the way to a random value.
+        p_delete_subtree: probability that a part and all below it are removed.
+        p_duplicate_subtree: probability that a part and all below it are copied to a
+            free slot.
+        p_swap_subtree: probability that two parts change places, with all below them.
+        p_delete_hidden_neuron: probability that a hidden neuron is removed; as many
+            are added, on average.
+        p_remove_brain_connection: probability that a connection is removed; as many
+            are added, on average.
+        body_epsilon: step size of the parameters of parts, as a share of the way to a
+            random value.
+        brain_epsilon: step size of the parameters of neurons, of ``cpg`` brains also
+            of weights, as a share of the way to a random value.
         add_parts: ``loop`` may add several parts, ``once`` at most one; the expected
             number is what deletion removes, less what duplication adds.
         duplicable_size: size of subtrees in that number: their ``mean`` or ``sum``.
@@ -240,10 +253,6 @@ class Vetting(Section, frozen=True):
     tolerance_m: NotNegative = 1e-6
 
 
-NoiseLevel = Annotated[float, Meta(ge=0, le=1e6)]
-"""A standard deviation; within these bounds no arithmetic overflows."""
-
-
 class Simulation(Section, frozen=True):
     """Physics, noise, and clocks in physics steps.
 
@@ -266,6 +275,10 @@ class Simulation(Section, frozen=True):
             chatters above 2 servo_armature / timestep_s.
         contact_time_s: time constant of contacts [s].
         drop_m: height above the ground at the start [m].
+        start_deg: attitude of the core at the start, off-line: roll, pitch and yaw
+            about the world's x, y and z, in this order [degrees].
+        mass_factor: factor of all masses of robots.
+        torque_factor: factor of the greatest torque of all motors.
         evaluation_s: shortest and longest evaluation [s], warm-up included, off-line;
             each evaluation draws its own, and the window is its last part.
         sensor_noise: standard deviation of each reading [unit of the reading]: m/s2 and
@@ -273,6 +286,8 @@ class Simulation(Section, frozen=True):
         actuator_noise: standard deviation of each output before it is clipped to
             [0, 1], the range of its joint; the network's state has no noise.
     """
+
+    later: ClassVar = ("start_deg", "mass_factor", "torque_factor")
 
     timestep_s: Positive = 0.005
     brain_steps: AtLeastOne = 25
@@ -290,16 +305,22 @@ class Simulation(Section, frozen=True):
     evaluation_s: tuple[Positive, Positive] | None = None
     sensor_noise: NoiseLevel = 0.0
     actuator_noise: NoiseLevel = 0.0
+    start_deg: Vector = (0.0, 0.0, 0.0)
+    mass_factor: Positive = 1.0
+    torque_factor: Positive = 1.0
 
 
 class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.
 
     Attributes:
-        function: short name of a built-in function, or ``module:attribute``.
-        path_weight, straight_weight: weights of the velocities along the path and
-            between its ends, of the function ``locomotion``.
-        limit: greatest realistic fitness [m/s]; above it, fitness is 0.
+        function: short name of a built-in function, or ``module:attribute``;
+            ``locomotion`` is another name of the default.
+        path_weight: weight of the velocity along the path; only ``locomotion`` has it.
+        straight_weight: weight of the velocity between the ends of the path; only
+            ``locomotion`` has it.
+        limit: greatest realistic fitness [m/s], above which it is 0; only
+            ``locomotion`` has it.
         parameters: parameters of a function that has a Struct of its own.
     """
 
@@ -354,7 +375,8 @@ class Arena(Section, frozen=True):
         drop_m: height above the ground at birth [m].
         wall_diameter_m: diameter of the ring wall [m]; 0 is no wall.
         wall_segments: number of straight segments of the wall.
-        wall_height_m, wall_thickness_m: height and thickness of the wall [m].
+        wall_height_m: height of the wall [m].
+        wall_thickness_m: thickness of the wall [m].
         light: as ``environment.light`` [m]; only one of the two is needed.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
@@ -405,6 +427,7 @@ class Islands(Section, frozen=True):
         fitness: fitness function of these islands.
         arena: these islands are arenas.
         migration: exchange of migrants from and to these islands.
+        robust: evaluation of these islands' robots under drawn disturbances.
     """
 
     count: AtLeastOne = 1
@@ -417,6 +440,7 @@ class Islands(Section, frozen=True):
     fitness: Fitness | None = None
     arena: Arena | None = None
     migration: Migration | None = None
+    robust: Robust | None = None
 
 
 class Experiment(Section, frozen=True):
@@ -441,6 +465,10 @@ class Experiment(Section, frozen=True):
         measures: numbers recorded beside the fitness, on all islands.
         encoding: how genomes describe robots, on all islands.
         brain: type of the robots' brains, on all islands.
+        robust: evaluation under drawn disturbances, off-line; without it robots are
+            evaluated once.
+        sweep: makes the document a campaign of experiments that differ in some
+            settings.
     """
 
     name: str
@@ -459,6 +487,8 @@ class Experiment(Section, frozen=True):
     measures: Measures = Measures()
     encoding: Encoding = Encoding()
     brain: BrainSection = NETWORK
+    robust: Robust | None = None
+    sweep: Sweep | None = None
 
     @property
     def window(self) -> int:
@@ -498,10 +528,13 @@ def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
     return own or environment.light
 
 
-def with_births(experiment: Experiment, births: int) -> Experiment:
-    """Return an experiment with another number of births on each island."""
-    islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
-    return structs.replace(experiment, births=births, islands=islands)
+def start_problems(simulation: Simulation) -> Iterator[str]:
+    """Yield what arenas do not support."""
+    if any(simulation.start_deg):
+        yield (
+            "simulation.start_deg: is for off-line evaluations; robots of an arena are "
+            "born upright with a drawn heading; remove it"
+        )
 
 
 def references(experiment: Experiment) -> list[str]:

@@ -19,6 +19,7 @@ from schema.experiment.document import (
     Space,
     Vetting,
     light_of,
+    start_problems,
 )
 from schema.experiment.environment import (
     FLAT,
@@ -27,6 +28,7 @@ from schema.experiment.environment import (
     ground_problems,
 )
 from schema.experiment.identity import Origin
+from schema.experiment.robust import Robust, robust_problems
 from schema.experiment.section import Section
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Vector
@@ -56,7 +58,7 @@ class VettingSettings(Section, frozen=True):
 class EvaluationSettings(Section, frozen=True):
     """Settings of an evaluation request."""
 
-    later: ClassVar = ("measures", "brain")
+    later: ClassVar = ("measures", "brain", "robust")
 
     space: Space
     simulation: Simulation
@@ -64,6 +66,7 @@ class EvaluationSettings(Section, frozen=True):
     environment: Environment = FLAT
     measures: Measures = Measures()
     brain: BrainSection = NETWORK
+    robust: Robust | None = None
 
     @property
     def light(self) -> Vector | None:
@@ -180,6 +183,8 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
     problems = list(ground_problems(environment))
     if isinstance(found, ArenaSettings):
         problems += arena_problems(environment)
+        problems += start_problems(found.simulation)
+    problems += robust_problems(getattr(found, "robust", None), is_arena=False)
     for problem in problems:
         raise ExperimentError(f"{where}: {problem}")
     return found

@@ -33,7 +33,7 @@ _ABOVE_M = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """Boxes of a robot at neutral pose as upright columns, in the core's frame.
+    """Boxes of a robot at neutral pose as upright columns, about the core's centre.
 
     The column of a cylinder encloses it.
 
@@ -48,10 +48,17 @@ class Footprint:
     halves: Floats
 
 
-def footprint(model: mujoco.MjModel) -> Footprint:
-    """Return the boxes of the only robot of a model, without static geoms."""
+def footprint(model: mujoco.MjModel, attitude: Floats | None = None) -> Footprint:
+    """Return the boxes of the only robot of a model, without static geoms.
+
+    Args:
+        model: of the robot.
+        attitude: of the core, a unit quaternion (4,) w, x, y, z; None if it is level.
+    """
     data = mujoco.MjData(model)
     data.qpos[:7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+    if attitude is not None:
+        data.qpos[3:7] = attitude
     mujoco.mj_kinematics(model, data)
     own = model.geom_bodyid > 0
     axes = data.geom_xmat[own].reshape(-1, 3, 3)

@@ -93,7 +93,8 @@ def solo_spec(
     Args:
         robot: a checked robot.
         space: its part types.
-        simulation: parameters of the world; ``drop_m`` lifts the robot.
+        simulation: parameters of the world; ``drop_m`` lifts the robot, and
+            ``start_deg`` turns it.
         environment: ground and scenery.
         furnish: adds further objects.
 
@@ -102,8 +103,9 @@ def solo_spec(
     """
     built = robot_spec(robot, space, simulation)
     spec, height = built.spec, built.height
-    if not environment.is_even:
-        boxes = footprint(spec.compile())
+    attitude = _attitude(simulation)
+    if attitude is not None or not environment.is_even:
+        boxes = footprint(spec.compile(), attitude)
         height = standing_height(boxes, simulation, environment, (0.0, 0.0), 0.0)
     set_options(spec, simulation, environment, is_single=True)
     add_ground(spec, simulation, environment)
@@ -111,8 +113,21 @@ def solo_spec(
         furnish(spec)
     objects = object_count(environment, simulation)
     spec.memory = MEMORY_BYTES + OBJECT_BYTES * objects
-    spec.body("root").pos = (0.0, 0.0, height + simulation.drop_m)
+    root = spec.body("root")
+    root.pos = (0.0, 0.0, height + simulation.drop_m)
+    if attitude is not None:
+        root.quat = attitude
     return spec
+
+
+def _attitude(simulation: Simulation) -> Floats | None:
+    """Return the quaternion of the core at the start; None if it is level."""
+    if not any(simulation.start_deg):
+        return None
+    found = np.empty(4)
+    # Capitals: about the axes of the world, one after the other.
+    mujoco.mju_euler2Quat(found, np.radians(simulation.start_deg), "XYZ")
+    return found
 
 
 def shared_model(
@@ -219,7 +234,8 @@ class _Builder:
             actuator.name = actuator.target = f"joint{index}"
             actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
             actuator.forcelimited = 1
-            actuator.forcerange = (-motor.max_torque, motor.max_torque)
+            torque = motor.max_torque * simulation.torque_factor
+            actuator.forcerange = (-torque, torque)
             actuator.set_to_velocity(kv=share * simulation.servo_stiffness)
         return body, anchor.tolist()
 
@@ -262,7 +278,8 @@ class _Builder:
                 geom.type = mujoco.mjtGeom.mjGEOM_CYLINDER
                 half = (half[0], half[2], 0.0)
             geom.size, geom.pos, geom.quat = half, place, attitude
-            geom.mass, geom.rgba = box.mass, colour
+            geom.mass = box.mass * self.simulation.mass_factor
+            geom.rgba = colour
             if box.name in imus:
                 body.add_site(name=f"{index}/imu", pos=place, quat=attitude)
             self.lowest = min(self.lowest, centre[2] - below)

@@ -8,8 +8,11 @@ population = 8
 children = 8
 [simulation]
 window_steps = 400
+[robust]
+draws = 2
+take = "least"
 """
-"""Off-line island of short evaluations."""
+"""Off-line island of short evaluations under drawn disturbances."""
 
 BRIDGE = """
 name = "short-bridge"

@@ -11,7 +11,12 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from schema.errors import SimulationDiverged, one_line
+from schema.errors import (
+    FitnessUndefined,
+    SensorFailed,
+    SimulationDiverged,
+    one_line,
+)
 from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
@@ -22,6 +27,7 @@ from schema.robot.trace import Trace
 from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.measures.functions import measures_of
 from worker.robot.brains import controls_of
+from worker.robot.disturbances import combined, disturbances
 from worker.robot.light import read_light
 from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
@@ -38,10 +44,12 @@ def evaluate(
 ) -> Evaluation:
     """Return the evaluation of a robot: a pure function of the arguments.
 
+    With the section ``robust`` it combines several simulations.
+
     Args:
         robot: a robot that passes ``check_robot`` in the settings' body space.
         settings: body space, simulation, environment, fitness and measures.
-        identity: of the evaluation; noise and pushes depend on it.
+        identity: of the evaluation; noise, pushes and disturbances depend on it.
 
     Raises:
         SimulationDiverged: the physics diverged; with reason and simulated time.
@@ -52,7 +60,16 @@ def evaluate(
             unknown fitness function or measure.
         InvalidRobot: more neurons than the limits.
     """
-    return judge(simulate(robot, settings, identity=identity), settings)
+    if settings.robust is None:
+        return judge(simulate(robot, settings, identity=identity), settings)
+    found: list[Evaluation] = []
+    for drawn, own in disturbances(settings, settings.robust, identity):
+        try:
+            found.append(judge(simulate(robot, drawn, identity=own), drawn))
+        except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
+            number = f"draw {len(found) + 1} of {settings.robust.draws}"
+            raise type(error)(f"{number}: {error}") from None
+    return combined(found, settings.robust)
 
 
 def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:

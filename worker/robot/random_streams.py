@@ -18,6 +18,7 @@ class Purpose(IntEnum):
 
     NOISE = 11
     PUSHES = 12
+    DISTURBANCES = 13
 
 
 def stream(

@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
 
 from analysis.comparison.claims import CLAIMS, Claim
-from analysis.comparison.comparison import Outcomes, comparison, findings, verdict
+from analysis.comparison.comparison import Outcomes, comparison
+from analysis.comparison.findings import findings
 from analysis.comparison.outcomes import outcome
+from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
 from analysis.measures.load import IslandSettings, Run
 from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
 from analysis.measures.study import MeasuredRun
@@ -107,6 +110,33 @@ def test_every_measure_of_every_pair_is_compared_once() -> None:
     assert first["difference_low"] < 3 < first["difference_high"]
 
 
+def test_fitness_is_compared_only_with_the_same_function() -> None:
+    """The function of c is another one; sizes of its robots are compared."""
+    levels = [{"births": 15, "fitness": 0.1, "parts": 1.0, "fitness_best": 9.0}]
+    made = []
+    for name, function in (("a", "f"), ("b", "f"), ("c", "g")):
+        for number in range(2):
+            one = measured(name, number, tables(levels))
+            made.append(replace(one, run=replace(one.run, fitness=function)))
+    outcomes = Outcomes(made)
+    rows = comparison(outcomes).to_pylist()
+    found: dict[tuple[str, str], set[str]] = {}
+    for row in rows:
+        found.setdefault((row["a"], row["b"]), set()).add(row["measure"])
+    assert {"fitness", "fitness_best", "parts"} <= found["a", "b"]
+    for pair in (("a", "c"), ("b", "c")):
+        assert not found[pair] & {"fitness", "fitness_best", "late_gain"}
+        assert "parts" in found[pair]
+    claims = [Claim("1", "fitter", "fitness", "a", ">", "c"),
+              Claim("2", "larger", "parts", "a", ">", "c")]  # fmt: skip
+    fitter, larger = findings(outcomes, claims).to_pylist()
+    assert (fitter["verdict"], fitter["why"]) == (
+        "undecided",
+        "different fitness functions: f, g",
+    )
+    assert (fitter["p"], larger["p"]) == (None, 1.0)
+
+
 def test_experiments_are_compared_at_births_that_all_runs_reach() -> None:
     short = [
         measured("a", 0, tables([{"births": 30, "fitness": 0.2}])),
@@ -193,6 +223,8 @@ def test_the_rules_of_verdicts(
     expected: str, effect: float, q: float, ends: tuple[float, float], decided: str
 ) -> None:
     row = {"effect": effect, "q": q, "effect_low": ends[0], "effect_high": ends[1]}
+    row |= {"runs_b": 30, "margin": LARGE if expected == "=" else NEGLIGIBLE}
+    row["q_alike"] = 0.01 if max(map(abs, ends)) < LARGE else 0.2
     assert verdict(expected, row)[0] == decided
 
 
@@ -200,4 +232,10 @@ def test_claims_name_existing_measures() -> None:
     assert {claim.measure for claim in CLAIMS} <= set(OUTCOME)
     figures = [tuple(map(int, claim.figure.split("."))) for claim in CLAIMS]
     assert figures == sorted(figures)
-    assert {figure for _, figure in figures} == {*range(2, 10), 12, 14, 15, 16}
+    of_chapter_6 = {*range(2, 10), *range(11, 17), 18, 19, 20}
+    assert {*figures} == {
+        *((6, figure) for figure in of_chapter_6),
+        (7, 1, 2),
+        (7, 2, 1),
+    }
+    assert len({claim.text for claim in CLAIMS}) == len(CLAIMS)

@@ -10,7 +10,6 @@ from matplotlib.image import AxesImage
 from analysis.figures.family_tree import (
     Best,
     best_robots,
-    family,
     lineage,
     ordered,
     row_of,
@@ -18,6 +17,7 @@ from analysis.figures.family_tree import (
 from analysis.figures.pictures import family_tree, gaits
 from analysis.figures.robot_pictures import FOUNDERS, RobotPicture
 from analysis.figures.robots import lineages
+from analysis.measures.families import family
 from analysis.measures.outputs import schema
 from schema.robot.ids import BirthId
 from tests.analysis.bodies import Body, part
@@ -142,6 +142,7 @@ def robot_picture(members: pa.Table) -> RobotPicture:
         (0.0, 0.5),
         (pictures[0], pictures[1]),
         0.5,
+        0.031,
         relatives,
         pictures,
         {row: BirthId(0 if row else 1, row) for row in pictures},
@@ -185,6 +186,8 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
 def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None:
     figure = gaits([robot_picture, robot_picture])
     assert len(figure.axes) == 4
-    assert figure.axes[0].get_title(loc="left") == "scenario 1, fitness 0.25"
+    assert figure.axes[0].get_title(loc="left") == (
+        "scenario 1, fitness 0.25; 3.1 cm from the first to the last picture"
+    )
     assert figure.axes[3].get_title() == "0.5 s"
     assert shade(figure.axes[3].images[0]) == 1

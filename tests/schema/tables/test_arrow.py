@@ -8,9 +8,9 @@ TOP = Path(__file__).parents[3]
 SCRIPT = """
 import sys
 import pyarrow as pa
-from schema.tables.no_pandas import leave_out_pandas
+from schema.tables.arrow import skip_pandas
 
-leave_out_pandas()
+skip_pandas()
 table = pa.table({"a": pa.array([1, None]), "b": pa.array(["x", "y"])})
 print("pandas" in sys.modules, len(sys.meta_path))
 frame = table.to_pandas()

@@ -1,0 +1,87 @@
+"""The section ``[robust]``: evaluation under disturbances that are drawn."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from schema.experiment.section import NotNegative, Positive, Probability, Section
+
+MOST_DRAWS = 100
+"""Most draws of one evaluation."""
+Degrees = Annotated[float, Meta(ge=-180, le=180)]
+NoiseLevel = Annotated[float, Meta(ge=0, le=1e6)]
+"""A standard deviation; within these bounds no arithmetic overflows."""
+RANGES = (
+    "friction",
+    "mass",
+    "torque",
+    "lift_m",
+    "tilt_deg",
+    "heading_deg",
+    "sensor_noise",
+    "actuator_noise",
+)
+"""Keys that are ranges, in the order of the draws."""
+
+
+class Robust(Section, frozen=True):
+    """Evaluation of each robot under several drawn disturbances, off-line.
+
+    A robot is simulated ``draws`` times, each time in a simulation whose numbers are
+    drawn from the ranges below, and its fitness is the least, the mean or a quantile of
+    the draws. Velocities and measures are means over the draws. If one draw fails, the
+    evaluation fails. Each evaluation has a random stream of its own.
+
+    Attributes:
+        draws: simulations per evaluation.
+        take: ``mean``, ``least`` or ``quantile`` of the fitness of the draws.
+        quantile: share of the draws below the quantile; between two draws it is
+            interpolated linearly.
+        distribution: of each number in its range ``[least, greatest]``: ``uniform``, or
+            ``normal`` with the middle as mean, a quarter of the range as standard
+            deviation, and values beyond the range moved to its ends.
+        friction: factor of ``simulation.friction``.
+        mass: factor of ``simulation.mass_factor``: all masses of the robot.
+        torque: factor of ``simulation.torque_factor``: greatest torque of all motors.
+        lift_m: added to ``simulation.drop_m`` [m].
+        tilt_deg: added to roll and to pitch of ``simulation.start_deg`` [degrees]; two
+            draws.
+        heading_deg: added to yaw of ``simulation.start_deg`` [degrees].
+        sensor_noise: added to ``simulation.sensor_noise`` [unit of the reading].
+        actuator_noise: added to ``simulation.actuator_noise``.
+    """
+
+    draws: Annotated[int, Meta(ge=1, le=MOST_DRAWS)] = 4
+    take: Literal["mean", "least", "quantile"] = "mean"
+    quantile: Probability = 0.25
+    distribution: Literal["uniform", "normal"] = "uniform"
+    friction: tuple[NotNegative, NotNegative] = (0.9, 1.1)
+    mass: tuple[Positive, Positive] = (0.9, 1.1)
+    torque: tuple[Positive, Positive] = (0.9, 1.1)
+    lift_m: tuple[NotNegative, NotNegative] = (0.0, 0.001)
+    tilt_deg: tuple[Degrees, Degrees] = (-1.0, 1.0)
+    heading_deg: tuple[Degrees, Degrees] = (0.0, 0.0)
+    sensor_noise: tuple[NoiseLevel, NoiseLevel] = (0.0, 0.05)
+    actuator_noise: tuple[NoiseLevel, NoiseLevel] = (0.0, 0.01)
+
+
+def robust_problems(robust: Robust | None, *, is_arena: bool) -> Iterator[str]:
+    """Yield what is wrong with the section of one island.
+
+    Args:
+        robust: the section; None if there is none.
+        is_arena: whether the island is an arena.
+    """
+    if robust is None:
+        return
+    if is_arena:
+        yield (
+            "robust: is for off-line evaluations; the robots of an arena live once, in "
+            "one world. Remove it, or give it to off-line [[islands]] only. In arenas "
+            "use simulation.sensor_noise and simulation.actuator_noise"
+        )
+    for name in RANGES:
+        low, high = getattr(robust, name)
+        if low > high:
+            yield f"robust.{name}: must be [least, greatest], got [{low:g}, {high:g}]"
