@@ -67,6 +67,7 @@ def analyze(
     except OSError as error:
         why = f"cannot be written: {error.strerror}"
         raise RunFolderError(f"{options.out}: {why}") from None
+    _tell_replaced(options.out / REPORT)
     with bars(
         f"measuring {counted(len(runs), 'run')}", *columns, TimeRemainingColumn()
     ) as bar:
@@ -139,9 +140,17 @@ def _write_measures(
 def _listed(figures: Sequence[DrawnFigure]) -> str:
     """Return the numbers of the figures as text."""
     if not figures:
-        return "no figure could be drawn; see the lines 'left out: figure'"
+        return "no figure could be drawn; see the line 'left out: figures'"
     numbers = ", ".join(one.figure.number for one in figures)
     return f"figures {numbers} as PDF and PNG"
+
+
+def _tell_replaced(report: Path) -> None:
+    """Say that an earlier report is replaced, before it is."""
+    if report.is_file():
+        written = datetime.fromtimestamp(report.stat().st_mtime, UTC)
+        text = f"replaces the report of {written:%Y-%m-%d %H:%M} UTC, its figures and"
+        print(f"{report}: {text} measures; to keep them, give another folder: --out")
 
 
 def _versions() -> dict[str, str]:

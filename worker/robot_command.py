@@ -3,6 +3,8 @@
 import sys
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from schema.agent.flags import Flags, add_plugins
 from schema.errors import rounded
 from schema.experiment.brains import neuron_kinds
@@ -59,6 +61,10 @@ def _show_robustness(
     robot: Robot, settings: EvaluationSettings, fitness: float
 ) -> None:
     """Print the robot's fitness under each small change, then one line of all."""
+    if settings.robust is not None:
+        settings = replace(settings, robust=None)
+        fitness = evaluate(robot, settings).fitness
+        print(f"{'undisturbed:':26}{rounded(fitness)}")
     judged: list[Judged] = []
     for one in rejudge(robot, small_changes(settings)):
         print(f"{one.change.name + ':':26}{_share(one.fitness, fitness)}", flush=True)

@@ -104,6 +104,9 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     shown["function"] = experiments.map(functions)
     in_panels = ["function", "panel"] if functions else "panel"
     lines = len(set(functions.values())) or 1
+    of_line = shown.groupby(["experiment", "population"])["bin"]
+    # The library warns of lines of one point.
+    joined = shown[of_line.transform("size") > 1]
     return (
         p9.ggplot(shown, p9.aes("at", "fitness"))
         + p9.geom_linerange(
@@ -113,7 +116,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
             alpha=0.6,
             show_legend=False,
         )
-        + p9.geom_line(p9.aes(colour="experiment"), size=0.6)
+        + p9.geom_line(p9.aes(colour="experiment"), data=joined, size=0.6)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
         + p9.facet_wrap(in_panels, ncol=2, scales="free_y" if functions else "fixed")
         + scales(experiments, is_filled=False)
@@ -160,7 +163,7 @@ def lineages(tables: Tables) -> p9.ggplot:
         )
         + scales(rows["experiment"].to_pylist(), is_filled=False)
         + p9.scale_y_continuous(breaks=integer_breaks)
-        + p9.labs(x="number of birth", y="rank")
+        + p9.labs(x="number of birth", y="rank (founders 1, children one more)")
         + theme_of_size(4.2)
     )
 

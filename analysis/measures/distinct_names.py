@@ -55,7 +55,17 @@ def _settings(document: str) -> dict[str, Any]:
     with suppress(ExperimentError):  # otherwise it is compared unchanged
         document = experiment_text(experiment_from_text(document))
     entries: dict[str, Any] = json.loads(document)
+    # Runs of a sweep are one experiment.
+    for key in (entries.get("sweep") or {}).pop("chosen", None) or {}:
+        _remove(entries, key.split("."))
     return _without(entries)
+
+
+def _remove(section: dict[str, Any], words: Sequence[str]) -> None:
+    """Remove the value of a dotted key, if it is there."""
+    for word in words[:-1]:
+        section = section.get(word) or {}
+    section.pop(words[-1], None)
 
 
 def _without(entries: Mapping[str, Any]) -> dict[str, Any]:

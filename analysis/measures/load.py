@@ -56,7 +56,7 @@ class Run:
 
     Attributes:
         folder: path of the folder.
-        experiment: name of the experiment.
+        experiment: name of the experiment; that of a sweep for all its runs.
         number: number of the repeat.
         seed: seed of the run.
         state: finished, stopped or running (also if it was killed).
@@ -68,6 +68,7 @@ class Run:
         fitness: fitness functions as ``fitness_text``, with digests of their sources.
         plugins: digest of the source of each plug-in, by module; "unknown" for runs
             that did not record it.
+        point: values of the swept settings, by dotted key; empty without a sweep.
     """
 
     folder: Path
@@ -82,6 +83,7 @@ class Run:
     function: str = ""
     fitness: str = ""
     plugins: Mapping[str, str] = field(default_factory=dict)
+    point: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def is_finished(self) -> bool:
@@ -169,6 +171,7 @@ def read_run(folder: Path) -> Run:
         function = str(document.get("fitness", {}).get("function", ""))
         plugins = _plugins(details)
         fitness = fitness_text(document, plugins)
+        point = dict((document.get("sweep") or {}).get("chosen") or {})
     except (
         ValueError, KeyError, TypeError, AttributeError, RecursionError
     ) as error:  # fmt: skip
@@ -176,7 +179,8 @@ def read_run(folder: Path) -> Run:
         raise RunFolderError(f"{DETAILS}: cannot be read: {cause}") from None
     run = Run(
         folder=folder,
-        experiment=str(name),
+        # Its points have the sweep's name and a number.
+        experiment=str(name).rpartition("-")[0] if point else str(name),
         number=int(number),
         seed=int(seed),
         state=_state(folder, details),
@@ -186,6 +190,7 @@ def read_run(folder: Path) -> Run:
         function=function,
         fitness=fitness,
         plugins=plugins,
+        point=point,
     )
     if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
         raise RunFolderError("the run is finished, but its tables are missing")

@@ -191,6 +191,12 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "mean": "mean of judged robots, in the measure's unit",
         "robots": "number of these robots",
     },
+    "sweeps": {
+        **_RUN,
+        "setting": "dotted key of a setting that the sweep changes",
+        "value": "its value in this run, as JSON",
+        "number": "the same if it is a number",
+    },
     "progression": {
         "experiment": _RUN["experiment"],
         "measure": "column of populations",
@@ -244,7 +250,8 @@ _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "sam
              "birth", "members", "founders"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
           "figure", "claim", "expected", "verdict", "why", "what", "topic",
-          "differs", "function", "fitness_function", "plugins"}  # fmt: skip
+          "setting", "value", "differs", "function", "fitness_function",
+          "plugins"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

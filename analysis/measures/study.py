@@ -1,5 +1,6 @@
 """Measures of many runs, computed in parallel processes."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from analysis.measures.measures import measure
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
+from schema.agent.import_path import safe_import_path
 
 _FEW = 3
 """Number of runs that are measured faster than another process starts."""
@@ -50,7 +52,8 @@ def measure_runs(
     if processes == 1 or len(runs) <= _FEW:
         yield from map(measure_run, runs, repeat(slots))
         return
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(processes, get_context("spawn"))
+    with safe_import_path(), pool:
         try:
             yield from pool.map(measure_run, runs, repeat(slots))
         except BaseException:
@@ -83,7 +86,22 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
         left_out.append(LeftOut(folder, "comparison", why))
     named = {name: _named(found[name], name, run) for name in found}
     named["runs"] = _named(_summary(run, tables, unread), "runs", run)
+    if run.point:
+        named["sweeps"] = _named(_chosen(run), "sweeps", run)
     return MeasuredRun(run, named, tuple(left_out))
+
+
+def _chosen(run: Run) -> pa.Table:
+    """Return one row per swept setting."""
+    rows = [
+        {
+            "setting": setting,
+            "value": json.dumps(value),
+            "number": value if isinstance(value, int | float) else None,
+        }
+        for setting, value in run.point.items()
+    ]
+    return pa.Table.from_pylist(rows, run_schema("sweeps"))
 
 
 def planned_births(run: Run) -> int:

@@ -11,7 +11,7 @@ import pyarrow as pa
 from PIL import Image
 
 from analysis.figures.catalogue import DrawnFigure, Section
-from analysis.figures.figure_writer import GAITS, Drawings, Film
+from analysis.figures.figure_writer import GAITS, PART_COLOURS, Drawings, Film
 from analysis.figures.style import in_order, label
 from analysis.measures.fitness_functions import axis_text
 from analysis.measures.outputs import OUTPUTS
@@ -125,6 +125,7 @@ def _sections(
 
     return {
         "overview": ("Overview", _overview(tables, courses)),
+        "sweeps": ("Sweeps", shown("sweeps")),
         "robots": ("Best robots", _films(tables, drawings) + shown("robots")),
         "fitness": ("Fitness", last + shown("fitness")),
         "comparison": ("Comparison", all_differences(tables)),
@@ -196,7 +197,12 @@ def _films(tables: Tables, drawings: Drawings) -> str:
         f"<p>{escape(label(name))}: no moving picture: {escape(why)}</p>"
         for name, why in drawings.no_films.items()
     )
-    return (f'<div class="films">{shown}</div>' if shown else "") + reasons
+    text = (
+        f"{PART_COLOURS} The dark shapes on the floor are shadows; their edges are "
+        "coarse because they are drawn with few pixels."
+    )
+    note = f'<p class="note">{text}</p>'
+    return (f'<div class="films">{shown}</div>{note}' if shown else "") + reasons
 
 
 def _film(one: Film, run: str) -> str:

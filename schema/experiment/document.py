@@ -27,6 +27,7 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
+from schema.experiment.sweep import Sweep
 from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
@@ -121,8 +122,8 @@ class Variation(Section, frozen=True):
             are added, on average.
         body_epsilon: step size of the parameters of parts, as a share of the way to a
             random value.
-        brain_epsilon: step size of the parameters of neurons and connections, as a
-            share of the way to a random value.
+        brain_epsilon: step size of the parameters of neurons, of ``cpg`` brains also
+            of weights, as a share of the way to a random value.
         add_parts: ``loop`` may add several parts, ``once`` at most one; the expected
             number is what deletion removes, less what duplication adds.
         duplicable_size: size of subtrees in that number: their ``mean`` or ``sum``.
@@ -466,6 +467,8 @@ class Experiment(Section, frozen=True):
         brain: type of the robots' brains, on all islands.
         robust: evaluation under drawn disturbances, off-line; without it robots are
             evaluated once.
+        sweep: makes the document a campaign of experiments that differ in some
+            settings.
     """
 
     name: str
@@ -485,6 +488,7 @@ class Experiment(Section, frozen=True):
     encoding: Encoding = Encoding()
     brain: BrainSection = NETWORK
     robust: Robust | None = None
+    sweep: Sweep | None = None
 
     @property
     def window(self) -> int:
@@ -531,12 +535,6 @@ def start_problems(simulation: Simulation) -> Iterator[str]:
             "simulation.start_deg: is for off-line evaluations; robots of an arena are "
             "born upright with a drawn heading; remove it"
         )
-
-
-def with_births(experiment: Experiment, births: int) -> Experiment:
-    """Return an experiment with another number of births on each island."""
-    islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
-    return structs.replace(experiment, births=births, islands=islands)
 
 
 def references(experiment: Experiment) -> list[str]:

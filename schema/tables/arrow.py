@@ -23,8 +23,11 @@ def skip_pandas() -> None:
     """Keep PyArrow from importing pandas, if it is installed, at the first array.
 
     The import takes half a second and 40 MB. PyArrow makes it to recognise arrays of
-    pandas, which our tables are never made of. ``to_pandas`` still works.
+    pandas, which our tables are never made of. ``to_pandas`` still works. Nothing is
+    changed in a process that has imported pandas.
     """
+    if "pandas" in sys.modules:
+        return
     finder = _WithoutPandas()
     sys.meta_path.insert(0, finder)
     try:

@@ -167,6 +167,7 @@ def robot_picture(members: pa.Table) -> RobotPicture:
         (0.0, 0.5),
         (pictures[0], pictures[1]),
         0.5,
+        0.031,
         relatives,
         pictures,
         {row: BirthId(0 if row else 1, row) for row in pictures},
@@ -210,6 +211,8 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
 def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None:
     figure = gaits([robot_picture, robot_picture])
     assert len(figure.axes) == 4
-    assert figure.axes[0].get_title(loc="left") == "scenario 1, fitness 0.25"
+    assert figure.axes[0].get_title(loc="left") == (
+        "scenario 1, fitness 0.25, moved 3.1 cm"
+    )
     assert figure.axes[3].get_title() == "0.5 s"
     assert shade(figure.axes[3].images[0]) == 1

@@ -1,17 +1,28 @@
 """Fitness under small changes of the simulation."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from msgspec.structs import asdict, replace
 
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.environment import Environment
+from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.robot import Robot
 from worker.robot import robustness
+from worker.robot.disturbances import disturbances
 from worker.robot.evaluation import evaluate
-from worker.robot.robustness import Change, Judged, rejudge, small_changes, summary
+from worker.robot.robustness import (
+    Change,
+    Judged,
+    all_changes,
+    rejudge,
+    small_changes,
+    summary,
+)
 
 SETTINGS = EvaluationSettings(
     space=Space(),
@@ -45,6 +56,52 @@ def test_each_change_changes_one_thing_and_no_duration() -> None:
     assert len({*lifts}) == 8
     assert all(0 < lift < 0.2 for lift in lifts)
     assert sum(lifts) / 8 == pytest.approx(0.1, abs=0.05)
+
+
+def test_all_changes_by_hand() -> None:
+    changes = all_changes(SETTINGS)
+    counts: dict[str, int] = {}
+    for change in changes:
+        counts[change.group] = counts.get(change.group, 0) + 1
+    assert counts == {
+        "time step": 2, "friction": 4, "start": 12, "mass": 2, "torque": 2,
+        "noise": 2, "ground": 2,
+    }  # fmt: skip
+    assert len({change.name for change in changes}) == len(changes) == 26
+    found = {change.name: change.settings for change in changes}
+    base = SETTINGS.simulation
+    expected: dict[str, dict[str, Any]] = {
+        "friction 0.9": {"friction": 0.9},
+        "friction 1.1": {"friction": 1.1},
+        "start tilted -1 degree about y": {"start_deg": (0.0, -1.0, 0.0)},
+        "start tilted +1 degree about x": {"start_deg": (1.0, 0.0, 0.0)},
+        "mass x 0.9": {"mass_factor": 0.9},
+        "torque x 1.1": {"torque_factor": 1.1},
+    }
+    for name, wanted in expected.items():
+        simulation = replace(base, **wanted)
+        assert found[name] == replace(SETTINGS, simulation=simulation)
+    slope, bumps = found["slope +1 degree"], found["ground with bumps of 2 mm"]
+    assert slope == replace(SETTINGS, environment=Environment(slope_deg=1.0))
+    assert bumps == replace(SETTINGS, environment=Environment(roughness_m=0.002))
+    rough = replace(SETTINGS, environment=Environment(roughness_m=0.1, ground_seed=4))
+    other = {change.name: change.settings for change in all_changes(rough)}
+    assert other["other bumps"].environment.ground_seed == 5
+
+
+def test_noise_is_the_only_disturbance_of_its_change(turtle: Robot) -> None:
+    changes = {change.name: change.settings for change in all_changes(SETTINGS)}
+    noisy = changes["actuator noise 0.01"]
+    rules = noisy.robust
+    assert rules is not None
+    worlds = [own.simulation for own, _ in disturbances(noisy, rules, NO_IDENTITY)]
+    assert worlds == [replace(SETTINGS.simulation, actuator_noise=0.01)] * 4
+    trials = [
+        evaluate(turtle, own, name).fitness
+        for own, name in disturbances(noisy, rules, NO_IDENTITY)
+    ]
+    assert evaluate(turtle, noisy).fitness == pytest.approx(sum(trials) / 4)
+    assert len({*trials}) == 4
 
 
 def test_starts_are_drawn_from_the_seed() -> None:

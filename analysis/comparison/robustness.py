@@ -1,0 +1,119 @@
+"""Table of fitness under changes of the simulation, and what it comes to.
+
+Each row is one robot under one change. A share is the fitness there divided by the
+fitness without changes; it is null if the evaluation failed or that fitness is not
+positive.
+"""
+
+from collections.abc import Iterable, Sequence
+from statistics import fmean, median
+from typing import Any
+
+import pyarrow as pa
+
+from schema.errors import rounded
+
+Row = dict[str, Any]
+
+_COLUMNS: dict[str, tuple[pa.DataType, str]] = {
+    "experiment": (pa.string(), "name of the experiment"),
+    "folder": (pa.string(), "path of the run folder"),
+    "island": (pa.int32(), "island of birth"),
+    "birth": (pa.int64(), "number of birth there"),
+    "is_best": (pa.bool_(), "whether it has the greatest recorded fitness of the run"),
+    "is_last": (pa.bool_(), "whether it is in an island's last population"),
+    "recorded": (pa.float64(), "last recorded fitness"),
+    "undisturbed": (
+        pa.float64(),
+        "fitness alone without changes; null if the evaluation failed",
+    ),
+    "group": (pa.string(), "what is changed"),
+    "change": (pa.string(), "the change in words"),
+    "fitness": (pa.float64(), "fitness under it; null if the evaluation failed"),
+    "share": (pa.float64(), "fitness divided by undisturbed; null if that is not > 0"),
+    "failure": (pa.string(), "why an evaluation failed; empty if none did"),
+}
+
+
+def schema() -> pa.Schema:
+    """Return the Arrow schema, with ``meaning`` in each field's metadata."""
+    return pa.schema(
+        [
+            pa.field(name, kind, metadata={"meaning": meaning})
+            for name, (kind, meaning) in _COLUMNS.items()
+        ]
+    )
+
+
+def table_of(rows: Iterable[Row]) -> pa.Table:
+    """Return the table of some rows, with their shares."""
+    return pa.Table.from_pylist(
+        [{**row, "share": _share(row)} for row in rows], schema()
+    )
+
+
+def _share(row: Row) -> float | None:
+    fitness, undisturbed = row["fitness"], row["undisturbed"]
+    if fitness is None or undisturbed is None or undisturbed <= 0:
+        return None
+    return float(fitness / undisturbed)
+
+
+def kept(rows: Sequence[Row]) -> float | None:
+    """Return the share of its fitness that one robot keeps; None if there is none.
+
+    The mean over groups of the mean over the changes of a group, so that groups of many
+    changes count no more than others. Failed evaluations are left out.
+
+    Args:
+        rows: of one robot, all changes.
+    """
+    groups: dict[str, list[float]] = {}
+    for row in rows:
+        if row["share"] is not None:
+            groups.setdefault(row["group"], []).append(row["share"])
+    return fmean(map(fmean, groups.values())) if groups else None
+
+
+def summary(table: pa.Table) -> str:
+    """Return one line that says how much of its fitness a run keeps.
+
+    Args:
+        table: rows of one run.
+    """
+    robots: dict[tuple[int, int], list[Row]] = {}
+    for row in table.to_pylist():
+        robots.setdefault((row["island"], row["birth"]), []).append(row)
+    best = next(rows for rows in robots.values() if rows[0]["is_best"])
+    last = [kept(rows) for rows in robots.values() if rows[0]["is_last"]]
+    shares = [share for share in last if share is not None]
+    texts = [_of_best(best)]
+    if shares:
+        texts.append(
+            f"the last population of {len(last)} keeps {_percent(median(shares))} in "
+            f"the median, {_percent(min(shares))} to {_percent(max(shares))}"
+        )
+    evaluations = [row for rows in robots.values() for row in rows]
+    failed = sum(row["fitness"] is None for row in evaluations)
+    if failed:
+        texts.append(f"{failed} of {len(evaluations)} evaluations failed")
+    return "; ".join(texts)
+
+
+def _of_best(rows: Sequence[Row]) -> str:
+    name = f"{rows[0]['island']}:{rows[0]['birth']}"
+    undisturbed, share = rows[0]["undisturbed"], kept(rows)
+    if undisturbed is None:
+        return f"the best, {name}, has no fitness without changes"
+    if share is None:
+        return f"the best, {name}, has a fitness of {rounded(undisturbed)} undisturbed"
+    least = min((r for r in rows if r["share"] is not None), key=lambda r: r["share"])
+    return (
+        f"the best, {name}, keeps {_percent(share)} of its fitness "
+        f"({rounded(undisturbed)}), least {_percent(least['share'])} under "
+        f"{least['change']}"
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"

@@ -1,0 +1,55 @@
+"""Figure of the fitness that robots keep under changes of the simulation."""
+
+import plotnine as p9
+import pyarrow as pa
+
+from analysis.figures.forms import NothingToDraw
+from analysis.figures.style import theme_of_size
+
+_LAST, _BEST = "last population", "best"
+_MOST = 2.0
+"""Greatest share that the figure shows; points beyond stand at the edge."""
+
+
+def robustness(table: pa.Table) -> p9.ggplot:
+    """Return the share of its fitness that each robot keeps under each change.
+
+    Args:
+        table: of ``analysis.comparison.robustness``.
+
+    Raises:
+        NothingToDraw: no robot has a positive fitness without changes.
+    """
+    rows = table.to_pandas()
+    rows = rows[rows["share"].notna()]
+    if rows.empty:
+        raise NothingToDraw("no robot has a positive fitness without changes")
+    raised = rows["change"].str.contains("higher")
+    rows["label"] = rows["change"].where(~raised, "start raised by < 0.2 mm")
+    rows["share"] = rows["share"].clip(-_MOST, _MOST)
+    labels = list(dict.fromkeys(rows["label"]))[::-1]
+    best = rows[rows["is_best"]].assign(of=_BEST)
+    last = rows[rows["is_last"]].assign(of=_LAST)
+    figure = p9.ggplot(mapping=p9.aes("label", "share"))
+    figure += p9.geom_hline(yintercept=1.0, colour="#999999", size=0.5)
+    if not last.empty:
+        figure += p9.geom_boxplot(
+            data=last, outlier_alpha=0, fill="#DDEBF5", colour="#7F7F7F", size=0.4
+        )
+    for each, size in ((last, 1.2), (best, 2.4)):
+        figure += p9.geom_point(
+            p9.aes(fill="of"),
+            data=each,
+            position=p9.position_jitter(width=0.15, height=0, random_state=1),
+            size=size,
+            stroke=0.2,
+        )
+    return (
+        figure
+        + p9.scale_fill_manual({_LAST: "#0072B2", _BEST: "#D55E00"}, name="")
+        + p9.scale_x_discrete(limits=labels)
+        + p9.coord_flip()
+        + p9.expand_limits(y=[0, 1])
+        + p9.labs(x="", y="fitness divided by fitness without changes")
+        + theme_of_size(5.2)
+    )

@@ -1,0 +1,65 @@
+"""``revolve robustness``: re-evaluate the robots of finished runs under changes."""
+
+from pathlib import Path
+
+from schema.agent.extras import install_advice
+from schema.agent.flags import Flags, add_plugins, whole_number
+from schema.agent.supervisor import cores
+from schema.errors import RevolveError
+from schema.plugins.permission import allow
+
+
+def main(arguments: list[str]) -> int:
+    """Re-evaluate robots, write table and figure, and return the exit code.
+
+    Args:
+        arguments: the command's name first.
+
+    Raises:
+        RunFolderError: no run, an unfinished one, or a folder that cannot be written.
+        RevolveError: a library is missing, or no worker is left.
+    """
+    options = parser().parse_args(arguments[1:])
+    allow(options.plugins)
+    try:
+        from revolve.cli.rejudging import rejudge_runs
+    except ImportError as error:
+        raise RevolveError(
+            f"robustness needs {error.name}: {install_advice('analysis')}"
+        ) from None
+    rejudge_runs(options.runs, options.out, options.workers)
+    return 0
+
+
+def parser(_command: str = "robustness") -> Flags:
+    """Return the parser of ``revolve robustness``."""
+    flags = Flags(
+        prog="revolve robustness",
+        description="Re-evaluate the last population and the best robot of finished "
+        "runs, alone, under changes of time step, friction, start, mass, torque, noise "
+        "and ground, and show how much of their fitness they keep.",
+        examples=(
+            "revolve robustness runs/scenario1-seed1",
+            "revolve robustness runs/a runs/b --out robust --workers 4",
+        ),
+    )
+    flags.add_argument(
+        "runs", nargs="+", type=Path, metavar="RUN", help="run folder, finished"
+    )
+    flags.add_argument(
+        "--out",
+        type=Path,
+        default=Path("robustness"),
+        metavar="FOLDER",
+        help="folder to write to (default: robustness)",
+    )
+    flags.add_argument(
+        "--workers",
+        type=whole_number(),
+        default=cores(),
+        metavar="N",
+        help="number of workers, started on this machine; no result depends on it "
+        "(default: one per core)",
+    )
+    add_plugins(flags)
+    return flags

@@ -1,0 +1,68 @@
+"""``revolve robustness`` against evaluations of the same robots here."""
+
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from msgspec.structs import replace
+
+import revolve as rv
+from revolve.command import main
+from revolve.robot import plain
+from schema.experiment.file import read_experiment
+from schema.experiment.settings import evaluation_settings_of
+from worker.robot.evaluation import evaluate
+from worker.robot.robustness import all_changes
+
+pytestmark = pytest.mark.system
+
+SHORT = """
+name = "short"
+births = 4
+[selection]
+population = 2
+children = 2
+parents = "random"
+[simulation]
+window_steps = 80
+brain_steps = 20
+pose_steps = 20
+[robust]
+draws = 2
+"""
+
+
+def test_table_has_the_fitness_of_each_robot_under_each_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("short.toml").write_text(SHORT)
+    words = ["run", "short.toml", "--seed", "3", "--in-process", "--quiet"]
+    assert main([*words, "--out", "a"]) == 0
+    capsys.readouterr()
+    assert main(["robustness", "a", "--workers", "1", "--out", "out"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("a: the best, 0:")
+    rows = pq.read_table("out/robustness.parquet").to_pylist()
+    assert Path("out/robustness.png").stat().st_size > 10_000
+
+    settings = evaluation_settings_of(read_experiment("short.toml"))
+    settings = replace(settings, robust=None)
+    changes = {each.name: each.settings for each in all_changes(settings)}
+    run = rv.read("a")
+    names = {(row["island"], row["birth"]) for row in rows}
+    assert len(rows) == len(names) * len(changes)
+    assert sum(row["is_last"] for row in rows) == 2 * len(changes)
+    assert len({row["birth"] for row in rows if row["is_best"]}) == 1
+    (best,) = {row["birth"] for row in rows if row["is_best"]}
+    assert run.best()[0] == run.robot(best)
+    for row in rows:
+        robot = plain(run.robot(row["birth"]))
+        if row["change"] not in ("friction 0.9", "sensor noise 0.05"):
+            continue
+        assert row["undisturbed"] == evaluate(robot, settings).fitness
+        assert row["fitness"] == evaluate(robot, changes[row["change"]]).fitness
+
+    (Path("a") / "state").write_text("running")
+    assert main(["robustness", "a"]) == 2
+    assert "'revolve resume a' finishes it" in capsys.readouterr().err
