@@ -114,7 +114,7 @@ def report(name: str, found: ArenaTiming) -> None:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("name", "least", "most"),
-    [("evolved", 0.84, 0.07), ("random", 0.83, 0.04), ("crowded", 0.88, 0.05)],
+    [("evolved", 0.84, 0.07), ("random", 0.82, 0.04), ("crowded", 0.88, 0.05)],
 )
 def test_steps_are_most_of_the_time_of_thirty_robots(
     name: str, least: float, most: float
