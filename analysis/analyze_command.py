@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-from analysis.comparison.comparison import Outcomes, comparison, findings
+from analysis.comparison.comparison import Outcomes, comparison
+from analysis.comparison.findings import WithBenchmark, findings
 from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
@@ -66,10 +67,11 @@ def analyze(
     except OSError as error:
         why = f"cannot be written: {error.strerror}"
         raise RunFolderError(f"{options.out}: {why}") from None
+    _tell_replaced(options.out / REPORT)
     with bars(
         f"measuring {counted(len(runs), 'run')}", *columns, TimeRemainingColumn()
     ) as bar:
-        tables, left_out = _measured(runs, options, bar)
+        tables, left_out = _measured(runs, benchmark, options, bar)
         left_out = [*unread, *not_benchmarks, *left_out]
         # Before the figures: one that fails must not cost the measures.
         _write_measures(tables, left_out, options.out / MEASURES)
@@ -93,7 +95,7 @@ def analyze(
 
 
 def _measured(
-    runs: list[Run], options: argparse.Namespace, bar: Progress
+    runs: list[Run], benchmark: pa.Table, options: argparse.Namespace, bar: Progress
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     """Return the tables of all runs, and what was left out."""
     slots: SlotRule = "own" if options.slots == "own" else "parent"
@@ -106,7 +108,7 @@ def _measured(
     outcomes = Outcomes(measured)
     tables["outcomes"] = outcomes.table()
     tables["comparison"] = comparison(outcomes)
-    tables["findings"] = findings(outcomes)
+    tables["findings"] = findings(WithBenchmark(outcomes, benchmark))
     bar.remove_task(comparing)
     return tables, [one for run in measured for one in run.left_out]
 
@@ -138,9 +140,17 @@ def _write_measures(
 def _listed(figures: Sequence[DrawnFigure]) -> str:
     """Return the numbers of the figures as text."""
     if not figures:
-        return "no figure could be drawn; see the lines 'left out: figure'"
+        return "no figure could be drawn; see the line 'left out: figures'"
     numbers = ", ".join(one.figure.number for one in figures)
     return f"figures {numbers} as PDF and PNG"
+
+
+def _tell_replaced(report: Path) -> None:
+    """Say that an earlier report is replaced, before it is."""
+    if report.is_file():
+        written = datetime.fromtimestamp(report.stat().st_mtime, UTC)
+        text = f"replaces the report of {written:%Y-%m-%d %H:%M} UTC, its figures and"
+        print(f"{report}: {text} measures; to keep them, give another folder: --out")
 
 
 def _versions() -> dict[str, str]:

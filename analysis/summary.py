@@ -1,6 +1,6 @@
 """Summary that ``revolve analyze`` prints: populations, findings, what was left out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -10,12 +10,15 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from analysis.measures.fitness_functions import by_function, functions_of
 from analysis.progress import print_line
 from schema.errors import rounded
 
 _FITNESS = ("fitness", "fitness_best")
 _BORDERS, _BORDER = 3, 1
 """Characters of a column besides its cells, and of a table besides its columns."""
+_FIGURE = "figure "
+"""Prefix of the name of a figure that was left out."""
 _FOLDED = 12
 """Least width of a folded column of words."""
 
@@ -29,7 +32,7 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     """
     populations = _last_populations(tables["populations"])
     if populations:
-        heads = ("experiment", "run", "births", "size", "mean fitness", "best")
+        heads = ("experiment", "run", "births", "size", "mean of population", "best")
         _print_table(console, heads, populations, words={0, 1})
     else:
         print_line(console, "no population could be measured")
@@ -40,9 +43,28 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     keys = ["experiment", "differs"]
     for row in renamed.group_by(keys, use_threads=False).aggregate([]).to_pylist():
         print_line(console, f"{row['experiment']}: {row['differs']}")
-    for row in tables["left_out"].to_pylist():
-        folder = f"{row['folder']}: " if row["folder"] else ""
-        print_line(console, f"left out: {folder}{row['what']}: {row['why']}")
+    groups = by_function(functions_of(tables["runs"]))
+    if len(groups) > 1:
+        lists = "; ".join(f"{', '.join(each)} by {one}" for one, each in groups.items())
+        text = "fitness is not compared between different fitness functions"
+        print_line(console, f"{text}: {lists}")
+    for line in _left_out(tables["left_out"].to_pylist()):
+        print_line(console, line)
+
+
+def _left_out(rows: Sequence[Mapping[str, str]]) -> list[str]:
+    """Return a line for each thing that was left out; figures share one line."""
+    whys: dict[str, list[str]] = {}
+    lines = []
+    for row in rows:
+        if row["folder"]:
+            lines.append(f"left out: {row['folder']}: {row['what']}: {row['why']}")
+        else:
+            whys.setdefault(row["why"], []).append(row["what"].removeprefix(_FIGURE))
+    if whys:
+        each = "; ".join(f"{', '.join(names)} ({why})" for why, names in whys.items())
+        lines.append(f"left out: figures {each}")
+    return lines
 
 
 def _print_table(

@@ -39,16 +39,12 @@ from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import ExperimentError, NetworkError
-from schema.experiment.check import check_experiment
-from schema.experiment.document import (
-    Experiment,
-    island_count,
-    island_experiment,
-    with_births,
-)
+from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow, is_own
+from schema.tables.arrow import skip_pandas
 
 
 def main(arguments: list[str]) -> int:
@@ -68,6 +64,7 @@ def main(arguments: list[str]) -> int:
         return about_plugins(words, plugin_kinds())
     flags = run_flags(command)
     options = flags.parse_args(words)
+    skip_pandas()
     if command == "compare":
         return _compare(options)
     if command == "bench dispatch":
@@ -152,14 +149,9 @@ def _stoppable(
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     """Return the experiments to run, checked; imports the room of the worker."""
-    refuse_faulty(options.experiments)
-    experiments = read_experiments(options.experiments)
-    if options.births is not None:
-        experiments = tuple(
-            with_births(experiment, options.births) for experiment in experiments
-        )
+    refuse_faulty(options.experiments, options.births)
+    experiments = read_experiments(options.experiments, options.births)
     for experiment in experiments:
-        check_experiment(experiment, "--births" if options.births else experiment.name)
         _check_built_in(experiment)
     return experiments
 
@@ -177,6 +169,8 @@ def _check_built_in(experiment: Experiment) -> None:
                 use.check(use.load())
     for number in range(island_count(experiment)):
         own = island_experiment(experiment, number)
+        if not is_own(own.fitness.function):
+            check_fitness_keys(own.fitness)
         if not is_own(own.encoding.type):
             encoding_of(own)
 

@@ -1,10 +1,9 @@
-"""Tables of the campaign in docs/data: columns, files, reading and checks.
+"""Tables of the campaign in docs/data: columns, files and reading.
 
 A table is a folder with one file per repeat. Rows of a finished repeat never change.
 """
 
 import os
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +16,8 @@ from analysis.measures.outputs import BODY, schema
 from analysis.measures.population_table import Numbers
 
 DATA = Path(__file__).resolve().parent / "data"
+BENCHMARKS = ("arena", "spider")
+"""Kinds of ``revolve bench`` whose files are in the folder ``bench``."""
 LEVEL = 19
 """Compression level of zstd: files are written once and stay in the Git history."""
 
@@ -55,16 +56,23 @@ PARTS = (
         repeats=30,
     ),
     Part("arena", "thesis-arena", ("scenario3",), repeats=10),
+    Part(
+        "touches",
+        "thesis-touches",
+        ("docs/data/scenario3-touches.toml",),
+        repeats=10,
+        births=150,
+    ),
 )
 
-_NAMES = [("experiment", pa.string()), ("run", pa.int32())]
+NAMES = [("experiment", pa.string()), ("run", pa.int32())]
 
 
 def _of_analysis(table: str) -> pa.Schema:
     """Return the columns of ``revolve analyze``, but the repeat for the folder."""
     names = {"experiment", "folder"}
     fields = [(one.name, one.type) for one in schema(table) if one.name not in names]
-    return pa.schema([*_NAMES, *fields])
+    return pa.schema([*NAMES, *fields])
 
 
 _RUNS = {
@@ -83,11 +91,20 @@ _FINAL = {
     **dict.fromkeys(("rank", "ancestors", *BODY), pa.int64()),
     "genome": pa.binary(),
 }
+_FAMILY = {
+    "birth": pa.int64(),
+    "level": pa.int64(),
+    "parents": pa.list_(pa.int64()),
+    "rank": pa.int64(),
+    "fitness": pa.float64(),
+    "genome": pa.binary(),
+}
 _MEASURES = ("outcomes", "populations", "extremities", "variability")
 TABLES = {
     **{name: _of_analysis(name) for name in _MEASURES},
-    "final": pa.schema([*_NAMES, *_FINAL.items()]),
-    "runs": pa.schema([*_NAMES, *_RUNS.items()]),
+    "final": pa.schema([*NAMES, *_FINAL.items()]),
+    "family": pa.schema([*NAMES, *_FAMILY.items()]),
+    "runs": pa.schema([*NAMES, *_RUNS.items()]),
 }
 """Columns of the tables, by the name of the folder in ``docs/data``.
 
@@ -95,7 +112,7 @@ TABLES = {
 """
 
 _ONLY_OF_ARENAS = {"variability"}
-_TO_THE_END = {"outcomes", "populations", "runs"}
+_ARENAS = {"arena", "touches"}
 
 
 def parquet(table: pa.Table) -> bytes:
@@ -146,43 +163,15 @@ def path_of(data: Path, table: str, name: str) -> Path:
     return data / table / f"{name}.parquet"
 
 
+def benchmark_path(data: Path, kind: str) -> Path:
+    """Return the path of a file of ``revolve bench``."""
+    return data / "bench" / f"{kind}.parquet"
+
+
 def tables_of(part: Part) -> list[str]:
     """Return the tables that each run of a part has."""
-    is_arena = part.option == "arena"
+    is_arena = part.option in _ARENAS
     return [name for name in TABLES if is_arena or name not in _ONLY_OF_ARENAS]
-
-
-def problems_of(data: Path, part: Part, name: str) -> Iterator[str]:
-    """Yield the problems of a repeat's files."""
-    for table in tables_of(part):
-        path = path_of(data, table, name)
-        place = f"{table}/{path.name}"
-        try:
-            rows = read_rows(data, table, name)
-        except FileNotFoundError:
-            yield f"{place}: missing"
-        except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
-            yield f"{place}: cannot be read: {error}"
-        else:
-            if why := _problem(rows, table, part, name):
-                yield f"{place}: {why}"
-
-
-def _problem(rows: pa.Table, table: str, part: Part, name: str) -> str:
-    """Return the problem of readable rows, "" if there is none."""
-    if rows.schema != TABLES[table]:
-        found = ", ".join(f"{field.name} {field.type}" for field in rows.schema)
-        return f"unexpected columns: {found}"
-    names = set(zip(*(rows[key].to_pylist() for key, _ in _NAMES), strict=True))
-    if {stem(*each) for each in names} != {name}:
-        return f"must have rows of {name} only, got {sorted(names)}"
-    if table in _TO_THE_END and pc.max(rows["births"]).as_py() != part.births:
-        return f"does not reach {part.births} births"
-    if table == "runs" and (
-        rows.num_rows != 1 or rows["state"][0].as_py() != "finished"
-    ):
-        return "must have one row, of a finished run"
-    return ""
 
 
 def read_rows(data: Path, table: str, name: str) -> pa.Table:
@@ -207,76 +196,6 @@ def read_rows(data: Path, table: str, name: str) -> pa.Table:
         rows = rows.append_column(one, pa.nulls(rows.num_rows, one.type))
     known = TABLES[table].names
     return rows.select([*known, *(set(rows.column_names) - set(known))])
-
-
-def _kept_repeats(data: Path, part: Part, experiment: str) -> list[int]:
-    """Return the repeats that have at least one file."""
-    there = {path.stem for path in data.glob("*/*.parquet")}
-    return [each for each in range(part.repeats) if stem(experiment, each) in there]
-
-
-def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
-    """Print kept, missing and damaged files.
-
-    Args:
-        data: folder of the rows.
-        parts: parts of the campaign.
-
-    Returns:
-        0, or 1 if a file is damaged or unexpected, if a repeat is incomplete, or if the
-        runs differ in platform or, within one experiment, in settings. Repeats without
-        any file are no error.
-    """
-    problems = []
-    details: list[dict[str, str]] = []
-    expected: set[Path] = set()
-    for part in parts:
-        for experiment in part.names:
-            kept = _kept_repeats(data, part, experiment)
-            for name in (stem(experiment, number) for number in kept):
-                found = list(problems_of(data, part, name))
-                problems += found
-                expected |= {path_of(data, table, name) for table in tables_of(part)}
-                if not found:
-                    details += read_rows(data, "runs", name).to_pylist()
-            missing = [each for each in range(part.repeats) if each not in kept]
-            lack = f", missing: {_ranges(missing)}" if missing else ""
-            print(f"{experiment}: {len(kept)} of {part.repeats} repeats{lack}")
-    there = {path for table in data.glob("*/") for path in table.iterdir()}
-    strays = sorted(there - expected)
-    problems += [f"{path.relative_to(data)}: unexpected file" for path in strays]
-    size = sum(path.stat().st_size for path in there)
-    print(f"{len(there)} files, {size / 1e6:.1f} MB")
-    for column in ("platform", "versions", "commit"):
-        for value in sorted({str(row[column]) for row in details}):
-            print(f"{column}: {value}")
-    problems += _differences(details)
-    for problem in problems:
-        print(f"damaged: {problem}")
-    return 1 if problems else 0
-
-
-def _differences(details: Sequence[dict[str, str]]) -> Iterator[str]:
-    """Yield differences that runs must not have."""
-    platforms = {tag for row in details for tag in row["platform"].split()}
-    if len(platforms) > 1:
-        yield f"runs: must have one platform, got {len(platforms)}"
-    for experiment in sorted({row["experiment"] for row in details}):
-        mine = [row for row in details if row["experiment"] == experiment]
-        if len({row["document"] for row in mine}) > 1:
-            yield f"runs: settings of {experiment} differ"
-
-
-def _ranges(numbers: Sequence[int]) -> str:
-    """Return ascending numbers as text, such as ``0-3, 7``."""
-    found: list[list[int]] = []
-    for number in numbers:
-        if found and found[-1][-1] == number - 1:
-            found[-1].append(number)
-        else:
-            found.append([number])
-    ends = (dict.fromkeys((each[0], each[-1])) for each in found)
-    return ", ".join("-".join(map(str, each)) for each in ends)
 
 
 def kept(data: Path, table: str) -> pa.Table:
@@ -309,7 +228,12 @@ class KeptOutcomes:
 
     def __init__(self, rows: pa.Table, most: int | None = None) -> None:
         self._rows = rows if most is None else rows.filter(pc.field("births") <= most)
-        self.experiments: list[str] = sorted(set(self._rows["experiment"].to_pylist()))
+        names = self._rows["experiment"].to_pylist()
+        self._places: dict[tuple[str, int], list[int]] = {}
+        births = self._rows["births"].to_pylist()
+        for row, place in enumerate(zip(names, births, strict=True)):
+            self._places.setdefault(place, []).append(row)
+        self.experiments: list[str] = sorted(set(names))
 
     def births(self, *experiments: str) -> int:
         """Return the most births at which all runs have rows; 0 if there are none."""
@@ -324,6 +248,11 @@ class KeptOutcomes:
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
         """Return the runs' values of a measure; runs without a value are skipped."""
-        is_of = pc.field("experiment") == experiment
-        rows = self._rows.filter(is_of & (pc.field("births") == births))
-        return np.asarray(rows[measure].drop_null(), np.float64)
+        places = np.array(self._places.get((experiment, births), []), np.int64)
+        found = np.asarray(self._rows[measure].to_numpy(), np.float64)[places]
+        known: Numbers = found[~np.isnan(found)]
+        return known
+
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the only fitness function: the kept runs have the thesis's."""
+        return ["locomotion"] if experiments else []

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FunctionType
 
 import revolve
+from docs.struct_tables import linked
 
 PAGE = Path(__file__).parent / "reference.md"
 _HEAD = """# Reference of the Python interface
@@ -27,7 +28,8 @@ _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 def reference() -> str:
     """Return the page."""
     names = sorted(revolve.__all__, key=lambda name: (_order(name), name.lower()))
-    return _HEAD + "\n".join(line for name in names for line in _entry(name))
+    text = "\n".join(line for name in names for line in _entry(name))
+    return _HEAD + linked(text)
 
 
 def _order(name: str) -> int:

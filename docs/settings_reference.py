@@ -9,7 +9,7 @@ import msgspec.inspect as kinds
 from msgspec import Struct
 
 from coordinator.evolution.kinds import KINDS as COORDINATOR_KINDS
-from docs.struct_tables import introduction, rows
+from docs.struct_tables import introduction, linked, rows
 from schema.experiment.calibration import Calibration
 from schema.experiment.document import Experiment, Islands
 from schema.experiment.kinds import KINDS as SCHEMA_KINDS
@@ -96,7 +96,7 @@ def _sections() -> Iterator[str]:
     for section, name in names.items():
         title = _title(section, names)
         yield f"## `{title}`\n" if name else f"## {title}\n"
-        yield f"{introduction(section)}\n"
+        yield f"{linked(introduction(section), '../')}\n"
         yield f"In the code: {_place(section)}.\n"
         yield from rows(section, link)
 
@@ -120,8 +120,11 @@ def _plugins() -> Iterator[str]:
     yield "| key | name | what it is |"
     yield "|---|---|---|"
     for kind, key in _KEYS.items():
+        names: dict[int, str] = {}
         for name, plugin in every[kind].built_in.items():
-            yield f"| {key} | `{name}` | {_about(plugin)} |"
+            first = names.setdefault(id(plugin), name)
+            about = _about(plugin) if first == name else f"another name of `{first}`"
+            yield f"| {key} | `{name}` | {about} |"
     yield ""
     tables: list[tuple[str, str, type[Struct]]] = [
         *_with_parameters(every["fitness"], "fitness.parameters"),

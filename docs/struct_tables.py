@@ -58,6 +58,16 @@ def rows(
     yield ""
 
 
+def linked(text: str, up: str = "") -> str:
+    """Return a text in which names of pages, docs/NAME.md, are links.
+
+    Args:
+        text: of a docstring.
+        up: path from the folder of the page that shows it to docs/, with its slash.
+    """
+    return re.sub(r"\bdocs/(\w+)\.md\b", rf"[\1]({up}\1.md)", text)
+
+
 def introduction(found: object) -> str:
     """Return the text of a docstring before its list of attributes, as Markdown."""
     text, _, rest = _docstring(found).partition("\nAttributes:\n")

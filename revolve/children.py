@@ -9,7 +9,6 @@ import atexit
 import os
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Sequence
 from multiprocessing.connection import Connection, Pipe
@@ -18,6 +17,7 @@ from pathlib import Path
 import msgspec
 
 from revolve.messages import Outcome, Problem, Task, error_of
+from schema.agent.import_path import environment, python_command
 from schema.agent.supervision import crash_cause
 from schema.errors import RevolveError
 from schema.plugins.permission import allowed, source_of
@@ -26,12 +26,6 @@ from schema.plugins.source import forget_digests, plugins_of
 _GRACE_S = 5.0
 _OUTCOMES = msgspec.msgpack.Decoder(Outcome)
 _PROBLEMS = msgspec.msgpack.Decoder(Problem)
-
-
-def environment() -> dict[str, str]:
-    """Return the environment of children, which import what this process can."""
-    paths = [str(Path(path).absolute()) for path in sys.path]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
 
 
 def plugins() -> tuple[str, ...]:
@@ -60,7 +54,7 @@ class Child:
         self.connection, theirs = Pipe()
         with theirs:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "revolve.child", str(theirs.fileno()), *words],
+                [*python_command("revolve.child"), str(theirs.fileno()), *words],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL if is_quiet else None,
                 pass_fds=[theirs.fileno()],

@@ -123,6 +123,7 @@ def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
             file=sys.stderr,
         )
         return 2
+    _show_start(words)
     # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
     import_module("schema.agent.supervisor").prepare_process()
     error_type = import_module("schema.errors").RevolveError
@@ -138,6 +139,16 @@ def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
     finally:
         if words[1:] in (["-h"], ["--help"]):
             print(_also(words[0]), end="")
+
+
+def _show_start(words: list[str]) -> None:
+    """Show on a terminal that a run starts: its imports alone take half a second.
+
+    The next line that is written to the terminal replaces this one.
+    """
+    is_shown = words[0] in ("run", "resume") and "--quiet" not in words
+    if is_shown and sys.stderr is not None and sys.stderr.isatty():
+        print("starting ...", end="\r", file=sys.stderr, flush=True)
 
 
 def _unknown_action(words: list[str], room: ModuleType) -> str:

@@ -27,12 +27,22 @@ def stranger() -> str:
             spec = None
         origin = spec.origin if spec is not None else None
         if origin is None or Path(origin).resolve() != wanted or not _is_ours(wanted):
+            what = f"the module {room!r} is not that of Revolve Islands but"
+            if origin is not None and not _is_installed(Path(origin)):
+                return f"{what} {origin}: rename yours"
             return (
-                f"the module {room!r} is not that of Revolve Islands but of another "
-                f"package ({origin or 'of unknown place'}): install revolve-islands "
-                "again, in an environment of its own"
+                f"{what} of another package ({origin or 'of unknown place'}): install "
+                "revolve-islands again, in an environment of its own"
             )
     return ""
+
+
+def _is_installed(file: Path) -> bool:
+    """Return whether a file belongs to an installed package or to this project."""
+    ours = Path(__file__).absolute().parent.parent
+    return file.is_relative_to(ours) or any(
+        part in ("site-packages", "dist-packages") for part in file.parts
+    )
 
 
 def _is_ours(init: Path) -> bool:

@@ -3,10 +3,9 @@
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Sequence
 
-from revolve.children import environment
+from schema.agent.import_path import environment, python_command
 
 _GRACE_S = 6.0
 """Longer than the command itself waits for its processes."""
@@ -34,7 +33,7 @@ class Workers:
         words = [word for entry in plugins for word in ("--plugins", entry)]
         self._process = subprocess.Popen(
             [
-                *(sys.executable, "-m", "revolve", "worker", "--connect", address),
+                *(*python_command("revolve"), "worker", "--connect", address),
                 *("--processes", str(count), "--oversubscribe", "--until-closed"),
                 *words,
             ],

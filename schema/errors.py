@@ -131,6 +131,9 @@ def unreadable(error: OSError | UnicodeDecodeError) -> str:
 def expectation(message: str) -> str:
     """Return a message of msgspec in words, such as "must be a number, got a text"."""
     text = message.replace("Expected ", "must be ")
+    text = re.sub(
+        "Object missing required field `(.*?)`", r"must have a key '\1'", text
+    )
     return re.sub(r"`(\w+(?: \| \w+)*)`", _types_in_words, text)
 
 

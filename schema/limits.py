@@ -152,6 +152,8 @@ MOST_KEY_PARTS = 16
 """Parts of a dotted key in TOML; ``tomllib`` takes quadratic memory for them."""
 MOST_ISLANDS = 10_000
 """Islands of an experiment."""
+MOST_SWEEP_POINTS = 1000
+"""Experiments of a sweep."""
 MOST_ISLAND_TABLES = 1000
 """Tables ``[[islands]]`` of an experiment."""
 MOST_OTHERS = 100

@@ -1,13 +1,13 @@
 """Findings of the thesis as data: measure, experiments and direction.
 
 Each finding is expressed by a measure; where the thesis does not define one, the choice
-is that of this project, and the text names it. Source: Hupkes 2016, chapter 6.
+is that of this project, and the text names it. Source: Hupkes 2016, chapters 6 and 7.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
-Direction = Literal[">", "<", "="]
+Direction = Literal[">", "<", "=", "!=", "some"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,14 +15,23 @@ class Claim:
     """A finding of the thesis.
 
     Attributes:
-        figure: figure of the thesis.
+        figure: figure of the thesis, or section of its chapter 7.
         text: the finding in words.
         measure: column of ``outputs.OUTCOME``.
         a: an experiment.
-        expected: relation of its runs to those of ``b``, or to ``reference``; "="
-            means no large difference.
+        expected: relation of its runs to those of ``b``, or to ``reference``: "="
+            means alike, "!=" different in either direction, "some" that the measure
+            is above 0 in a run.
         b: another experiment; None compares ``a`` with ``reference``.
         reference: a number.
+        margin: largest difference from ``reference`` that is negligible, in the
+            measure's unit; with "=", the largest that counts as alike.
+        share: factor of the values of ``b``.
+        is_spread: compare the distances of the runs from their experiment's median,
+            instead of the values.
+        is_automatic: the finding follows almost by construction.
+        births: fewest births at which the finding means something.
+        topic: the finding without the names of experiments.
     """
 
     figure: str
@@ -32,75 +41,183 @@ class Claim:
     expected: Direction
     b: str | None = None
     reference: float = 0.0
+    margin: float = 0.0
+    share: float = 1.0
+    is_spread: bool = False
+    is_automatic: bool = False
+    births: int = 0
+    topic: str = ""
 
 
 _ONE, _TWO, _THREE = "scenario1", "scenario2", "scenario3"
 _RANDOM, _DRIFT = "no-reproduction", "no-selection"
 _EVOLVED = (_ONE, _TWO, _THREE)
+ARENA, TOUCHES = "bench-arena", "scenario3-touches"
+"""Names of a benchmark of arenas, and of scenario 3 with ``record_touches``."""
 
+FLAT_BIRTHS, EARLY_BIRTHS, RETAINED_BIRTHS = 600, 300, 150
+"""Fewest births: 20 broods in each half; a tenth that has a brood besides the founders;
+populations 120 births apart."""
 
 Pair = tuple[str, str]
 
 
 def _of(
-    figure: str, text: str, measure: str, expected: Direction, *pairs: Pair
+    figure: str,
+    text: str,
+    measure: str,
+    expected: Direction,
+    *pairs: Pair,
+    births: int = 0,
+    is_automatic: bool = False,
+    is_spread: bool = False,
+    share: float = 1.0,
 ) -> list[Claim]:
     """Return one claim per pair of experiments, with both names in the text."""
     return [
-        Claim(figure, text.format(a=a, b=b), measure, a, expected, b) for a, b in pairs
+        Claim(
+            figure,
+            text.format(a=a, b=b),
+            measure,
+            a,
+            expected,
+            b,
+            share=share,
+            is_spread=is_spread,
+            is_automatic=is_automatic,
+            births=births,
+            topic=text.format(a="A", b="B"),
+        )
+        for a, b in pairs
     ]
 
 
 def _all(
-    figure: str, text: str, measure: str, expected: Direction, reference: float = 0.0
+    figure: str,
+    text: str,
+    measure: str,
+    expected: Direction,
+    reference: float = 0.0,
+    *,
+    margin: float = 0.0,
+    of: tuple[str, ...] = _EVOLVED,
+    births: int = 0,
+    is_automatic: bool = False,
 ) -> list[Claim]:
-    """Return one claim per scenario that compares it with a number."""
+    """Return one claim per experiment that compares it with a number."""
     return [
-        Claim(figure, f"{a}: {text}", measure, a, expected, reference=reference)
-        for a in _EVOLVED
+        Claim(
+            figure,
+            f"{a}: {text}",
+            measure,
+            a,
+            expected,
+            reference=reference,
+            margin=margin,
+            is_automatic=is_automatic,
+            births=births,
+            topic=text,
+        )
+        for a in of
     ]
 
 
 _TO_3 = ((_THREE, _ONE), (_THREE, _TWO))
+_AMONG = ((_ONE, _TWO), (_ONE, _THREE), (_TWO, _THREE))
+_OVER = tuple((a, b) for a in _EVOLVED for b in (_RANDOM, _DRIFT))
 
-CLAIMS: tuple[Claim, ...] = (
+
+def _sizes(figure: str, per_part: str, what: str, measure: str) -> list[Claim]:
+    """Return the claims about a size: alike, over the baselines, alike per part."""
+    divided = f"{measure}_per_part"
+    return [
+        *_of(figure, f"as many {what} in {{a}} as in {{b}}", measure, "=", *_AMONG),
+        *_of(figure, f"more {what} in {{a}} than in {{b}}", measure, ">", *_OVER),
+        *_of(per_part, f"as many {what} per part in {{a}} as in {{b}}", divided, "=",
+             *_AMONG, *_OVER),
+    ]  # fmt: skip
+
+
+def _in_order(claims: list[Claim]) -> tuple[Claim, ...]:
+    """Return claims in the order of the thesis's figures and sections."""
+    return tuple(
+        sorted(claims, key=lambda claim: [int(n) for n in claim.figure.split(".")])
+    )
+
+
+CLAIMS: tuple[Claim, ...] = _in_order([
     *_of("6.2", "{a} ends fitter than {b}", "fitness", ">",
-         (_ONE, _RANDOM), (_ONE, _DRIFT), (_TWO, _RANDOM), (_TWO, _DRIFT)),
+         (_ONE, _RANDOM), (_TWO, _RANDOM)),
+    *_of("6.2", "{a} ends fitter than {b}", "fitness", ">",
+         (_ONE, _DRIFT), (_TWO, _DRIFT), is_automatic=True),
     *_of("6.2", "{a} and {b} end alike", "fitness", "=", (_ONE, _TWO)),
+    *_of("6.2", "the runs of {a} differ from each other more or less than those of "
+         "{b}", "fitness", "!=", (_TWO, _ONE), is_spread=True),
     *_of("6.2", "{a} ends less fit than {b}", "fitness", "<", *_TO_3),
+    *_all("6.2", "fitness stays about zero (within 0.01 m/s)", "fitness", "=",
+          margin=0.01, of=(_DRIFT,), is_automatic=True),
+    *_of("6.2", "{a} gains less than a quarter of what {b} gains", "gain", "<",
+         (_RANDOM, _ONE), share=0.25),
     *_of("6.3", "fitness levels off earlier in {a} than in {b}", "late_gain", "<",
-         (_TWO, _ONE), *_TO_3),
+         (_TWO, _ONE), *_TO_3, births=FLAT_BIRTHS),
     *_of("6.4", "as many ancestors per robot in {a} as in {b}", "ancestors_per_robot",
          "=", (_TWO, _ONE)),
     *_of("6.4", "more ancestors per robot in {a} than in {b}", "ancestors_per_robot",
          ">", *_TO_3),
-    *_all("6.5", "diversity falls", "diversity_change", "<"),
+    *_all("6.5", "diversity falls", "diversity_change", "<", margin=1.0),
     *_all("6.5", "early: the first tenth of births takes more than a tenth of it",
-          "early_drop", ">", 0.1),
+          "early_drop", ">", 0.1, margin=0.05, births=EARLY_BIRTHS),
     *_of("6.5", "less diversity is left in {a} than in {b}", "diversity", "<",
          (_TWO, _ONE)),
     *_of("6.5", "more diversity is left in {a} than in {b}", "diversity", ">", *_TO_3),
     *_of("6.6", "rank is greater in {a} than in {b}", "rank", ">",
-         (_TWO, _ONE), (_THREE, _TWO)),
+         (_TWO, _ONE), (_THREE, _TWO), (_THREE, _ONE)),
     *_of("6.7", "fewer stay for 120 births in {a} than in {b}", "retention", "<",
-         *_TO_3),
-    Claim("6.8", "a robot's fitness ranges over more than a tenth of its "
-          "contemporaries'", "variability", _THREE, ">", reference=0.1),
-    *_all("6.9", "robots outgrow random ones", "parts_change", ">"),
-    *_of("6.9", "robots are larger in {a} than in {b}", "parts", ">",
-         (_ONE, _RANDOM), (_ONE, _DRIFT)),
-    *_of("6.12", "as many joints per part in {a} as in {b}", "joints_per_part", "=",
-         (_ONE, _TWO), (_ONE, _THREE), (_TWO, _THREE)),
-    *_all("6.14", "more extremities, more fitness", "extremities_fitness", ">"),
+         *_TO_3, births=RETAINED_BIRTHS),
+    *_all("6.7", "retention mirrors fitness: their rank correlation over births",
+          "retention_fitness", ">", margin=0.1, births=EARLY_BIRTHS),
+    *_all("6.8", "a robot's fitness ranges over more than a tenth of its "
+          "contemporaries'", "variability", ">", 0.1, margin=0.05, of=(_THREE,),
+          is_automatic=True),
+    *_all("6.9", "robots outgrow random ones", "parts_change", ">", margin=1.0),
+    *_of("6.9", "robots are larger in {a} than in {b}", "parts", ">", *_OVER),
+    *_of("6.9", "robots are as large in {a} as in {b}", "parts", "=", *_AMONG),
+    *_all("6.9", "larger robots are fitter", "parts_fitness", ">", margin=0.1),
+    *_sizes("6.11", "6.12", "joints", "joints"),
+    *_sizes("6.11", "6.12", "active joints", "active_joints"),
+    *_sizes("6.11", "6.12", "passive joints", "passive_joints"),
+    *_sizes("6.13", "6.13", "extremities", "extremities"),
+    *_all("6.14", "more extremities, more fitness", "extremities_fitness", ">",
+          margin=0.1),
     *_all("6.14", "more extremities per part, less fitness",
-          "extremities_per_part_fitness", "<"),
-    *_all("6.15", "most robots have no touch sensor", "without_touch", ">", 0.5),
+          "extremities_per_part_fitness", "<", margin=0.1),
+    *_all("6.15", "most robots have no touch sensor", "without_touch", ">", 0.5,
+          margin=0.05),
     *_all("6.15", "fewer touch sensors than random robots have",
-          "touch_sensors_change", "<"),
-    *_all("6.16", "fewer hidden neurons than random robots have", "hidden_change", "<"),
-    Claim("6.16", "no-selection: fewer hidden neurons than random robots have",
-          "hidden_change", _DRIFT, "<"),
+          "touch_sensors_change", "<", margin=0.15, of=(*_EVOLVED, _DRIFT)),
+    *_all("6.15", "as many touch sensors as random robots have (within 0.3)",
+          "touch_sensors_change", "=", margin=0.3, of=(_RANDOM,)),
+    *_all("6.15", "robots without touch sensor occur", "without_touch", "some",
+          is_automatic=True),
+    *_all("6.15", "robots with one touch sensor occur", "one_touch", "some",
+          is_automatic=True),
+    *_all("6.15", "robots with two touch sensors occur", "two_touch", "some",
+          is_automatic=True),
+    *_all("6.16", "fewer hidden neurons than random robots have", "hidden_change", "<",
+          margin=0.5, of=(*_EVOLVED, _DRIFT)),
+    *_all("6.16", "as many hidden neurons as random robots have (within 1)",
+          "hidden_change", "=", margin=1.0, of=(_RANDOM,)),
     *_of("6.16", "as many hidden neurons in {a} as in {b}", "hidden", "=",
          (_ONE, _DRIFT)),
-)  # fmt: skip
+    *(claim for number, a in enumerate(_EVOLVED, 18) for claim in (
+        *_all(f"6.{number}", "the best robot and ancestors of five levels differ less "
+              "than half as much as founders", "family_distance", "<", 0.5,
+              margin=0.05, of=(a,)),
+        *_all(f"6.{number}", "their parts come from less than a third of the 15 "
+              "founders", "family_founders", "<", 5.0, margin=0.5, of=(a,)))),
+    *_all("7.1.2", "an arena of 30 random robots is simulated in real time",
+          "real_time_factor", ">", 1.0, margin=0.1, of=(ARENA,)),
+    *_all("7.2.1", "robots touch each other for less than a twentieth of their lives",
+          "touching", "<", 0.05, margin=0.01, of=(TOUCHES,)),
+])  # fmt: skip
 """Findings in the order of the thesis's figures."""

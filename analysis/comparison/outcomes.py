@@ -8,11 +8,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.statistics import ranks
+from analysis.measures.families import FOUNDERS
 from analysis.measures.outputs import POPULATION
 from analysis.measures.population_table import Numbers
-
-FOUNDERS = 15
-"""Number of founders in the thesis's experiments."""
 
 
 def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
@@ -40,7 +38,7 @@ def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
         found[name] = _mean(np.array([one[name] for one in each]))
     if "robots" in tables:
         found |= _of_robots(tables["robots"], found, births)
-    return found | _of_arena(tables, births)
+    return found | _of_families(tables, births) | _of_arena(tables, births)
 
 
 def _of_island(
@@ -54,6 +52,9 @@ def _of_island(
     drop = _share(diversity, counts[first:], births / 10, is_late=False)
     found["early_drop"] = drop
     found["diversity_change"] = float(diversity[-1] - diversity[0])
+    found["gain"] = float(columns["fitness"][-1] - columns["fitness"][first])
+    found["size_mean"] = _mean(columns["size"])
+    found["retention_fitness"] = _correlation(columns["retention"], columns["fitness"])
     return found
 
 
@@ -84,21 +85,38 @@ def _of_robots(
     for name in ("parts", "touch_sensors", "hidden"):
         change = last.get(name, math.nan) - _mean(_column(random, name))
         found[f"{name}_change"] = change
-    for name in ("extremities", "extremities_per_part"):
+    for name in ("parts", "extremities", "extremities_per_part"):
         correlation = _correlation(_column(born, name), _column(born, "fitness"))
         found[f"{name}_fitness"] = correlation
     return found
 
 
+def _of_families(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
+    found = dict.fromkeys(("family_distance", "family_founders"), math.nan)
+    # Families are those of the last populations.
+    if "families" in tables and births >= pc.max(tables["families"]["births"]).as_py():
+        families = tables["families"]
+        distance, apart = (
+            _column(families, name) for name in ("distance", "founder_distance")
+        )
+        unknown = np.full(len(apart), np.nan)
+        ratio = np.divide(distance, apart, out=unknown, where=apart > 0)
+        found["family_distance"] = _mean(ratio)
+        found["family_founders"] = _mean(_column(families, "founders"))
+    return found
+
+
 def _of_arena(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
-    found = dict.fromkeys(("variability", "touched", "between"), math.nan)
+    names = ("variability", "touched", "touching", "between", "real_time_factor")
+    found = dict.fromkeys(names, math.nan)
     if "variability" in tables:
         born = tables["variability"].filter(pc.field("birth") < births)
         values = _column(born, "variability")
         values = values[~np.isnan(values)]
         found["variability"] = float(np.median(values)) if len(values) else math.nan
     if "interactions" in tables:
-        found["touched"] = _mean(_column(tables["interactions"], "touched"))
+        for name in ("touched", "touching"):
+            found[name] = _mean(_column(tables["interactions"], name))
     if "between" in tables:
         until = tables["between"].filter(pc.field("births") <= births)
         if until.num_rows:
@@ -107,7 +125,12 @@ def _of_arena(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
 
 
 def _correlation(first: Numbers, second: Numbers) -> float:
-    """Return Spearman's rank correlation; NaN if one of the two is constant."""
+    """Return Spearman's rank correlation of pairs; NaN if one of the two is constant.
+
+    Pairs with a NaN are ignored.
+    """
+    is_known = ~np.isnan(first) & ~np.isnan(second)
+    first, second = first[is_known], second[is_known]
     if len(first) < 2 or not np.ptp(first) or not np.ptp(second):  # noqa: PLR2004
         return math.nan
     return float(np.corrcoef(ranks(first), ranks(second))[0, 1])

@@ -48,16 +48,24 @@ def delta_interval(delta: float, first: int, second: int) -> tuple[float, float]
     """
     found = (delta + 1) / 2
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
-    mean_runs = (first + second) / 2
 
     def is_inside(theta: float) -> bool:
-        bracket = (1 - theta) / (2 - theta) + theta / (1 + theta)
-        spread = theta * (1 - theta) * (1 + (mean_runs - 1) * bracket)
-        return (theta - found) ** 2 <= z**2 * spread / (first * second)
+        return (theta - found) ** 2 <= z**2 * score_variance(theta, first, second)
 
     low = _edge(is_inside, found, 0.0)
     high = _edge(is_inside, found, 1.0)
     return 2 * low - 1, 2 * high - 1
+
+
+def score_variance(theta: float, first: int, second: int) -> float:
+    """Return the variance of (delta + 1) / 2 if its true value is ``theta``.
+
+    Source: Newcombe, 2006, as for ``delta_interval``.
+    """
+    mean_runs = (first + second) / 2
+    bracket = (1 - theta) / (2 - theta) + theta / (1 + theta)
+    spread = theta * (1 - theta) * (1 + (mean_runs - 1) * bracket)
+    return spread / (first * second)
 
 
 def _edge(is_inside: Callable[[float], bool], inner: float, outer: float) -> float:
@@ -82,11 +90,23 @@ def rank_sum_p(a: Numbers, b: Numbers) -> float:
     Source: Wilcoxon, 1945; Mann and Whitney, 1947; counted exactly.
     """
     places = _doubled_ranks(np.concatenate([a, b]))
-    ways = np.zeros((len(a) + 1, int(places.sum()) + 1))
+    ways = rank_sum_ways(places, len(a))
+    return _tails(ways, int(places[: len(a)].sum()))
+
+
+def rank_sum_ways(places: Integers, chosen: int) -> Numbers:
+    """Return the number of ways to choose some of the places, by the sum of these.
+
+    Args:
+        places: (N,) twice the rank of each number.
+        chosen: how many are chosen.
+    """
+    ways = np.zeros((chosen + 1, int(places.sum()) + 1))
     ways[0, 0] = 1.0
     for place in places.tolist():
         ways[1:, place:] += ways[:-1, :-place]
-    return _tails(ways[len(a)], int(places[: len(a)].sum()))
+    found: Numbers = ways[chosen]
+    return found
 
 
 def signed_rank(values: Numbers) -> tuple[float, float]:
@@ -194,16 +214,35 @@ def half_interval(deviation: Numbers, runs: Integers) -> Numbers:
     return np.where(runs > 1, half, np.nan)
 
 
-def t_quantile(freedom: float) -> float:
-    """Return the 97.5 % quantile of Student's t.
+def t_quantile(freedom: float, level: float = LEVEL) -> float:
+    """Return the number that Student's t exceeds in size with probability 1 - level.
 
     Args:
         freedom: degrees of freedom, >= 1.
+        level: confidence level of a two-sided interval; 0.95 is the 97.5 % quantile.
     """
+    angles, share = _t_shares(freedom)
+    angle = float(np.interp(level, share, angles))
+    return math.sqrt(freedom) * math.tan(angle)
+
+
+def t_tail(value: float, freedom: float) -> float:
+    """Return the probability that Student's t is above a value.
+
+    Args:
+        value: any number.
+        freedom: degrees of freedom, >= 1.
+    """
+    angles, share = _t_shares(freedom)
+    angle = math.atan(abs(value) / math.sqrt(freedom))
+    tail = (1 - float(np.interp(angle, angles, share))) / 2
+    return tail if value >= 0 else 1 - tail
+
+
+def _t_shares(freedom: float) -> tuple[Numbers, Numbers]:
+    """Return angles and the probability that t lies within each of them."""
     # With t = sqrt(freedom) tan(angle) the density becomes cos(angle)^(freedom - 1).
     angles = np.linspace(0.0, math.pi / 2, 20001)
     area = np.cos(angles) ** (freedom - 1)
     steps = (area[1:] + area[:-1]) / 2
-    share = np.append(0.0, np.cumsum(steps)) / steps.sum()
-    angle = float(np.interp(LEVEL, share, angles))
-    return math.sqrt(freedom) * math.tan(angle)
+    return angles, np.append(0.0, np.cumsum(steps)) / steps.sum()

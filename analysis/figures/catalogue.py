@@ -9,7 +9,13 @@ from typing import Any, Literal
 
 from analysis.figures.bench import arena_speed, spider_speed
 from analysis.figures.courses import course_caption, over_births
-from analysis.figures.forms import Panels, Tables, over_runs, spread_caption
+from analysis.figures.forms import (
+    Panels,
+    Tables,
+    fitness_note,
+    over_runs,
+    spread_caption,
+)
 from analysis.figures.islands import between, fitness_by_island, migration_graph
 from analysis.figures.named_measures import measures_over_births
 from analysis.figures.robots import (
@@ -24,7 +30,15 @@ BIRTHS = "the births tables of the runs"
 _BENCHMARK = "the benchmark file"
 
 Section = Literal[
-    "fitness", "robots", "bodies", "diversity", "islands", "measures", "speed", "thesis"
+    "sweeps",
+    "fitness",
+    "robots",
+    "bodies",
+    "diversity",
+    "islands",
+    "measures",
+    "speed",
+    "thesis",
 ]
 """Section of the report that shows a figure."""
 
@@ -93,6 +107,11 @@ def _course(
     )
 
 
+def _with_note(tables: Tables, text: str) -> str:
+    """Return a caption, and what the panels are if fitness functions differ."""
+    return text + fitness_note(tables)
+
+
 FIGURES: tuple[Figure, ...] = (
     Figure("6.1", "Speed of an arena by its population",
            "Real-time factor (simulated time by wall-clock time) of random robots in "
@@ -108,7 +127,8 @@ FIGURES: tuple[Figure, ...] = (
             "mean tree edit distance"),
     _spread("diversity", "6.5b", "Diversity at the end",
             {"diversity": "mean tree edit distance"}),
-    _spread("diversity", "6.6", "Rank at the end", {"rank": "rank"}),
+    _spread("diversity", "6.6", "Rank in ancestry at the end",
+            {"rank": "rank (founders 1, children one more)"}),
     _course("diversity", "6.7", "Retention over births", "retention",
             "share alive 120 births later"),
     Figure("6.8", "Variability of fitness on-line",
@@ -127,9 +147,9 @@ FIGURES: tuple[Figure, ...] = (
             {"extremities": "extremities",
              "extremities_per_part": "extremities per part"}),
     Figure("6.14a", "Fitness by the number of extremities",
-           "Points are means over the runs that have such robots. Bars are 95 % "
-           "intervals of the mean, shown for three or more runs. Left: the last "
-           "populations. Right: all robots ever evaluated.",
+           partial(_with_note, text="Points are means over the runs that have such "
+           "robots. Bars are 95 % intervals of the mean, shown for three or more runs. "
+           "Left: the last populations. Right: all robots ever evaluated."),
            ("extremities",), partial(extremities_and_fitness, by="count"), "bodies"),
     Figure("6.14b", "Fitness by extremities per part",
            "As figure 6.14a, in bins of 0.1; each point is at the middle of its bin.",
@@ -142,8 +162,9 @@ FIGURES: tuple[Figure, ...] = (
              "hidden_per_part": "hidden neurons per part"}),
     Figure("6.17", "All ancestors of the best robots",
            "Each point is an ancestor of the fittest robot of an experiment's last "
-           "populations; the horizontal axis is its number of birth on its island. "
-           "Each line leads to a parent.",
+           "populations; the horizontal axis is its number of birth on its island, the "
+           "vertical one its rank: 1 for founders, else one more than the greatest of "
+           "its parents. Each line leads to a parent.",
            (BIRTHS,), lineages, "diversity"),
     Figure("7.1", "Speed of an arena of spiders by its population",
            "Real-time factor (simulated time by wall-clock time) of identical spiders "
@@ -153,8 +174,8 @@ FIGURES: tuple[Figure, ...] = (
             {"connections": "connections",
              "connections_per_part": "connections per part"}),
     Figure("B", "Fitness of islands",
-           "Each line is the mean fitness of one island, for all runs with several "
-           "islands.",
+           partial(_with_note, text="Each line is the mean fitness of one island, for "
+           "all runs with several islands."),
            ("populations",), fitness_by_island, "islands"),
     Figure("C", "Migration between islands",
            "The width of an arrow is the number of migrants. Its colour is the share "
@@ -169,7 +190,8 @@ FIGURES: tuple[Figure, ...] = (
     Figure("F", "The thesis's findings as effects",
            "Cliff's delta of a over b with its 95 % interval, or the rank-biserial "
            "correlation where an experiment is compared with a number. In brackets: "
-           "the thesis's finding (> greater, < smaller, = no large difference).",
+           "the thesis's finding (> greater, < smaller, = alike, != different). Each "
+           "mark of a line is a pair of experiments, or an experiment.",
            ("findings",), effects, "thesis"),
     Figure("H", "Measures over births",
            "Mean over the population of each measure that the experiment names. Each "

@@ -8,11 +8,21 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.progression import mean_of_all_runs, run_means
-from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables, counted_runs
+from analysis.figures.forms import (
+    BAND_RUNS,
+    FITNESS,
+    NothingToDraw,
+    Tables,
+    counted_runs,
+    fitness_note,
+    fitness_panels,
+)
 from analysis.figures.style import in_order, label, scales, theme_of_size
 
 FEW_RUNS = 10
 """Runs of an experiment up to which each is drawn."""
+_NARROW = 2
+"""Panels in a row."""
 _MOST_POINTS = 300
 """Points of a run that are drawn; more cannot be told apart."""
 
@@ -83,7 +93,8 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     """Return a measure of runs, and its mean over them, by number of births.
 
     Args:
-        tables: ``populations`` and ``progression``.
+        tables: ``populations`` and ``progression``; ``runs`` for the panels of
+            fitness functions.
         measure: column of ``populations``.
         text: label of the axis.
 
@@ -91,13 +102,19 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
         NothingToDraw: no run has two populations with a value.
     """
     shown = course(tables, measure)
-    runs = shown.by_run.to_pandas()
+    functions = fitness_panels(tables) if measure == FITNESS else {}
+
+    def frame(rows: pa.Table) -> Any:  # noqa: ANN401 - pandas
+        made = rows.to_pandas()
+        return made.assign(function=made["experiment"].map(functions))
+
+    runs = frame(shown.by_run)
     few = [name for name, size in shown.sizes.items() if 1 < size <= FEW_RUNS]
-    figure = p9.ggplot(shown.mean.to_pandas(), p9.aes("births", "mean"))
+    figure = p9.ggplot(frame(shown.mean), p9.aes("births", "mean"))
     sure = shown.mean.filter(pc.field("runs") >= BAND_RUNS)
     if sure.num_rows:
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
-        figure += p9.geom_ribbon(ends, data=sure.to_pandas(), alpha=0.18)
+        figure += p9.geom_ribbon(ends, data=frame(sure), alpha=0.18)
     if few:
         figure += p9.geom_line(
             p9.aes(colour="experiment", group="folder"),
@@ -109,7 +126,10 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
     figure = figure + scales(shown.sizes, is_filled=sure.num_rows > 0)
     figure += p9.expand_limits(y=0)
-    return figure + p9.labs(x="births", y=text) + theme_of_size(3.8)
+    if functions:
+        figure += p9.facet_wrap("function", scales="free_y", ncol=_NARROW)
+    rows = -(-len(set(functions.values())) // _NARROW) or 1
+    return figure + p9.labs(x="births", y=text) + theme_of_size(0.8 + 3.0 * rows)
 
 
 def course_caption(tables: Tables, measure: str) -> str:
@@ -128,7 +148,8 @@ def course_caption(tables: Tables, measure: str) -> str:
             f"Bands are 95 % intervals of the mean of {BAND_RUNS} or more runs; that "
             "of few runs may reach beyond possible values."
         )
-    return " ".join([*texts, *_ends(shown.ends)])
+    note = fitness_note(tables) if measure == FITNESS else ""
+    return " ".join([*texts, *_ends(shown.ends)]) + note
 
 
 def _ends(ends: Mapping[str, int]) -> list[str]:

@@ -1,7 +1,6 @@
-"""The best robots, their ancestors, and the founders of their parts."""
+"""The best robots, all their ancestors, and the order of a family tree."""
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -12,9 +11,6 @@ import pyarrow.compute as pc
 
 from analysis.measures.ancestry import ancestors, parents_first, parents_of
 from analysis.measures.population_table import individual_ids, rows_of
-
-LEVELS = 5
-"""Levels of reproduction that a family tree shows, the robot's own included."""
 
 LINEAGE = pa.schema(
     [
@@ -40,25 +36,6 @@ class Best:
     fitness: float
 
 
-@dataclass(frozen=True, slots=True)
-class Family:
-    """A robot and its nearest ancestors, as rows of the births table.
-
-    Attributes:
-        levels: the robot, its parents, their parents, and so on; each ancestor is
-            listed once, on its nearest level.
-        edges: (child, parent) of those.
-        founders: robots without parents whose parts survive in any of them, the
-            founder with the most parts first.
-        founder_of: first founder that has a gene, by gene.
-    """
-
-    levels: tuple[tuple[int, ...], ...]
-    edges: tuple[tuple[int, int], ...]
-    founders: tuple[int, ...]
-    founder_of: dict[int, int]
-
-
 def best_robots(robots: pa.Table) -> list[Best]:
     """Return the best robot of each experiment, sorted by the experiment's name.
 
@@ -80,47 +57,6 @@ def row_of(best: Best, births: pa.Table) -> int:
     """Return the births row of a robot; -1 if its birth is not recorded."""
     named = pa.table({"birth_island": [best.birth_island], "birth": [best.birth]})
     return int(rows_of(individual_ids(named), births)[0])
-
-
-def family(births: pa.Table, row: int, levels: int = LEVELS) -> Family:
-    """Return the nearest ancestors of a robot, and the founders of their parts.
-
-    Args:
-        births: births table of the robot's run.
-        row: row of the robot.
-        levels: number of levels, the robot's own included.
-
-    Source: Hupkes 2016, figures 6.18 to 6.20.
-    """
-    parents = parents_of(births)
-    shown = [[row]]
-    known = {row}
-    for _ in range(levels - 1):
-        above = dict.fromkeys(up for down in shown[-1] for up in parents[down])
-        nearest = [up for up in above if up not in known]
-        if not nearest:
-            break
-        known.update(nearest)
-        shown.append(nearest)
-    edges = [(down, up) for level in shown for down in level for up in parents[down]]
-    bodies = births["body"].combine_chunks()
-
-    def genes(member: int) -> list[int]:
-        # 0 is no identity.
-        return list(filter(None, bodies[member].values.field("gene").to_pylist()))
-
-    founder_of: dict[int, int] = {}
-    for founder in (row for row, couple in enumerate(parents) if not couple):
-        for gene in genes(founder):
-            founder_of.setdefault(gene, founder)
-    inherited = [gene for member in known for gene in genes(member)]
-    counts = Counter(founder_of[gene] for gene in inherited if gene in founder_of)
-    return Family(
-        tuple(map(tuple, shown)),
-        tuple((down, up) for down, up in edges if up in known),
-        tuple(sorted(counts, key=lambda founder: (-counts[founder], founder))),
-        founder_of,
-    )
 
 
 def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:

@@ -15,13 +15,19 @@ from analysis.figures.family_tree import LINEAGE, Best, best_robots
 from analysis.figures.films import film
 from analysis.figures.forms import NothingToDraw, Tables
 from analysis.figures.pictures import family_tree, gaits
-from analysis.figures.robot_pictures import RobotPicture, robot_picture
+from analysis.figures.robot_pictures import (
+    RobotPicture,
+    robot_picture,
+    shown_document,
+)
 from analysis.figures.style import PICTURE_ENDING, in_order, label, save
+from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
 from schema.experiment.file import own_experiment
 from schema.experiment.identity import Origin
+from schema.plugins.source import modules_named
 from schema.robot.ids import BirthId
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
@@ -29,6 +35,11 @@ from schema.tables.files import read_table
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
 _BASELINES = ("no-reproduction", "no-selection")
 """Experiments without an ancestry that selection made."""
+PART_COLOURS = (
+    "A part's colour shows the founder that the part descends from; white parts were "
+    "added by mutation. Parts of encodings that give them no identity keep their own "
+    "colour."
+)
 GAITS = "6.10"
 """Number of the figure of gaits."""
 _SOURCE = ("robots", BIRTHS)
@@ -77,7 +88,7 @@ class FigureWriter:
             folder: an existing folder.
         """
         self._folder = folder
-        for pattern in ("G-*.p??", f"{_FILM}*.gif", _EARLIER):
+        for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif", _EARLIER):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
@@ -150,6 +161,7 @@ def draw_figures(
     for figure in FIGURES:
         writer.add(figure, given)
         bar.advance(task)
+    _add_sweeps(writer, given)
     _add_gaits(writer, list(pictures.values()), problems)
     bar.advance(task)
     for name in trees:
@@ -162,6 +174,23 @@ def draw_figures(
     films = [writer.add_film(one) for one in pictures.values()]
     figures = sorted(writer.drawn, key=_place)
     return Drawings(figures, films, problems, writer.left_out)
+
+
+def _add_sweeps(writer: FigureWriter, tables: Tables) -> None:
+    """Draw the map of each sweep."""
+    if "sweeps" not in tables:
+        return
+    for name in in_order(tables["sweeps"]["experiment"].to_pylist()):
+        figure = Figure(
+            f"S-{name}",
+            f"Outcomes of the sweep {label(name)}",
+            partial(sweep_caption, experiment=name),
+            ("sweeps", "outcomes"),
+            partial(sweep_map, experiment=name),
+            "sweeps",
+            f"sweep-{name}",
+        )
+        writer.add(figure, tables)
 
 
 def _robot_pictures(
@@ -181,11 +210,13 @@ def _robot_pictures(
     for name in bar.track(in_order(best), description="rendering robots"):
         run = runs[best[name].folder]
         try:
-            allow_plugins_of(run.folder)
+            document = shown_document(run.document)
+            if modules_named(document.encode()):
+                allow_plugins_of(run.folder)
             pictures[name] = robot_picture(
                 best[name],
                 read_table(run.folder, "births"),
-                own_experiment(run.document),
+                own_experiment(document),
                 simulation,
                 origin=Origin(seed=run.seed, run=run.number),
                 has_family=name not in _BASELINES,
@@ -209,9 +240,10 @@ def _add_gaits(
         return
     caption = (
         "The fittest robot of each experiment's last populations, simulated alone and "
-        "shown from the middle of its evaluation on. A part's colour shows the founder "
-        "that the part descends from; white parts were added by mutation. Parts of "
-        "encodings that give them no identity keep their own colour."
+        "shown from the middle of its evaluation on, by a camera that stands still; a "
+        "tile of the floor has 20 cm. Pictures of robots that move less than 10 cm in "
+        "that time are taken further apart, up to the end of the evaluation. "
+        f"{PART_COLOURS}"
     )
     title = "Gaits of the best robots"
     draw = partial(gaits, pictures)

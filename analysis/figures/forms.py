@@ -15,6 +15,7 @@ from analysis.figures.style import (
     theme_of_size,
     two_line_label,
 )
+from analysis.measures.fitness_functions import functions_of
 from schema.errors import RevolveError
 
 Tables = Mapping[str, pa.Table]
@@ -32,8 +33,34 @@ _NARROW = 3
 _INK = "#333333"
 
 
+FITNESS = "fitness"
+"""Measure whose figures have a panel for each fitness function."""
+
+
 class NothingToDraw(RevolveError):  # noqa: N818 - a result, not a failure
     """The tables lack the data of a figure; the message says what is missing."""
+
+
+def fitness_panels(tables: Tables) -> dict[str, str]:
+    """Return the fitness function of each experiment; empty if there is only one.
+
+    Values of different functions must not share an axis.
+
+    Args:
+        tables: ``runs``; without it, all functions are the same.
+    """
+    functions = functions_of(tables["runs"]) if "runs" in tables else {}
+    return functions if len(set(functions.values())) > 1 else {}
+
+
+def fitness_note(tables: Tables) -> str:
+    """Return a sentence about the panels of fitness functions; empty for one."""
+    if not fitness_panels(tables):
+        return ""
+    return (
+        " Each fitness function has its own panel; values of different functions "
+        "cannot be compared."
+    )
 
 
 def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
@@ -43,7 +70,8 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     fewer. Pale violins show the robots of all last populations.
 
     Args:
-        tables: ``outcomes``, and ``robots`` if they have the measure.
+        tables: ``outcomes``, and ``robots`` if they have the measure; ``runs`` for
+            the panels of fitness functions.
         panels: the measures.
 
     Raises:
@@ -51,12 +79,13 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     """
     if not tables["outcomes"].num_rows:
         raise NothingToDraw("no finished run could be measured")
-    runs = stacked(tables["outcomes"], panels)
+    functions = fitness_panels(tables) if FITNESS in panels else {}
+    runs = _by_function(stacked(tables["outcomes"], panels), functions)
     if runs.empty:
         raise NothingToDraw(f"no finished run has a value of {next(iter(panels))}")
     experiments = in_order(runs["experiment"])
     figure = p9.ggplot(runs, p9.aes("experiment", "value"))
-    figure += [*_violins(tables, panels, experiments), *_summaries(runs)]
+    figure += [*_violins(tables, panels, functions, experiments), *_summaries(runs)]
     figure = figure + scales(experiments) + p9.expand_limits(y=0)
     # An invisible layer extends panels of zeros from 0 to 1.
     flat = runs[runs.groupby("panel", observed=True)["value"].transform("max") == 0]
@@ -73,13 +102,26 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     births = _births(tables["outcomes"], experiments)
     if len(panels) > 1:
         return figure + _in_panels(len(panels), experiments, births)
-    labels = [
-        f"{two_line_label(name)}\n{births[name]}" if births else two_line_label(name)
+    labels = {
+        name: f"{two_line_label(name)}\n{births.get(name, '')}".rstrip()
         for name in experiments
-    ]
-    figure += p9.scale_x_discrete(limits=experiments, labels=labels)
+    }
     look = theme_of_size(3.6) + p9.theme(legend_position="none")
+    if functions:
+        figure += p9.facet_wrap("panel", scales="free", ncol=_NARROW)
+        figure += p9.scale_x_discrete(labels=labels)
+        rows = -(-runs["panel"].nunique() // _NARROW)
+        look = theme_of_size(0.6 + 3.0 * rows) + p9.theme(legend_position="none")
+    else:
+        figure += p9.scale_x_discrete(limits=experiments, labels=list(labels.values()))
     return figure + p9.labs(x="", y=next(iter(panels.values()))) + look
+
+
+def _by_function(rows: Any, functions: Mapping[str, str]) -> Any:  # noqa: ANN401 - pandas
+    """Return rows of ``stacked`` whose panels are the fitness functions, if several."""
+    if not functions:
+        return rows
+    return rows.assign(panel=rows["experiment"].map(functions))
 
 
 def spread_caption(tables: Tables, panels: Panels) -> str:
@@ -97,12 +139,12 @@ def spread_caption(tables: Tables, panels: Panels) -> str:
         )
     if min(sizes.values(), default=BOX_RUNS) < BOX_RUNS:
         texts.append(f"Bars show the median of fewer than {BOX_RUNS} runs.")
-    if _violins(tables, panels, in_order(sizes)):
+    if _violins(tables, panels, {}, in_order(sizes)):
         texts.append(
             "Pale shapes show the robots of all last populations, from the least to "
             "the greatest value."
         )
-    return " ".join(texts)
+    return " ".join(texts) + (fitness_note(tables) if FITNESS in panels else "")
 
 
 def counted_runs(sizes: Mapping[str, int]) -> str:
@@ -173,12 +215,17 @@ def _grouped(rows: Any) -> Any:  # noqa: ANN401 - pandas
     return groups["value"]
 
 
-def _violins(tables: Tables, panels: Panels, experiments: list[str]) -> list[Any]:
+def _violins(
+    tables: Tables,
+    panels: Panels,
+    functions: Mapping[str, str],
+    experiments: list[str],
+) -> list[Any]:
     """Return a layer of the robots of last populations, if they have the measures."""
     robots = tables.get("robots")
     if robots is None or not panels.keys() & set(robots.column_names):
         return []
-    rows = stacked(robots.filter(pc.field("is_last")), panels)
+    rows = _by_function(stacked(robots.filter(pc.field("is_last")), panels), functions)
     rows = rows[rows["experiment"].isin(experiments)]
     values = _grouped(rows)
     # A distribution of equal values has no shape.

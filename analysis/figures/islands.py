@@ -7,7 +7,7 @@ import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.forms import NothingToDraw, Tables, fitness_panels
 from analysis.figures.style import (
     OTHERS,
     in_order,
@@ -40,11 +40,12 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
     frame["island"] = frame["island"].astype(str)
     frame["line"] = frame["folder"] + " " + frame["island"]
     names = sorted(set(frame["island"]), key=int)
+    heights = "free_y" if fitness_panels(tables) else "fixed"
     hues = OTHERS * -(-len(names) // len(OTHERS))
     return (
         p9.ggplot(frame, p9.aes("births", "fitness"))
         + p9.geom_line(p9.aes(colour="island", group="line"), size=0.7, alpha=0.85)
-        + p9.facet_wrap("experiment", labeller=label)
+        + p9.facet_wrap("experiment", labeller=label, scales=heights)
         + p9.scale_colour_manual(hues[: len(names)], limits=names)
         + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))
         + p9.expand_limits(y=0)

@@ -1,6 +1,8 @@
 """Renders the best robots, their gaits and their families."""
 
-from collections.abc import Callable, Iterable, Mapping
+import dataclasses
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -10,7 +12,8 @@ import numpy as np
 import pyarrow as pa
 from msgspec.structs import replace
 
-from analysis.figures.family_tree import Best, Family, family, lineage, row_of
+from analysis.figures.family_tree import LINEAGE, Best, lineage, row_of
+from analysis.measures.families import Family, family
 from analysis.render.picture import Picture, RobotRenderer, Simulate
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, island_experiment
@@ -27,10 +30,14 @@ EVERY_S = 0.5
 FILM_EVERY_S = 0.1
 """Time between two pictures of a film [s]; it lasts as long as the gait."""
 _LARGE, _SMALL, _FILMED = (400, 300), (300, 225), (320, 240)
+_JUDGING = frozenset({"fitness", "measures", "selection"})
 _WIDE, _CLOSE = (0.15, 0.15, 0.0), (0.26, 0.14, 0.1)
 _FILM = (0.12, 0.03, 0.0)
 """Shares of a picture that are cut off: of the height above and below, of the width at
 each side. Robots are flat, and the near side is below the middle."""
+_SLOW_M = 0.1
+"""Way during a gait below which its pictures are taken further apart [m]: a robot that
+moves less looks the same in all of them."""
 MUTATED = (0.93, 0.93, 0.93)
 """Colour of parts that were added by mutation."""
 
@@ -56,6 +63,8 @@ class RobotPicture:
         times_s: time of each of these pictures [s].
         film: pictures of the same time, more of them.
         film_interval_s: time between two of these pictures [s].
+        moved_m: distance between the core's places in the first and last picture of
+            the gait, in the ground plane [m].
         family: its nearest ancestors; None if they are not shown.
         pictures: pictures of the family, by births row.
         births: birth ids of the family, by births row.
@@ -67,6 +76,7 @@ class RobotPicture:
     times_s: tuple[float, ...]
     film: tuple[Picture, ...]
     film_interval_s: float
+    moved_m: float
     family: Family | None
     pictures: Mapping[int, Picture]
     births: Mapping[int, BirthId]
@@ -99,8 +109,39 @@ def robot_picture(
     row = row_of(best, births)
     if row < 0:
         raise RunFolderError(f"{best.folder}: birth {best.birth} is not recorded")
+    found = family_picture(
+        best, births, family(births, row), experiment, simulate,
+        origin=origin, has_family=has_family,
+    )  # fmt: skip
+    return dataclasses.replace(found, lineage=lineage(births, best.experiment, row))
+
+
+def family_picture(
+    best: Best,
+    births: pa.Table,
+    relatives: Family,
+    experiment: Experiment,
+    simulate: Simulate,
+    *,
+    origin: Origin,
+    has_family: bool,
+) -> RobotPicture:
+    """Return pictures as ``robot_picture`` does, without the lineage.
+
+    Args:
+        best: the robot, the only one on the first level of its family.
+        births: ``island``, ``birth``, ``genome`` and ``robot`` of the family.
+        relatives: its family.
+        experiment: experiment of the run.
+        simulate: the worker's simulation.
+        origin: seed and run, which determine the noise.
+        has_family: render the family, too.
+
+    Raises:
+        SimulationDiverged: the physics diverged.
+    """
+    ((row,), *_) = relatives.levels
     settings = evaluation_settings_of(island_experiment(experiment, best.birth_island))
-    relatives = family(births, row)
     paint = dict(zip(relatives.founders, FOUNDERS, strict=False))
 
     def colour(gene: int) -> Colour:
@@ -133,8 +174,27 @@ def robot_picture(
         relatives if has_family else None,
         pictures,
         names,
-        lineage(births, best.experiment, row),
+        LINEAGE.empty_table(),
     )
+
+
+def shown_document(document: str) -> str:
+    """Return an experiment as JSON without the sections that only judge robots.
+
+    Pictures need no fitness function. Without those sections they need no plug-in of
+    the user's either, unless it defines bodies or brains: of two runs with different
+    sources of a plug-in, one process can import only one.
+
+    Args:
+        document: an experiment as JSON.
+    """
+
+    def without(entries: Mapping[str, Any]) -> dict[str, Any]:
+        return {key: value for key, value in entries.items() if key not in _JUDGING}
+
+    found = without(json.loads(document))
+    found["islands"] = [without(each) for each in found.get("islands") or ()]
+    return json.dumps(found)
 
 
 def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
@@ -146,12 +206,12 @@ def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
 
 def _motion(
     robot: Robot, settings: EvaluationSettings, simulate: Simulate
-) -> tuple[tuple[Picture, ...], tuple[float, ...], tuple[Picture, ...], float]:
+) -> tuple[tuple[Picture, ...], tuple[float, ...], tuple[Picture, ...], float, float]:
     """Return pictures from the middle of a robot's life on, by a fixed camera.
 
     Returns:
         Pictures of the gait and their times [s]; pictures of the film and the time
-        between two of them [s].
+        between two of them [s]; the robot's way during the gait [m].
     """
     poses: list[Floats] = []
     watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
@@ -163,11 +223,14 @@ def _motion(
     first = len(poses) // 2
     chosen = range(first, len(poses), step)[:FRAMES]
     filmed = range(first, min(len(poses), first + FRAMES * step), film_step)
-    middle = np.mean([poses[at][:3] for at in chosen], axis=0)
+    if _way_m(poses, chosen) < _SLOW_M:
+        step = max(step, (len(poses) - 1 - first) // (FRAMES - 1))
+        chosen = range(first, len(poses), step)[:FRAMES]
 
     def drawn(
-        ticks: Iterable[int], size: tuple[int, int], cut: tuple[float, float, float]
+        ticks: Sequence[int], size: tuple[int, int], cut: tuple[float, float, float]
     ) -> tuple[Picture, ...]:
+        middle = np.mean([poses[at][:3] for at in ticks], axis=0)
         with RobotRenderer(robot, settings, size=size) as renderer:
             return tuple(
                 _cut(renderer.picture(poses[at], look_at=middle), cut) for at in ticks
@@ -175,4 +238,11 @@ def _motion(
 
     times_s = tuple((at - first) * tick_s for at in chosen)
     film = drawn(filmed, _FILMED, _FILM)
-    return drawn(chosen, _LARGE, _WIDE), times_s, film, film_step * tick_s
+    gait, way_m = drawn(chosen, _LARGE, _WIDE), _way_m(poses, chosen)
+    return gait, times_s, film, film_step * tick_s, way_m
+
+
+def _way_m(poses: Sequence[Floats], ticks: Sequence[int]) -> float:
+    """Return the core's distance between the first and last tick, in the plane [m]."""
+    first, last = poses[ticks[0]], poses[ticks[-1]]
+    return float(np.linalg.norm(last[:2] - first[:2]))

@@ -1,12 +1,14 @@
 """Figures of single robots, their ancestors, and the findings of the thesis."""
 
+from typing import Any
+
 import numpy as np
 import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.statistics import half_interval
-from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables
+from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables, fitness_panels
 from analysis.figures.style import (
     in_order,
     integer_breaks,
@@ -71,7 +73,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     """Return the mean fitness of robots by their extremities, over runs.
 
     Args:
-        tables: ``extremities``.
+        tables: ``extremities``; ``runs`` for the panels of fitness functions.
         by: "count" or "per_part".
 
     Raises:
@@ -98,6 +100,13 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     shown["at"] = shown["bin"] + start + _DODGE * width * aside
     panels = shown["population"].astype("category").cat.set_categories([*_POPULATIONS])
     shown["panel"] = panels.cat.rename_categories(_POPULATIONS)
+    functions = fitness_panels(tables)
+    shown["function"] = experiments.map(functions)
+    in_panels = ["function", "panel"] if functions else "panel"
+    lines = len(set(functions.values())) or 1
+    of_line = shown.groupby(["experiment", "population"])["bin"]
+    # The library warns of lines of one point.
+    joined = shown[of_line.transform("size") > 1]
     return (
         p9.ggplot(shown, p9.aes("at", "fitness"))
         + p9.geom_linerange(
@@ -107,13 +116,13 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
             alpha=0.6,
             show_legend=False,
         )
-        + p9.geom_line(p9.aes(colour="experiment"), size=0.6)
+        + p9.geom_line(p9.aes(colour="experiment"), data=joined, size=0.6)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
-        + p9.facet_wrap("panel", ncol=2)
+        + p9.facet_wrap(in_panels, ncol=2, scales="free_y" if functions else "fixed")
         + scales(experiments, is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x=axis, y="mean fitness")
-        + theme_of_size(3.6)
+        + theme_of_size(0.6 + 3.0 * lines)
     )
 
 
@@ -154,7 +163,7 @@ def lineages(tables: Tables) -> p9.ggplot:
         )
         + scales(rows["experiment"].to_pylist(), is_filled=False)
         + p9.scale_y_continuous(breaks=integer_breaks)
-        + p9.labs(x="number of birth", y="rank")
+        + p9.labs(x="number of birth", y="rank (founders 1, children one more)")
         + theme_of_size(4.2)
     )
 
@@ -171,24 +180,32 @@ def effects(tables: Tables) -> p9.ggplot:
     rows = tables["findings"].filter(pc.field("effect").is_valid())
     if not rows.num_rows:
         raise NothingToDraw("no finding has two finished runs of each experiment")
-    claims = [
-        f"{row['figure']}  {row['claim']}  ({row['expected']})"
-        for row in rows.to_pylist()
-    ]
-    named = rows.append_column("text", pa.array(claims))
+    shown = rows.filter(pc.field("expected") != "some").to_pylist()
+    if not shown:
+        raise NothingToDraw("no finding compares runs with each other or a number")
+    lines: dict[str, list[Any]] = {}
+    for row in shown:
+        text = f"{row['figure']}  {row['topic']}  ({row['expected']})"
+        lines.setdefault(text, []).append(row)
+    for height, group in enumerate(lines.values()):
+        for at, row in enumerate(group):
+            row["height"] = height + 0.7 * ((at + 0.5) / len(group) - 0.5)
+    named = pa.Table.from_pylist(shown)
     sure = named.filter(named["effect_low"].is_valid())
     figure = (
-        p9.ggplot(named.to_pandas(), p9.aes("text", "effect", colour="verdict"))
-        + p9.geom_hline(yintercept=0, colour="#999999", size=0.5)
-        + p9.geom_point(size=2)
-        + p9.scale_x_discrete(limits=claims[::-1])
+        p9.ggplot(named.to_pandas(), p9.aes("effect", "height", colour="verdict"))
+        + p9.geom_vline(xintercept=0, colour="#999999", size=0.5)
+        + p9.geom_point(size=1.4)
+        + p9.scale_y_reverse(
+            breaks=list(range(len(lines))), labels=list(lines), expand=(0, 0.6)
+        )
         + p9.scale_colour_manual(_VERDICTS, name="")
-        + p9.coord_flip(ylim=(-1, 1))
-        + p9.labs(x="", y="effect")
-        + theme_of_size(1.2 + 0.16 * len(claims), 9.0)
-        + p9.theme(axis_text_y=p9.element_text(size=8))
+        + p9.coord_cartesian(xlim=(-1, 1))
+        + p9.labs(x="effect", y="")
+        + theme_of_size(1.2 + 0.24 * len(lines), 9.0)
+        + p9.theme(axis_text_y=p9.element_text(size=7.5))
     )
     if not sure.num_rows:
         return figure
-    ends = p9.aes(ymin="effect_low", ymax="effect_high")
-    return figure + p9.geom_linerange(ends, data=sure.to_pandas(), size=0.7)
+    ends = p9.aes(x="effect_low", xend="effect_high", yend="height")
+    return figure + p9.geom_segment(ends, data=sure.to_pandas(), size=0.5)

@@ -1,15 +1,20 @@
 """Style of all figures: theme, colour and label of each experiment, file formats."""
 
-from collections.abc import Iterable
-from itertools import cycle
+import re
+import warnings
+from collections.abc import Iterable, Iterator
+from colorsys import hls_to_rgb
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import plotnine as p9
 from matplotlib import pyplot as plt
 from matplotlib import rc_context
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from plotnine.exceptions import PlotnineWarning
 
 from analysis.measures.distinct_names import MARK
 
@@ -23,6 +28,9 @@ _THESIS = {
     "no-reproduction": "#7F7F7F",
     "no-selection": "#CC79A7",
 }
+_GOLDEN = 0.618034
+"""Golden ratio: multiples of it are far from each other on a circle."""
+_LIGHTNESS = (0.3, 0.68, 0.47)
 OTHERS = ("#D55E00", "#56B4E9", "#8C6D31", "#5254A3", "#000000", "#B2DF8A", "#E7298A")
 """Colours of experiments that are not in the thesis."""
 _INK, _FAINT = "#333333", "#E6E6E6"
@@ -48,17 +56,27 @@ def colours(experiments: Iterable[str]) -> dict[str, str]:
     Source: Okabe and Ito, *Color universal design*, 2008: distinguishable for the
     colour-blind.
     """
-    spare = cycle(OTHERS)
+    spare = _spare()
     return {name: _THESIS.get(name) or next(spare) for name in in_order(experiments)}
 
 
+def _spare() -> Iterator[str]:
+    """Yield different colours: those of ``OTHERS``, then hues all around the circle."""
+    yield from OTHERS
+    for number in count():
+        hue, lightness = number * _GOLDEN % 1, _LIGHTNESS[number % len(_LIGHTNESS)]
+        yield to_hex(hls_to_rgb(hue, lightness, 0.75)).upper()
+
+
 def label(experiment: str) -> str:
-    """Return the label of an experiment in figures."""
+    """Return the label of an experiment in figures.
+
+    Only names of the thesis's experiments are changed: users look for their own names.
+    """
     name, mark, number = experiment.partition(MARK)
-    if name.startswith("scenario") and name[8:].isdigit():
-        text = f"scenario {name[8:]}"
-    else:
-        text = name.replace("-", " ")
+    text = name
+    if name in _THESIS:
+        text = re.sub(r"(?<=\D)(?=\d)", " ", name).replace("-", " ")
     return f"{text} {mark}{number}" if mark else text
 
 
@@ -67,7 +85,10 @@ def two_line_label(experiment: str) -> str:
     text = label(experiment)
     if MARK in text:
         return text.replace(f" {MARK}", f"\n{MARK}")
-    return text if len(text) < _BROAD else text.replace(" ", "\n", 1)
+    if len(text) < _BROAD:
+        return text
+    # After the first space or hyphen.
+    return re.sub(r"(?<=[ -])", "\n", text, count=1).replace(" \n", "\n")
 
 
 def scales(experiments: Iterable[str], *, is_filled: bool = True) -> list[Any]:
@@ -120,7 +141,10 @@ def save(figure: p9.ggplot | Figure, stem: Path) -> None:
         figure: a plotnine or matplotlib figure.
         stem: path without an ending.
     """
-    drawn = figure.draw() if isinstance(figure, p9.ggplot) else figure
+    with warnings.catch_warnings():
+        # A line of one point is not drawn: nothing that a user can mend.
+        warnings.simplefilter("ignore", PlotnineWarning)
+        drawn = figure.draw() if isinstance(figure, p9.ggplot) else figure
     with rc_context(_SETTINGS):
         for ending in _ENDINGS:
             # Without a date, the same tables give the same bytes.

@@ -1,6 +1,7 @@
 """Distinct names for experiments of the same name with different settings.
 
-A mean over runs with different settings would describe neither experiment. The number
+A mean over runs with different settings would describe neither experiment. The source
+of a plug-in counts as a setting: an edited fitness function is another one. The number
 of planned births is not compared: experiments are compared at births that all runs
 reach.
 """
@@ -35,14 +36,15 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
     """
     groups: dict[str, dict[str, list[Run]]] = {}
     for run in runs:
-        text = json.dumps(_settings(run.document), sort_keys=True)
+        both = (_settings(run.document), dict(run.plugins))
+        text = json.dumps(both, sort_keys=True)
         groups.setdefault(run.experiment, {}).setdefault(text, []).append(run)
     renamed: dict[int, Run] = {}
     for name, by_settings in groups.items():
         first, *others = sorted(by_settings.values(), key=len, reverse=True)
         free = (each for n in count(2) if (each := f"{name}{MARK}{n}") not in groups)
         for experiment, group in zip(free, others, strict=False):
-            differs = _compared(group[0].document, first[0].document)
+            differs = _compared(group[0], first[0])
             for run in group:
                 renamed[id(run)] = replace(run, experiment=experiment, differs=differs)
     return [renamed.get(id(run), run) for run in runs]
@@ -53,7 +55,17 @@ def _settings(document: str) -> dict[str, Any]:
     with suppress(ExperimentError):  # otherwise it is compared unchanged
         document = experiment_text(experiment_from_text(document))
     entries: dict[str, Any] = json.loads(document)
+    # Runs of a sweep are one experiment.
+    for key in (entries.get("sweep") or {}).pop("chosen", None) or {}:
+        _remove(entries, key.split("."))
     return _without(entries)
+
+
+def _remove(section: dict[str, Any], words: Sequence[str]) -> None:
+    """Remove the value of a dotted key, if it is there."""
+    for word in words[:-1]:
+        section = section.get(word) or {}
+    section.pop(words[-1], None)
 
 
 def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
@@ -65,9 +77,16 @@ def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _compared(mine: str, others: str) -> str:
-    """Return the differences of two documents as text."""
-    found = list(_differences(_settings(mine), _settings(others), ""))
+def _compared(mine: Run, other: Run) -> str:
+    """Return the differences of the settings of two runs as text."""
+    # A plug-in that only one of them has is named by another setting.
+    found = [
+        f"source of plug-in {name} (plugins/{name}.py in the run folders): digest "
+        f"{mine.plugins[name]} instead of {digest}"
+        for name, digest in other.plugins.items()
+        if mine.plugins.get(name, digest) != digest
+    ]
+    found += _differences(_settings(mine.document), _settings(other.document), "")
     more = [f"and {len(found) - _LISTED} more"] if len(found) > _LISTED else []
     return ", ".join(found[:_LISTED] + more)
 

@@ -4,8 +4,8 @@ Everything readable is read; everything else is reported with its folder and the
 """
 
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from msgspec import structs
 from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
+from schema.experiment.fitness_text import fitness_text
+from schema.plugins.source import modules_named
 from schema.tables.columns import TABLES, VERSION
 from schema.tables.description import DETAILS, STATE, read_description, read_state
 from schema.tables.files import finished_path, has_rows, is_sealed, read_table
@@ -54,7 +56,7 @@ class Run:
 
     Attributes:
         folder: path of the folder.
-        experiment: name of the experiment.
+        experiment: name of the experiment; that of a sweep for all its runs.
         number: number of the repeat.
         seed: seed of the run.
         state: finished, stopped or running (also if it was killed).
@@ -63,6 +65,10 @@ class Run:
         differs: settings that differ from other runs of the same experiment name.
         has_measures: the experiment names measures of robots.
         function: fitness function; empty if the document does not name one.
+        fitness: fitness functions as ``fitness_text``, with digests of their sources.
+        plugins: digest of the source of each plug-in, by module; "unknown" for runs
+            that did not record it.
+        point: values of the swept settings, by dotted key; empty without a sweep.
     """
 
     folder: Path
@@ -75,6 +81,9 @@ class Run:
     differs: str = ""
     has_measures: bool = False
     function: str = ""
+    fitness: str = ""
+    plugins: Mapping[str, str] = field(default_factory=dict)
+    point: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def is_finished(self) -> bool:
@@ -85,9 +94,9 @@ class Run:
 def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     """Return the runs in or below some folders, by path, and what was left out.
 
-    Of several folders with the same run (experiment, repeat, seed, settings) one is
-    kept: that with the most readable tables, then the finished one, then the longest,
-    then the first.
+    Of several folders with the same run (experiment, repeat, seed, settings, sources
+    of plug-ins) one is kept: that with the most readable tables, then the finished
+    one, then the longest, then the first.
 
     Raises:
         RunFolderError: a folder does not exist, or no readable run is found.
@@ -124,9 +133,10 @@ def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
         runs: sorted by folder.
         left_out: what was left out.
     """
-    copies: dict[tuple[str, int, int, str], list[Run]] = {}
+    copies: dict[tuple[object, ...], list[Run]] = {}
     for run in runs:
-        name = (run.experiment, run.number, run.seed, run.document)
+        sources = tuple(run.plugins.items())
+        name = (run.experiment, run.number, run.seed, run.document, sources)
         copies.setdefault(name, []).append(run)
     kept = []
     for group in copies.values():
@@ -159,6 +169,9 @@ def read_run(folder: Path) -> Run:
         name, number, seed = details["name"], details["run"], details["seed"]
         has_measures = bool(document.get("measures", {}).get("names"))
         function = str(document.get("fitness", {}).get("function", ""))
+        plugins = _plugins(details)
+        fitness = fitness_text(document, plugins)
+        point = dict((document.get("sweep") or {}).get("chosen") or {})
     except (
         ValueError, KeyError, TypeError, AttributeError, RecursionError
     ) as error:  # fmt: skip
@@ -166,7 +179,8 @@ def read_run(folder: Path) -> Run:
         raise RunFolderError(f"{DETAILS}: cannot be read: {cause}") from None
     run = Run(
         folder=folder,
-        experiment=str(name),
+        # Its points have the sweep's name and a number.
+        experiment=str(name).rpartition("-")[0] if point else str(name),
         number=int(number),
         seed=int(seed),
         state=_state(folder, details),
@@ -174,6 +188,9 @@ def read_run(folder: Path) -> Run:
         islands=islands,
         has_measures=has_measures,
         function=function,
+        fitness=fitness,
+        plugins=plugins,
+        point=point,
     )
     if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
         raise RunFolderError("the run is finished, but its tables are missing")
@@ -193,6 +210,13 @@ def _details(folder: Path) -> dict[str, Any]:
             raise
         warn_once(f"{error}; using its row in the table runs")
         return dict(rows[0])
+
+
+def _plugins(details: dict[str, Any]) -> dict[str, str]:
+    """Return the digest of the source of each plug-in of a run, by module."""
+    known = details.get("plugins") or {}
+    names = modules_named(details["document"].encode())
+    return {name: known[name].digest if name in known else "unknown" for name in names}
 
 
 def _state(folder: Path, details: dict[str, Any]) -> str:

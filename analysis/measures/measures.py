@@ -12,6 +12,7 @@ import pyarrow as pa
 from analysis.measures.ancestry import migrants
 from analysis.measures.bodies import extremity_bins
 from analysis.measures.diversity import mean_distances
+from analysis.measures.families import families
 from analysis.measures.interactions import interactions
 from analysis.measures.named_measures import named_measures
 from analysis.measures.population_table import (
@@ -72,6 +73,7 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Booleans]:
 _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
     "robots": (robots, _OF_ROBOTS),
     "extremities": (lambda run: extremity_bins(robots(run)), _OF_ROBOTS),
+    "families": (families, ("births", "population")),
     "variability": (lambda run: variability(run.tables["fitness"]), ("fitness",)),
     "interactions": (
         lambda run: interactions(
@@ -112,7 +114,7 @@ def measure(
     found = {}
     found["populations"], problems = populations(run)
     for name, (function, needed) in _OTHERS.items():
-        if name not in {"robots", "extremities"} | wanted:
+        if name not in {"robots", "extremities", "families"} | wanted:
             continue
         missing = [table for table in needed if table in unread]
         if missing:

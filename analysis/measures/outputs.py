@@ -12,6 +12,7 @@ _KINDS = {
     "island": pa.int32(),
     "birth_island": pa.int32(),
     "is_last": pa.bool_(),
+    "near_automatic": pa.bool_(),
 }
 _RUN = {
     "experiment": "name of the experiment",
@@ -42,8 +43,8 @@ PER_PART = {
 POPULATION = {
     "size": "living robots",
     "judged": "living robots whose fitness counts: off-line all, on-line mature ones",
-    "fitness": "mean of judged robots [m/s]",
-    "fitness_best": "maximum of judged robots [m/s]",
+    "fitness": "mean of judged robots, in the unit of the fitness function",
+    "fitness_best": "maximum of judged robots, in the same unit",
     "rank": "mean of judged robots (thesis eq. 6.1)",
     "ancestors": "different ancestors of all judged robots together",
     "ancestors_per_robot": "ancestors divided by judged",
@@ -53,6 +54,8 @@ POPULATION = {
     **{name: f"mean of judged robots: {what}" for name, what in BODY.items()},
     **{name: f"mean of judged robots: {what}" for name, what in PER_PART.items()},
     "without_touch": "share of judged robots without touch sensors",
+    "one_touch": "share of judged robots with one touch sensor",
+    "two_touch": "share of judged robots with two or more touch sensors",
 }
 """Measures of a population at a number of births."""
 
@@ -71,6 +74,14 @@ OUTCOME = {
     "variability": "median of the robots' variability (on-line)",
     "touched": "share of robots that ever touched another robot (on-line)",
     "between": "mean tree edit distance between islands",
+    "gain": "fitness of the last population minus that of the founders",
+    "size_mean": "mean over the run's births of the number of living robots",
+    "retention_fitness": "rank correlation of retention and fitness over births",
+    "parts_fitness": "rank correlation of fitness and parts, all robots",
+    "family_distance": "distance within the best robot's family / among founders",
+    "family_founders": "number of founders whose parts are in that family",
+    "touching": "contact time of robots divided by their lifetimes (on-line)",
+    "real_time_factor": "simulated by wall-clock time of 30 robots (bench arena)",
 }
 """Outcome of a run: one number per measure, by which experiments are compared."""
 
@@ -104,13 +115,19 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "function": "fitness function",
         "failures": "failed evaluations, and robots of arenas whose physics diverged",
         "duration_s": "time from the start to the end of the run, pauses included [s]",
+        "fitness_function": "fitness function, its parameters and the digest of its "
+        "source; only runs with the same text have comparable fitness",
+        "plugins": "plug-in modules and the digests of their sources",
+        "deaths": "robots of arenas that died; null without an arena",
+        "simulated_s": "simulated time of the arenas up to the last sample of fitness; "
+        "null without an arena [s]",
     },
     "populations": {**_ISLAND, **POPULATION},
     "robots": {
         **_RUN,
         **_ROBOT,
         "is_last": "whether it is judged in an island's last population",
-        "fitness": "last fitness; off-line 0 if the evaluation failed [m/s]",
+        "fitness": "last fitness; off-line 0 if the evaluation failed",
         "rank": "rank (thesis eq. 6.1)",
         "ancestors": "number of different ancestors",
         **BODY,
@@ -122,15 +139,15 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "by": "'count': by extremities; 'per_part': by extremities_per_part",
         "bin": "number of extremities, or lower end of a bin of width 0.1",
         "robots": "number of robots in the bin",
-        "fitness": "mean fitness of the bin [m/s]",
+        "fitness": "mean fitness of the bin",
     },
     "variability": {
         **_RUN,
         "island": "island that it lived on",
         **_ROBOT,
         "samples": "fitness samples of the mature robot",
-        "fitness_range": "greatest minus least of its fitness [m/s]",
-        "population_range": "range of all fitness samples during its life [m/s]",
+        "fitness_range": "greatest minus least of its fitness",
+        "population_range": "range of all fitness samples during its life",
         "variability": "fitness_range divided by population_range",
     },
     "interactions": {
@@ -149,13 +166,21 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "within": "mean over islands of their diversity",
         "between": "mean tree edit distance of pairs on different islands",
     },
+    "families": {
+        **_ISLAND,
+        "birth": "number of birth of the fittest robot of the last population",
+        "members": "robots of its family: its ancestors of five levels, and itself",
+        "distance": "mean tree edit distance of pairs of the family",
+        "founder_distance": "mean tree edit distance of pairs of robots born first",
+        "founders": "founders whose parts are in the family; null if unknown",
+    },
     "migrants": {
         **_RUN,
         "epoch": "migration epoch",
         **_ROBOT,
         "island": "island that it left",
         "to": "island that it went to",
-        "fitness": "fitness when it left [m/s]",
+        "fitness": "fitness when it left",
         "descendants": "descendants born on island 'to'",
         "living": "descendants in that island's last population, itself included",
         "reached": "islands whose last population contains it or a descendant",
@@ -165,6 +190,12 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "measure": "name in measures.names",
         "mean": "mean of judged robots, in the measure's unit",
         "robots": "number of these robots",
+    },
+    "sweeps": {
+        **_RUN,
+        "setting": "dotted key of a setting that the sweep changes",
+        "value": "its value in this run, as JSON",
+        "number": "the same if it is a number",
     },
     "progression": {
         "experiment": _RUN["experiment"],
@@ -192,11 +223,18 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "measure": "column of outcomes",
         "a": "experiment",
         "b": "experiment; empty if a is compared with a number",
-        "expected": "'>', '<' or '=' (no large difference) of a against b",
+        "expected": "'>', '<', '=' (alike), '!=' or 'some' (occurs) of a against b",
         "births": OUTCOME["births"],
         **_TWO_SAMPLES,
-        "verdict": "reproduced, not reproduced or undecided",
+        "verdict": "reproduced, not reproduced, undecided or does not apply",
         "why": "the rule of the verdict",
+        "topic": "the finding without the names of experiments",
+        "margin": "largest negligible effect, or difference if there is no b; with "
+        "'=', the largest that counts as alike",
+        "p_alike": "p of the equivalence test (two one-sided tests), with '='",
+        "q_alike": "p_alike, corrected for all equivalence tests of the table",
+        "power": "probability that this test finds equal experiments alike at 5 %",
+        "near_automatic": "whether the finding follows almost by construction",
     },
     "left_out": {
         "folder": "path of the run folder; empty for figures",
@@ -208,10 +246,12 @@ OUTPUTS: dict[str, dict[str, str]] = {
 
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
-             "runs_a", "runs_b", "failures", "finding", "births", "birth"}  # fmt: skip
+             "runs_a", "runs_b", "failures", "deaths", "finding", "births",
+             "birth", "members", "founders"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
-          "figure", "claim", "expected", "verdict", "why", "what",
-          "differs", "function"}  # fmt: skip
+          "figure", "claim", "expected", "verdict", "why", "what", "topic",
+          "setting", "value", "differs", "function", "fitness_function",
+          "plugins"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

@@ -81,6 +81,8 @@ def _means(run: RunTables) -> Columns:
         "rank": np.asarray(run.births["rank"], np.float64),
         **run.sizes,
         "without_touch": (run.sizes["touch_sensors"] == 0).astype(np.float64),
+        "one_touch": (run.sizes["touch_sensors"] == 1).astype(np.float64),
+        "two_touch": (run.sizes["touch_sensors"] > 1).astype(np.float64),
     }
     return {name: _mean(run, values) for name, values in of_births.items()}
 

@@ -1,5 +1,6 @@
 """Measures of many runs, computed in parallel processes."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from analysis.measures.measures import measure
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
+from schema.agent.import_path import safe_import_path
 
 _FEW = 3
 """Number of runs that are measured faster than another process starts."""
@@ -50,7 +52,8 @@ def measure_runs(
     if processes == 1 or len(runs) <= _FEW:
         yield from map(measure_run, runs, repeat(slots))
         return
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(processes, get_context("spawn"))
+    with safe_import_path(), pool:
         try:
             yield from pool.map(measure_run, runs, repeat(slots))
         except BaseException:
@@ -83,7 +86,22 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
         left_out.append(LeftOut(folder, "comparison", why))
     named = {name: _named(found[name], name, run) for name in found}
     named["runs"] = _named(_summary(run, tables, unread), "runs", run)
+    if run.point:
+        named["sweeps"] = _named(_chosen(run), "sweeps", run)
     return MeasuredRun(run, named, tuple(left_out))
+
+
+def _chosen(run: Run) -> pa.Table:
+    """Return one row per swept setting."""
+    rows = [
+        {
+            "setting": setting,
+            "value": json.dumps(value),
+            "number": value if isinstance(value, int | float) else None,
+        }
+        for setting, value in run.point.items()
+    ]
+    return pa.Table.from_pylist(rows, run_schema("sweeps"))
 
 
 def planned_births(run: Run) -> int:
@@ -107,6 +125,7 @@ def _wanted(run: Run) -> frozenset[str]:
 def _summary(
     run: Run, tables: Mapping[str, pa.Table], unread: frozenset[str]
 ) -> pa.Table:
+    has_arena = any(island.is_online for island in run.islands)
     row = {
         "run": run.number,
         "seed": run.seed,
@@ -116,10 +135,20 @@ def _summary(
         "islands": len(run.islands),
         "differs": run.differs,
         "function": run.function,
+        "fitness_function": run.fitness,
+        "plugins": " ".join(f"{name}={digest}" for name, digest in run.plugins.items()),
+        "deaths": tables["deaths"].num_rows if has_arena else None,
+        "simulated_s": _simulated_s(tables) if has_arena else None,
         "failures": None if unread & {"evaluations", "deaths"} else _failures(tables),
         "duration_s": read_duration_s(run.folder),
     }
     return pa.Table.from_pylist([row], run_schema("runs"))
+
+
+def _simulated_s(tables: Mapping[str, pa.Table]) -> float | None:
+    """Return the greatest time of a sample of fitness [s]; None without samples."""
+    latest: float | None = pc.max(tables["fitness"]["sim_time_s"]).as_py()
+    return latest
 
 
 def _failures(tables: Mapping[str, pa.Table]) -> int:

@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from analysis.figures.courses import Course, course
 from analysis.figures.forms import BAND_RUNS, NothingToDraw
 from analysis.figures.style import colours, in_order, label
+from analysis.measures.fitness_functions import by_function, functions_of
 from analysis.report.html import legend
 from analysis.report.plots import Axes, band, dot, line, painted, plot, with_margin
 
@@ -44,11 +45,35 @@ def run_names(runs: pa.Table) -> dict[str, RunName]:
     }
 
 
-def fitness_over_births(tables: Tables) -> str:
+def of_each_function(tables: Tables) -> dict[str, Tables]:
+    """Return the tables with the runs of each fitness function, by its name.
+
+    Plots of different functions must not share an axis. The table ``runs`` is complete
+    everywhere: it determines the colours.
+
+    Args:
+        tables: ``runs``, ``robots``, ``populations``, ``progression``.
+    """
+    groups = by_function(functions_of(tables["runs"]))
+    names = ("robots", "populations", "progression")
+    return {
+        function: {
+            **tables,
+            **{
+                name: tables[name].filter(pc.field("experiment").isin(experiments))
+                for name in names
+            },
+        }
+        for function, experiments in groups.items()
+    }
+
+
+def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
     """Return the plot of runs, their means, and robots fitter than all before.
 
     Args:
         tables: ``runs``, ``robots``, ``populations``, ``progression``.
+        y_text: label of the y axis.
 
     Returns:
         HTML; empty if no run has two populations.
@@ -81,7 +106,7 @@ def fitness_over_births(tables: Tables) -> str:
         marks,
         description="Fitness over births",
         x_text="births on each island",
-        y_text="fitness",
+        y_text=y_text,
     )
     return legend(in_order(shown.sizes), of_all) + drawn
 
@@ -152,11 +177,12 @@ def _described(row: Row) -> str:
     )
 
 
-def last_populations(tables: Tables) -> str:
+def last_populations(tables: Tables, y_text: str = "fitness") -> str:
     """Return the plot of all robots of the last populations, a column per run.
 
     Args:
         tables: ``runs`` and ``robots``.
+        y_text: label of the y axis.
 
     Returns:
         HTML; empty if no run has a population, or if there are too many robots.
@@ -180,7 +206,7 @@ def last_populations(tables: Tables) -> str:
         marks,
         description="Fitness of the last populations",
         x_text="",
-        y_text="fitness",
+        y_text=y_text,
         x_names=ticks,
     )
 

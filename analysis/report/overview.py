@@ -1,6 +1,6 @@
-"""First screen of the report: what the experiments did, and how they differ."""
+"""Summaries of experiments, runs, arenas and speed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from statistics import mean
 from typing import Any
@@ -9,21 +9,18 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.style import colours, in_order, label
-from analysis.measures.outputs import OUTCOME
+from analysis.measures.fitness_functions import (
+    fitness_unit,
+    functions_of,
+)
 from analysis.report.fitness import run_names
-from analysis.report.html import cell, duration, folded, number, plural, table
+from analysis.report.html import cell, duration, folded, plural, table
 
 Tables = Mapping[str, pa.Table]
 Row = Mapping[str, Any]
 
-_MOST_PAIRS = 3
-"""Pairs of experiments on the first screen, those with the smallest p."""
-_COMPARED = {
-    "fitness": "Difference of mean fitness",
-    "fitness_best": "Difference of best fitness",
-}
-_SURE = 2
-"""Runs of both experiments from which on their difference has an interval."""
+_MOST_ARENAS = 3
+"""Runs of arenas that are described without a fold."""
 
 
 def summary(tables: Tables) -> str:
@@ -37,8 +34,12 @@ def summary(tables: Tables) -> str:
     names = in_order(row["experiment"] for row in runs)
     paint = colours(names)
     has_settings = any(row["differs"] for row in runs)
-    heads = ["experiment", "runs", "births of a run", "best fitness", "mean fitness"]
-    heads += ["time of a run", "failures", *(["settings"] if has_settings else [])]
+    functions = functions_of(tables["runs"])
+    has_functions = len(set(functions.values())) > 1
+    heads = ["experiment", *(["fitness function"] if has_functions else []), "runs",
+             "births of a run", "best fitness", "mean of bests", "mean of populations",
+             "time of a run", "failures",
+             *(["settings"] if has_settings else [])]  # fmt: skip
     rows = []
     for name in names:
         mine = [row for row in runs if row["experiment"] == name]
@@ -49,18 +50,29 @@ def summary(tables: Tables) -> str:
         mark = f'<i style="background:{paint[name]}"></i>'
         cells = [
             f'<td class="name">{mark}{escape(label(name))}</td>',
+            *([cell(_with_unit(functions[name]))] if has_functions else []),
             cell(_states(mine)),
             cell(
                 str(births[0]) if len(births) == 1 else f"{births[0]} to {births[-1]}"
             ),
             cell(max((best for best, _ in known), default=None)),
-            cell(mean(each for _, each in known) if known else None),
+            *(cell(mean(each) if each else None) for each in _columns(known)),
             cell(duration(mean(times) if times else None)),
             cell(sum(failures) if failures else None),
             *([cell(mine[0]["differs"] or "")] if has_settings else []),
         ]
         rows.append(cells)
-    return table(heads, rows) + _summary_note(runs) if rows else ""
+    return table(heads, rows) + _summary_note(set(functions.values())) if rows else ""
+
+
+def _columns(rows: Sequence[tuple[float, float]]) -> list[list[float]]:
+    """Return first and second numbers of pairs."""
+    return [[row[column] for row in rows] for column in range(2)]
+
+
+def _with_unit(function: str) -> str:
+    unit = fitness_unit(function)
+    return f"{function} [{unit}]" if unit else function
 
 
 def _states(runs: Sequence[Row]) -> str:
@@ -70,15 +82,59 @@ def _states(runs: Sequence[Row]) -> str:
     return ", ".join(f"{count} {state}" for state, count in counts.items() if count)
 
 
-def _summary_note(runs: Sequence[Row]) -> str:
-    functions = in_order(row["function"] for row in runs if row["function"])
+def _summary_note(functions: Collection[str]) -> str:
     text = (
-        "Fitness is that of the last populations: of their best robot, and the mean "
-        "over runs of their means"
+        "Fitness of the last populations: the best robot of all runs, the mean over "
+        "runs of each run's best robot, and the mean over runs of the mean of each "
+        "run's population. "
     )
-    if functions:
-        text += f"; fitness function {', '.join(functions)}"
-    return f'<p class="note">{escape(text)}.</p>'
+    if len(functions) > 1:
+        text += (
+            "The experiments have different fitness functions: compare numbers only "
+            "between rows with the same function."
+        )
+    elif any(functions):
+        text += f"Fitness function: {', '.join(map(_with_unit, functions))}."
+    return f'<p class="note">{escape(text)}</p>'
+
+
+def arenas(tables: Tables) -> str:
+    """Return a sentence about what happened in the arenas of each experiment.
+
+    Args:
+        tables: ``runs`` and ``populations``.
+
+    Returns:
+        HTML; empty if no run has an arena.
+    """
+    populations = tables["populations"]
+    keys = ["folder", "island"]
+    last = populations.group_by(keys).aggregate([("births", "max")])
+    rows = populations.join(last, keys).filter(
+        pc.field("births") == pc.field("births_max")
+    )
+    living: dict[str, int] = {}
+    for row in rows.select(["folder", "size"]).to_pylist():
+        living[row["folder"]] = living.get(row["folder"], 0) + (row["size"] or 0)
+    names = run_names(tables["runs"])
+    lines = [
+        f"{names[row['folder']]}: {plural(row['births'], 'robot')} were born in "
+        f"{duration(row['simulated_s'])} of simulated time, {row['deaths']} died, "
+        f"{living.get(row['folder'], 0)} were alive at the last birth."
+        for row in tables["runs"].to_pylist()
+        if row["simulated_s"] is not None
+    ]
+    if not lines:
+        return ""
+    rule = (
+        "In an arena, fitness is measured all the time; the fitness of a robot is that "
+        "of its last window before the last birth. Robots that are not yet mature have "
+        "none."
+    )
+    content = "".join(f"<p>{escape(line)}</p>" for line in lines)
+    if len(lines) > _MOST_ARENAS:
+        content = folded(f"Births and deaths in {len(lines)} runs of arenas", content)
+    return f'{content}<p class="note">{rule}</p>'
 
 
 def _last_fitness(populations: pa.Table) -> dict[str, tuple[float, float]]:
@@ -95,136 +151,6 @@ def _last_fitness(populations: pa.Table) -> dict[str, tuple[float, float]]:
         folder: (max(best for best, _ in each), mean(value for _, value in each))
         for folder, each in islands.items()
     }
-
-
-def differences(tables: Tables) -> str:
-    """Return the differences of fitness between experiments, with intervals.
-
-    Args:
-        tables: ``comparison`` and ``runs``.
-
-    Returns:
-        HTML; empty if there is one experiment.
-    """
-    if len(set(tables["runs"]["experiment"].to_pylist())) <= 1:
-        return ""
-    parts = [_differences_of(tables["comparison"], *one) for one in _COMPARED.items()]
-    if not any(parts):
-        return (
-            "<h3>Comparison</h3><p>Nothing is compared: fewer than two experiments "
-            "have a finished run with a population.</p>"
-        )
-    note = (
-        '<p class="note">Dot: difference of the means over finished runs; bar: its '
-        "95 % interval (Welch); thin line: no difference. All measures are in "
-        '<a href="#comparison">Comparison</a>.</p>'
-    )
-    return "".join(parts) + note
-
-
-def _differences_of(comparison: pa.Table, measure: str, title: str) -> str:
-    """Return the differences of one measure; empty if nothing is compared."""
-    rows = comparison.filter(pc.field("measure") == measure).to_pylist()
-    rows.sort(key=lambda row: row["p"])
-    shown = rows[:_MOST_PAIRS]
-    if not shown:
-        return ""
-    ends = [row["difference"] for row in shown]
-    ends += [end for row in shown if (both := _interval(row)) for end in both]
-    reach = max(map(abs, ends)) or 1.0
-    more = f", {len(shown)} of {len(rows)} pairs" * (len(rows) > len(shown))
-    lines = [_difference(row, reach) for row in shown]
-    return f"<h3>{title}{more}</h3>{''.join(lines)}"
-
-
-def _interval(row: Row) -> tuple[float, float] | None:
-    """Return the interval of a difference; None without two runs of each."""
-    low, high = row["difference_low"], row["difference_high"]
-    if low is None or min(row["runs_a"], row["runs_b"]) < _SURE:
-        return None
-    return low, high
-
-
-def _difference(row: Row, reach: float) -> str:
-    """Return a difference in words and as a bar from ``-reach`` to ``reach``."""
-    a, b = (f"<b>{escape(label(row[name]))}</b>" for name in "ab")
-    both = _interval(row)
-    counts = f"{row['runs_a']} and {plural(row['runs_b'], 'run')}"
-    at = f"{counts}, at {row['births']} births"
-    sign = "+" * (row["difference"] > 0)
-    value = f"<b>{sign}{number(row['difference'])}</b>"
-    if both is None:
-        verdict = "no interval: it needs two finished runs of each (--repeats)"
-        text = f"{value} ({at})"
-    else:
-        low, high = both
-        text = (
-            f"{value}, 95 % interval {number(low)} to {number(high)} ({at}; "
-            f"p = {number(row['p'])})"
-        )
-        verdict = "the interval includes 0: no difference is shown"
-        if low > 0 or high < 0:
-            higher = row["a"] if low > 0 else row["b"]
-            verdict = f"{label(higher)} is fitter: the interval excludes 0"
-    return (
-        f'<div class="difference"><p>{a} minus {b}: {text}<br>'
-        f'<span class="verdict">{escape(verdict)}</span></p>'
-        f"{_bar(row['difference'], both, reach)}</div>"
-    )
-
-
-def _bar(value: float, both: tuple[float, float] | None, reach: float) -> str:
-    def at(number: float) -> float:
-        return 200 + 190 * number / reach
-
-    interval = ""
-    if both is not None:
-        interval = (
-            f'<path class="interval" d="M{at(both[0]):.1f} 12H{at(both[1]):.1f}"/>'
-        )
-    return (
-        '<svg class="bar" viewBox="0 0 400 24" role="img" aria-label="interval">'
-        f'<path class="zero" d="M200 0V24"/>{interval}'
-        f'<circle cx="{at(value):.1f}" cy="12" r="5"/></svg>'
-    )
-
-
-def all_differences(tables: Tables) -> str:
-    """Return a folded table of all measures for each pair of experiments.
-
-    Args:
-        tables: ``comparison``.
-    """
-    pairs: dict[tuple[str, str], list[Row]] = {}
-    for row in tables["comparison"].to_pylist():
-        pairs.setdefault((row["a"], row["b"]), []).append(row)
-    columns = ("mean_a", "mean_b", "difference", "difference_low", "difference_high",
-               "effect", "p", "q")  # fmt: skip
-    folds = []
-    for (a, b), mine in pairs.items():
-        heads = ("measure", label(a), label(b), "difference", "low", "high", "effect",
-                 "p", "q")  # fmt: skip
-        rows = []
-        for row in mine:
-            known = row if _interval(row) else {**row, "difference_low": None,
-                                                "difference_high": None}  # fmt: skip
-            name = row["measure"]
-            first = f'<td title="{escape(OUTCOME[name])}">{name.replace("_", " ")}</td>'
-            rows.append([first, *(cell(known[column]) for column in columns)])
-        title = (
-            f"{label(a)} ({plural(mine[0]['runs_a'], 'run')}) and {label(b)} "
-            f"({plural(mine[0]['runs_b'], 'run')}) at {mine[0]['births']} births"
-        )
-        folds.append(folded(title, table(heads, rows)))
-    if not folds:
-        return ""
-    note = (
-        "Means over finished runs; low and high are the ends of the difference's 95 % "
-        "interval. The effect is Cliff's delta: how much more often a run of the first "
-        "experiment is above one of the second than below. q is p, corrected for all "
-        "tests of this section. The pointer on a measure shows its meaning."
-    )
-    return f'<p class="note">{escape(note)}</p>{"".join(folds)}'
 
 
 def all_runs(tables: Tables) -> str:
@@ -244,7 +170,7 @@ def all_runs(tables: Tables) -> str:
                  row["folder"])  # fmt: skip
         rows.append([cell(value) for value in cells])
     heads = ("experiment", "run", "seed", "state", "births", "islands", "best fitness",
-             "mean fitness", "time", "failures", "folder")  # fmt: skip
+             "mean of population", "time", "failures", "folder")  # fmt: skip
     return table(heads, rows)
 
 

@@ -2,7 +2,7 @@
 
 import base64
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from html import escape
 from importlib.resources import files
@@ -11,24 +11,45 @@ import pyarrow as pa
 from PIL import Image
 
 from analysis.figures.catalogue import DrawnFigure, Section
-from analysis.figures.figure_writer import GAITS, Drawings, Film
+from analysis.figures.figure_writer import GAITS, PART_COLOURS, Drawings, Film
 from analysis.figures.style import in_order, label
+from analysis.measures.fitness_functions import axis_text
 from analysis.measures.outputs import OUTPUTS
-from analysis.report.fitness import fitness_over_births, last_populations, run_names
-from analysis.report.html import cell, folded, number, plural, table
-from analysis.report.overview import (
-    all_differences,
-    all_runs,
-    differences,
-    speed,
-    summary,
+from analysis.report.differences import all_differences, differences
+from analysis.report.fitness import (
+    fitness_over_births,
+    last_populations,
+    of_each_function,
+    run_names,
 )
+from analysis.report.html import cell, folded, number, plural, table
+from analysis.report.overview import all_runs, arenas, speed, summary
 from analysis.report.thesis import findings
 
 _SHOWN_PIXELS = 1400
 """Width of figures in the report; their files are wider."""
 _COLOURS = 128
 """Colours of plots in the report."""
+
+_COURSES = (
+    "6.3",
+    "Fitness over births",
+    (
+        "Thick lines are means over the runs of an experiment, as far as all its runs "
+        "reach; bands are 95 % intervals of the mean of three or more runs. Thin lines "
+        "are the mean fitness of single runs. Dots are robots that were fitter than "
+        "all robots born before them in their run."
+    ),
+)
+_LAST = (
+    "6.2",
+    "Fitness of the last populations",
+    (
+        "Each dot is a robot of a last population, each column of dots a run; short "
+        "bars are the means of runs."
+    ),
+)
+"""Number of the figure, title and text of the interactive plots."""
 
 Tables = Mapping[str, pa.Table]
 
@@ -90,9 +111,10 @@ def _sections(
     tables: Tables, drawings: Drawings, command: str, versions: Mapping[str, str]
 ) -> dict[str, tuple[str, str]]:
     """Return heading and content of all sections by anchor, empty ones included."""
-    courses, last = fitness_over_births(tables), last_populations(tables)
-    plots = {"6.3": courses, "6.2": last}
     by_number = {one.figure.number: one for one in drawings.figures}
+    courses = _of_functions(tables, fitness_over_births, _COURSES, by_number)
+    last = _of_functions(tables, last_populations, _LAST, by_number)
+    plots = {"6.3": courses, "6.2": last}
 
     def shown(section: Section) -> str:
         return _figures(
@@ -102,9 +124,10 @@ def _sections(
         )
 
     return {
-        "overview": ("Overview", _overview(tables, courses, by_number.get("6.3"))),
+        "overview": ("Overview", _overview(tables, courses)),
+        "sweeps": ("Sweeps", shown("sweeps")),
         "robots": ("Best robots", _films(tables, drawings) + shown("robots")),
-        "fitness": ("Fitness", _last(last, by_number.get("6.2")) + shown("fitness")),
+        "fitness": ("Fitness", last + shown("fitness")),
         "comparison": ("Comparison", all_differences(tables)),
         "bodies": ("Bodies", shown("bodies")),
         "diversity": ("Diversity and ancestry", shown("diversity")),
@@ -119,40 +142,50 @@ def _sections(
     }
 
 
-def _overview(tables: Tables, courses: str, drawn: DrawnFigure | None) -> str:
-    if courses:
-        text = (
-            "Thick lines are means over the runs of an experiment, as far as all its "
-            "runs reach; bands are 95 % intervals of the mean of three or more runs. "
-            "Thin lines are the mean fitness of single runs. Dots are robots that were "
-            "fitter than all robots born before them in their run."
-        )
-        courses = _plotted("6.3", "Fitness over births", courses, text, drawn)
-    compared = f"<div>{text}</div>" if (text := differences(tables)) else ""
-    both = f'<div class="duo">{courses}{compared}</div>' if courses or compared else ""
-    return summary(tables) + both
+def _overview(tables: Tables, courses: str) -> str:
+    left = f"<div>{courses}</div>" if courses else ""
+    right = f"<div>{text}</div>" if (text := differences(tables)) else ""
+    both = f'<div class="duo">{left}{right}</div>' if left or right else ""
+    return summary(tables) + arenas(tables) + both
 
 
-def _last(plot: str, drawn: DrawnFigure | None) -> str:
-    if not plot:
-        return ""
-    text = (
-        "Each dot is a robot of a last population, each column of dots a run; short "
-        "bars are the means of runs."
-    )
-    return _plotted("6.2", "Fitness of the last populations", plot, text, drawn)
-
-
-def _plotted(
-    number: str, title: str, plot: str, text: str, drawn: DrawnFigure | None
+def _of_functions(
+    tables: Tables,
+    draw: Callable[[Tables, str], str],
+    about: tuple[str, str, str],
+    drawn: Mapping[str, DrawnFigure],
 ) -> str:
-    """Return an interactive plot in place of a figure, with the figure's file."""
-    files_of = f" {_file_of(drawn)}" if drawn else ""
-    return (
-        f'<figure id="figure-{number}">{plot}<figcaption><b>{title}.</b> '
-        f"{text} A pointer on a mark shows run, seed and robot.{files_of}"
-        "</figcaption></figure>"
-    )
+    """Return an interactive plot for each fitness function, in place of a figure.
+
+    Args:
+        tables: of all runs.
+        draw: returns the plot of some runs, given the label of its y axis.
+        about: number of the figure, title and text of the plot.
+        drawn: figures by number.
+
+    Returns:
+        HTML; empty if nothing can be drawn.
+    """
+    number, title, text = about
+    groups = of_each_function(tables)
+    plots = {
+        function: plot
+        for function, mine in groups.items()
+        if (plot := draw(mine, axis_text(function)))
+    }
+    figures = []
+    for count, (function, plot) in enumerate(plots.items()):
+        own = f": {escape(function)}" * (len(groups) > 1)
+        caption = f"<b>{title}{own}.</b>"
+        if count == len(plots) - 1:
+            files_of = f" {_file_of(drawn[number])}" if number in drawn else ""
+            caption += f" {text} A pointer on a mark shows run, seed and robot."
+            caption += files_of
+        anchor = f"figure-{number}" + f"-{count + 1}" * (count > 0)
+        figures.append(
+            f'<figure id="{anchor}">{plot}<figcaption>{caption}</figcaption></figure>'
+        )
+    return "".join(figures)
 
 
 def _films(tables: Tables, drawings: Drawings) -> str:
@@ -164,7 +197,12 @@ def _films(tables: Tables, drawings: Drawings) -> str:
         f"<p>{escape(label(name))}: no moving picture: {escape(why)}</p>"
         for name, why in drawings.no_films.items()
     )
-    return (f'<div class="films">{shown}</div>' if shown else "") + reasons
+    text = (
+        f"{PART_COLOURS} The dark shapes on the floor are shadows; their edges are "
+        "coarse because they are drawn with few pixels."
+    )
+    note = f'<p class="note">{text}</p>'
+    return (f'<div class="films">{shown}</div>{note}' if shown else "") + reasons
 
 
 def _film(one: Film, run: str) -> str:

@@ -5,7 +5,6 @@ import getpass
 import shlex
 import socket
 import subprocess
-import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from urllib.parse import quote
 
 from analysis.viewer.flags import HOST
 from analysis.viewer.recording import Recording, ViewerError
+from schema.agent.import_path import python_command
 from schema.agent.log import tell_user
 from schema.agent.screen import missing_screen
 
@@ -85,7 +85,7 @@ class Window:
                     tell_user(line)
             return
         # The viewer's own server, which is not used, listens on this machine only.
-        command = [sys.executable, "-m", "rerun", "--bind", HOST, "--connect"]
+        command = [*python_command("rerun"), "--bind", HOST, "--connect"]
         self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
             [*command, output.url],
             stdout=subprocess.DEVNULL,

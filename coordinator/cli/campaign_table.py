@@ -1,5 +1,6 @@
 """Table at the end of a campaign: the outcome of each experiment."""
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +12,12 @@ from rich.table import Table
 from coordinator.cli.format import duration
 from coordinator.storage.folder_status import folder_status
 from schema.errors import RevolveError, rounded
+from schema.experiment.fitness_text import fitness_text
 from schema.tables.files import read_table
 
 _WIDEST = 1000
-_HEADS = ("experiment", "runs", "best", "mean", "sd", "time per run", "failed")
+_HEADS = ("experiment", "runs", "best", "mean of bests", "sd", "time per run",
+          "failed")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +29,14 @@ class RunOutcome:
         best: fitness of the best robot of the last population; None: there is none.
         took_s: from start to end by the clock, pauses included [s]; None: no end.
         has_failed: it was not finished, or no evaluation succeeded.
+        function: fitness functions, as ``fitness_text``; empty if unknown.
     """
 
     experiment: str
     best: float | None
     took_s: float | None
     has_failed: bool
+    function: str = ""
 
 
 def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome:
@@ -47,11 +52,13 @@ def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome
     try:
         bests = [island.best for island in folder_status(folder).islands]
         (row,) = read_table(folder, "runs").to_pylist()
+        function = fitness_text(json.loads(row["document"]))
     except (RevolveError, ValueError):
         return RunOutcome(experiment, None, None, has_failed=True)
     judged = [best for best in bests if best is not None]
     took_s = (row["end"] - row["start"]).total_seconds() if row["end"] else None
-    return RunOutcome(experiment, max(judged, default=None), took_s, has_failed=False)
+    best = max(judged, default=None)
+    return RunOutcome(experiment, best, took_s, has_failed=False, function=function)
 
 
 def rows(outcomes: Iterable[RunOutcome]) -> list[tuple[str, ...]]:
@@ -81,13 +88,22 @@ def _row(name: str, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
 
 
 def show(outcomes: Iterable[RunOutcome]) -> None:
-    """Print the table on standard output, with a line that explains it."""
+    """Print the table on standard output, with a line that explains it.
+
+    Args:
+        outcomes: of all runs, in any order.
+    """
     table = Table(box=None, pad_edge=False)
     for number, head in enumerate(_HEADS):
         table.add_column(head, justify="right" if number else "left", no_wrap=True)
-    for cells in rows(outcomes):
+    known = list(outcomes)
+    for cells in rows(known):
         table.add_row(*cells)
     # Wide: a narrow terminal wraps lines, but nothing is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
     console.print(table)
     console.print("fitness of each run's best robot in its last population")
+    functions = {run.experiment: run.function for run in known if run.function}
+    if len(set(functions.values())) > 1:
+        lists = ", ".join(f"{name} {text}" for name, text in functions.items())
+        console.print(f"not comparable, as fitness functions differ: {lists}")

@@ -28,6 +28,7 @@ from schema.agent.flags import Flags
 from schema.agent.log import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.limits import printable
+from schema.tables.arrow import skip_pandas
 from schema.tables.description import DETAILS, check_folder
 from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.operator import (
@@ -58,6 +59,7 @@ def main(arguments: list[str]) -> int:
     """
     flags = parser()
     options = flags.parse_args(arguments[1:])
+    skip_pandas()
     if options.folder is not None and options.connect is not None:
         flags.error("give either a folder or --connect")
     if options.folder is None:

@@ -117,7 +117,10 @@ def _best_robot(run: RunSession, birth: BirthId, fitness: float) -> list[str]:
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
     what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
     line = f"best robot: birth {birth.number}{where}, fitness {rounded(fitness)}"
-    return [f"{line}, rank {row['rank']}, {what}", f"its file: {folder / BEST}"]
+    return [
+        f"{line}, rank in ancestry {row['rank']} (founders: 1), {what}",
+        f"its file: {folder / BEST}",
+    ]
 
 
 def _windows(folder: Path, simulation: Simulation) -> list[str]:

@@ -240,7 +240,7 @@ class Dispatch:
             answer, reason = self._read(pending.job, event)
             if event.outcome == "ok" and not reason:
                 agent.failures = 0
-                self._learn(pending, agent)
+                self._learn(pending, agent, event.took_s)
                 platform = agent.joined.platform
                 yield Deliver(pending.job, event.agent, platform, answer)
                 yield from self._close(pending)
@@ -271,11 +271,15 @@ class Dispatch:
             self._faults.note("malformed", event.agent, str(error))
             return None, str(error)
 
-    def _learn(self, pending: Pending, agent: AgentState) -> None:
-        """Note how long an agent took for a job, which it no longer holds."""
+    def _learn(self, pending: Pending, agent: AgentState, took_s: float | None) -> None:
+        """Note how long an agent took for a job, which it no longer holds.
+
+        The time between ticks is at least a pause of the coordinator: it is too long
+        for short jobs.
+        """
         since_s, place = pending.holders.pop(agent.joined.agent)
         if self._now_s is not None:
-            elapsed_s = self._now_s - since_s
+            elapsed_s = self._now_s - since_s if took_s is None else took_s
             self._deadlines.learn(pending.job.kind, elapsed_s)
             agent.learn(elapsed_s / place)
 

@@ -106,6 +106,7 @@ class Returned:
             "fenced" (the agent knows a later coordinator of the run) or "cancelled".
         answer: encoded answer; empty unless ok.
         reason: of the agent; empty if ok or lost.
+        took_s: time from sending the job to its answer [s]; None: not measured.
     """
 
     number: int
@@ -113,6 +114,7 @@ class Returned:
     outcome: Literal["ok", "error", "lost", "fenced", "cancelled"]
     answer: bytes = b""
     reason: str = ""
+    took_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,6 +89,11 @@ def gene_ids(birth: BirthId) -> Iterator[int]:
 
 def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
     """Return a genome as a mutable tree."""
+    return to_branches(genome, space)[0]
+
+
+def to_branches(genome: Genome, space: BodySpace) -> list[MutableGenome]:
+    """Return the branches of a genome's mutable tree, depth first."""
     branches: list[MutableGenome] = []
     for node, parent, slot in walk(genome):
         kind, *fields, _children = astuple(node)
@@ -98,7 +103,7 @@ def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
             above = branch.parent = branches[parent]
             branch.parent_slot = slot
             above.children[slot] = branch
-    return branches[0]
+    return branches
 
 
 def to_genome(branches: Sequence[MutableGenome]) -> Genome:
@@ -241,11 +246,11 @@ def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Size
         parts, inputs = 1, branch.kind.inputs
         outputs, hidden = len(branch.outputs), len(branch.hidden)
         for child in branch.children.values():
-            below = sums[child]
-            parts += below.parts
-            inputs += below.inputs
-            outputs += below.outputs
-            hidden += below.hidden
+            p, i, o, h = sums[child]
+            parts += p
+            inputs += i
+            outputs += o
+            hidden += h
         sums[branch] = SizeCounts(parts, inputs, outputs, hidden)
     return dict(reversed(sums.items()))
 
@@ -254,6 +259,9 @@ def fitting_subtrees(
     sizes: dict[MutableGenome, SizeCounts], room: SizeCounts
 ) -> list[MutableGenome]:
     """Return the subtrees, except the whole tree, that exceed no count of ``room``."""
+    parts, inputs, outputs, hidden = room
     return [
-        branch for branch, size in sizes.items() if branch.parent and size.fits(room)
+        branch
+        for branch, (p, i, o, h) in sizes.items()
+        if p <= parts and i <= inputs and o <= outputs and h <= hidden and branch.parent
     ]

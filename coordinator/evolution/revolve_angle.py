@@ -11,6 +11,7 @@ from coordinator.evolution.mutable_genome import (
     gene_ids,
     level,
     preorder,
+    to_branches,
     to_genome,
     to_mutable,
 )
@@ -60,9 +61,9 @@ class RevolveAngle:
         self, first: Genome, second: Genome, rng: np.random.Generator
     ) -> Genome | None:
         """Return the first genome with a subtree of the second, or None."""
-        root, donor = (to_mutable(each, self._types) for each in (first, second))
-        is_done = crossover(BufferedRng(rng), root, donor, self._experiment)
-        return self._genome(root) if is_done else None
+        branches, donors = (to_branches(each, self._types) for each in (first, second))
+        is_done = crossover(BufferedRng(rng), branches, donors, self._experiment)
+        return self._genome(branches[0]) if is_done else None
 
     def mutate(
         self, genome: Genome, rng: np.random.Generator, birth: BirthId

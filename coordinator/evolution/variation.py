@@ -4,7 +4,7 @@ Source: Hupkes 2016, sections 4.4.3 to 4.4.6; the code of the original. The anal
 checks the body of the child later.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -25,8 +25,8 @@ from coordinator.evolution.mutable_genome import (
     size_limits,
     size_of,
     subtree_sizes,
+    to_branches,
     to_genome,
-    to_mutable,
 )
 from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment, body_space
@@ -57,10 +57,10 @@ def mate(
     """
     draws = BufferedRng(rng)
     types = body_space(experiment.space)
-    root, donor = to_mutable(first, types), to_mutable(second, types)
-    parents = [*preorder(root), *preorder(donor)]
+    branches, donors = to_branches(first, types), to_branches(second, types)
+    parents, root = [*branches, *donors], branches[0]
     child: Genome | None = None
-    if crossover(draws, root, donor, experiment):
+    if crossover(draws, branches, donors, experiment):
         mutate(draws, root, gene_ids(birth), experiment)
         branches = preorder(root)
         if any(branch.outputs for branch in branches):
@@ -83,8 +83,8 @@ def _unlink(branches: Iterable[MutableGenome]) -> None:
 
 def crossover(
     draws: BufferedRng,
-    root: MutableGenome,
-    donor: MutableGenome,
+    branches: Sequence[MutableGenome],
+    donors: Sequence[MutableGenome],
     experiment: Experiment,
 ) -> bool:
     """Replace a subtree by one of a donor; neither is a root.
@@ -94,17 +94,17 @@ def crossover(
 
     Args:
         draws: source of all choices.
-        root: root of the tree that changes.
-        donor: root of the other tree, which loses the donated subtree.
+        branches: those of the tree that changes, depth first.
+        donors: those of the other tree, which loses the donated subtree.
         experiment: restrictions.
 
     Returns:
         Whether a subtree was replaced; if not, the trees are unchanged.
     """
     space = experiment.space
-    branches, donated_sizes = preorder(root), subtree_sizes(preorder(donor))
     if len(branches) == 1:
         return False
+    donated_sizes = subtree_sizes(donors)
     replaced = draws.pick(branches[1:])
     rest = size_of(branches).minus(size_of(preorder(replaced)))
     room = size_limits(space).minus(rest)

@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Literal, Self
 
@@ -35,7 +35,13 @@ from schema.agent.network import (
     hub_config,
 )
 from schema.agent.platform_tag import wire_version
-from schema.agent.service import HubWatch, Outlet, log_engine, session_config
+from schema.agent.service import (
+    HubWatch,
+    Outlet,
+    keep_thread_state,
+    log_engine,
+    session_config,
+)
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import (
@@ -60,6 +66,8 @@ _MALFORMED_SILENCES = 5
 class _Asked:
     """A query to an agent; ``number`` is the job's, -1 asks for its ``AgentInfo``.
 
+    ``took_s`` is the time from sending it to its reply [s].
+
     Any process can serve the agent's key. All that do get the query, so that none can
     keep it from the agent, and only the reply of the agent's own session counts.
     """
@@ -69,9 +77,12 @@ class _Asked:
     inbox: "SimpleQueue[_News]"
     reply: zenoh.Reply | None = None
     has_stray: bool = False
+    asked_s: float = field(default_factory=time.monotonic)
+    took_s: float = 0.0
 
     def take(self, reply: zenoh.Reply) -> None:
         """Pass the first reply on at once: another process may never end its own."""
+        keep_thread_state()
         replier = reply.replier_id
         if replier is None:
             return  # of the engine itself, after the timeout
@@ -81,6 +92,7 @@ class _Asked:
             self._pass_on("late")
         else:
             self.reply = reply
+            self.took_s = time.monotonic() - self.asked_s
             self.inbox.put(self)
 
     def end(self) -> None:
@@ -452,7 +464,8 @@ class Network:
                 self._info_queue.add(asked.member)
             return [Returned(number, agent, "lost")]
         if reply.ok is not None:
-            return [Returned(number, agent, "ok", reply.ok.payload.to_bytes())]
+            answer = reply.ok.payload.to_bytes()
+            return [Returned(number, agent, "ok", answer, took_s=asked.took_s)]
         assert reply.err is not None
         told = reply.err.payload.to_bytes()[: 4 * LONGEST_REASON].decode(
             "utf-8", "replace"

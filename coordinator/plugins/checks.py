@@ -18,14 +18,21 @@ from typing import IO
 
 from coordinator.storage.campaign import campaign_plugins, is_campaign, read_campaign
 from coordinator.storage.folder import holds_run, read_details
+from schema.agent.import_path import environment, python_command
 from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
-from schema.experiment.document import Experiment, references
+from schema.experiment.document import (
+    Experiment,
+    island_count,
+    island_experiment,
+    references,
+)
 from schema.experiment.file import (
-    draft_experiment,
+    draft_experiments,
+    experiments_of,
     own_experiment,
     own_references,
-    read_experiment,
 )
+from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
 from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
@@ -36,26 +43,32 @@ LIMIT_S = 30.0
 """Time for the import, and for the check, of one plug-in [s]."""
 HERE = "--here"
 """Flag of ``revolve check`` in the process that does the checks, with their limit."""
+BIRTHS = "--births"
+"""Flag of the same process: births in place of those of the experiments."""
 # What ``faulthandler`` writes for each thread when time is up; the main one is last.
 _LATE = re.compile(r'^Thread .* first\):\n *File "([^"]*)", line (\d+)', re.MULTILINE)
 
 _PLACE = re.compile(r"\.py:\d")
 
 
-def refuse_faulty(sources: Iterable[str]) -> None:
+def refuse_faulty(sources: Iterable[str], births: int | None = None) -> None:
     """Check the plug-ins of experiments before a run, in a process of their own.
 
     Built-in plug-ins are not checked: the tests of this project do that.
 
     Args:
-        sources: as for ``read_experiment``.
+        sources: as for ``experiments_of``.
+        births: as for ``experiments_of``.
 
     Raises:
         ExperimentError: one cannot be loaded, breaks its contract, takes too long or
             ends its process; an experiment that is invalid.
     """
-    own = [source for source in sources if any(map(is_own, own_references(source)))]
-    _refuse(own)
+    own = [
+        source for source in sources if any(map(is_own, own_references(source, births)))
+    ]
+    if own:
+        _refuse(own if births is None else [*own, BIRTHS, str(births)])
 
 
 def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
@@ -111,7 +124,8 @@ def check_apart(
     for entry in allowed():
         flags += [FLAG, entry]
     child = subprocess.run(  # noqa: S603 - our own interpreter
-        [sys.executable, "-m", "revolve", "check", *words, *flags],
+        [*python_command("revolve"), "check", *words, *flags],
+        env=environment(),
         capture_output=True, text=True, errors="replace", check=False,
     )  # fmt: skip
     problems: list[str] = []
@@ -142,6 +156,8 @@ def check_here(
     kind: str | None,
     output: IO[str],
     limit_s: float,
+    *,
+    births: int | None = None,
 ) -> bool:
     """Check plug-ins in this process; return whether all are in order.
 
@@ -151,6 +167,7 @@ def check_here(
         kind: name of the kind that the words are of; None: found out.
         output: gets the steps as lines of JSON.
         limit_s: time after which an import or a check ends this process [s].
+        births: as for ``read_experiment``.
     """
     is_fine = True
 
@@ -173,18 +190,25 @@ def check_here(
             try:
                 say("begin", word)
                 with _time_limit(limit_s):
-                    uses = list(_uses(word, kinds, kind))
+                    uses = list(_uses(word, kinds, kind, births))
                 for name, use in uses:
                     check(word, name, use)
                 if ":" not in word and not _is_folder(Path(word)):
-                    # What the run would refuse besides plug-ins.
-                    read_experiment(word)
+                    _check_document(word, births, limit_s)
                 if not uses:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
                 is_fine = False
                 say("fault", one_line(error))
     return is_fine
+
+
+def _check_document(source: str, births: int | None, limit_s: float) -> None:
+    """Raise what a run would refuse besides plug-ins."""
+    for experiment in experiments_of(source, births):
+        with _time_limit(limit_s):
+            for number in range(island_count(experiment)):
+                check_fitness_keys(island_experiment(experiment, number).fitness)
 
 
 def _is_folder(folder: Path) -> bool:
@@ -215,7 +239,7 @@ def _time_limit(limit_s: float) -> Iterator[None]:
 
 
 def _uses(
-    word: str, kinds: Sequence[Kind], kind: str | None
+    word: str, kinds: Sequence[Kind], kind: str | None, births: int | None
 ) -> Iterator[tuple[str, Use]]:
     """Yield the plug-ins that a word of the command line means, with their kinds.
 
@@ -229,7 +253,7 @@ def _uses(
         folder = Path(word)
         is_folder = _is_folder(folder)
         experiments = (
-            _experiments_of(folder) if is_folder else (draft_experiment(word),)
+            _experiments_of(folder) if is_folder else draft_experiments(word, births)
         )
         for each, experiment in product(kinds, experiments):
             for use in each.used(experiment):

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import entry_points
 
-from coordinator.plugins.checks import HERE, check_apart, check_here
+from coordinator.plugins.checks import BIRTHS, HERE, check_apart, check_here
 from schema.agent.flags import Flags, add_plugins, positive_number
 from schema.errors import RevolveError, one_line
 from schema.experiment.kinds import Kind, offered
@@ -49,8 +49,14 @@ def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
     options = check_flags(kinds).parse_args(arguments)
     allow(options.plugins)
     if options.here:
-        words, limit_s = options.plugin, options.here
-        is_fine = check_here(words, kinds, options.kind, sys.stdout, limit_s)
+        is_fine = check_here(
+            options.plugin,
+            kinds,
+            options.kind,
+            sys.stdout,
+            options.here,
+            births=options.births,
+        )
         return 0 if is_fine else 1
     words = [*options.plugin, *(("--kind", options.kind) if options.kind else ())]
     problems = check_apart(words, print)
@@ -136,6 +142,7 @@ def check_flags(kinds: Sequence[Kind]) -> Flags:
         help="kind of the plug-ins (default: found out)",
     )
     flags.add_argument(HERE, type=positive_number, help=argparse.SUPPRESS)
+    flags.add_argument(BIRTHS, type=int, help=argparse.SUPPRESS)
     add_plugins(flags)
     return flags
 

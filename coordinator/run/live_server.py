@@ -5,7 +5,6 @@ a slow connection may block.
 """
 
 import subprocess
-import sys
 import threading
 from math import inf
 from queue import SimpleQueue
@@ -15,6 +14,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network, Order
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
+from schema.agent.import_path import environment, python_command
 from schema.agent.network import Tls
 from schema.plugins.permission import allowed
 from schema.wire.updates import WorkerInfo, encode_update
@@ -106,5 +106,7 @@ def open_viewer(address: str, fleet: str, tls: Tls | None) -> None:
         words += ["--plugins", entry]
     # In its own session: a Ctrl-C that stops the run leaves the window open.
     subprocess.Popen(  # noqa: S603 - our own interpreter
-        [sys.executable, "-m", "revolve", "view", *words], start_new_session=True
+        [*python_command("revolve"), "view", *words],
+        env=environment(),
+        start_new_session=True,
     )

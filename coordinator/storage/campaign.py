@@ -31,7 +31,7 @@ from schema.experiment.file import (
     check_source,
     experiment_from_text,
     experiment_text,
-    read_experiment,
+    experiments_of,
     shipped_experiments,
 )
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
@@ -82,11 +82,14 @@ def shipped_campaigns() -> dict[str, tuple[str, ...]]:
     }
 
 
-def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
+def read_experiments(
+    sources: Sequence[str], births: int | None = None
+) -> tuple[Experiment, ...]:
     """Return the experiments of some names; a campaign stands for its experiments.
 
     Args:
         sources: names of shipped experiments or campaigns, or paths to .toml files.
+        births: of ``--births``, in place of those of the documents.
 
     Raises:
         ExperimentError: there is no such experiment, its document is invalid, or two
@@ -96,7 +99,7 @@ def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
     for source in sources:
         check_source(source, [*shipped_experiments(), *shipped])
     words = [word for source in sources for word in shipped.get(source, (source,))]
-    experiments = tuple(map(read_experiment, words))
+    experiments = tuple(each for word in words for each in experiments_of(word, births))
     _check_names(experiments)
     return experiments
 
@@ -116,8 +119,8 @@ def _check_names(experiments: Sequence[Experiment]) -> None:
             )
         if "/" in name or name.startswith("."):
             raise ExperimentError(
-                f"name: a campaign's experiment cannot be called {name!r}: its name "
-                "becomes a folder's name"
+                f"name: must have no '/' and not start with '.' in a campaign, which "
+                f"names a folder by it, got {name!r}"
             )
 
 

@@ -5,6 +5,7 @@ Two machines with equal tags give equal results; others may.
 
 import platform
 from collections.abc import Collection
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
@@ -79,6 +80,7 @@ def cpu_flags(cpuinfo: Path) -> frozenset[str]:
     return frozenset()
 
 
+@cache
 def _version(distribution: str) -> str:
     try:
         return installed(distribution)

@@ -19,6 +19,7 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
+from schema.agent.import_path import safe_import_path
 from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import (
     LAST_DEATHS,
@@ -168,10 +169,12 @@ class ProcessPool:
         )
         # A Ctrl-C of the terminal reaches all; only this process may act on it. The
         # tracker first: starting it unblocks SIGINT.
-        resource_tracker.ensure_running()
+        with safe_import_path():
+            resource_tracker.ensure_running()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            process.start()
+            with safe_import_path():
+                process.start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return process

@@ -22,6 +22,7 @@ from schema.experiment.document import (
 )
 from schema.experiment.robust import robust_problems
 from schema.experiment.selection_rules import rule_problems
+from schema.experiment.sweep import sweep_problems
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
 _LONGEST_NAME = 200
@@ -47,6 +48,13 @@ def check_experiment(experiment: Experiment, where: str) -> None:
 
 def _problems(experiment: Experiment) -> Iterator[str]:
     """Yield what is wrong with an experiment; each check relies on those before it."""
+    if experiment.sweep is not None:
+        yield from sweep_problems(experiment.sweep)
+        if not experiment.sweep.chosen:
+            yield (
+                "sweep: stands for several experiments; only revolve run and "
+                "revolve check take all of them"
+            )
     first = 0
     for index, islands in enumerate(experiment.islands):
         for problem in _island_problems(island_experiment(experiment, first)):

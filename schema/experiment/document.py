@@ -28,6 +28,7 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
+from schema.experiment.sweep import Sweep
 from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
@@ -42,9 +43,11 @@ class Space(Section, frozen=True):
 
     Attributes:
         part_types: ``module:attribute`` of each; exactly one is a core.
-        min_parts, max_parts: least and greatest number of parts, core included.
-        max_inputs, max_outputs, max_hidden: greatest number of input, output and hidden
-            neurons.
+        min_parts: least number of parts, core included.
+        max_parts: greatest number of parts, core included.
+        max_inputs: greatest number of input neurons.
+        max_outputs: greatest number of output neurons, one for each motor.
+        max_hidden: greatest number of hidden neurons.
         planar: keep all parts in the plane of the core.
         neuron_types: types of output and hidden neurons: short names of built-in
             types, or ``module:attribute``; each is equally likely.
@@ -91,8 +94,8 @@ class Generation(Section, frozen=True):
     """Generation of random robots (thesis section 4.4.2).
 
     Attributes:
-        parts_mean, parts_sd: mean and standard deviation of the normal distribution
-            of the number of parts.
+        parts_mean: mean of the number of parts, which has a normal distribution.
+        parts_sd: standard deviation of the number of parts.
         p_connect_neurons: probability of each possible connection.
         hidden_on: parts that get hidden neurons: ``any``, or those that are
             ``wired`` (have a sensor or a motor).
@@ -110,10 +113,18 @@ class Variation(Section, frozen=True):
     """Mutation of offspring (thesis section 4.4.6).
 
     Attributes:
-        p_delete_subtree, p_duplicate_subtree, p_swap_subtree, p_delete_hidden_neuron,
-            p_remove_brain_connection: probability of the step of that name.
-        body_epsilon, brain_epsilon: step size of the parameters of bodies and brains,
-            as a share of the way to a random value.
+        p_delete_subtree: probability that a part and all below it are removed.
+        p_duplicate_subtree: probability that a part and all below it are copied to a
+            free slot.
+        p_swap_subtree: probability that two parts change places, with all below them.
+        p_delete_hidden_neuron: probability that a hidden neuron is removed; as many
+            are added, on average.
+        p_remove_brain_connection: probability that a connection is removed; as many
+            are added, on average.
+        body_epsilon: step size of the parameters of parts, as a share of the way to a
+            random value.
+        brain_epsilon: step size of the parameters of neurons, of ``cpg`` brains also
+            of weights, as a share of the way to a random value.
         add_parts: ``loop`` may add several parts, ``once`` at most one; the expected
             number is what deletion removes, less what duplication adds.
         duplicable_size: size of subtrees in that number: their ``mean`` or ``sum``.
@@ -304,10 +315,13 @@ class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.
 
     Attributes:
-        function: short name of a built-in function, or ``module:attribute``.
-        path_weight, straight_weight: weights of the velocities along the path and
-            between its ends, of the function ``locomotion``.
-        limit: greatest realistic fitness [m/s]; above it, fitness is 0.
+        function: short name of a built-in function, or ``module:attribute``;
+            ``locomotion`` is another name of the default.
+        path_weight: weight of the velocity along the path; only ``locomotion`` has it.
+        straight_weight: weight of the velocity between the ends of the path; only
+            ``locomotion`` has it.
+        limit: greatest realistic fitness [m/s], above which it is 0; only
+            ``locomotion`` has it.
         parameters: parameters of a function that has a Struct of its own.
     """
 
@@ -362,7 +376,8 @@ class Arena(Section, frozen=True):
         drop_m: height above the ground at birth [m].
         wall_diameter_m: diameter of the ring wall [m]; 0 is no wall.
         wall_segments: number of straight segments of the wall.
-        wall_height_m, wall_thickness_m: height and thickness of the wall [m].
+        wall_height_m: height of the wall [m].
+        wall_thickness_m: thickness of the wall [m].
         light: as ``environment.light`` [m]; only one of the two is needed.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
@@ -456,6 +471,8 @@ class Experiment(Section, frozen=True):
         calibration: measured sensors and motors of part types, off-line, on all
             islands; a document may give the path of a file with these tables,
             relative to itself.
+        sweep: makes the document a campaign of experiments that differ in some
+            settings.
     """
 
     name: str
@@ -476,6 +493,7 @@ class Experiment(Section, frozen=True):
     brain: BrainSection = NETWORK
     robust: Robust | None = None
     calibration: tuple[Calibration, ...] = ()
+    sweep: Sweep | None = None
 
     @property
     def window(self) -> int:
@@ -522,12 +540,6 @@ def start_problems(simulation: Simulation) -> Iterator[str]:
             "simulation.start_deg: is for off-line evaluations; robots of an arena are "
             "born upright with a drawn heading; remove it"
         )
-
-
-def with_births(experiment: Experiment, births: int) -> Experiment:
-    """Return an experiment with another number of births on each island."""
-    islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
-    return structs.replace(experiment, births=births, islands=islands)
 
 
 def references(experiment: Experiment) -> list[str]:

@@ -2,7 +2,9 @@
 
 import re
 import tomllib
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from copy import deepcopy
 from importlib import resources
 from math import isfinite
 from pathlib import Path
@@ -16,6 +18,7 @@ from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, references
 from schema.experiment.environment import is_mjcf
+from schema.experiment.sweep import Point, sweep_points, sweep_problems, with_point
 from schema.limits import (
     MOST_BRACKETS,
     MOST_DIGITS,
@@ -35,16 +38,52 @@ _LONG_NUMBER = re.compile(rf"(?<!\w)[0-9][0-9A-Fa-f_xob]{{{MOST_DIGITS}}}")
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_KEY_PART}){{{MOST_KEY_PARTS}}}")
 
 
-def read_experiment(source: str) -> Experiment:
+def read_experiment(source: str, births: int | None = None) -> Experiment:
     """Return a shipped experiment by its name, or one from a TOML file.
 
     Args:
         source: ``scenario1``, or a path that ends in ``.toml``.
+        births: of ``--births``, in place of those of the document.
 
     Raises:
         ExperimentError: no such experiment or file, or an invalid document.
     """
-    return parse_experiment(*source_text(source))
+    tables, where = _tables(source, births)
+    named = where if births is None else f"{where} with --births {births}"
+    return _checked(_converted(tables, where), where, named)
+
+
+def _tables(source: str, births: int | None) -> tuple[dict[str, Any], str]:
+    """Return the tables of an experiment, with other births, and its path."""
+    text, where = source_text(source)
+    tables = parse_toml(text, where)
+    if births is not None:
+        tables["births"] = births
+        islands = tables.get("islands")
+        for island in islands if isinstance(islands, list) else ():
+            if isinstance(island, dict):
+                island.pop("births", None)
+    return tables, where
+
+
+def experiments_of(source: str, births: int | None = None) -> tuple[Experiment, ...]:
+    """Return the experiments of a document: one, or those of its sweep.
+
+    Args:
+        source: as for ``read_experiment``.
+        births: as for ``read_experiment``.
+
+    Raises:
+        ExperimentError: as of ``read_experiment``, at any point of the sweep.
+    """
+    drafts = draft_experiments(source, births)
+    where = source if source.endswith(".toml") else f"{source}.toml"
+    if births is not None:
+        where = f"{where} with --births {births}"
+    for draft in drafts:
+        with _at_point(draft.sweep.chosen if draft.sweep else {}):
+            check_experiment(draft, where)
+    return drafts
 
 
 def source_text(source: str) -> tuple[str, str]:
@@ -119,7 +158,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
         ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
             wrong type or outside its range; inconsistent values.
     """
-    return _checked(_converted(parse_toml(text, where), where), where)
+    return _checked(_converted(parse_toml(text, where), where), where, where)
 
 
 def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
@@ -132,13 +171,13 @@ def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
     Raises:
         ExperimentError: as for ``parse_experiment``.
     """
-    return _checked(_converted(document, where), where)
+    return _checked(_converted(document, where), where, where)
 
 
-def _checked(experiment: Experiment, where: str) -> Experiment:
+def _checked(experiment: Experiment, where: str, named: str) -> Experiment:
     """Return an experiment after the checks across its keys."""
     allow_references(references(experiment), Path(where).parent)
-    check_experiment(experiment, where)
+    check_experiment(experiment, named)
     return experiment
 
 
@@ -155,28 +194,69 @@ def own_experiment(text: str) -> Experiment:
     return experiment
 
 
-def draft_experiment(source: str) -> Experiment:
-    """Return an experiment before the checks across its keys; no plug-in is imported.
+def draft_experiments(source: str, births: int | None = None) -> tuple[Experiment, ...]:
+    """Return the experiments of a document before the checks across their keys.
 
-    The modules that it names may be imported by this process from now on.
+    No plug-in is imported; the modules that they name may be from now on.
 
     Args:
         source: as for ``read_experiment``.
+        births: as for ``read_experiment``.
 
     Raises:
         ExperimentError: as of ``own_references``.
     """
-    text, where = source_text(source)
-    experiment = _converted(parse_toml(text, where), where)
-    allow_references(references(experiment), Path(where).parent)
-    return experiment
+    document, where = _tables(source, births)
+    experiments = _drafts(document, where, births)
+    for experiment in experiments:
+        allow_references(references(experiment), Path(where).parent)
+    return experiments
 
 
-def own_references(source: str) -> list[str]:
+def _drafts(
+    document: dict[str, Any], where: str, births: int | None
+) -> tuple[Experiment, ...]:
+    """Return the experiments of tables before the checks across their keys."""
+    whole = _converted(deepcopy(document), where)
+    sweep = whole.sweep
+    if sweep is None or sweep.chosen:
+        return (whole,)
+    if problem := next(sweep_problems(sweep), ""):
+        raise ExperimentError(f"{where}: {problem}")
+    if births is not None and "births" in sweep.settings:
+        raise ExperimentError(f"{where}: --births: the sweep changes births itself")
+    try:
+        points = sweep_points(sweep)
+    except ExperimentError as error:
+        raise ExperimentError(f"{where}: {error}") from None
+    width = len(str(len(points) - 1))
+    experiments = []
+    for number, point in enumerate(points):
+        name = f"{whole.name}-{number:0{width}}"
+        with _at_point(point):
+            tables = with_point(document, point, name)
+            experiments.append(_converted(tables, where))
+    return tuple(experiments)
+
+
+@contextmanager
+def _at_point(point: Point) -> Iterator[None]:
+    """Add the values of a sweep's point to the message of an error."""
+    try:
+        yield
+    except ExperimentError as error:
+        if not point:
+            raise
+        values = ", ".join(f"{key} = {shown(value)}" for key, value in point.items())
+        raise ExperimentError(f"{error}; in the sweep at {values}") from error
+
+
+def own_references(source: str, births: int | None = None) -> list[str]:
     """Return the ``module:attribute`` that an experiment names; nothing is imported.
 
     Args:
         source: as for ``read_experiment``; a shipped one has none of its own.
+        births: as for ``read_experiment``.
 
     Raises:
         ExperimentError: the file cannot be read, or has an unknown key or a value of a
@@ -184,7 +264,8 @@ def own_references(source: str) -> list[str]:
     """
     if not source.endswith(".toml"):
         return []
-    return references(_converted(parse_toml(_text(source), source), source))
+    drafts = _drafts(*_tables(source, births), births)
+    return list(dict.fromkeys(path for each in drafts for path in references(each)))
 
 
 def _converted(document: dict[str, Any], where: str) -> Experiment:

@@ -78,8 +78,9 @@ def where_raised(error: BaseException, file: str) -> str:
 
 def _where_assigned(value: object) -> str:
     """Return file and line of the assignment of a module's object; or empty."""
-    # Equal constants of different modules may be one object.
-    if isinstance(value, _CONSTANTS):
+    # Equal constants of different modules may be one object; a module is imported by
+    # many, each of whose sources would be parsed.
+    if isinstance(value, (*_CONSTANTS, ModuleType)):
         return ""
     for module in list(sys.modules.values()):
         # A snapshot: the import of another thread may change it.

@@ -27,7 +27,8 @@ class CpgParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters of the brain type ``cpg``.
 
     Attributes:
-        lowest_hz, highest_hz: range of the frequencies [Hz].
+        lowest_hz: lowest frequency of an oscillator [Hz].
+        highest_hz: highest frequency of an oscillator [Hz].
         coupling: [rad/s] per unit of weight; weights are in [0, 1].
     """
 

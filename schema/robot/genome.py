@@ -79,12 +79,11 @@ def walk(genome: Genome) -> list[tuple[Node, int, int]]:
     stack: list[tuple[Node, int, int]] = [(genome, -1, -1)]
     while stack:
         entry = stack.pop()
-        index = len(entries)
+        if children := entry[0].children:
+            index = len(entries)
+            for slot, child in reversed(children):
+                stack.append((child, index, slot))
         entries.append(entry)
-        if entry[0].children:
-            stack += [
-                (child, index, slot) for slot, child in reversed(entry[0].children)
-            ]
     return entries
 
 

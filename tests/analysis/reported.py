@@ -20,12 +20,13 @@ NOTHING = Drawings([], [], {}, [])
 RUNS: list[dict[str, Any]] = [
     {"experiment": "soft", "folder": f"soft-{n}", "run": n, "seed": 7, "births": 60,
      "state": "finished", "islands": 1, "differs": "", "function": "worker.fitness:f",
-     "failures": n, "duration_s": 60.0 + n}
+     "fitness_function": "locomotion", "failures": n, "duration_s": 60.0 + n}
     for n in range(2)
 ] + [
     {"experiment": "hard & <b>", "folder": "hard-0", "run": 0, "seed": 8, "births": 45,
      "state": "stopped", "islands": 1, "differs": "births: 1 instead of 2",
-     "function": "", "failures": None, "duration_s": None},
+     "function": "", "fitness_function": "locomotion",
+     "failures": None, "duration_s": None},
 ]  # fmt: skip
 
 

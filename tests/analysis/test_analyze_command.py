@@ -33,7 +33,11 @@ def test_an_analysis_without_figures_says_so(
     assert analyze(options, ["analyze", "run"], no_pictures) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "no population could be measured"
-    text = "no figure could be drawn; see the lines 'left out: figure'"
+    text = "no figure could be drawn; see the line 'left out: figures'"
     assert f"{out / 'figures'}: {text}" in lines
-    whys = [line for line in lines if line.startswith("left out: figure 6.2: ")]
-    assert whys == ["left out: figure 6.2: no finished run could be measured"]
+    (line,) = [line for line in lines if line.startswith("left out: figures ")]
+    assert "; 6.2, " in line
+    assert line.count("no finished run could be measured") == 1
+    analyze(options, ["analyze", "run"], no_pictures)
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith(f"{out / 'report.html'}: replaces the report of ")

@@ -53,6 +53,27 @@ def test_folded_names_are_complete() -> None:
     assert "".join(run.strip() for _, run in cells).replace(" ", "") == f"{NAME}-123"
 
 
+def test_figures_that_are_left_out_share_a_line() -> None:
+    rows = [
+        {"folder": "", "what": f"figure {number}", "why": why}
+        for number, why in (("6.1", "no file"), ("B", "one island"), ("7.1", "no file"))
+    ]
+    assert output({"left_out": [*ROWS["left_out"], *rows]}, 80).splitlines()[1:] == [
+        "left out: runs/x: run: broken [red] & gone",
+        "left out: figures 6.1, 7.1 (no file); B (one island)",
+    ]
+
+
+def test_different_fitness_functions_are_named() -> None:
+    rows = [
+        {"experiment": name, "differs": "", "fitness_function": text}
+        for name, text in (("a", "locomotion"), ("b", "x:f"), ("c", "x:f"))
+    ]
+    assert "compared" not in output({"runs": rows[1:]}, 80)
+    text = "fitness is not compared between different fitness functions"
+    assert f"{text}: a by locomotion; b, c by x:f" in output({"runs": rows}, 200)
+
+
 def test_a_run_without_populations_is_reported() -> None:
     text = output({"left_out": ROWS["left_out"]}, 80)
     assert text == (

@@ -1,4 +1,4 @@
-"""Timing of an arena compared with the bare physics of its robots, by second."""
+"""Timing of an arena compared with the physics of its clusters and robots alone."""
 
 import math
 import time
@@ -6,15 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
+from unittest.mock import patch
 
 import mujoco
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
+from schema.robot.results import Floats
 from schema.wire.arena import Changes, Insertion
 from worker.arena.threads import Pool
 from worker.arena.world import World
 from worker.bench.arena_timing import Place
+from worker.clusters.cluster import Cluster
 
 T = TypeVar("T")
 Clock = Callable[[], float]
@@ -27,8 +30,10 @@ class ArenaTiming:
     Attributes:
         simulated_s: simulated time [s].
         wall_s: wall time; CPU time of the thread if there is one thread [s].
-        bare_s: time of the same robots' steps alone on as many threads [s]; 0 if not
-            measured.
+        cluster_s: time of the steps of the very same clusters alone, with the same
+            commands [s]; 0 if not measured.
+        solo_s: time of the steps of the same robots, each in a model of its own, on as
+            many threads [s]; 0 if not measured.
         changing_s: of ``wall_s``, births, deaths and regrouping [s].
         merging_s: of ``wall_s``, checks for merges [s].
         merges, splits: of clusters.
@@ -37,7 +42,8 @@ class ArenaTiming:
 
     simulated_s: float
     wall_s: float
-    bare_s: float
+    cluster_s: float
+    solo_s: float
     changing_s: float
     merging_s: float
     merges: int
@@ -50,9 +56,14 @@ class ArenaTiming:
         return self.simulated_s / self.wall_s
 
     @property
-    def ratio(self) -> float:
-        """Ratio of the time of the robots' bare steps to the time of the arena."""
-        return self.bare_s / self.wall_s
+    def cluster_ratio(self) -> float:
+        """Ratio of the time of its clusters' steps to the time of the arena."""
+        return self.cluster_s / self.wall_s
+
+    @property
+    def solo_ratio(self) -> float:
+        """Ratio of the time of the robots' steps in own models to that of the arena."""
+        return self.solo_s / self.wall_s
 
 
 class Stopwatch:
@@ -82,6 +93,89 @@ class Stopwatch:
         return run
 
 
+@dataclass(slots=True)
+class Run:
+    """Steps of a cluster from one tick to the next, to be repeated alone.
+
+    Attributes:
+        model, data: of the cluster; the data is a copy.
+        state: positions and velocities at the start; None if the cluster's last run
+            ended there.
+        ctrl: commands.
+        plan: steps to each moment from the one before.
+    """
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    state: tuple[Floats, Floats] | None
+    ctrl: Floats
+    plan: list[int]
+
+
+class Twin:
+    """An arena equal to the timed one, which records the steps of its clusters."""
+
+    def __init__(self, settings: ArenaSettings, robots: Sequence[Insertion]) -> None:
+        """Insert the robots into an empty arena."""
+        self.world = World(settings)
+        self.world.apply(Changes(insertions=tuple(robots)))
+        self._runs: list[Run] = []
+        self._data: dict[Cluster, mujoco.MjData] = {}
+        self._ends: dict[Cluster, tuple[Floats, Floats]] = {}
+
+    def advance(self, changes: Changes, until: int) -> None:
+        """Apply changes, advance and record."""
+        run_cluster, rewind_cluster = Cluster.run, Cluster.rewind
+        latest: dict[Cluster, tuple[Run, int]] = {}
+
+        def run(cluster: Cluster, plan: Sequence[int], first: int = 0) -> None:
+            start, end = _state(cluster.data), self._ends.get(cluster)
+            if cluster not in self._data:
+                self._data[cluster] = mujoco.MjData(cluster.model)
+            continues = end is not None and all(map(np.array_equal, start, end))
+            self._runs.append(
+                Run(
+                    cluster.model,
+                    self._data[cluster],
+                    None if continues else start,
+                    cluster.data.ctrl.copy(),
+                    list(plan[first:]),
+                )
+            )
+            latest[cluster] = self._runs[-1], first
+            run_cluster(cluster, plan, first)
+            self._ends[cluster] = _state(cluster.data)
+
+        def rewind(cluster: Cluster, moment: int) -> None:
+            # Steps that are dropped do not count.
+            if cluster in latest:
+                recorded, first = latest[cluster]
+                del recorded.plan[max(0, moment + 1 - first) :]
+            rewind_cluster(cluster, moment)
+
+        self.world.apply(changes)
+        with (
+            patch.object(Cluster, "run", run),
+            patch.object(Cluster, "rewind", rewind),
+        ):
+            self.world.advance(until)
+
+    def replay(self, clock: Clock) -> float:
+        """Return the time of the recorded steps alone [s], and forget them."""
+        runs, self._runs = self._runs, []
+        began = clock()
+        for run in runs:
+            if run.state is not None:
+                run.data.qpos[:], run.data.qvel[:] = run.state
+            run.data.ctrl[:] = run.ctrl
+            mujoco.mj_step(run.model, run.data, sum(run.plan))
+        return clock() - began
+
+
+def _state(data: mujoco.MjData) -> tuple[Floats, Floats]:
+    return data.qpos.copy(), data.qvel.copy()
+
+
 def even_places(rng: np.random.Generator, count: int, radius_m: float) -> list[Place]:
     """Return random places on a disc, at least 0.25 m apart if possible."""
     places: list[Place] = []
@@ -104,21 +198,26 @@ def time_arena(
     threads: int,
     spares: Sequence[Insertion],
     warm_up_s: int,
-    measures_bare: bool,
+    advance_s: int = 1,
+    measures: str = "",
 ) -> ArenaTiming:
     """Return the components of the time of an arena.
 
     Args:
         settings: settings of the arena.
         robots: inserted at the start, which is not timed.
-        seconds: simulated time that is timed [s].
+        seconds: simulated time that is timed, a multiple of ``advance_s`` [s].
         threads: number of threads that step clusters.
-        spares: robots born one per second, each replacing the oldest robot.
+        spares: robots born one per advance, each replacing the oldest robot.
         warm_up_s: simulated time before the measurement [s].
-        measures_bare: also time the bare steps of the same robots in each second.
+        advance_s: length of an advance [s].
+        measures: "solo" also times the steps of the same robots in own models, after
+            each advance; "all" also those of the same clusters, by turns before and
+            after it, with one thread.
     """
     clock = time.thread_time if threads == 1 else time.perf_counter
     second = round(1.0 / settings.simulation.timestep_s)
+    steps = advance_s * second
     world, changing, merging = (
         World(settings, threads),
         Stopwatch(clock),
@@ -126,28 +225,39 @@ def time_arena(
     )
     world.apply(Changes(insertions=tuple(robots)))
     world.advance(warm_up_s * second)
-    population, wall, bare = world.population, 0.0, 0.0
+    twin = Twin(settings, robots) if measures == "all" else None
+    if twin is not None:
+        twin.world.advance(warm_up_s * second)
+    population, wall, cluster, solo = world.population, 0.0, 0.0, 0.0
     merging.wrap(population, "merge")
     changing.wrap(population, "regroup", "split", "remove", "catch_up")
     changing.wrap(world, "apply")
     merges, splits = population.merges, population.splits
     unborn, pool = list(spares), Pool(threads)
-    for _ in range(seconds):
+    for number in range(seconds // advance_s):
         changes = Changes()
         if unborn and world.births:
             changes = Changes((world.births[0],), (unborn.pop(0),))
+        if twin is not None:
+            twin.advance(changes, world.step + steps)
+            if number % 2:
+                cluster += twin.replay(clock)
         start = clock()
         world.apply(changes)
-        world.advance(world.step + second)
+        world.advance(world.step + steps)
         wall += clock() - start
-        if measures_bare:
-            bare += bare_time(world, pool, second, clock)
+        if twin is not None and not number % 2:
+            cluster += twin.replay(clock)
+        if measures:
+            solo += solo_time(world, pool, steps, clock)
     world.close()
     pool.close()
+    assert twin is None or twin.world.digest() == world.digest()
     return ArenaTiming(
         simulated_s=seconds,
         wall_s=wall,
-        bare_s=bare,
+        cluster_s=cluster,
+        solo_s=solo,
         changing_s=changing.total_s,
         merging_s=merging.total_s,
         merges=population.merges - merges,
@@ -156,7 +266,7 @@ def time_arena(
     )
 
 
-def bare_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
+def solo_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
     """Return the time of the steps of a world's robots, each simulated alone.
 
     Control signals are constant. The world does not change.

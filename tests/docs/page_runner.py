@@ -9,8 +9,8 @@
   ``...`` stands for any text.
 - Blocks of other languages, or of none, are not run.
 
-``NUMBER=OTHER`` replaces a number in commands and their output, so that a test has
-fewer births than the page.
+``NUMBER=OTHER`` replaces a number in commands, their output and experiments, so that a
+test has fewer births than the page.
 """
 
 import contextlib
@@ -44,7 +44,7 @@ def run_page(page: Path, numbers: dict[str, str]) -> int:
 
     Args:
         page: a Markdown file.
-        numbers: numbers that are replaced in commands and their output.
+        numbers: numbers that are replaced in commands, their output and experiments.
 
     Raises:
         PageError: a block fails, or its output is not that of the page.
@@ -57,7 +57,9 @@ def run_page(page: Path, numbers: dict[str, str]) -> int:
         done += 1
         named = _FILE.match(text)
         if named:
-            Path(named[1]).write_text(text, "utf-8")
+            is_toml = language == "toml"
+            code = _replaced(text, numbers) if is_toml else text
+            Path(named[1]).write_text(code, "utf-8")
         elif language == "python":
             output = _python(text, session)
         elif language == "sh":

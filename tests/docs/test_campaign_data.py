@@ -12,18 +12,19 @@ import pyarrow.compute as pc
 import pytest
 
 from analysis.comparison.claims import CLAIMS
-from analysis.comparison.comparison import Outcomes, comparison, findings
+from analysis.comparison.comparison import Outcomes, comparison
+from analysis.comparison.findings import findings
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.progression import progression
 from analysis.measures.load import read_runs
 from analysis.measures.study import concatenated, measure_runs
-from docs import campaign
+from docs import campaign, campaign_rows
+from docs.campaign_check import check
 from docs.campaign_data import (
     DATA,
     TABLES,
     KeptOutcomes,
     Part,
-    check,
     kept,
     parquet,
     path_of,
@@ -67,7 +68,7 @@ Files = dict[str, bytes]
 
 @pytest.fixture(autouse=True)
 def _early_mark(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(campaign, "MARKS", (MARK,))
+    monkeypatch.setattr(campaign_rows, "MARKS", (MARK,))
 
 
 @pytest.fixture(scope="module")

@@ -56,6 +56,13 @@ def test_every_key_of_every_section_is_listed() -> None:
         (part,) = (part for part in parts if place in part)
         listed = re.findall(r"^\| `(\w+)` \|", part, re.MULTILINE)
         assert listed == [*section.__struct_encode_fields__]
+        meanings = re.findall(r"^\| `\w+` \|.* \| (.*) \|$", part, re.MULTILINE)
+        assert len(set(meanings)) == len(listed), "keys with the same description"
+
+
+def test_two_names_of_one_function_are_listed_as_such() -> None:
+    row = "`fitness.function` | `locomotion` | another name of `worker.fitness:thesis`"
+    assert f"| {row} |" in _page("settings.md").splitlines()
 
 
 def test_rows_of_settings_have_type_default_unit_and_meaning() -> None:

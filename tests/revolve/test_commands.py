@@ -3,6 +3,7 @@
 import argparse
 import re
 import shlex
+import sys
 from collections import defaultdict
 
 import pytest
@@ -149,3 +150,19 @@ def test_the_version_names_what_decides_results(
     assert re.match(r"Python 3\.\d+\.\d+, \w+ \w+", machine)
     for name in ("mujoco", "zenoh", "pyarrow", "numpy"):
         assert re.search(rf"\b{name} \d+\.\d+", libraries)
+
+
+def test_a_run_shows_at_once_on_a_terminal_that_it_starts(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = {}
+    for is_terminal, flags in ((True, []), (True, ["--quiet"]), (False, [])):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda is_it=is_terminal: is_it)
+        assert main(["run", "nonsense", *flags]) == 2
+        lines[is_terminal, *flags] = capsys.readouterr().err
+    start, _, error = lines[True,].partition("\r")
+    assert start == "starting ..."
+    # The next line is longer and replaces it.
+    assert len(error.splitlines()[0]) > len(start)
+    assert "nonsense: no such experiment" in error
+    assert not any("starting" in lines[key] for key in lines if key != (True,))

@@ -98,6 +98,7 @@ def test_a_stranger_called_schema_is_named_in_one_line(
         place.unlink()
     place.mkdir()
     (place / "__init__.py").write_text('"""Validation."""\n\n__version__ = "0.7.8"\n')
+    advice = "rename yours" if how == "before" else "environment of its own"
     search = [str(tmp_path)] if how == "instead" else [str(tmp_path), str(TOP)]
     for words in (["-m", "revolve"], ["-c", "from revolve import Robot"]):
         done = subprocess.run(
@@ -111,5 +112,6 @@ def test_a_stranger_called_schema_is_named_in_one_line(
         last = done.stderr.splitlines()[-1]
         assert done.returncode
         assert "'schema' is not that of Revolve Islands" in last
+        assert last.endswith(advice)
         if "-m" in words:
             assert (done.returncode, done.stderr.count("\n")) == (2, 1)

@@ -14,7 +14,7 @@ from coordinator.cluster.kit import Cluster, Kit
 from coordinator.storage.compare import compare
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import Member, agents_alive, member_of
-from tests.system.fleet import make_certificate, size
+from tests.system.fleet import make_certificate
 from tests.system.test_agents import free_address
 from tests.system.workspace import Workspace, runtime_directory, wait_until
 
@@ -164,9 +164,12 @@ def test_three_commands_of_one_user_need_no_address(
     coordinator = workspace.start("coordinator", *RUN, environment=place)
     for role in ("analyzer", "worker"):
         workspace.start(role, "--processes", "1", environment=place)
-    wait_until(lambda: size(workspace.folder / "run") > 0, "the run begins")
-    told = workspace.start("status", environment=place).communicate()[0]
-    assert "1 worker, 1 analyzer" in told
+
+    def status() -> str:
+        text: str = workspace.start("status", environment=place).communicate()[0]
+        return text
+
+    wait_until(lambda: "1 worker, 1 analyzer" in status(), "both have joined")
     second = workspace.start(
         "coordinator", *RUN[:-1], "second", environment=place
     ).communicate()[1]

@@ -198,3 +198,19 @@ def test_errors_are_reported_in_one_line(
     output = workspace.run(*words, code=2)
     assert complaint in output
     assert len(output.strip().splitlines()) == 1
+
+
+def test_killed_sweep_resumes(workspace: Workspace, until: Until) -> None:
+    text = SHORT.format(name="sizes", children=1)
+    settings = 'settings."selection.population" = [5, 8]'
+    (workspace.folder / "sizes.toml").write_text(f"{text}[sweep]\n{settings}\n")
+    words = ("run", "sizes.toml", "--seed", "7", "--in-process", "--quiet", "--out")
+    assert "2 runs finished" in workspace.run(*words, "all")
+    whole, killed = workspace.folder / "all", workspace.folder / "killed"
+    first = workspace.start(*words, "killed")
+    until(lambda: _sizes(killed) > 0.4 * _sizes(whole), "the sweep is on its way")
+    first.send_signal(signal.SIGKILL)
+    first.communicate()
+    workspace.run("resume", "killed", "--in-process", "--quiet")
+    for name in ("sizes-0-0", "sizes-1-0"):
+        assert compare(whole / name, killed / name) == []

@@ -15,6 +15,7 @@ from revolve.command import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
 from schema.experiment.settings import fitness_function
+from schema.parts import ACTIVE_HINGE, PartType
 from tests.own_brains import write_module
 from worker.fitness import check_fitness
 from worker.measures.functions import BUILT_IN, measures_of
@@ -193,10 +194,29 @@ def test_experiments_of_the_brains_page_run(tmp_path: Path) -> None:
 
 def test_parts_page_runs(tmp_path: Path) -> None:
     page = TOP / "docs" / "parts.md"
-    (module,) = _blocks(page, "python")
-    (document,) = _blocks(page, "toml")
-    (tmp_path / "my_parts.py").write_text(module)
-    (tmp_path / "mine.toml").write_text(document)
+    module, knees = _blocks(page, "python")
+    document, with_knees = _blocks(page, "toml")
+    (robot,) = _blocks(page, "yaml")
+    for name, text in (
+        ("my_parts.py", module),
+        ("mine.toml", document),
+        ("knees.py", knees),
+        ("knees.toml", with_knees),
+        ("kneed.yaml", robot),
+    ):
+        (tmp_path / name).write_text(text)
+    (block,) = _blocks(page, "sh")
+    for line in block.splitlines():
+        done = _python(("-m", *line.split()), tmp_path)
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+        printed = re.search(r"^fitness: +(\S+)", done.stdout, re.MULTILINE)
+        assert not printed or 0.025 < float(printed[1]) < 0.035
+    # The page gives the numbers of the built-in hinge.
+    session: dict[str, PartType] = {}
+    exec(knees, session)  # noqa: S102 - the page's own code
+    knee = session["KNEE"]
+    assert knee.shape(()) == ACTIVE_HINGE.shape(())
+    assert knee.motor == ACTIVE_HINGE.motor
     words = "run mine.toml --births 20 --in-process --quiet --out out"
     done = _python(("-m", "revolve", *words.split()), tmp_path)
     assert done.returncode == 0, done.stderr

@@ -12,6 +12,8 @@ import pytest
 TOP = Path(__file__).parents[2]
 SCRIPTS = sorted((TOP / "docs" / "examples").glob("*.py"))
 MOST_LINES = 40
+PICTURES = Path(__file__).with_name("test_view_picture.py")
+"""Runs the script that needs a Vulkan driver."""
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -76,11 +78,11 @@ def test_analysis_with_polars_prints_its_tables(tmp_path: Path) -> None:
     assert "parents.birth" in done.stdout
 
 
-def test_every_script_is_run_here() -> None:
-    tree = ast.parse(Path(__file__).read_text("utf-8"))
+def test_every_script_is_run_here_or_with_the_pictures() -> None:
     texts = {
         node.value.removesuffix(".py")
-        for node in ast.walk(tree)
+        for file in (Path(__file__), PICTURES)
+        for node in ast.walk(ast.parse(file.read_text("utf-8")))
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     }
     assert {script.stem for script in SCRIPTS} <= texts

@@ -5,6 +5,7 @@ They need a Vulkan driver (Debian: mesa-vulkan-drivers) and are skipped without 
 
 import io
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -124,6 +125,16 @@ def test_replay_shows_robots_at_their_recorded_positions(
     # The check rejects a mirrored picture.
     with pytest.raises(AssertionError):
         check_robots(picture[:, ::-1], small_arena_run)
+    # The script of the page about viewing draws the recording, too.
+    script = Path(__file__).parents[2] / "docs" / "examples" / "viewer_picture.py"
+    own = workspace.folder / "run.png"
+    subprocess.run(
+        [sys.executable, str(script), "run.rrd", str(own), str(free_port())],
+        cwd=workspace.folder, check=True,
+    )  # fmt: skip
+    shown = Image.open(own).convert("RGB")
+    colours = shown.getcolors(maxcolors=shown.width * shown.height)
+    assert len(colours or []) > 100
 
 
 def test_live_view_shows_robots_at_their_recorded_positions(

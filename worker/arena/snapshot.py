@@ -8,6 +8,7 @@ pose samples, so there are none between two advances.
 
 import hashlib
 from collections.abc import Sequence
+from functools import lru_cache
 
 import msgspec
 import numpy as np
@@ -158,6 +159,7 @@ def read_snapshot(
     return state.step, [Casualty(*fields) for fields in state.casualties]
 
 
+@lru_cache(maxsize=8)
 def _digest(settings: ArenaSettings) -> bytes:
     """Return the SHA-256 of an arena's settings."""
     return hashlib.sha256(stable_json(settings)).digest()

@@ -7,6 +7,7 @@ an interval independently and keeps its states at the interval's moments.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import mujoco
 import numpy as np
@@ -17,7 +18,6 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.clusters.bounds import Indices
 from worker.robot.motors import Servos
 from worker.robot.recording import Probe, probed_channels, step_with
 from worker.robot.sensors import Sensors
@@ -124,25 +124,33 @@ class StateHistory:
         ends = np.cumsum(cluster.sizes).tolist()
         parts = np.split(self.state, ends[:-1], axis=1)
         self.qpos, self.qvel = parts[:2]
-        self._warning_counts: Indices = cluster.data.warning.number
-        self.warnings = np.zeros((count, len(self._warning_counts)), dtype=np.intp)
+        warnings = cluster.data.warning.number
+        self.warnings = np.zeros((count, len(warnings)), dtype=warnings.dtype)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
-        self._probes = cluster.probes
         self.probed: list[list[Floats]] = [[] for _ in range(count)]
-        # Copies between views of bytes are faster than between arrays.
-        self._live = [_bytes(array) for array in cluster.live]
-        self._rows = [[_bytes(array[k]) for array in parts] for k in range(count)]
+        # Copies between memory views are faster than between arrays, and one view of
+        # all rows is faster than one of each, as few of them stay in the caches.
+        self._cells = self.state.reshape(-1).data
+        self._counts = self.warnings.reshape(-1).data
+        self._live = [array.data for array in (*cluster.live, warnings)]
+        self._ends = *ends, len(warnings)
+        self._count = count
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return self._count
 
     def keep(self, moment: int) -> None:
-        """Copy the present state to the row of a moment."""
-        qpos, qvel, xpos, xmat = self._rows[moment]
-        qpos[:], qvel[:], xpos[:], xmat[:] = self._live
-        self.warnings[moment] = self._warning_counts
-        if self._probes:
-            self.probed[moment] = [probe.numbers.copy() for probe in self._probes]
+        """Copy the present state and warnings to the rows of a moment."""
+        cells, counts = self._cells, self._counts
+        qpos, qvel, xpos, xmat, warnings = self._live
+        first, second, third, width, kinds = self._ends
+        at = moment * width
+        cells[at : at + first] = qpos
+        cells[at + first : at + second] = qvel
+        cells[at + second : at + third] = xpos
+        cells[at + third : at + width] = xmat
+        at = moment * kinds
+        counts[at : at + kinds] = warnings
 
 
 class Cluster:
@@ -191,6 +199,7 @@ class Cluster:
         self.probes = [view.probe for view in self.views if view.probe is not None]
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
+        self._contacts = self.data.contact
         self.history = StateHistory(self, 0)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
@@ -217,9 +226,11 @@ class Cluster:
                 self.failure, self.failed_at = one_line(error), moment
                 self.keep(range(moment, len(plan)))
                 return
-            for probe in self.probes:
-                probe.read()
             keep(moment)
+            if self.probes:
+                for probe in self.probes:
+                    probe.read()
+                self._keep_probed(moment)
             if self._records_contacts:
                 self.history.touching[moment] = self.touching()
         self._read_touched()
@@ -230,8 +241,13 @@ class Cluster:
             self.history = StateHistory(self, moments.stop)
         for moment in moments:
             self.history.keep(moment)
+            self._keep_probed(moment)
             self.history.touching[moment] = self.touching()
         self._read_touched()
+
+    def _keep_probed(self, moment: int) -> None:
+        numbers = [probe.numbers.copy() for probe in self.probes]
+        self.history.probed[moment] = numbers
 
     def rewind(self, moment: int) -> None:
         """Set positions and velocities to those of a moment of the interval."""
@@ -248,20 +264,16 @@ class Cluster:
             return []
         owners = self._owners
         # Plain numbers, as contacts are few and most of them with the ground.
-        geoms: list[list[int]] = self.data.contact.geom.tolist()
+        geoms: list[list[int]] = self._contacts.geom.tolist()
         pairs = {(owners[first], owners[second]) for first, second in geoms}
         return sorted({(min(p), max(p)) for p in pairs if p[0] != p[1] and min(p) >= 0})
 
     def _read_touched(self) -> None:
         if self._has_pads:
-            geoms: list[int] = self.data.contact.geom.ravel().tolist()
-            self.touched = frozenset(geoms)
+            geoms: list[list[int]] = self._contacts.geom.tolist()
+            self.touched = frozenset(chain.from_iterable(geoms))
 
     def reset(self) -> None:
         """Reset the state to the model's initial one."""
         mujoco.mj_resetData(self.model, self.data)
         self.failure, self.failed_at = "", NEVER
-
-
-def _bytes(array: Floats) -> memoryview:
-    return array.data.cast("B")

@@ -6,6 +6,7 @@ with their speed, so that falling robots merge in time. Bounding boxes exclude a
 all pairs; only the others are measured.
 """
 
+from collections.abc import Iterable
 from functools import cached_property
 from itertools import compress
 
@@ -87,6 +88,20 @@ class Scene:
         limit = (radii[first, None] + within_m) + radii[second]
         return bool((gaps[:, 0] + gaps[:, 1] <= limit * limit).any())
 
+    def may_be_near(self, pairs: Iterable[tuple[int, int]], margins: Floats) -> Pairs:
+        """Return the pairs whose distance may fall below the sum of their margins.
+
+        Args:
+            pairs: of robots.
+            margins: (R,) of the robots [m].
+        """
+        reach: list[float] = margins.tolist()
+        return [
+            (here, there)
+            for here, there in pairs
+            if self.is_near(here, there, reach[here] + reach[there])
+        ]
+
     def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
         """Return pairs of different clusters whose bounding boxes overlap.
 
@@ -97,9 +112,21 @@ class Scene:
             Rows of the first and of the second robots, ascending by both.
         """
         cluster_indices = self._layout.cluster_indices
-        robot_rows = self._layout.robot_rows
         if not len(cluster_indices):
             return [], []
+        is_near = self.overlaps(margins)
+        is_near &= cluster_indices[:, None] != cluster_indices
+        first, second = is_near.nonzero()
+        is_once = first < second
+        return first[is_once].tolist(), second[is_once].tolist()
+
+    def overlaps(self, margins: Floats) -> Mask:
+        """Return whether the bounding boxes of R > 0 robots overlap, (R, R).
+
+        Args:
+            margins: (R,) that each robot's box is extended by [m].
+        """
+        robot_rows = self._layout.robot_rows
         low = self._hulls.min(axis=0) - robot_rows.hulls[3]
         high = self._hulls.max(axis=0) + robot_rows.hulls[3]
         low = np.minimum.reduceat(low, robot_rows.first_bodies, axis=1)
@@ -110,10 +137,7 @@ class Scene:
         is_beside = low[1][:, None] <= high[1]
         is_near &= is_beside
         is_near &= is_near.T.copy()
-        is_near &= cluster_indices[:, None] != cluster_indices
-        first, second = is_near.nonzero()
-        is_once = first < second
-        return first[is_once].tolist(), second[is_once].tolist()
+        return np.asarray(is_near)
 
 
 class Proximity:
@@ -134,11 +158,8 @@ class Proximity:
         """
         margins = self._margins(scene)
         most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
-        pairs = [
-            (here, there)
-            for here, there in zip(*scene.neighbours(most), strict=True)
-            if scene.is_near(here, there, float(most[here] + most[there]))
-        ]
+        neighbours = zip(*scene.neighbours(most), strict=True)
+        pairs = scene.may_be_near(neighbours, most)
         if not pairs:
             return [[] for _ in margins]
         is_near = _are_near(scene, margins, pairs, self._merge_m)
@@ -152,6 +173,11 @@ class Proximity:
             pairs: at least one.
         """
         margins = self._margins(scene)
+        most = margins[0] + (0.5 * self._split_m + _ROUNDING_M)
+        overlaps = scene.overlaps(most)[*zip(*pairs, strict=True)]
+        pairs = scene.may_be_near(compress(pairs, overlaps.tolist()), most)
+        if not pairs:
+            return []
         is_near = _are_near(scene, margins, pairs, self._split_m)[0]
         return list(compress(pairs, is_near.tolist()))
 

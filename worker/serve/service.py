@@ -6,6 +6,7 @@ from schema.agent.network import Agent
 from schema.agent.service import Outlet, own_agent, serve_as_process
 from schema.agent.supervision import ProcessSlot
 from schema.agent.topics import Member
+from schema.tables.arrow import skip_pandas
 from schema.wire.arena_codec import Live, encode_live
 from worker.serve.jobs import Jobs
 
@@ -22,5 +23,6 @@ def process(agent: Agent, slot: ProcessSlot) -> None:
         if outlet.has_listeners(key):
             outlet.put(key, encode_live(live))
 
+    skip_pandas()
     jobs = Jobs(most_shards=own.shards, threads=own.threads, publish=publish)
     serve_as_process(jobs.answer, own, slot, outlet)

@@ -41,8 +41,10 @@ class Parameters(Struct, frozen=True):
         weight_step: greatest change of a weight.
         p_toggle: probability that mutation enables or disables a connection.
         p_function: probability that mutation changes the function of a node.
-        p_add_connection, p_add_node: probabilities of new structure.
-        max_nodes, max_connections: limits of a network.
+        p_add_connection: probability that mutation adds a connection.
+        p_add_node: probability that mutation adds a hidden node.
+        max_nodes: greatest number of hidden nodes.
+        max_connections: greatest number of connections.
     """
 
     p_connect: Probability = 0.2

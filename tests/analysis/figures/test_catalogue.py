@@ -13,7 +13,7 @@ from analysis.figures.forms import (
     spread_caption,
     stacked,
 )
-from analysis.figures.style import colours, in_order, label
+from analysis.figures.style import colours, in_order, label, two_line_label
 from tests.analysis.drawn import Row, layers, table
 
 
@@ -221,6 +221,48 @@ def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
     assert alone["scenario2"] == others["scenario2"]
     assert len(set(others.values())) == 3
     assert [label("scenario3"), label("no-selection")] == ["scenario 3", "no selection"]
+
+
+def test_colours_of_many_experiments_differ() -> None:
+    """A step of 1 in 8 of red, green or blue can be seen."""
+    shades = [
+        tuple(int(colour[at : at + 2], 16) for at in (1, 3, 5))
+        for colour in colours([f"e{number:02}" for number in range(24)]).values()
+    ]
+    for at, one in enumerate(shades):
+        for other in shades[:at]:
+            assert max(abs(a - b) for a, b in zip(one, other, strict=True)) >= 20
+
+
+def test_own_names_of_experiments_are_not_changed() -> None:
+    assert [label("my-robots-2"), label("a-b~3")] == ["my-robots-2", "a-b ~3"]
+    assert label("scenario10") == "scenario10"
+    assert two_line_label("my-long-robots-2") == "my-\nlong-robots-2"
+    assert two_line_label("no-reproduction") == "no\nreproduction"
+
+
+def test_each_fitness_function_has_its_own_panel() -> None:
+    tables = courses(("a", "a-0", (1.0, 2.0)), ("b", "b-0", (100.0, 300.0)))
+    tables["outcomes"] = table("outcomes", [*outcomes("a", 2.0), *outcomes("b", 300.0)])
+    names = [("a", "locomotion"), ("b", "x:f (source 1a)")]
+    rows = [{"experiment": name, "fitness_function": text} for name, text in names]
+    tables["runs"] = table("runs", rows)
+    end, curve = over_runs(tables, FITNESS), over_births(tables, "fitness", "fitness")
+    assert dict(zip(end.data["experiment"], end.data["panel"], strict=True)) == {
+        "a": "locomotion",
+        "b": "x:f",
+    }
+    assert set(curve.data["function"]) == {"locomotion", "x:f"}
+    for figure in (end, curve):
+        # Each panel has axes of its own: 2 is not beside 300.
+        low, high = (axes.get_ylim()[1] for axes in figure.draw().axes)
+        assert low < 3
+        assert high >= 300
+    note = "values of different functions cannot be compared"
+    assert note in spread_caption(tables, FITNESS)
+    assert note in course_caption(tables, "fitness")
+    tables["runs"] = table("runs", rows[:1] * 2)
+    assert note not in spread_caption(tables, FITNESS)
 
 
 def test_null_values_have_no_rows() -> None:

@@ -98,6 +98,25 @@ def test_last_populations_are_left_for_any_number_of_runs() -> None:
     assert titles.index("last populations") < titles.index("all robots ever evaluated")
 
 
+@pytest.mark.parametrize("born", [(4.0, 5.0), (4.0,)])
+def test_a_single_number_of_extremities_is_drawn_without_warning(
+    born: tuple[float, ...],
+) -> None:
+    rows = [
+        {"experiment": "a", "folder": "f", "population": population, "by": "count",
+         "bin": extremities, "fitness": 0.1}
+        for population, bins in (("born", born), ("final", (4.0,)))
+        for extremities in bins
+    ]  # fmt: skip
+    tables = {"extremities": table("extremities", rows)}
+    figure = extremities_and_fitness(tables, "count")
+    figure.draw()
+    (line,) = (
+        each for each in figure.layers if type(each.geom).__name__ == "geom_line"
+    )
+    assert len(line.data) == (2 if len(born) > 1 else 0)
+
+
 def test_a_speed_is_drawn_beside_the_thesiss() -> None:
     rows = [
         {"benchmark": "arena", "population": size, "factor": factor}

@@ -1,5 +1,6 @@
 """Tests of the simulation that a gait is rendered from."""
 
+import json
 from pathlib import Path
 from typing import NoReturn
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.family_tree import Best
-from analysis.figures.robot_pictures import robot_picture
+from analysis.figures.robot_pictures import robot_picture, shown_document
 from coordinator.evolution.generation import generate
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Islands
@@ -44,3 +45,20 @@ def test_gait_uses_noise_of_the_robots_run_and_island() -> None:
         )
     origin = Origin(seed=7, run=3, island=2)
     assert asked == [Identity(origin, BirthId(2, 4), 0)]
+
+
+def test_pictures_need_no_plug_in_that_only_judges() -> None:
+    fitness = {"function": "goals:fast"}
+    document = {
+        "name": "x",
+        "fitness": fitness,
+        "measures": {"names": ["goals:length"]},
+        "selection": {"parents": "goals:pick"},
+        "space": {"part_types": ["goals:PART"]},
+        "islands": [{"fitness": fitness, "births": 3}],
+    }
+    assert json.loads(shown_document(json.dumps(document))) == {
+        "name": "x",
+        "space": {"part_types": ["goals:PART"]},
+        "islands": [{"births": 3}],
+    }

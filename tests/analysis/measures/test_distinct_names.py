@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +126,23 @@ def test_invalid_documents_are_compared_unchanged() -> None:
     )
     further = {**strange, "islands": [{"births": 4, "a": 2}]}
     assert named(strange, further)[1][1] == "islands.0.a: 2 instead of 1"
+
+
+def test_an_edited_plug_in_is_another_setting() -> None:
+    some = runs(SCENARIO, SCENARIO, SCENARIO)
+    digests = ({"goals": "1a"}, {"goals": "1a"}, {"goals": "2b"})
+    found = with_distinct_names(
+        [replace(run, plugins=each) for run, each in zip(some, digests, strict=True)]
+    )
+    differs = (
+        "source of plug-in goals (plugins/goals.py in the run folders): digest 2b "
+        "instead of 1a"
+    )
+    assert [(run.experiment, run.differs) for run in found] == [
+        ("scenario1", ""),
+        ("scenario1", ""),
+        ("scenario1~2", differs),
+    ]
 
 
 def test_each_name_is_numbered_separately() -> None:

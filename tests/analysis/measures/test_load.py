@@ -148,6 +148,26 @@ def test_a_run_in_two_folders_counts_once(made: Maker, tmp_path: Path) -> None:
     assert all(one.why.endswith("b") for one in left_out)
 
 
+def test_runs_with_another_source_of_a_plug_in_are_different_runs(
+    made: Maker, tmp_path: Path
+) -> None:
+    document = {"births": 3, "fitness": {"function": "goals:fast"}}
+    digests = {"a": "1a", "b": "1a", "c": "2b", "d": None}
+    for name, digest in digests.items():
+        file = made(name) / "run.json"
+        details = {**json.loads(file.read_text()), "document": json.dumps(document)}
+        if digest:
+            details["plugins"] = {"goals": {"digest": digest}}
+        file.write_text(json.dumps(details))
+    runs, left_out = read_runs([tmp_path])
+    assert [(run.folder.name, run.fitness, run.plugins) for run in runs] == [
+        ("a", "goals:fast (source 1a)", {"goals": "1a"}),
+        ("c", "goals:fast (source 2b)", {"goals": "2b"}),
+        ("d", "goals:fast (source unknown)", {"goals": "unknown"}),
+    ]
+    assert [Path(one.folder).name for one in left_out] == ["b"]
+
+
 def test_a_finished_run_without_tables_is_reported(made: Maker, tmp_path: Path) -> None:
     made("whole")
     shutil.rmtree(made("gone", seed=2) / "tables")

@@ -100,10 +100,10 @@ def test_contents_lead_to_every_section_in_order(read: Reader) -> None:
 def test_summary_has_one_row_per_experiment(read: Reader) -> None:
     # Means of the last populations are 0.1, 0.2 and 0.3, the best 0, 0.5 and 1.
     assert "3 runs, 165 births; written 2020-01-01" in read.text
-    assert "soft 2 finished 60 0.5 0.15 1 min 00 s 1" in read.text
-    row = "hard & <b> 1 not finished 45 1 0.3 – – births: 1 instead of 2"
+    assert "soft 2 finished 60 0.5 0.25 0.15 1 min 00 s 1" in read.text
+    row = "hard & <b> 1 not finished 45 1 1 0.3 – – births: 1 instead of 2"
     assert row in read.text
-    assert "fitness function worker.fitness:f." in read.text
+    assert "Fitness function: locomotion [m/s]." in read.text
 
 
 def test_differences_have_an_interval_where_both_have_two_runs(read: Reader) -> None:
@@ -113,6 +113,47 @@ def test_differences_have_an_interval_where_both_have_two_runs(read: Reader) -> 
     # One run of b is no spread of zero.
     assert "\u22120.05 (2 and 1 run, at 30 births) no interval" in read.text
     assert "0.02" not in read.text
+
+
+def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
+    given = tables()
+    functions = ["locomotion", "locomotion", "goals:far (limit = 2.0, source 1a)"]
+    runs = given["runs"].drop_columns("fitness_function")
+    given["runs"] = runs.append_column("fitness_function", pa.array(functions))
+    given["comparison"] = given["comparison"].slice(0, 0)
+    found = read_page(given)
+    assert "soft locomotion [m/s] 2 finished" in found.text
+    assert "hard & <b> goals:far (limit = 2.0) 1 not finished" in found.text
+    far, near = "goals:far (limit = 2.0)", "locomotion"
+    for title in ("Fitness over births", "Fitness of the last populations"):
+        assert f"{title}: {far}." in found.text
+        assert f"{title}: {near}." in found.text
+    lists = f"hard & <b> by {far}; soft by {near}."
+    assert f"their numbers have different meanings: {lists}" in found.text
+    assert "fitter" not in found.text.replace("fitter than all", "").replace(
+        "a <b> fitter", ""
+    )
+    # Robot 2 of each run is at the same place in the plots of its own function only.
+    assert found.text.count("robot 0:2, hard & <b>, run 0") == 2
+
+
+def test_an_arena_is_summed_up() -> None:
+    given = tables()
+    runs = given["runs"].drop_columns(["deaths", "simulated_s"])
+    runs = runs.append_column("deaths", pa.array([None, 9, None], pa.int64()))
+    seconds = pa.array([None, 125.0, None], pa.float64())
+    given["runs"] = runs.append_column("simulated_s", seconds)
+    names = given["populations"].column_names
+    sizes = pa.array([3, 4] * 3, pa.int64())
+    given["populations"] = given["populations"].set_column(
+        names.index("size"), "size", sizes
+    )
+    text = read_page(given).text
+    assert text.count("of simulated time") == 1
+    assert (
+        "soft, run 1, seed 7: 60 robots were born in 2 min 05 s of simulated time, "
+        "9 died, 4 were alive at the last birth." in text
+    )
 
 
 def test_marks_tell_run_seed_and_robot(read: Reader) -> None:

@@ -43,6 +43,21 @@ def test_the_table_fits_80_columns_and_explains_itself(
     assert "best robot in its last population" in note
 
 
+def test_different_fitness_functions_are_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    one, other = (
+        RunOutcome(name, 0.1, 60.0, has_failed=False, function=function)
+        for name, function in (("a", "locomotion"), ("b", "goals:far"))
+    )
+    show([one, one])
+    assert "comparable" not in capsys.readouterr().out
+    show(iter([one, other]))
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        "not comparable, as fitness functions differ: a locomotion, b goals:far"
+    )
+
+
 def test_a_folder_without_a_run_counts_as_failed(tmp_path: Path) -> None:
     expected = outcome("a", None, None, has_failed=True)
     assert outcome_of(tmp_path, "a", has_failed=False) == expected

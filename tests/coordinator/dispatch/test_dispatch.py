@@ -1,5 +1,6 @@
 """Dispatch: each job is done once, whatever happens to its agents."""
 
+from dataclasses import replace
 from itertools import count
 from random import Random
 
@@ -134,6 +135,19 @@ def test_short_jobs_are_given_ahead_while_many_wait() -> None:
         dispatch.handle(event)
     assert len(held) == 2 + MOST_AHEAD
     assert dispatch.leisure_s == PAUSE_S
+
+
+def test_a_pause_does_not_lengthen_the_next_one() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(*range(100)))
+    dispatch.handle(Ticked(0.001))
+    dispatch.handle(ok(0, "a"))
+    for turn in range(1, 50):
+        # The coordinator looks every 100 ms; the worker took 1 ms for each job.
+        dispatch.handle(Ticked(0.1 * turn))
+        place = len(dispatch._pools["worker"].agents["a"].held)
+        dispatch.handle(replace(ok(turn, "a"), took_s=0.001 * place))
+    # Half of what the 16 jobs ahead take.
+    assert dispatch.leisure_s == pytest.approx(0.008, rel=0.1)
 
 
 def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:

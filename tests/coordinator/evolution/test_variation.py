@@ -14,6 +14,7 @@ from coordinator.evolution.mutable_genome import (
     preorder,
     size_limits,
     size_of,
+    to_branches,
     to_genome,
     to_mutable,
 )
@@ -74,9 +75,10 @@ def kinds(genome: Genome) -> list[str]:
 def crossed(
     seed: int, first: Genome, second: Genome, setting: Experiment = DEFAULT
 ) -> Genome | None:
-    root = to_mutable(first, TYPES)
+    branches, donors = to_branches(first, TYPES), to_branches(second, TYPES)
+    root = branches[0]
     draws = BufferedRng(np.random.default_rng(seed))
-    done = crossover(draws, root, to_mutable(second, TYPES), setting)
+    done = crossover(draws, branches, donors, setting)
     if not done:
         assert to_genome(preorder(root)) == first, "a failure changes nothing"
         return None

@@ -1,10 +1,12 @@
 """The coordinator's end of the network, with real processes on loopback."""
 
+import ctypes
 import os
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -103,6 +105,7 @@ class Driver:
         self.network = network
         self.dispatch = Dispatch()
         self.delivered: dict[int, str] = {}
+        self.took_s: list[float | None] = []
 
     def tell(self, event: DispatchEvent) -> None:
         for command in self.dispatch.handle(event):
@@ -130,6 +133,8 @@ class Driver:
             assert now_s < end_s, self.delivered
             self.tell(Ticked(now_s))
             for event in self.network.receive(0.05):
+                if isinstance(event, Returned) and event.outcome == "ok":
+                    self.took_s.append(event.took_s)
                 self.tell(event)
 
 
@@ -141,14 +146,27 @@ def test_agent_joins_with_its_properties_and_leaves(network: Network) -> None:
         assert process.wait(PATIENCE_S) == 0
 
 
-def test_each_job_is_delivered_once_by_two_workers(network: Network) -> None:
+def test_each_job_is_delivered_once_by_two_workers(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keep, kept = ctypes.pythonapi.PyGILState_Ensure, []
+    monkeypatch.setattr(
+        ctypes.pythonapi, "PyGILState_Ensure", lambda: kept.append(keep())
+    )
+    # An earlier test may have kept the states of the engine's threads.
+    monkeypatch.setattr("schema.agent.service._THREAD", threading.local())
     driver = Driver(network)
     with agent(network, "a"), agent(network, "b"):
         driver.run(lambda: driver.dispatch.agents("worker") == 2)
+        began_s = time.monotonic()
         driver.ask(*range(500))
         driver.run(lambda: not driver.dispatch.pending)
+        all_s = time.monotonic() - began_s
     assert sorted(driver.delivered) == list(range(500))
     assert set(driver.delivered.values()) == {"a", "b"}
+    assert all(took_s is not None and 0.0 < took_s < all_s for took_s in driver.took_s)
+    # Once for each thread of the engine, not for each answer.
+    assert 1 <= len(kept) < 50
 
 
 def test_jobs_of_a_killed_worker_are_done_by_another(network: Network) -> None:

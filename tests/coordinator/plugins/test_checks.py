@@ -200,7 +200,31 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
     assert permission.allowed() == ()
 
 
-def test_check_refuses_what_a_run_would_refuse(tmp_path: Path) -> None:
+def test_a_key_of_fitness_without_effect_is_refused(
+    lab: Callable[[str], Path], tmp_path: Path
+) -> None:
+    file = lab("def judge(track, fitness):\n    return min(1.0, fitness.limit)\n")
+    document = tmp_path / "mine.toml"
+    for function, key, why in (
+        (f"{file.stem}:judge", "limit", ""),
+        (f"{file.stem}:judge", "path_weight", "which does not read it"),
+        ("locomotion", "straight_weight", ""),
+        ("balance", "limit", r"which reads \[fitness\.parameters\]"),
+    ):
+        document.write_text(
+            f'name = "x"\n[fitness]\nfunction = "{function}"\n{key} = 2.0\n'
+        )
+        step, line = checked(str(document))[-1]
+        assert step == ("fault" if why else "fine"), line
+        assert re.search(why, line)
+
+
+def test_check_refuses_what_a_run_would_refuse(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The current folder holds a module that hides one of the standard library."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "random.py").write_text("raise SystemExit(7)\n")
     (tmp_path / "mine.toml").write_text(
         'name = "mine"\n[space]\nmin_parts = 20\nmax_parts = 4\n'
     )

@@ -188,7 +188,7 @@ EXPECTED = {
     "finite": "finite|different whole numbers",
     "repeatable": "the same|expected equal|must be equal",
     "exit": "SystemExit: 3$",
-    "slow": "must take at most 3 s, but was still at",
+    "slow": "must take at most 1 s, but was still at",
     "os._exit": "must not end its process, but did, with status 3$",
 }
 APART = ("slow", "os._exit")
@@ -262,7 +262,7 @@ def test_each_end_of_a_process_is_one_line(
     faulty: Callable[[str, str], tuple[Path, Path]], kind: str, fault: str
 ) -> None:
     document, file = faulty(kind, fault)
-    (line,) = check_apart([str(document)], limit_s=3.0 if fault == "slow" else 30.0)
+    (line,) = check_apart([str(document)], limit_s=1.0 if fault == "slow" else 30.0)
     _check_line(line, file, kind, fault)
 
 

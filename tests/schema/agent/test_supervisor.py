@@ -109,13 +109,20 @@ if __name__ == "__main__":
 
 
 def test_ctrl_c_reaches_no_child_from_its_start_on(tmp_path: Path) -> None:
-    """Includes the first child, with which Python starts a process of its own."""
+    """Includes the first child, with which Python starts a process of its own.
+
+    The current folder holds a module that hides one of the standard library.
+    """
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "pickle.py").write_text("raise SystemExit(7)\n")
     script = tmp_path / "pool.py"
     script.write_text(_SHIELDED)
     done = subprocess.check_output(
         [sys.executable, script, tmp_path],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
         text=True,
+        cwd=tmp_path / "here",
+        timeout=60,
     )
     assert [(tmp_path / name).read_text() for name in "01"] == ["True", "True"]
     assert done.split() == ["False"]

@@ -1,18 +1,16 @@
 """Sections on islands and migration: meaning, and errors."""
 
+from pathlib import Path
+
 import pytest
 
 from schema.errors import ExperimentError
-from schema.experiment.document import (
-    Experiment,
-    island_count,
-    island_experiment,
-    with_births,
-)
+from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
     parse_experiment,
+    read_experiment,
 )
 from schema.experiment.migration import Migration, migrant_count
 
@@ -74,9 +72,14 @@ def test_island_number_out_of_range_is_refused() -> None:
             island_experiment(parse(), number)
 
 
-def test_births_of_a_flag_apply_to_each_island() -> None:
-    experiment = with_births(parse(), 70)
+def test_births_of_a_flag_replace_those_of_each_island(tmp_path: Path) -> None:
+    """Those of the document, which the flag replaces, are invalid."""
+    text = TWO_KINDS.replace("births = 90", 'births = "x"').replace("= 40", "= 1")
+    (tmp_path / "two.toml").write_text(text)
+    experiment = read_experiment(str(tmp_path / "two.toml"), 70)
     assert {island_experiment(experiment, each).births for each in range(5)} == {70}
+    with pytest.raises(ExperimentError, match=r"two\.toml with --births 14: .*births"):
+        read_experiment(str(tmp_path / "two.toml"), 14)
 
 
 @pytest.mark.parametrize(

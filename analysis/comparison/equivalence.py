@@ -1,0 +1,96 @@
+"""Equivalence tests: whether a difference is smaller than a margin, and their power.
+
+Two one-sided tests (TOST) at 5 %: both ends of the margin are excluded, which is the
+same as a 90 % interval inside the margin. Source: Schuirmann, *A comparison of the two
+one-sided tests procedure and the power approach*, J. Pharmacokin. Biopharm. 15, 1987.
+"""
+
+import math
+from functools import lru_cache
+from statistics import NormalDist
+
+import numpy as np
+
+from analysis.comparison.statistics import (
+    rank_sum_ways,
+    score_variance,
+    t_quantile,
+    t_tail,
+)
+from analysis.measures.population_table import Numbers
+
+ALPHA = 0.05
+"""Probability to call experiments alike that differ by the margin."""
+
+
+def alike_p(delta: float, first: int, second: int, margin: float) -> float:
+    """Return p of the test that Cliff's delta is within a margin.
+
+    Args:
+        delta: Cliff's delta of two experiments.
+        first: number of runs of one experiment.
+        second: number of runs of the other.
+        margin: largest delta that counts as alike, in (0, 1).
+
+    Source: score test, as the interval of ``statistics.delta_interval``.
+    """
+    end = (margin + 1) / 2
+    error = math.sqrt(score_variance(end, first, second))
+    return NormalDist().cdf((abs(delta) - margin) / 2 / error)
+
+
+@lru_cache
+def alike_power(first: int, second: int, margin: float) -> float:
+    """Return how probably ``alike_p`` is below 5 % for runs of one distribution.
+
+    Counted exactly over all orders of the runs, without ties.
+
+    Args:
+        first: number of runs of one experiment.
+        second: number of runs of the other.
+        margin: largest delta that counts as alike.
+    """
+    error = math.sqrt(score_variance((margin + 1) / 2, first, second))
+    most = margin - 2 * NormalDist().inv_cdf(1 - ALPHA) * error
+    ways = rank_sum_ways(2 * np.arange(1, first + second + 1), first)
+    # A doubled rank sum s is delta = (s - first (first + 1)) / (first second) - 1.
+    delta = (np.arange(len(ways)) - first * (first + 1)) / (first * second) - 1
+    return float(ways[np.abs(delta) <= most].sum() / ways.sum())
+
+
+def mean_alike_p(values: Numbers, reference: float, margin: float) -> float:
+    """Return p of the test that a mean is within a margin of a number.
+
+    Args:
+        values: (N,) one number per run, N >= 2.
+        reference: the number.
+        margin: largest difference that counts as alike, in the measure's unit.
+
+    Source: Schuirmann, 1987, with Student's t.
+    """
+    room = margin - abs(float(values.mean()) - reference)
+    error = _error(values)
+    if error == 0:
+        return 0.0 if room > 0 else 1.0
+    return t_tail(room / error, len(values) - 1)
+
+
+def mean_alike_power(values: Numbers, margin: float) -> float:
+    """Return how probably ``mean_alike_p`` is below 5 % if the mean is the number.
+
+    The spread over runs is taken as known from the runs.
+
+    Args:
+        values: (N,) one number per run, N >= 2.
+        margin: largest difference that counts as alike, in the measure's unit.
+    """
+    error, freedom = _error(values), len(values) - 1
+    if error == 0:
+        return 1.0
+    room = margin / error - t_quantile(freedom, 1 - 2 * ALPHA)
+    return max(0.0, 1 - 2 * t_tail(room, freedom))
+
+
+def _error(values: Numbers) -> float:
+    """Return the standard error of a mean."""
+    return float(values.std(ddof=1)) / math.sqrt(len(values))

@@ -1,0 +1,137 @@
+"""Tests of the findings of the thesis."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.comparison.claims import ARENA, CLAIMS, Claim
+from analysis.comparison.comparison import OF_FITNESS, RunOutcomes
+from analysis.comparison.equivalence import (
+    alike_p,
+    alike_power,
+    mean_alike_p,
+    mean_alike_power,
+)
+from analysis.comparison.samples import Row, correct, one_sample, two_samples
+from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
+from analysis.measures.outputs import schema
+from analysis.measures.population_table import Numbers
+
+ARENA_ROBOTS = 30
+"""Robots of the arena whose speed is tested."""
+
+
+class WithBenchmark:
+    """Outcomes of runs, and the speed of an arena as an experiment of its own.
+
+    Args:
+        outcomes: outcomes of runs.
+        benchmark: rows of ``revolve bench arena --out``; each repetition is a run.
+    """
+
+    def __init__(self, outcomes: RunOutcomes, benchmark: pa.Table) -> None:
+        self._outcomes = outcomes
+        is_of = (pc.field("benchmark") == "arena") & (
+            pc.field("population") == ARENA_ROBOTS
+        )
+        factors = benchmark.filter(is_of)["factor"]
+        self._factors: Numbers = np.asarray(factors, np.float64)
+
+    @property
+    def experiments(self) -> list[str]:
+        """Experiments with finished runs, by name."""
+        return [*self._outcomes.experiments, *([ARENA] if len(self._factors) else [])]
+
+    def births(self, *experiments: str) -> int:
+        """Return the most births that all runs reach; 0 for the benchmark."""
+        return 0 if ARENA in experiments else self._outcomes.births(*experiments)
+
+    def values(self, experiment: str, measure: str, births: int) -> Numbers:
+        """Return the runs' values of a measure; runs without a value are skipped."""
+        if experiment != ARENA:
+            return self._outcomes.values(experiment, measure, births)
+        return self._factors if measure == "real_time_factor" else np.empty(0)
+
+    def fitness_functions(self, *experiments: str) -> list[str]:
+        """Return the fitness functions of experiments, each once; none of ``ARENA``."""
+        names = [name for name in experiments if name != ARENA]
+        return self._outcomes.fitness_functions(*names)
+
+
+def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
+    """Return the test of each finding of the thesis.
+
+    Args:
+        outcomes: outcomes of finished runs.
+        claims: the findings.
+
+    Returns:
+        One row per claim, in order, with the columns of ``outputs``; claims about
+        experiments without finished runs are undecided.
+    """
+    rows = [_tested(outcomes, claim) for claim in claims]
+    correct(rows)
+    correct(rows, "p_alike", "q_alike")
+    for number, (claim, row) in enumerate(zip(claims, rows, strict=True), 1):
+        row |= {
+            "finding": number,
+            "figure": claim.figure,
+            "claim": claim.text,
+            "topic": claim.topic or claim.text,
+            "measure": claim.measure,
+            "a": claim.a,
+            "b": claim.b or "",
+            "expected": claim.expected,
+            "near_automatic": claim.is_automatic,
+        }
+        if "why" not in row:
+            row["verdict"], row["why"] = verdict(claim.expected, row)
+    return pa.Table.from_pylist(rows, schema("findings"))
+
+
+def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
+    """Return the numbers of a claim, or the reason why it cannot be tested."""
+    names = [name for name in (claim.a, claim.b) if name is not None]
+    for name in names:
+        if name not in outcomes.experiments:
+            why = f"no finished run of {name} could be measured"
+            return {"verdict": "undecided", "why": why}
+    functions = outcomes.fitness_functions(*names)
+    if claim.measure in OF_FITNESS and len(functions) > 1:
+        why = f"different fitness functions: {', '.join(functions)}"
+        return {"verdict": "undecided", "why": why}
+    births = outcomes.births(*names)
+    if births < claim.births:
+        why = f"means something from {claim.births} births on"
+        return {"births": births, "verdict": "does not apply", "why": why}
+    samples = [outcomes.values(name, claim.measure, births) for name in names]
+    if min(map(len, samples)) <= 1:
+        why = "less than two runs have a value"
+        return {"births": births, "verdict": "undecided", "why": why}
+    if claim.is_spread:
+        samples = [np.abs(values - np.median(values)) for values in samples]
+    if claim.b is None:
+        return {"births": births, **_against_number(samples[0], claim)}
+    a, b = samples
+    return {"births": births, **_against_experiment(a, b, claim)}
+
+
+def _against_number(a: Numbers, claim: Claim) -> Row:
+    row = one_sample(a, claim.reference) | {"margin": claim.margin}
+    if claim.expected == "=":
+        row["p_alike"] = mean_alike_p(a, claim.reference, claim.margin)
+        row["power"] = mean_alike_power(a, claim.margin)
+    elif claim.expected == "some":
+        row |= {"effect": float((a > 0).mean()), "p": None, "margin": None}
+    return row
+
+
+def _against_experiment(a: Numbers, b: Numbers, claim: Claim) -> Row:
+    row = two_samples(a, claim.share * b)
+    if claim.expected != "=":
+        return row | {"margin": NEGLIGIBLE}
+    p = alike_p(row["effect"], len(a), len(b), LARGE)
+    power = alike_power(len(a), len(b), LARGE)
+    return row | {"margin": LARGE, "p_alike": p, "power": power}

@@ -1,0 +1,66 @@
+"""Rows of numbers that compare samples of runs."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from analysis.comparison.statistics import (
+    cliffs_delta,
+    delta_interval,
+    false_discovery,
+    mean_difference,
+    rank_sum_p,
+    signed_rank,
+)
+from analysis.measures.population_table import Numbers
+
+Row = dict[str, Any]
+
+
+def two_samples(a: Numbers, b: Numbers) -> Row:
+    """Return means, effect with interval, and p of two experiments."""
+    delta = cliffs_delta(a, b)
+    low, high = delta_interval(delta, len(a), len(b))
+    return {
+        **_described(a, b),
+        "runs_b": len(b),
+        "effect": delta,
+        "effect_low": low,
+        "effect_high": high,
+        "p": rank_sum_p(a, b),
+    }
+
+
+def one_sample(a: Numbers, reference: float) -> Row:
+    """Return means, effect and p of an experiment and a number."""
+    effect, p = signed_rank(a - reference)
+    return {**_described(a, np.array([reference])), "effect": effect, "p": p}
+
+
+def _described(a: Numbers, b: Numbers) -> Row:
+    difference, low, high = mean_difference(a, b)
+    return {
+        "runs_a": len(a),
+        "mean_a": float(a.mean()),
+        "mean_b": float(b.mean()),
+        "median_a": float(np.median(a)),
+        "median_b": float(np.median(b)),
+        "difference": difference,
+        "difference_low": known(low),
+        "difference_high": known(high),
+    }
+
+
+def known(value: float) -> float | None:
+    """Return a number, None for NaN."""
+    return None if math.isnan(value) else value
+
+
+def correct(rows: list[Row], p: str = "p", q: str = "q") -> list[Row]:
+    """Write the corrected p values of rows that have one, and return all rows."""
+    tested = [row for row in rows if row.get(p) is not None]
+    values = np.array([row[p] for row in tested], np.float64)
+    for row, value in zip(tested, false_discovery(values).tolist(), strict=True):
+        row[q] = value
+    return rows

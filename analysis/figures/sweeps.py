@@ -1,0 +1,182 @@
+"""Maps of a sweep: outcomes of its runs by the settings that differ."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.figures.forms import NothingToDraw, Tables
+
+MEASURES = {
+    "fitness": "mean fitness",
+    "fitness_best": "best fitness",
+    "late_gain": "share of the gain in fitness\nin the second half of births",
+    "diversity": "mean tree edit distance",
+    "size": "living robots",
+}
+"""Outcomes that a map shows: how good a setting is, and how stable.
+
+A small share in the second half says that fitness has levelled off; the number of
+living robots says what population an arena keeps.
+"""
+_COLUMNS = 3
+_INK = "#333333"
+_PANEL_IN = 2.4
+_MOST_CELLS = 40
+"""Cells of a map from which on their numbers are not written."""
+
+
+class SweepRuns(NamedTuple):
+    """Finished runs of one sweep.
+
+    Attributes:
+        settings: swept settings, in the order of the document.
+        frame: one row per run: a column for each setting and each known measure.
+        measures: the measures that the runs have.
+    """
+
+    settings: list[str]
+    frame: Any  # a data frame; pandas has no types
+    measures: list[str]
+
+
+def sweep_runs(tables: Tables, experiment: str) -> SweepRuns:
+    """Return the finished runs of a sweep with their settings and outcomes.
+
+    Args:
+        tables: ``sweeps`` and ``outcomes``.
+        experiment: name of the sweep.
+
+    Raises:
+        NothingToDraw: no run of it is finished.
+    """
+    rows = tables["sweeps"].to_pandas()
+    rows = rows[rows["experiment"] == experiment]
+    settings = list(dict.fromkeys(rows["setting"]))
+    points: dict[str, dict[str, Any]] = {}
+    for row in rows.itertuples():
+        value = row.value if np.isnan(row.number) else row.number
+        points.setdefault(row.folder, {})[row.setting] = value
+    outcomes = tables["outcomes"].to_pandas()
+    outcomes = outcomes[outcomes["folder"].isin(points)].reset_index(drop=True)
+    if outcomes.empty:
+        raise NothingToDraw(f"no run of the sweep {experiment} is finished")
+    for setting in settings:
+        outcomes[setting] = [points[folder][setting] for folder in outcomes["folder"]]
+    known = [name for name in MEASURES if outcomes[name].notna().any()]
+    # Off-line populations have a fixed size.
+    shown = [name for name in known if name != "size" or outcomes[name].nunique() > 1]
+    return SweepRuns(settings, outcomes[[*settings, *shown]], shown)
+
+
+def sweep_map(tables: Tables, experiment: str) -> Figure:
+    """Return the outcomes of a sweep's runs by its settings.
+
+    One setting: a line; two settings with repeated values: a map of the means over
+    runs; otherwise one panel per setting, each point a run.
+
+    Args:
+        tables: ``sweeps`` and ``outcomes``.
+        experiment: name of the sweep.
+
+    Raises:
+        NothingToDraw: no run of it is finished.
+    """
+    runs = sweep_runs(tables, experiment)
+    columns = len(runs.settings)
+    if columns == _is_map(runs) * 2:
+        return _panels(runs.measures, partial(_draw_map, runs))
+    cells = [(name, each) for name in runs.measures for each in runs.settings]
+    wide = columns if columns > 1 else min(_COLUMNS, len(cells))
+    high = -(-len(cells) // wide)
+    size = (_PANEL_IN * wide + 0.8, _PANEL_IN * high)
+    figure, axes = plt.subplots(high, wide, figsize=size, squeeze=False)
+    for at, (measure, setting) in enumerate(cells):
+        _draw_points(runs, axes.flat[at], measure, setting)
+    return _finished(figure, axes, len(cells))
+
+
+def sweep_caption(tables: Tables, experiment: str) -> str:
+    """Return what the map shows, and the settings with the highest mean fitness."""
+    runs = sweep_runs(tables, experiment)
+    means = runs.frame.groupby(runs.settings)["fitness"].agg(["mean", "size"])
+    best = means["mean"].idxmax()
+    values = best if isinstance(best, tuple) else (best,)
+    pairs = zip(runs.settings, values, strict=True)
+    at = ", ".join(f"{setting} = {_text(value)}" for setting, value in pairs)
+    few = "Means over finished runs" if means["size"].max() > 1 else "Finished runs"
+    kind = (
+        "" if _is_map(runs) else " Each point is a run; the line joins means over runs."
+    )
+    return (
+        f"{few} at each point of the sweep ({len(runs.frame)} runs at {len(means)} "
+        f"points).{kind} Mean fitness is highest at {at}: {means['mean'].max():.3g}."
+    )
+
+
+def _is_map(runs: SweepRuns) -> bool:
+    """Return whether two settings cross: both have values that repeat."""
+    if len(runs.settings) != 2:  # noqa: PLR2004 - the axes of a map
+        return False
+    points = runs.frame[runs.settings].drop_duplicates()
+    return all(points[name].nunique() < len(points) for name in runs.settings)
+
+
+def _panels(measures: Sequence[str], draw: Any) -> Figure:  # noqa: ANN401 - a callable
+    wide = min(_COLUMNS, len(measures))
+    high = -(-len(measures) // wide)
+    size = ((_PANEL_IN + 0.9) * wide, (_PANEL_IN + 0.4) * high)
+    figure, axes = plt.subplots(high, wide, figsize=size, squeeze=False)
+    for panel, measure in zip(axes.flat, measures, strict=False):
+        draw(panel, measure)
+    return _finished(figure, axes, len(measures))
+
+
+def _finished(figure: Figure, axes: Any, used: int) -> Figure:  # noqa: ANN401 - array
+    for panel in axes.flat[used:]:
+        panel.set_visible(False)
+    figure.tight_layout()
+    return figure
+
+
+def _draw_map(runs: SweepRuns, panel: Axes, measure: str) -> None:
+    across, up = runs.settings
+    means = runs.frame.pivot_table(
+        index=up, columns=across, values=measure, dropna=False
+    )
+    picture = panel.imshow(means, origin="lower", aspect="auto", cmap="viridis")
+    panel.set_xticks(range(means.shape[1]), map(_text, means.columns))
+    panel.set_yticks(range(means.shape[0]), map(_text, means.index))
+    panel.set(xlabel=across, ylabel=up)
+    panel.set_title(MEASURES[measure], fontsize=9, color=_INK)
+    panel.figure.colorbar(picture, ax=panel)
+    if means.size > _MOST_CELLS:
+        return
+    middle = float(np.nanmean([np.nanmin(means), np.nanmax(means)]))
+    for (row, column), value in np.ndenumerate(means.to_numpy()):
+        colour = "black" if value > middle else "white"
+        panel.text(
+            column, row, _text(value), ha="center", va="center", size=7, color=colour
+        )
+
+
+def _draw_points(runs: SweepRuns, panel: Axes, measure: str, setting: str) -> None:
+    frame = runs.frame[[setting, measure]].dropna()
+    values = frame[setting]
+    is_number = values.dtype.kind in "if"
+    x = values if is_number else values.map(str)
+    panel.scatter(x, frame[measure], s=12, color="#0072B2", alpha=0.6)
+    means = frame.groupby(setting)[measure].mean()
+    if len(means) < len(frame):
+        at = means.index if is_number else means.index.map(str)
+        panel.plot(at, means, color=_INK, linewidth=1)
+    panel.set(xlabel=setting)
+    panel.set_ylabel(MEASURES[measure], fontsize=8)
+
+
+def _text(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,63 @@
+"""Fitness functions of experiments: which share one, its name, its unit."""
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+
+import pyarrow as pa
+
+UNITS = {
+    "locomotion": "m/s",
+    "directed-locomotion": "m/s",
+    "target": "m/s",
+    "light": "brightness",
+    "turning": "rad/s",
+    "balance": "m",
+}
+"""Unit of each function that comes with the toolkit, as in its docstring."""
+
+
+def functions_of(runs: pa.Table) -> dict[str, str]:
+    """Return the name of each experiment's fitness function, by experiment.
+
+    Args:
+        runs: ``experiment`` and ``fitness_function``; an experiment has one function.
+
+    Returns:
+        Texts as those of ``fitness_text``, without the digests of sources where that
+        does not make different texts equal; by name of the experiment.
+    """
+    rows = runs.select(["experiment", "fitness_function"]).to_pylist()
+    texts = {row["experiment"]: row["fitness_function"] or "" for row in rows}
+    counts = Counter(map(_without_source, set(texts.values())))
+    return {
+        name: short if counts[short := _without_source(text)] == 1 else text
+        for name, text in sorted(texts.items())
+    }
+
+
+def by_function(functions: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return the experiments of each fitness function, in order of appearance."""
+    found: dict[str, list[str]] = {}
+    for experiment, function in functions.items():
+        found.setdefault(function, []).append(experiment)
+    return found
+
+
+def fitness_unit(function: str) -> str:
+    """Return the unit of a fitness function; empty if it is not known.
+
+    Args:
+        function: a value of ``functions_of``.
+    """
+    return UNITS.get(function.partition(" (")[0], "") if " and " not in function else ""
+
+
+def axis_text(function: str, what: str = "fitness") -> str:
+    """Return the label of an axis of fitness, for example ``fitness [m/s]``."""
+    unit = fitness_unit(function)
+    return f"{what} [{unit}]" if unit else what
+
+
+def _without_source(text: str) -> str:
+    return re.sub(r" \(source \w+\)|, source \w+(?=\))", "", text)

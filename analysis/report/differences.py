@@ -1,0 +1,188 @@
+"""Differences of fitness and of all measures between experiments."""
+
+from collections.abc import Mapping
+from html import escape
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.figures.style import label
+from analysis.measures.fitness_functions import by_function, functions_of
+from analysis.measures.outputs import OUTCOME
+from analysis.report.html import cell, folded, number, plural, table
+
+Tables = Mapping[str, pa.Table]
+Row = Mapping[str, Any]
+
+_MOST_PAIRS = 3
+"""Pairs of experiments on the first screen, those with the smallest p."""
+_COMPARED = {
+    "fitness": "Difference of mean fitness",
+    "fitness_best": "Difference of best fitness",
+}
+_SURE = 2
+"""Runs of both experiments from which on their difference has an interval."""
+
+
+def differences(tables: Tables) -> str:
+    """Return the differences of fitness between experiments, with intervals.
+
+    Args:
+        tables: ``comparison`` and ``runs``.
+
+    Returns:
+        HTML; empty if there is one experiment.
+    """
+    if len(set(tables["runs"]["experiment"].to_pylist())) <= 1:
+        return ""
+    parts = [_differences_of(tables["comparison"], *one) for one in _COMPARED.items()]
+    apart = not_compared(tables)
+    if not any(parts):
+        why = apart or (
+            "<p>Nothing is compared: fewer than two experiments have a finished run "
+            "with a population.</p>"
+        )
+        return f"<h3>Comparison of fitness</h3>{why}"
+    note = (
+        '<p class="note">Dot: difference of the means over finished runs. Bar: its '
+        "95 % interval (Welch's t, which is about means). p: exact rank-sum test, "
+        "which is about how often a run of one experiment is fitter than one of the "
+        "other; with few runs the two can disagree, and then nothing is certain. The "
+        'meaning of all columns is in <a href="#comparison">Comparison</a>.</p>'
+    )
+    return "".join(parts) + apart + note
+
+
+def not_compared(tables: Tables) -> str:
+    """Return why some experiments are not compared by fitness; empty if all are.
+
+    Args:
+        tables: ``runs``.
+    """
+    groups = by_function(functions_of(tables["runs"]))
+    if len(groups) <= 1:
+        return ""
+    lists = "; ".join(
+        f"<b>{escape(', '.join(map(label, names)))}</b> by {escape(function)}"
+        for function, names in groups.items()
+    )
+    return (
+        "<p>Experiments with different fitness functions are not compared by fitness, "
+        f"because their numbers have different meanings: {lists}.</p>"
+    )
+
+
+def _differences_of(comparison: pa.Table, measure: str, title: str) -> str:
+    """Return the differences of one measure; empty if nothing is compared."""
+    rows = comparison.filter(pc.field("measure") == measure).to_pylist()
+    rows.sort(key=lambda row: row["p"])
+    shown = rows[:_MOST_PAIRS]
+    if not shown:
+        return ""
+    ends = [row["difference"] for row in shown]
+    ends += [end for row in shown if (both := _interval(row)) for end in both]
+    reach = max(map(abs, ends)) or 1.0
+    more = f", {len(shown)} of {len(rows)} pairs" * (len(rows) > len(shown))
+    lines = [_difference(row, reach) for row in shown]
+    return f"<h3>{title}{more}</h3>{''.join(lines)}"
+
+
+def _interval(row: Row) -> tuple[float, float] | None:
+    """Return the interval of a difference; None without two runs of each."""
+    low, high = row["difference_low"], row["difference_high"]
+    if low is None or min(row["runs_a"], row["runs_b"]) < _SURE:
+        return None
+    return low, high
+
+
+def _difference(row: Row, reach: float) -> str:
+    """Return a difference in words and as a bar from ``-reach`` to ``reach``."""
+    a, b = (f"<b>{escape(label(row[name]))}</b>" for name in "ab")
+    both = _interval(row)
+    counts = f"{row['runs_a']} and {plural(row['runs_b'], 'run')}"
+    at = f"{counts}, at {row['births']} births"
+    sign = "+" * (row["difference"] > 0)
+    value = f"<b>{sign}{number(row['difference'])}</b>"
+    if both is None:
+        verdict = "no interval: it needs two finished runs of each (--repeats)"
+        text = f"{value} ({at})"
+    else:
+        low, high = both
+        text = (
+            f"{value}, 95 % interval {number(low)} to {number(high)} ({at}; "
+            f"rank-sum p = {number(row['p'])})"
+        )
+        verdict = "the interval includes 0: these runs do not tell which is fitter"
+        if low > 0 or high < 0:
+            higher = row["a"] if low > 0 else row["b"]
+            verdict = f"{label(higher)} is fitter: the interval excludes 0"
+    return (
+        f'<div class="difference"><p>{a} minus {b}: {text}<br>'
+        f'<span class="verdict">{escape(verdict)}</span></p>'
+        f"{_bar(row['difference'], both, reach)}</div>"
+    )
+
+
+def _bar(value: float, both: tuple[float, float] | None, reach: float) -> str:
+    def at(number: float) -> float:
+        return 200 + 190 * number / reach
+
+    interval = ""
+    if both is not None:
+        interval = (
+            f'<path class="interval" d="M{at(both[0]):.1f} 12H{at(both[1]):.1f}"/>'
+        )
+    ticks = "".join(
+        f'<path class="zero" d="M{at(place):.1f} {top}V24"/>'
+        f'<text x="{at(place):.1f}" y="38" text-anchor="{anchor}">'
+        f"{number(float(place))}</text>"
+        for place, top, anchor in ((-reach, 19, "start"), (0, 0, "middle"),
+                                   (reach, 19, "end"))
+    )  # fmt: skip
+    return (
+        '<svg class="bar" viewBox="0 0 400 42" role="img" aria-label="interval">'
+        f'<path class="zero" d="M10 24H390"/>{ticks}{interval}'
+        f'<circle cx="{at(value):.1f}" cy="12" r="5"/></svg>'
+    )
+
+
+def all_differences(tables: Tables) -> str:
+    """Return a folded table of all measures for each pair of experiments.
+
+    Args:
+        tables: ``comparison`` and ``runs``.
+    """
+    pairs: dict[tuple[str, str], list[Row]] = {}
+    for row in tables["comparison"].to_pylist():
+        pairs.setdefault((row["a"], row["b"]), []).append(row)
+    columns = ("mean_a", "mean_b", "difference", "difference_low", "difference_high",
+               "effect", "p", "q")  # fmt: skip
+    folds = []
+    for (a, b), mine in pairs.items():
+        heads = ("measure", label(a), label(b), "difference", "low", "high", "effect",
+                 "p", "q")  # fmt: skip
+        rows = []
+        for row in mine:
+            known = row if _interval(row) else {**row, "difference_low": None,
+                                                "difference_high": None}  # fmt: skip
+            name = row["measure"]
+            first = f'<td title="{escape(OUTCOME[name])}">{name.replace("_", " ")}</td>'
+            rows.append([first, *(cell(known[column]) for column in columns)])
+        title = (
+            f"{label(a)} ({plural(mine[0]['runs_a'], 'run')}) and {label(b)} "
+            f"({plural(mine[0]['runs_b'], 'run')}) at {mine[0]['births']} births"
+        )
+        folds.append(folded(title, table(heads, rows)))
+    if not folds:
+        return ""
+    note = (
+        "Means over finished runs; low and high are the ends of the difference's 95 % "
+        "interval (Welch's t). The effect is Cliff's delta: how much more often a run "
+        "of the first experiment is above one of the second than below. p is that of "
+        "the exact rank-sum test (Wilcoxon, Mann and Whitney), which assumes no "
+        "distribution; q is p, corrected for all tests of this section. The pointer on "
+        "a measure shows its meaning."
+    )
+    apart = not_compared(tables)
+    return f'{apart}<p class="note">{escape(note)}</p>{"".join(folds)}'

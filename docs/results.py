@@ -1,0 +1,108 @@
+"""Writes the generated parts and pictures of docs/results.md from docs/data.
+
+    python -m docs.results            # write them
+    python -m docs.results --check    # fail if they differ from what would be written
+
+A generated part is between two comments of the page that name it. A picture holds the
+digest of the rows that it was drawn from, so that it can be checked without drawing.
+"""
+
+import argparse
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pyarrow as pa
+
+from analysis.comparison.findings import WithBenchmark, findings
+from analysis.comparison.progression import progression
+from analysis.measures.benchmarks import read_benchmarks
+from docs.campaign_data import DATA, KeptOutcomes, kept
+from docs.results_parts import parts_of
+from schema.errors import RevolveError
+
+DOCS = Path(__file__).resolve().parent
+PAGE = DOCS / "results.md"
+_PART = re.compile(r"(<!-- begin: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_TABLES = ("outcomes", "populations", "runs", "family")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the page and its pictures, or check them.
+
+    Returns:
+        0; with ``--check`` 1 if the page or a picture is not up to date.
+    """
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="write nothing; compare")
+    options = parser.parse_args(arguments)
+    tables = tables_of(DATA)
+    page = updated(PAGE.read_text("utf-8"), parts_of(tables))
+    if options.check:
+        stale = stale_files(page, tables)
+        for name in stale:
+            print(f"{name}: not up to date, run python -m docs.results")
+        return 1 if stale else 0
+    PAGE.write_text(page, encoding="utf-8")
+    print(PAGE.name)
+    from docs.results_pictures import draw  # noqa: PLC0415 - draws robots
+
+    try:
+        for name in draw(tables):
+            print(name, flush=True)
+    except RevolveError as error:
+        print(error)
+        return 1
+    return 0
+
+
+def tables_of(data: Path) -> dict[str, pa.Table]:
+    """Return the kept tables, and those computed from them.
+
+    Args:
+        data: folder of the rows.
+    """
+    tables = {name: kept(data, name) for name in _TABLES}
+    tables["benchmark"], _ = read_benchmarks([data / "bench"])
+    tables["progression"] = progression(tables["populations"])
+    outcomes = KeptOutcomes(tables["outcomes"])
+    tables["findings"] = findings(WithBenchmark(outcomes, tables["benchmark"]))
+    return tables
+
+
+def updated(page: str, parts: Mapping[str, str]) -> str:
+    """Return a page with new generated parts.
+
+    Args:
+        page: the page, with each part once.
+        parts: Markdown by the name of the part.
+
+    Raises:
+        KeyError: the page names an unknown part.
+        ValueError: the page lacks a part.
+    """
+    found = [name for _, name, _ in _PART.findall(page)]
+    if sorted(found) != sorted(parts):
+        raise ValueError(f"the page must have parts {sorted(parts)}, has {found}")
+    return _PART.sub(lambda part: f"{part[1]}{parts[part[2]]}\n{part[3]}", page)
+
+
+def stale_files(page: str, tables: Mapping[str, pa.Table]) -> list[str]:
+    """Return the names of the page and pictures that differ from the rows.
+
+    Args:
+        page: the page as it should be.
+        tables: as ``tables_of`` returns them.
+    """
+    from docs.results_pictures import digest_in, digests  # noqa: PLC0415 - slow import
+
+    stale = [] if PAGE.read_text("utf-8") == page else [PAGE.name]
+    for path, digest in digests(tables).items():
+        if digest_in(path) != digest:
+            stale.append(path.name)
+    return stale
+
+
+if __name__ == "__main__":
+    sys.exit(main())

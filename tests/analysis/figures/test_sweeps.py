@@ -1,0 +1,70 @@
+"""Maps of sweeps: which runs they show, and which form they have."""
+
+from typing import Any
+
+import pyarrow as pa
+import pytest
+from matplotlib import pyplot as plt
+
+from analysis.figures.forms import NothingToDraw
+from analysis.figures.sweeps import sweep_caption, sweep_map, sweep_runs
+from analysis.measures.outputs import schema
+
+
+def _tables(points: list[dict[str, Any]]) -> dict[str, pa.Table]:
+    """Return the tables of one run per point; fitness is the sum of its numbers."""
+    sweeps, outcomes = [], []
+    for number, point in enumerate(points):
+        names = {"experiment": "e", "folder": f"f{number}"}
+        numbers = [each for each in point.values() if isinstance(each, float)]
+        outcomes.append({**names, "births": 9, "fitness": sum(numbers), "size": 5.0})
+        for setting, value in point.items():
+            number_of = value if isinstance(value, float) else None
+            row = {"setting": setting, "value": str(value), "number": number_of}
+            sweeps.append({**names, **row})
+    return {
+        "sweeps": pa.Table.from_pylist(sweeps, schema("sweeps")),
+        "outcomes": pa.Table.from_pylist(outcomes, schema("outcomes")),
+    }
+
+
+GRID = [{"a.b": a, "c": c} for a in (1.0, 2.0) for c in (10.0, 30.0) for _ in range(2)]
+
+
+def test_a_grid_of_two_settings_is_a_map_of_means_over_runs() -> None:
+    figure = sweep_map(_tables(GRID), "e")
+    panel = figure.axes[0]
+    (picture,) = panel.get_images()
+    array = picture.get_array()
+    assert array is not None
+    assert array.tolist() == [[11.0, 12.0], [31.0, 32.0]]
+    assert (panel.get_xlabel(), panel.get_ylabel()) == ("a.b", "c")
+    # One panel and its colour bar: off-line populations have one size.
+    assert len([each for each in figure.axes if each.get_visible()]) == 2
+    plt.close(figure)
+    assert sweep_caption(_tables(GRID), "e") == (
+        "Means over finished runs at each point of the sweep (8 runs at 4 points). "
+        "Mean fitness is highest at a.b = 2, c = 30: 32."
+    )
+
+
+def test_scattered_settings_have_a_panel_each() -> None:
+    points = [{"a": 1.0, "b": 4.0}, {"a": 2.0, "b": 5.0}, {"a": 3.0, "b": 6.0}]
+    figure = sweep_map(_tables(points), "e")
+    assert [panel.get_xlabel() for panel in figure.axes] == ["a", "b"]
+    plt.close(figure)
+    words = [{"a": "x", "b": 1.0}, {"a": "y", "b": 1.0}]
+    figure = sweep_map(_tables(words), "e")
+    assert [each.get_text() for each in figure.axes[0].get_xticklabels()] == ["x", "y"]
+    plt.close(figure)
+
+
+def test_runs_of_other_experiments_are_not_shown() -> None:
+    tables = _tables(GRID)
+    other = {"experiment": "o", "folder": "o", "births": 9, "fitness": 99.0}
+    more = pa.Table.from_pylist([other], schema("outcomes"))
+    tables["outcomes"] = pa.concat_tables([tables["outcomes"], more])
+    assert sweep_runs(tables, "e").frame["fitness"].max() == 32
+    tables["outcomes"] = more
+    with pytest.raises(NothingToDraw, match="no run of the sweep e is finished"):
+        sweep_map(tables, "e")
