@@ -10,6 +10,7 @@ from msgspec import Struct
 
 from coordinator.evolution.kinds import KINDS as COORDINATOR_KINDS
 from docs.struct_tables import introduction, linked, rows
+from schema.experiment.calibration import Calibration
 from schema.experiment.document import Experiment, Islands
 from schema.experiment.kinds import KINDS as SCHEMA_KINDS
 from schema.experiment.kinds import Kind
@@ -80,7 +81,7 @@ def _structs(kind: kinds.Type) -> Iterator[type[Section]]:
 
 def _title(section: type, names: dict[type[Section], str]) -> str:
     name = names[section]
-    if section is Islands:
+    if section in (Islands, Calibration):
         return f"[[{name}]]"
     return f"[{name}]" if name else "Keys before the first section"
 
