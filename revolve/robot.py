@@ -10,10 +10,12 @@ from coordinator.evolution.breeding import Breeder
 from revolve.children import SIMULATOR, plugins
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
-from schema.errors import RevolveError, counted
+from schema.errors import InvalidRobot, RevolveError, counted, shown
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, write_robot
+from schema.formats.yaml_reader import OTHER_TYPES
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
@@ -22,6 +24,9 @@ from schema.wire.codec import encode_robot
 
 DEFAULT = "scenario1"
 """Experiment of a robot that has no other one."""
+_OTHER_TYPES = (
+    " (name the experiment with its part types: Robot.read(path, experiment))"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +64,13 @@ class Robot:
             ExperimentError: no such experiment.
         """
         own = None if experiment is None else as_experiment(experiment)
-        found = read_robot(Path(path), body_space(_settings(own).space))
+        settings = _settings(own)
+        kinds = neuron_kinds(settings.brain, settings.space)
+        try:
+            found = read_robot(Path(path), body_space(settings.space), kinds)
+        except InvalidRobot as error:
+            text = str(error).replace(OTHER_TYPES, _OTHER_TYPES)
+            raise InvalidRobot(text) from None
         return cls(found.parts, found.brain, own)
 
     @classmethod
@@ -132,8 +143,15 @@ class Robot:
         return f"<Robot: {counted(len(self.parts), 'part')}, {neurons}, {edges}>"
 
 
-def plain(robot: Robot | PlainRobot) -> PlainRobot:
-    """Return a robot as the rooms have it."""
+def plain(robot: object) -> PlainRobot:
+    """Return a robot as the rooms have it.
+
+    Raises:
+        InvalidRobot: it is none, but the path of a file, for example.
+    """
+    if not isinstance(robot, Robot | PlainRobot):
+        hint = ": Robot.read reads a file" if isinstance(robot, str | Path) else ""
+        raise InvalidRobot(f"robot must be a Robot, got {shown(robot)}{hint}")
     return PlainRobot(robot.parts, robot.brain)
 
 

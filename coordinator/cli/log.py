@@ -21,7 +21,8 @@ from coordinator.storage.journal import (
     read_records,
 )
 from schema.agent.flags import Flags, add_count, whole_number
-from schema.errors import RunFolderError
+from schema.agent.log import tell_user
+from schema.errors import RunFolderError, unreadable
 from schema.tables.description import check_folder, read_state
 
 POLL_S = 0.5
@@ -35,7 +36,8 @@ def main(arguments: list[str]) -> int:
         arguments: the command's name first.
 
     Returns:
-        0 if all events are printed, 1 if the journal is damaged behind them.
+        0 if all events are printed, 1 if the journal is damaged behind them, or has
+        none of the birth or island that the flags name.
 
     Raises:
         RunFolderError: the folder holds no run, or the run no journal.
@@ -45,14 +47,20 @@ def main(arguments: list[str]) -> int:
     path = _journal_of(options.folder, is_followed=options.follow)
     if not options.json:
         print(HEADER, flush=True)
+    is_found = False
     try:
         for record, event in _events(path, is_followed=options.follow):
             for fields in describe(event, selection):
+                is_found = True
                 row = {"record": record, **fields}
                 print(json.dumps(row) if options.json else line(row))
     except RunFolderError as error:
         sys.stdout.flush()
         print(f"revolve: {error}", file=sys.stderr)
+        return 1
+    if not is_found and selection != Selection():
+        sys.stdout.flush()
+        tell_user(f"{path}: has no event of that birth or island")
         return 1
     return 0
 
@@ -134,7 +142,7 @@ def _read(path: Path, start: int, *, is_followed: bool) -> bytes:
             return b""
         raise RunFolderError(f"{path}: was removed while it was read") from None
     except OSError as error:
-        raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
+        raise RunFolderError(f"{path}: {unreadable(error)}") from None
 
 
 def _warn(line: str) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from schema.errors import RunFolderError
+from schema.tables.description import check_folder
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -160,8 +161,8 @@ def make_folder(path: Path) -> None:
     Raises:
         RunFolderError: a file is in its place, or the disk refuses it.
     """
-    if path.is_file():
-        raise RunFolderError(f"{path}: must be a folder, got a file")
+    if path.exists():
+        check_folder(path)
     with storage_errors(path):
         path.mkdir(parents=True, exist_ok=True)
 

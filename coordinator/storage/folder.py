@@ -28,7 +28,7 @@ from coordinator.storage.hints import command
 from coordinator.storage.journal import MOST_RECORDED_EPOCH, newest_epoch
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, FolderLock
-from schema.errors import RunFolderError
+from schema.errors import RunFolderError, unreadable
 from schema.experiment.identity import Origin
 from schema.limits import MOST_MARK
 from schema.plugins.kept import PLUGINS, KeptPlugin, kept_file, plugins_to_keep
@@ -211,7 +211,7 @@ def holds_run(path: Path) -> bool:
     try:
         return (path / DETAILS).exists()
     except OSError as error:
-        raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
+        raise RunFolderError(f"{path}: {unreadable(error)}") from None
 
 
 def read_details(path: Path) -> RunDetails:

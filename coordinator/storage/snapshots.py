@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from coordinator.storage.disk import replace_durably, storage_errors
-from schema.errors import RunFolderError
+from schema.errors import RunFolderError, unreadable
 
 FOLDER = "snapshots"
 
@@ -63,7 +63,7 @@ class Snapshots:
             return path.read_bytes()
         except OSError as error:
             raise RunFolderError(
-                f"{path}: cannot be read: {error.strerror}: remove it and resume; "
+                f"{path}: {unreadable(error)}: remove it and resume; "
                 "its state is computed again"
             ) from None
 

@@ -7,7 +7,7 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 
 from pathlib import Path
 
-from schema.errors import InvalidRobot, MalformedMessage
+from schema.errors import InvalidRobot, MalformedMessage, unreadable
 from schema.experiment.bounded import read_bytes
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -82,10 +82,14 @@ def read_robot(
         kinds: the allowed neuron types.
 
     Raises:
-        InvalidRobot: another ending, a file that cannot be read, a text that is not
-            a robot, or a robot that is not well formed in this body space.
+        InvalidRobot: another ending, a folder, a file that cannot be read, a text that
+            is not a robot, or a robot that is not well formed in this body space.
         MalformedMessage: a .pb file that does not hold a robot.
     """
+    if path.is_dir():
+        best = path / "best.yaml"
+        hint = f"; its best robot is {best}" if best.is_file() else ""
+        raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
     ending = _ending(path, _READ)
     if ending in _YAML:
         return robot_from_yaml(read_text(path), str(path), space, kinds)
@@ -137,7 +141,7 @@ def _read(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     try:
         return read_bytes(path, most)
     except OSError as error:
-        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
+        raise InvalidRobot(f"{path}: {unreadable(error)}") from None
 
 
 def write_robot(

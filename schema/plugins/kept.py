@@ -10,13 +10,14 @@ installed modules only the digest is kept.
 import hmac
 import os
 import secrets
+import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from msgspec import Struct
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, unreadable
 from schema.limits import MOST_PLUGIN_BYTES
 from schema.plugins.permission import FLAG, allow_file, allowed_file
 from schema.plugins.source import digest_of, digest_of_bytes, modules_named
@@ -73,7 +74,9 @@ def allow_kept(
 ) -> None:
     """Allow the plug-ins of a folder that the user named on the command line.
 
-    Modules that the user allowed herself take precedence over copies.
+    Modules that the user allowed herself take precedence over copies. A file that is
+    only found on the import path, as the folder of a Python script is, does not if it
+    has changed since a run that is not resumed.
 
     Args:
         folder: of a run or campaign.
@@ -89,17 +92,27 @@ def allow_kept(
         if not note.file:
             if is_resumed:
                 _check_installed(name, note)
-        elif found := digest_of(name):
+            continue
+        found = digest_of(name)
+        if found and found != note.digest and not is_resumed and _is_unused(name):
+            found = ""
+        if found:
             if found != note.digest:
                 raise ExperimentError(
                     f"plug-in {name}: has source digest {found}, but {folder} was made "
-                    f"with {note.digest}; to use that one: {FLAG} {copy}"
+                    f"with {note.digest}; to use that one: {FLAG} {copy} (in Python: "
+                    "read the folder in a new process)"
                 )
         else:
             if is_resumed:
                 _check_original(name, note, copy)
             _check_copy(name, note, copy)
             allow_file(name, copy)
+
+
+def _is_unused(name: str) -> bool:
+    """Return whether a module is neither imported nor allowed by the user."""
+    return name not in sys.modules and allowed_file(name) is None
 
 
 def _check_installed(name: str, note: KeptPlugin) -> None:
@@ -149,7 +162,7 @@ def _read(name: str, file: Path) -> bytes:
             data = opened.read(MOST_PLUGIN_BYTES + 1)
     except OSError as error:
         raise ExperimentError(
-            f"plug-in {name}: {file} cannot be read: {error.strerror}; give its source "
+            f"plug-in {name}: {file}: {unreadable(error)}; give its source "
             f"with {FLAG} FILE"
         ) from None
     if len(data) > MOST_PLUGIN_BYTES:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from schema.errors import RunFolderError
+from schema.errors import RunFolderError, unreadable
 from schema.limits import MOST_DESCRIPTION, MOST_MARK, MOST_NAME, printable
 from schema.plugins.kept import KeptPlugin, allow_kept
 
@@ -199,4 +199,4 @@ def read_small(file: Path, most: int) -> bytes:
     except (FileNotFoundError, NotADirectoryError):
         raise FileNotFoundError(file) from None
     except OSError as error:
-        raise RunFolderError(f"{file}: cannot be read: {error.strerror}") from None
+        raise RunFolderError(f"{file}: {unreadable(error)}") from None

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,6 +115,9 @@ def test_invalid_robot_raises_before_anything_runs() -> None:
         rv.evaluate(broken)
     with pytest.raises(rv.InvalidRobot, match="must end in one of"):
         rv.Robot.read("robot.doc")
+    path: Any = "robot.yaml"
+    with pytest.raises(rv.InvalidRobot, match=r"got 'robot\.yaml': Robot\.read reads"):
+        rv.evaluate(path)
 
 
 def test_failing_fitness_and_crash_are_results(

@@ -148,7 +148,11 @@ def test_flags_select_events(
     flags: Sequence[str],
     expected: list[str],
 ) -> None:
-    assert printed(capsys, run, *flags) == expected
+    code = main(["log", str(run), *flags])
+    said = capsys.readouterr()
+    assert said.out.splitlines()[1:] == expected
+    assert code == (0 if expected else 1)
+    assert ("no event of that birth or island" in said.err) == (not expected)
 
 
 def test_json_is_one_object_per_line(

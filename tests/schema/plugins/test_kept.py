@@ -47,7 +47,10 @@ def test_a_copy_of_the_user_is_allowed(
 
 
 def test_a_changed_original_stops_a_resumed_run_only(
-    tmp_path: Path, original: Path, kept: dict[str, KeptPlugin]
+    tmp_path: Path,
+    original: Path,
+    kept: dict[str, KeptPlugin],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     original.write_text("judge = 2\n")
     expected = r"kept_lab\.py has changed since .*: --plugins .*run/plugins/kept_lab"
@@ -57,8 +60,14 @@ def test_a_changed_original_stops_a_resumed_run_only(
     allow([str(copy)])
     allow_kept(tmp_path / "run", kept, is_resumed=True)
     permission._allowed.clear()
-    allow_kept(tmp_path / "run", kept, is_resumed=False)
-    assert allowed() == (str(copy),)
+    for is_on_path in (False, True):
+        if is_on_path:
+            monkeypatch.syspath_prepend(tmp_path)  # as that of a Python script
+        allow_kept(tmp_path / "run", kept, is_resumed=False)
+        assert allowed() == (str(copy),)
+        permission._allowed.clear()
+    with pytest.raises(ExperimentError, match="was made with 5ff4453f1603; to use"):
+        allow_kept(tmp_path / "run", kept, is_resumed=True)
 
 
 def test_another_file_of_the_user_is_refused(
