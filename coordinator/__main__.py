@@ -8,7 +8,7 @@ from pathlib import Path
 
 import schema.experiment.kinds
 from coordinator.cli.deployment import Deployment
-from coordinator.cli.execute import resume, start, start_campaign
+from coordinator.cli.execute import finished_code, resume, start, start_campaign
 from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
 from coordinator.dispatch.events import AgentKind
@@ -74,9 +74,7 @@ def main(arguments: list[str]) -> int:
     if not options.in_process and options.command != "coordinator":
         check_load(flags, "--workers", options.workers or 0, options)
     if command == "resume":
-        folder = Path(options.folder)
-        deployment = _deployment(options, refuse_faulty_of(folder), folder)
-        return _stoppable(folder, deployment, lambda: resume(folder, deployment))
+        return _resume(options)
     experiments = _experiments(options)
     is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
     name = "+".join(
@@ -126,6 +124,15 @@ def plugin_kinds() -> tuple[Kind, ...]:
         *KINDS,
         brain_kind(check_brain),
     )
+
+
+def _resume(options: argparse.Namespace) -> int:
+    folder = Path(options.folder)
+    # First: a finished run needs none of its plug-ins.
+    if (code := finished_code(folder)) is not None:
+        return code
+    deployment = _deployment(options, refuse_faulty_of(folder), folder)
+    return _stoppable(folder, deployment, lambda: resume(folder, deployment))
 
 
 def _stoppable(

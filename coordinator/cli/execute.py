@@ -82,6 +82,8 @@ def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> 
 def resume(folder: Path, deployment: Deployment) -> int:
     """Continue the run or the campaign of a folder; return the exit code.
 
+    A run for which ``finished_code`` has one must not be resumed.
+
     Raises:
         RunFolderError: the folder holds neither, another coordinator has locked it,
             its journal is damaged, or the disk fails.
@@ -92,10 +94,25 @@ def resume(folder: Path, deployment: Deployment) -> int:
         with FolderLock(folder):
             planned, failed = _plan(folder, read_campaign(folder))
             return _execute_campaign(folder, planned, failed, deployment)
-    if not _is_to_be_rewritten(folder) and read_state(folder) == "finished":
-        tell_user(f"{folder}: already finished")
-        return 0 if has_evaluated(folder) else 1
     return _execute_run(folder, RunFolder(folder), deployment)
+
+
+def finished_code(folder: Path) -> int | None:
+    """Return the exit code of a run that needs no resumption, and tell the user so.
+
+    Returns:
+        None for a campaign, for a run that is not finished or whose tables are to be
+        written again, and where there is no run.
+
+    Raises:
+        RunFolderError: a damaged table cannot be written again.
+    """
+    if is_campaign(folder) or not holds_run(folder):
+        return None
+    if _is_to_be_rewritten(folder) or read_state(folder) != "finished":
+        return None
+    tell_user(f"{folder}: already finished")
+    return 0 if has_evaluated(folder) else 1
 
 
 def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:

@@ -76,7 +76,8 @@ def execute_runs(
         )
         stack.callback(scheduler.close)
         server = None if network is None else _Server(scheduler, network)
-        with Display(scheduler, quiet=deployment.quiet) as display:
+        place = _place_to_join(folder, deployment)
+        with Display(scheduler, quiet=deployment.quiet, place=place) as display:
             shown_s = done_s = -math.inf
             while not (scheduler.is_finished or stop.is_set()):
                 scheduler.turn(_TURN_S, time.monotonic)
@@ -99,9 +100,21 @@ def execute_runs(
                 server.serve(time.monotonic())
         scheduler.stop()
         _tell_faults(scheduler)
-    for line in fault_lines(scheduler.status(time.monotonic()).faults):
+    faults = scheduler.status(time.monotonic()).faults
+    # Late answers ask for nothing; ``revolve status`` shows them.
+    for line in fault_lines([each for each in faults if each.kind != "late"]):
         tell_user(line)
     return scheduler
+
+
+def _place_to_join(folder: Path, deployment: Deployment) -> str:
+    """Return what agents on this machine connect to; empty if some start by themselves.
+
+    Agents of a hub with TLS need files that this process does not know.
+    """
+    if deployment.workers or deployment.answers is not None or deployment.tls:
+        return ""
+    return deployment.connect or str(folder)
 
 
 def _open_metrics(

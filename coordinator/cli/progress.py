@@ -23,12 +23,15 @@ from coordinator.cli.format import (
 )
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import SPAN_S
+from coordinator.storage.hints import command
 from schema.agent.log import log_form, tell_user, warn_user
 from schema.errors import counted
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
 """Bars of single runs or islands that fit on a screen."""
+_SOON_S = 2.0
+"""Time after which a run says how to start the agents that it waits for [s]."""
 _LEAST_FOR_BAR = 60
 """Characters of the narrowest terminal that has room for a bar."""
 
@@ -37,18 +40,26 @@ class Display:
     """Progress bars; without a terminal a line at regular intervals."""
 
     def __init__(
-        self, scheduler: RunScheduler, *, quiet: bool, console: Console | None = None
+        self,
+        scheduler: RunScheduler,
+        *,
+        quiet: bool,
+        console: Console | None = None,
+        place: str = "",
     ) -> None:
-        """Show all runs of a scheduler; nothing if ``quiet``.
+        """Show all runs of a scheduler; if ``quiet``, only what they wait for.
 
         Args:
             scheduler: its runs.
-            quiet: show nothing.
+            quiet: show no progress.
             console: where to draw; None: on standard error.
+            place: to which the user has to connect agents; empty: this command has
+                started some.
         """
         self._scheduler = scheduler
         self._console = console or Console(stderr=True)
         self._quiet = quiet
+        self._place = place
         # Bars would break lines of JSON.
         self._has_bars = self._console.is_terminal and log_form() != "json"
         self._progress = Progress(
@@ -77,10 +88,10 @@ class Display:
         Args:
             now_s: the time, of any clock that only goes forward [s].
         """
-        if self._quiet:
-            return
         status = self._scheduler.status(now_s)
-        if self._has_bars:
+        if self._quiet:
+            pass
+        elif self._has_bars:
             self._draw(status)
         elif now_s >= self._next_line_s:
             self._next_line_s = now_s + SPAN_S
@@ -134,9 +145,15 @@ class Display:
             self._missing_since_s = None
         elif self._missing_since_s is None:
             self._missing_since_s = now_s
-        elif now_s - self._missing_since_s > SPAN_S:
+        elif now_s - self._missing_since_s > (_SOON_S if self._place else SPAN_S):
             self._missing_since_s = now_s + 6 * SPAN_S
-            self._warn(f"waiting for {' and '.join(missing)}: none has joined")
+            line = f"waiting for {' and '.join(missing)}: none has joined"
+            starts = [
+                command(kind.removesuffix("s"), "--connect", self._place)
+                for kind in missing
+            ]
+            how = f"; to start some on this machine: {', '.join(starts)}"
+            self._warn(f"{line}{how if self._place else ''}")
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
             for run in self._scheduler.active
@@ -151,7 +168,7 @@ class Display:
                 )
 
     def _warn(self, line: str) -> None:
-        if self._has_bars:
+        if self._has_bars and not self._quiet:
             self._console.print(line, soft_wrap=True)
         else:
             warn_user(line)

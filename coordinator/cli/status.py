@@ -1,6 +1,7 @@
 """``revolve status``: progress of runs, from their coordinator or their folders."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from uuid import uuid4
 
@@ -40,6 +41,7 @@ from schema.wire.operator import (
 )
 from schema.wire.status import RunStatus, Status
 
+_COLUMNS = ("run", "state", "births", "births/s", "best alive, arenas")
 _WIDEST = 1000
 """Characters of the widest line that is not wrapped."""
 
@@ -184,20 +186,22 @@ def _show(source: Source) -> None:
     """Print the progress of runs, named by path below the folder or folder name."""
     status, is_live = source.status, source.coordinator is not None
     root = Path(source.folder) if source.folder else None
-    table = Table("run", "state", "births", "births/s", "best alive, arenas", box=None)
     above = root and root.resolve()
+    rows = []
     for run in status.runs:
         folder = Path(run.folder)
         if above and above in folder.parents:
             name = str(folder.relative_to(above))
         else:
             name = folder.name
-        table.add_row(
-            name,
-            state_of(run, status, is_live=is_live),
-            f"{run.births} of {run.wanted}" if run.islands else "",
-            f"{run.births_per_s:.1f}" if run.births_per_s else "",
-            run_details(run) if run.islands else "",
+        rows.append(
+            (
+                name,
+                state_of(run, status, is_live=is_live),
+                f"{run.births} of {run.wanted}" if run.islands else "",
+                f"{run.births_per_s:.1f}" if run.births_per_s else "",
+                run_details(run) if run.islands else "",
+            )
         )
     done = sum(run.state == "finished" for run in status.runs)
     births = f"{status.births} of {counted(status.wanted, 'birth')}"
@@ -219,7 +223,19 @@ def _show(source: Source) -> None:
     console = Console(width=_WIDEST, highlight=False, markup=False)
     for line in lines:
         console.print(line)
-    console.print(table)
+    console.print(_table(rows))
+
+
+def _table(rows: Sequence[Sequence[str]]) -> Table:
+    """Return a table of runs without the columns that are empty in all rows."""
+    table = Table(box=None)
+    columns = dict(zip(_COLUMNS, zip(*rows, strict=True), strict=False))
+    shown = {name: cells for name, cells in columns.items() if any(cells)}
+    for name in shown:
+        table.add_column(name)
+    for row in zip(*shown.values(), strict=True):
+        table.add_row(*row)
+    return table
 
 
 def _without_coordinator(status: Status, root: Path | None) -> str:

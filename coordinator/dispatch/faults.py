@@ -13,7 +13,7 @@ FaultKind = Literal[
 MEANINGS: Mapping[FaultKind, str] = {
     "malformed": "malformed messages, dropped",
     "refused": "cannot do jobs, or may not take part",
-    "late": "late or second answers, dropped",
+    "late": "answers to jobs that were already done, dropped",
     "foreign": "replies by another process in the agent's name, dropped",
     "fenced": "jobs refused for a forged epoch; no other coordinator has the run",
     "cancelled": "jobs cancelled by another process",
@@ -57,11 +57,16 @@ class PeerFaults:
                 key = (kind, OTHERS)
             if key not in self._counts:
                 self._counts[key] = 0
-                self._lines.append(_first_line(key, detail))
+                # A late answer is no fault: an overdue job was given out twice.
+                if kind != "late":
+                    self._lines.append(_first_line(key, detail))
         self._counts[key] += 1
 
     def lines(self) -> list[str]:
-        """Return the lines about faults that have begun since the last call."""
+        """Return the lines about faults that have begun since the last call.
+
+        Late answers have none; ``counts`` has them.
+        """
         lines, self._lines = self._lines, []
         return lines
 

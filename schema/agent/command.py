@@ -242,7 +242,7 @@ def run_pool(
             processes=options.processes,
             plugins=allowed(),
             give_up_after_s=options.give_up_after,
-            tells_hub=True,
+            tells_hub=not options.until_closed,
         )
         client_config(connect, tls)
     except RevolveError as error:

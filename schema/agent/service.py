@@ -302,7 +302,9 @@ def _open(
         try:
             return zenoh.open(config)
         except zenoh.ZError:
-            hub.seen(is_there=False)
+            # A process that is told to stop meanwhile needs no hub.
+            if not stop.is_set():
+                hub.seen(is_there=False)
         stop.wait(_RETRY_S)
     return None
 
@@ -344,7 +346,8 @@ def _serve_session(
         turns: FairQueue[zenoh.Query] = FairQueue()
         while not stop.is_set():
             if not _queue_all(inbox, turns, server.counts):
-                hub.seen(is_there=bool(session.info.routers_zid()))
+                if not stop.is_set():
+                    hub.seen(is_there=bool(session.info.routers_zid()))
                 continue
             # A job arrived: the hub is there.
             hub.seen(is_there=True)

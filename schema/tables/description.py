@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from schema.errors import RunFolderError, unreadable
+from schema.errors import RunFolderError, expectation, unreadable
 from schema.limits import MOST_DESCRIPTION, MOST_MARK, MOST_NAME, printable
 from schema.plugins.kept import KeptPlugin, allow_kept
 
@@ -81,7 +81,7 @@ def read_description(folder: Path) -> Description:
         why = _fault(found, data)
     # A UnicodeError is a ValueError; an escape in JSON may be half a character.
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-        why = str(error)
+        why = expectation(str(error))
     if why:
         raise RunFolderError(
             f"{file}: damaged: {printable(why, 200)}; restore a copy of the file"

@@ -36,6 +36,7 @@ def test_resume_and_check_name_the_changed_module(
     module.write_text(MODULE)
     workspace.run("run", "mine.toml", "--out", "a", *HOW)
     assert "lab.py:2: in order" in workspace.run("check", "a")
+    state = (run / "state").read_text()
     (run / "state").write_text("stopped")
     before = (run / "journal.bin").read_bytes()
 
@@ -48,6 +49,10 @@ def test_resume_and_check_name_the_changed_module(
     told = workspace.run("check", "mine.toml", code=1)
     assert "lab.py:2: 'lab:far' must take 2 arguments" in told
     assert (run / "journal.bin").read_bytes() == before
+
+    (run / "state").write_text(state)
+    assert "a: already finished" in workspace.run("resume", "a", *HOW)
+    (run / "state").write_text("stopped")
 
     kept = ("--plugins", "a/plugins/lab.py")
     assert "in order" in workspace.run("check", "a", *kept)

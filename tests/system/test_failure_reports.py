@@ -142,7 +142,7 @@ def test_damaged_run_does_not_hide_other_runs(
 ) -> None:
     shutil.copytree(campaign_folder, workspace.folder / "all")
     twice = workspace.folder / "all" / "twice"
-    damage = "seeing-0/run.json: damaged: Object missing required field `name`"
+    damage = "seeing-0/run.json: damaged: must have a key 'name'"
     (twice / "seeing-0" / "run.json").write_text("{}")
     output = workspace.run("status", "all", code=1)
     assert f"damaged: all/twice/{damage}" in output

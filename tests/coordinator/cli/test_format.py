@@ -12,7 +12,7 @@ from schema.wire.operator import (
     decode_operator_reply,
     encode_operator_reply,
 )
-from schema.wire.status import PeerFault, RunStatus, Status
+from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 FAULTS = (
     PeerFault("late", "a", 1),
@@ -24,7 +24,8 @@ FAULTS = (
 def test_faults_are_summed_by_kind_with_the_most_frequent_peers() -> None:
     late, malformed = fault_lines(FAULTS)
     assert late == (
-        "not used: 4 late: b 3, a 1 (late or second answers, dropped; since the start)"
+        "not used: 4 late: b 3, a 1 (answers to jobs that were already done, dropped; "
+        "since the start)"
     )
     assert malformed == (
         "not used: 16 malformed: peer0 2, peer1 2, peer2 2, peer3 2, peer4 2 and 3 "
@@ -43,6 +44,24 @@ def test_status_shows_the_faults(capsys: pytest.CaptureFixture[str]) -> None:
     _show(Source(received, "title"))
     shown = capsys.readouterr().out
     assert all(line in shown for line in fault_lines(FAULTS))
+
+
+def test_status_leaves_out_empty_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    islands = (IslandStatus(3, 10, 0.5, 2),)
+    slow = RunStatus("/r/slow", "a", 0, "finished", 0.0, islands)
+    fast = RunStatus("/r/fast", "a", 1, "running", 2.5, islands)
+    damaged = RunStatus("/r/bad", "a", 2, "damaged")
+    for runs, columns in (
+        ((slow, damaged), ["run", "state", "births", "best", "alive,", "arenas"]),
+        ((fast,), ["run", "state", "births", "births/s", "best", "alive,", "arenas"]),
+        ((damaged,), ["run", "state"]),
+    ):
+        _show(Source(Status(runs, 0, 0, 0.0), None, "/r"))
+        table = capsys.readouterr().out.splitlines()[-1 - len(runs) :]
+        assert table[0].split() == columns
+        assert [line.split()[0] for line in table[1:]] == [
+            run.folder.removeprefix("/r/") for run in runs
+        ]
 
 
 def test_a_status_with_a_long_name_is_malformed() -> None:

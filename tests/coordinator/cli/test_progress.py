@@ -68,3 +68,26 @@ def test_no_line_is_wider_than_the_terminal(width: int) -> None:
     assert all(len(line) <= width for line in islands)
     assert "island 1" in islands[-1]
     assert "best 0.512" in islands[-1]
+
+
+@pytest.mark.parametrize("is_quiet", [False, True])
+def test_a_run_without_agents_says_how_to_start_some(
+    capsys: pytest.CaptureFixture[str], *, is_quiet: bool
+) -> None:
+    status = Status((RunStatus("/r", "a", 0, "running", 0.0, (_ISLAND,)),), 0, 0, 0.0)
+    scheduler: Any = SimpleNamespace(active=[], status=lambda _now_s: status)
+    waiting = "waiting for workers and analyzers: none has joined"
+    how = (
+        "; to start some on this machine: revolve worker --connect runs/a, revolve "
+        "analyzer --connect runs/a\n"
+    )
+    for place, seconds, told in (
+        ("runs/a", (0.0, 3.0, 30.0), f"{waiting}{how}"),
+        ("", (0.0, 3.0), ""),
+        ("", (0.0, 11.0), f"{waiting}\n"),
+    ):
+        with Display(scheduler, quiet=is_quiet, place=place) as display:
+            for now_s in seconds:
+                display.update(now_s)
+        lines = capsys.readouterr().err.splitlines(keepends=True)
+        assert "".join(line for line in lines if "waiting" in line) == told
