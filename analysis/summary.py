@@ -126,7 +126,10 @@ def _findings(findings: pa.Table) -> list[tuple[str, ...]]:
         (
             row["figure"],
             row["claim"],
-            *(f"{row[name]:.3g}" for name in ("mean_a", "mean_b", "q")),
+            *(
+                "-" if row[name] is None else f"{row[name]:.3g}"
+                for name in ("mean_a", "mean_b", "q")
+            ),
             row["verdict"],
         )
         for row in compared.to_pylist()

@@ -228,18 +228,17 @@ def _differences(tables: Tables) -> str:
     return _table(["figure", "finding", *_NUMBERS], rows)
 
 
-_NUMBERS = ("means", "difference (95 %)", "effect (95 %)", "q")
+_NUMBERS = ("means", "difference (95 %)", "effect (95 %)", "q", "q alike")
 
 
 def _numbers(row: Row) -> list[str]:
     if row["mean_a"] is None:
-        return ["", "", "", ""]
-    q = row["q"] if row["q_alike"] is None else row["q_alike"]
+        return [""] * len(_NUMBERS)
     return [
         f"{_short(row['mean_a'])}; {_short(row['mean_b'])}",
         _interval(row, "difference"),
         _interval(row, "effect"),
-        "" if q is None else f"{q:.2g}",
+        *("" if row[q] is None else f"{row[q]:.2g}" for q in ("q", "q_alike")),
     ]
 
 

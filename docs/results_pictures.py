@@ -108,7 +108,7 @@ def draw(tables: Tables) -> Iterator[str]:
     """
     plots = {
         "progression.png": lambda: over_births(
-            {**tables, "populations": tables["populations"]},
+            {name: tables[name] for name in ("populations", "progression")},
             "fitness",
             "mean fitness [m/s]",
         ),

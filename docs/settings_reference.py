@@ -10,10 +10,12 @@ from msgspec import Struct
 
 from coordinator.evolution.kinds import KINDS as COORDINATOR_KINDS
 from docs.struct_tables import introduction, linked, rows
+from schema.experiment.calibration import Calibration
 from schema.experiment.document import Experiment, Islands
 from schema.experiment.kinds import KINDS as SCHEMA_KINDS
 from schema.experiment.kinds import Kind
 from schema.experiment.section import Section
+from schema.experiment.sweep import Range
 from schema.parts import PartType
 from schema.plugins.parameters import parameters_type
 from schema.robot.cpg import CpgParameters
@@ -71,17 +73,17 @@ def _structs(kind: kinds.Type) -> Iterator[type[Section]]:
     """Yield the sections that a type holds."""
     if isinstance(kind, kinds.StructType):
         yield kind.cls  # type: ignore[misc]
-    for each in (
-        *getattr(kind, "types", ()),
-        *filter(None, [getattr(kind, "item_type", None)]),
-    ):
+    inner = (getattr(kind, name, None) for name in ("item_type", "value_type"))
+    for each in (*getattr(kind, "types", ()), *filter(None, inner)):
         yield from _structs(each)
 
 
 def _title(section: type, names: dict[type[Section], str]) -> str:
     name = names[section]
-    if section is Islands:
+    if section in (Islands, Calibration):
         return f"[[{name}]]"
+    if section is Range:
+        return f"[{name}.KEY]"
     return f"[{name}]" if name else "Keys before the first section"
 
 

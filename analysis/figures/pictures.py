@@ -16,6 +16,8 @@ _INK, _FAINT = "#333333", "#9A9A9A"
 _HEIGHT = 0.53
 """Height of a picture in a family tree in which each robot has a width of 1."""
 _WIDTH = 0.94
+_TITLE_IN = 0.36
+"""Height of the two lines of text above a row of pictures [inches]."""
 _STEP = 1.0
 """Distance of two levels."""
 
@@ -29,21 +31,22 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
     Source: Hupkes 2016, figure 6.10.
     """
     columns = max(len(one.gait) for one in robot_pictures)
-    figure = Figure(
-        figsize=(8.0, 0.25 + len(robot_pictures) * (8.0 / columns * 0.525 + 0.26))
-    )
+    high = 8.0 / columns * 0.525
+    total = len(robot_pictures) * (high + _TITLE_IN)
+    figure = Figure(figsize=(8.0, total))
     axes = figure.subplots(len(robot_pictures), columns, squeeze=False)
-    figure.subplots_adjust(0, 0, 1, 0.97, wspace=0.02, hspace=0.18)
+    top = 1 - _TITLE_IN / total
+    figure.subplots_adjust(0, 0, 1, top, wspace=0.02, hspace=_TITLE_IN / high)
     for row, one in zip(axes, robot_pictures, strict=True):
         for axis in row:
             axis.set_axis_off()
         for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
             axis.imshow(picture)
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
-        way = f"{100 * one.moved_m:.2g} cm from the first to the last picture"
-        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}; {way}"
+        way = f"moved {100 * one.moved_m:.2g} cm"
+        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}, {way}"
         row[0].set_title("")
-        row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=6)
+        row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=12)
     return figure
 
 

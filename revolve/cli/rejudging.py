@@ -9,12 +9,12 @@ import pyarrow.parquet as pq
 from msgspec import structs
 from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
+from analysis.comparison.robustness import Row, summary, table_of
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.robustness import robustness
 from analysis.figures.style import save
 from analysis.measures.load import read_run, read_tables
 from analysis.measures.measures import robots
-from analysis.measures.robustness import Row, summary, table_of
 from analysis.measures.run_tables import RunTables
 from analysis.progress import bars
 from revolve.experiment import Experiment, document_of

@@ -6,6 +6,7 @@ from urllib.parse import quote
 
 from schema.errors import ExperimentError, nearest, shown
 from schema.experiment.brains import neuron_kinds
+from schema.experiment.calibration import calibration_problems, delay_problems
 from schema.experiment.check_migration import migration_problems
 from schema.experiment.check_world import world_problems
 from schema.experiment.document import (
@@ -38,7 +39,8 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             not a whole number of patches; invalid scenery; an unknown plug-in; a
             migration that can never happen; measures that are named twice, or
             parameters of a measure that is not named; a range that ends before it
-            begins, or disturbances in an arena.
+            begins; a calibration of an unknown part type, or with a delay between two
+            ticks; disturbances or calibrations in an arena.
     """
     if problem := next(_problems(experiment), ""):
         raise ExperimentError(f"{where}: {problem}")
@@ -72,6 +74,7 @@ def _problems(experiment: Experiment) -> Iterator[str]:
         )
     if not any(kind.outputs for kind in types.values()):
         yield "space.part_types: at least one type must have a motor"
+    yield from calibration_problems(experiment.calibration, types)
     # Loads and checks both; raises what is wrong.
     neuron_kinds(experiment.brain, experiment.space)
 
@@ -85,7 +88,10 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _pose_problems(experiment.simulation, "window_steps")
     yield from _duration_problems(experiment)
     yield from world_problems(experiment)
-    yield from robust_problems(experiment.robust, is_arena=experiment.arena is not None)
+    is_arena, clock = experiment.arena is not None, experiment.simulation
+    yield from robust_problems(experiment.robust, is_arena=is_arena)
+    tick_s = clock.brain_steps * clock.timestep_s
+    yield from delay_problems(experiment.calibration, tick_s, is_arena=is_arena)
     if experiment.arena is not None:
         yield from _arena_problems(experiment, experiment.arena)
         yield from _arena_clock_problems(experiment.arena, experiment.simulation)

@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta, field, structs
 
 from schema.errors import ExperimentError
+from schema.experiment.calibration import Calibration
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.migration import Migration
 from schema.experiment.robust import NoiseLevel, Robust
@@ -467,6 +468,9 @@ class Experiment(Section, frozen=True):
         brain: type of the robots' brains, on all islands.
         robust: evaluation under drawn disturbances, off-line; without it robots are
             evaluated once.
+        calibration: measured sensors and motors of part types, off-line, on all
+            islands; a document may give the path of a file with these tables,
+            relative to itself.
         sweep: makes the document a campaign of experiments that differ in some
             settings.
     """
@@ -488,6 +492,7 @@ class Experiment(Section, frozen=True):
     encoding: Encoding = Encoding()
     brain: BrainSection = NETWORK
     robust: Robust | None = None
+    calibration: tuple[Calibration, ...] = ()
     sweep: Sweep | None = None
 
     @property

@@ -29,6 +29,9 @@ from schema.limits import (
 )
 from schema.plugins.permission import allow_references
 
+_LISTS = ("islands", "calibration")
+"""Keys that are lists of tables."""
+
 # ``tomllib`` stores all beginnings of a dotted key. Possessive: without backtracking.
 _KEY_PART = r"""(?:[\w-]++|"(?:[^"\\\n]++|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _LONG_NUMBER = re.compile(rf"(?<!\w)[0-9][0-9A-Fa-f_xob]{{{MOST_DIGITS}}}")
@@ -267,6 +270,7 @@ def own_references(source: str, births: int | None = None) -> list[str]:
 
 def _converted(document: dict[str, Any], where: str) -> Experiment:
     """Return the experiment of tables before the checks across its keys."""
+    _read_calibration(document, where)
     _refuse_unknown(document, Experiment, where, "")
     _refuse_many_islands(document, where)
     _read_scenery(document, where)
@@ -346,6 +350,26 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
         environment["scenery"] = text
 
 
+def _read_calibration(document: dict[str, Any], where: str) -> None:
+    """Replace the path of a calibration file by the tables of the file, in place."""
+    named = document.get("calibration")
+    if not isinstance(named, str):
+        return
+    path = Path(where).parent / named
+    try:
+        tables = parse_toml(read_bytes(path).decode("utf-8-sig"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExperimentError(
+            f"{where}: calibration: {named}: {unreadable(error)}{_near(path)}"
+        ) from None
+    if list(tables) != ["calibration"]:
+        raise ExperimentError(
+            f"{where}: calibration: {named}: must hold [[calibration]] tables and "
+            f"nothing else, got {', '.join(map(cut, tables)) or 'nothing'}"
+        )
+    document["calibration"] = tables["calibration"]
+
+
 def _complete(document: dict[str, Any]) -> None:
     """Merge each section into those of ``islands``, in place."""
     for islands in document.get("islands", ()):
@@ -391,11 +415,9 @@ def _refuse_unknown(
         inner = _section(fields[key].type)
         if inner is None:
             continue
-        if key == "islands" and isinstance(value, dict):
-            raise ExperimentError(
-                f"{where}: islands: must be [[islands]], got [islands]"
-            )
-        if key == "islands" and isinstance(value, list):
+        if key in _LISTS and isinstance(value, dict):
+            raise ExperimentError(f"{where}: {key}: must be [[{key}]], got [{key}]")
+        if key in _LISTS and isinstance(value, list):
             tables = {f"{prefix}{key}[{at}]": each for at, each in enumerate(value)}
         else:
             tables = {f"{prefix}{key}": value}

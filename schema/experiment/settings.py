@@ -8,6 +8,7 @@ import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
+from schema.experiment.calibration import Calibration
 from schema.experiment.document import (
     NETWORK,
     Arena,
@@ -58,7 +59,7 @@ class VettingSettings(Section, frozen=True):
 class EvaluationSettings(Section, frozen=True):
     """Settings of an evaluation request."""
 
-    later: ClassVar = ("measures", "brain", "robust")
+    later: ClassVar = ("measures", "brain", "robust", "calibration")
 
     space: Space
     simulation: Simulation
@@ -67,6 +68,7 @@ class EvaluationSettings(Section, frozen=True):
     measures: Measures = Measures()
     brain: BrainSection = NETWORK
     robust: Robust | None = None
+    calibration: tuple[Calibration, ...] = ()
 
     @property
     def light(self) -> Vector | None:

@@ -21,7 +21,8 @@ class Range(Section, frozen=True):
     """Values between two numbers; whole numbers if both are.
 
     Attributes:
-        low, high: least and greatest value.
+        low: least value.
+        high: greatest value.
         steps: number of evenly spaced values, both ends included; without ``samples``
             it must be given.
         log: space the values evenly in their logarithm.

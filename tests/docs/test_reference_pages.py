@@ -37,12 +37,16 @@ def test_page_is_up_to_date(file: Path) -> None:
     )
 
 
+_INNER = ("Origin", "Range")
+"""Values of keys, which the descriptions of these keys explain."""
+
+
 def _sections(base: type[Section] = Section) -> Iterator[type[Section]]:
     """Yield the sections that users write; the others are parts of requests."""
     others = (PluginSection, VettingSettings, EvaluationSettings, ArenaSettings)
     for found in base.__subclasses__():
         in_document = found.__module__.startswith("schema.experiment.")
-        if in_document and found not in others and found.__name__ != "Origin":
+        if in_document and found not in others and found.__name__ not in _INNER:
             yield found
         yield from _sections(found)
 

@@ -142,8 +142,8 @@ def _of_one(claim: Claim, a: Numbers) -> Row:
     if np.ptp(away) > 0:
         ends = stats.ttest_1samp(away, 0).confidence_interval(0.95)
         sides = [
-            stats.ttest_1samp(away, -claim.margin, alternative="greater").pvalue,
-            stats.ttest_1samp(away, claim.margin, alternative="less").pvalue,
+            float(stats.ttest_1samp(away, -claim.margin, alternative="greater").pvalue),
+            float(stats.ttest_1samp(away, claim.margin, alternative="less").pvalue),
         ]
     return {"p": p, "effect": effect, "rough": is_tied, "ends": tuple(ends),
             "margin": claim.margin, "alike": max(sides),

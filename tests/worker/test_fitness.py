@@ -120,7 +120,8 @@ def test_own_parameters_are_read_as_the_struct_of_the_second_argument() -> None:
     fitness = Fitness(parameters={"reach_m": 3.0})
     assert fitness_argument(_seeks, fitness) == Light(3.0, 2)
     check_fitness(_seeks, fitness)
-    with pytest.raises(ExperimentError, match=r"fitness.parameters: Object missing"):
+    message = "fitness.parameters: must have a key 'reach_m'"
+    with pytest.raises(ExperimentError, match=message):
         check_fitness(_seeks, Fitness())
     with pytest.raises(ExperimentError, match=r"fitness.parameters.'reach': no such"):
         check_fitness(_seeks, Fitness(parameters={"reach": 3.0}))

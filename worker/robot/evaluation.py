@@ -21,12 +21,13 @@ from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.mjcf.model import solo_spec
-from schema.robot.results import Evaluation
+from schema.robot.results import Evaluation, Floats
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.measures.functions import measures_of
 from worker.robot.brains import controls_of
+from worker.robot.calibration import Calibrated
 from worker.robot.disturbances import combined, disturbances
 from worker.robot.light import read_light
 from worker.robot.motors import Servos
@@ -174,9 +175,16 @@ class _ControlLoop:
         ticks = steps // simulation.brain_steps + 1
         self._controller = controls.solo(robot.brain, ticks)
         self._sensors.write_to(self._controller.readings)
+        self._calibrated: Calibrated | None = None
+        further: tuple[Floats, Floats] | None = None
+        if settings.calibration:
+            self._calibrated = Calibrated(
+                robot, types, settings.calibration, tick_s=self._tick_s, width=width
+            )
+            further = self._calibrated.noise
         self._noise: Noise | None = None
-        if simulation.sensor_noise or simulation.actuator_noise:
-            source = NoiseSource(simulation, width, identity.origin)
+        if simulation.sensor_noise or simulation.actuator_noise or further:
+            source = NoiseSource(simulation, width, identity.origin, further)
             self._noise = Noise(source, (identity.birth,), identity.trial)
         self._pushes: Pushes | None = None
         if settings.environment.push_impulse:
@@ -251,14 +259,22 @@ class _ControlLoop:
         tick = step // self._simulation.brain_steps
         if self._pushes is not None:
             self._pushes.apply(tick)
-        if self._noise is None:
+        noise, calibrated = self._noise, self._calibrated
+        if noise is None and calibrated is None:
             self._servos.drive(self._controller.step(tick))
             return
         if self._recorder is not None:
             self._recorder.readings = self._inputs.copy()
-        self._inputs[:] = self._noise.perturb_readings(tick, self._inputs)
-        outputs = self._controller.step(tick)[np.newaxis]
-        self._servos.drive(self._noise.perturb_outputs(tick, outputs)[0])
+        if calibrated is not None:
+            self._inputs[:] = calibrated.readings(self._inputs)
+        if noise is not None:
+            self._inputs[:] = noise.perturb_readings(tick, self._inputs)
+        outputs = self._controller.step(tick)
+        if calibrated is not None:
+            outputs = calibrated.outputs(outputs)
+        if noise is not None:
+            outputs = noise.perturb_outputs(tick, outputs[np.newaxis])[0]
+        self._servos.drive(outputs)
 
     def _read_light(self) -> None:
         if self._light is not None:

@@ -30,11 +30,14 @@ class NoiseSource:
         simulation: holds the standard deviations.
         width: of every network.
         origin: run and island of the evaluation or arena.
+        further: standard deviations of further noise on each reading, (I,), and on
+            each output, (O,); None is none.
     """
 
     simulation: Simulation
     width: Widths
     origin: Origin
+    further: tuple[Floats, Floats] | None = None
 
 
 class Noise:
@@ -51,6 +54,13 @@ class Noise:
             trial: number of each robot's evaluation, from 0.
         """
         self._source = source
+        clock = source.simulation
+        self._on_readings: float | Floats = clock.sensor_noise
+        self._on_outputs: float | Floats = clock.actuator_noise
+        if source.further is not None:
+            # Standard deviations of sums of two independent noises.
+            self._on_readings = np.hypot(clock.sensor_noise, source.further[0])
+            self._on_outputs = np.hypot(clock.actuator_noise, source.further[1])
         self._births = births
         self._trial = trial
         self._block = -1
@@ -66,7 +76,7 @@ class Noise:
         Returns:
             (R, N); the readings themselves if sensors have no noise.
         """
-        if not self._source.simulation.sensor_noise:
+        if not np.any(self._on_readings):
             return readings
         added, _ = self._added(tick)
         return readings + added[:, : readings.shape[1]]
@@ -81,7 +91,7 @@ class Noise:
         Returns:
             (R, O), unclipped; the outputs themselves if motors have no noise.
         """
-        if not self._source.simulation.actuator_noise:
+        if not np.any(self._on_outputs):
             return outputs
         _, added = self._added(tick)
         return outputs + added
@@ -94,13 +104,13 @@ class Noise:
         return self._drawn[place]
 
     def _draw(self, block: int) -> None:
-        source, clock = self._source, self._source.simulation
+        source = self._source
         inputs, outputs = source.width.inputs, source.width.outputs
         numbers = np.empty((BLOCK_TICKS, len(self._births), inputs + outputs))
         for row, birth in enumerate(self._births):
             rng = stream(Purpose.NOISE, source.origin, birth, self._trial, block)
             numbers[:, row] = rng.standard_normal((BLOCK_TICKS, inputs + outputs))
-        on_readings = numbers[:, :, :inputs] * clock.sensor_noise
-        on_outputs = numbers[:, :, inputs:] * clock.actuator_noise
+        on_readings = numbers[:, :, :inputs] * self._on_readings
+        on_outputs = numbers[:, :, inputs:] * self._on_outputs
         self._drawn = list(zip(on_readings, on_outputs, strict=True))
         self._block = block

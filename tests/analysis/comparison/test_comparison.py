@@ -8,9 +8,9 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from analysis.comparison.claims import CLAIMS, Claim
+from analysis.comparison.claims import ARENA, CLAIMS, Claim
 from analysis.comparison.comparison import Outcomes, comparison
-from analysis.comparison.findings import findings
+from analysis.comparison.findings import WithBenchmark, findings
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
 from analysis.measures.load import IslandSettings, Run
@@ -202,6 +202,73 @@ def test_findings_are_reproduced_not_reproduced_or_undecided() -> None:
     assert found[3]["q"] is None
     assert (found[6]["mean_b"], found[6]["effect"]) == (0.5, 1)
     assert found[6]["p"] == pytest.approx(2 / 1024)
+
+
+def test_findings_of_few_births_spreads_shares_and_numbers() -> None:
+    wide = [value - 5.5 for value in range(12)]
+    claims = [
+        Claim("1", "too early", "fitness", "wide", ">", reference=-9, births=101),
+        Claim("2", "just in time", "fitness", "wide", ">", reference=-9, births=100),
+        Claim("3", "wider", "fitness", "wide", "!=", "narrow", is_spread=True),
+        Claim("4", "as wide", "fitness", "wide", "!=", "wide", is_spread=True),
+        Claim("5", "less than half", "fitness", "low", "<", "high", share=0.5),
+        Claim("6", "less than a tenth", "fitness", "low", "<", "high", share=0.1),
+        Claim("7", "about 0", "fitness", "narrow", "=", margin=0.2),
+        Claim("8", "about 1", "fitness", "narrow", "=", reference=1.0, margin=0.2),
+        Claim("9", "occurs", "fitness", "once", "some"),
+        Claim("10", "never occurs", "fitness", "never", "some"),
+        Claim("11", "may occur", "fitness", "seldom", "some"),
+        Claim("12", "negligible", "fitness", "narrow", ">", reference=-0.1, margin=0.5),
+    ]
+    outcomes = Outcomes(
+        [
+            *runs("wide", wide),
+            *runs("narrow", [value / 50 for value in wide]),
+            *runs("low", LOW),
+            *runs("high", [value + 20 for value in HIGH]),
+            *runs("once", [0.0] * 9 + [0.1]),
+            *runs("never", [0.0] * 29),
+            *runs("seldom", [0.0] * 28),
+        ]
+    )
+    found = findings(outcomes, claims).to_pylist()
+    assert [row["verdict"] for row in found] == [
+        "does not apply",
+        "reproduced",
+        "reproduced",
+        "undecided",
+        "reproduced",
+        "not reproduced",
+        "reproduced",
+        "not reproduced",
+        "reproduced",
+        "not reproduced",
+        "undecided",
+        "not reproduced",
+    ]
+    assert (found[0]["births"], found[0]["p"]) == (100, None)
+    assert found[2]["mean_a"] == 3
+    assert (found[4]["mean_a"], found[4]["mean_b"]) == (5.5, 17.75)
+    # A difference of 0.1 is significant, but less than the margin.
+    assert found[11]["q"] < 0.05
+    assert found[11]["why"].startswith("the interval of the difference ends below 0.5")
+    assert found[6]["power"] > 0.9
+    assert found[6]["q_alike"] < 0.05
+
+
+def test_an_arena_benchmark_is_compared_with_real_time() -> None:
+    sizes, factors = [30, 30, 30, 5], [2.0, 3.0, 4.0, 0.5]
+    rows = pa.table(
+        {"benchmark": ["arena"] * 4, "population": sizes, "factor": factors}
+    )
+    claims = [Claim("1", "x", "real_time_factor", ARENA, ">", reference=1.0),
+              Claim("2", "x", "fitness", "low", ">", reference=0.0)]  # fmt: skip
+    outcomes = Outcomes(runs("low", LOW))
+    fast, fit = findings(WithBenchmark(outcomes, rows), claims).to_pylist()
+    assert (fast["runs_a"], fast["mean_a"], fast["births"]) == (3, 3.0, 0)
+    assert (fit["runs_a"], fit["births"]) == (10, 100)
+    none = findings(WithBenchmark(outcomes, rows[:0]), claims).to_pylist()
+    assert none[0]["why"] == f"no finished run of {ARENA} could be measured"
 
 
 @pytest.mark.parametrize(

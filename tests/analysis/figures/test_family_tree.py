@@ -17,8 +17,9 @@ from analysis.figures.family_tree import (
 from analysis.figures.pictures import family_tree, gaits
 from analysis.figures.robot_pictures import FOUNDERS, RobotPicture
 from analysis.figures.robots import lineages
-from analysis.measures.families import family
+from analysis.measures.families import families, family
 from analysis.measures.outputs import schema
+from analysis.measures.run_tables import RunTables
 from schema.robot.ids import BirthId
 from tests.analysis.bodies import Body, part
 from tests.analysis.tables import births
@@ -73,6 +74,30 @@ def test_parts_without_identity_have_no_founder() -> None:
     found = family(born, 2)
     assert found.founders == (1,)
     assert found.founder_of == {7: 1}
+
+
+def test_families_are_those_of_the_fittest_of_the_last_populations(
+    members: pa.Table,
+) -> None:
+    rows = [(15, 4, 0.9), (30, 3, 0.1), (30, 5, 0.3), (30, 2, None)]
+    population = pa.table(
+        {
+            "island": [0] * 4,
+            "births": [births for births, _, _ in rows],
+            "birth_island": [0] * 4,
+            "birth": [birth for _, birth, _ in rows],
+            "fitness": pa.array([fitness for _, _, fitness in rows], pa.float64()),
+            "is_online": [True] * 4,
+        }
+    )
+    run = RunTables({"births": members, "population": population})
+    (found,) = families(run).to_pylist()
+    assert (found["births"], found["birth"], found["members"]) == (30, 5, 5)
+    # Bodies differ by their numbers of parts: 2, 3, 2, 2, 1 in the family, so 1 in six
+    # pairs and 2 in one; 1, 2, 1 of founders.
+    assert found["distance"] == pytest.approx((6 * 1 + 2) / 10)
+    assert found["founder_distance"] == pytest.approx(2 / 3)
+    assert found["founders"] == 2
 
 
 def test_lineage_is_all_ancestors_parents_first(members: pa.Table) -> None:
@@ -187,7 +212,7 @@ def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None
     figure = gaits([robot_picture, robot_picture])
     assert len(figure.axes) == 4
     assert figure.axes[0].get_title(loc="left") == (
-        "scenario 1, fitness 0.25; 3.1 cm from the first to the last picture"
+        "scenario 1, fitness 0.25, moved 3.1 cm"
     )
     assert figure.axes[3].get_title() == "0.5 s"
     assert shade(figure.axes[3].images[0]) == 1

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -152,6 +153,8 @@ def test_each_job_is_delivered_once_by_two_workers(
     monkeypatch.setattr(
         ctypes.pythonapi, "PyGILState_Ensure", lambda: kept.append(keep())
     )
+    # An earlier test may have kept the states of the engine's threads.
+    monkeypatch.setattr("schema.agent.service._THREAD", threading.local())
     driver = Driver(network)
     with agent(network, "a"), agent(network, "b"):
         driver.run(lambda: driver.dispatch.agents("worker") == 2)

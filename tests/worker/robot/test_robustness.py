@@ -1,6 +1,7 @@
 """Fitness under small changes of the simulation."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from msgspec.structs import asdict, replace
@@ -69,14 +70,15 @@ def test_all_changes_by_hand() -> None:
     assert len({change.name for change in changes}) == len(changes) == 26
     found = {change.name: change.settings for change in changes}
     base = SETTINGS.simulation
-    for name, wanted in {
+    expected: dict[str, dict[str, Any]] = {
         "friction 0.9": {"friction": 0.9},
         "friction 1.1": {"friction": 1.1},
         "start tilted -1 degree about y": {"start_deg": (0.0, -1.0, 0.0)},
         "start tilted +1 degree about x": {"start_deg": (1.0, 0.0, 0.0)},
         "mass x 0.9": {"mass_factor": 0.9},
         "torque x 1.1": {"torque_factor": 1.1},
-    }.items():
+    }
+    for name, wanted in expected.items():
         simulation = replace(base, **wanted)
         assert found[name] == replace(SETTINGS, simulation=simulation)
     slope, bumps = found["slope +1 degree"], found["ground with bumps of 2 mm"]

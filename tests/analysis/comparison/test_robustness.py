@@ -5,9 +5,9 @@ from typing import Any
 import plotnine as p9
 import pytest
 
+from analysis.comparison.robustness import Row, kept, schema, summary, table_of
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.robustness import robustness
-from analysis.measures.robustness import Row, kept, schema, summary, table_of
 
 
 def row(

@@ -1,0 +1,80 @@
+"""Tests of equivalence tests against SciPy, intervals and simulated runs."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from analysis.comparison.equivalence import (
+    alike_p,
+    alike_power,
+    mean_alike_p,
+    mean_alike_power,
+)
+from analysis.comparison.statistics import cliffs_delta, delta_interval, t_tail
+
+MARGIN = 0.474
+
+
+@pytest.mark.parametrize("end", [-MARGIN, MARGIN])
+def test_experiments_at_the_margin_are_as_likely_inside_as_outside(end: float) -> None:
+    assert alike_p(end, 12, 20, MARGIN) == pytest.approx(0.5)
+    assert alike_p(0.9 * end, 12, 20, MARGIN) < 0.5 < alike_p(1.1 * end, 12, 20, MARGIN)
+
+
+def test_p_of_the_95_percent_interval_is_a_fortieth() -> None:
+    """The interval of delta ends at the margin where one side has p = 0.025."""
+    for delta in np.linspace(-0.5, 0.5, 7):
+        for end in delta_interval(delta, 15, 25):
+            if end * delta >= 0 and abs(end) > abs(delta):
+                assert alike_p(delta, 15, 25, abs(end)) == pytest.approx(0.025)
+
+
+def test_power_is_the_share_of_equal_experiments_called_alike() -> None:
+    rng = np.random.default_rng(2)
+    for first, second in ((10, 10), (30, 12), (30, 30)):
+        calls = [
+            alike_p(
+                cliffs_delta(rng.normal(size=first), rng.normal(size=second)),
+                first,
+                second,
+                MARGIN,
+            )
+            < 0.05
+            for _ in range(2000)
+        ]
+        power = alike_power(first, second, MARGIN)
+        assert np.mean(calls) == pytest.approx(power, abs=0.04)
+    assert alike_power(5, 5, MARGIN) == 0
+
+
+def test_mean_alike_equals_two_t_tests_of_scipy() -> None:
+    rng = np.random.default_rng(4)
+    for mean in (-0.4, 0.0, 0.3, 2.0):
+        values = rng.normal(mean + 1, 1, 12)
+        sides = [
+            stats.ttest_1samp(values, 1 - 0.8, alternative="greater").pvalue,
+            stats.ttest_1samp(values, 1 + 0.8, alternative="less").pvalue,
+        ]
+        assert mean_alike_p(values, 1, 0.8) == pytest.approx(max(sides), abs=1e-7)
+    equal = np.full(3, 1.5)
+    assert (mean_alike_p(equal, 1, 0.8), mean_alike_p(equal, 1, 0.2)) == (0, 1)
+
+
+def test_mean_power_grows_with_the_margin_and_the_runs() -> None:
+    values = np.random.default_rng(5).normal(0, 1, 30)
+    powers = [mean_alike_power(values, margin) for margin in (0.1, 0.4, 0.6, 2.0)]
+    assert powers[0] == 0
+    assert powers == sorted(powers)
+    assert powers[-1] == pytest.approx(1)
+    # 2 P(t < 0.6 / error - t95) - 1 with t of 29 degrees of freedom.
+    error = values.std(ddof=1) / np.sqrt(30)
+    t = stats.t(29)
+    expected = 2 * t.cdf(0.6 / error - t.ppf(0.95)) - 1
+    assert powers[2] == pytest.approx(expected, abs=1e-4)
+
+
+def test_tails_of_t_equal_scipy() -> None:
+    for freedom in (1, 2.5, 29):
+        for value in (-3.0, 0.0, 0.7, 12.0):
+            expected = stats.t.sf(value, freedom)
+            assert t_tail(value, freedom) == pytest.approx(expected, abs=1e-6)

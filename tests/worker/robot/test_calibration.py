@@ -1,0 +1,185 @@
+"""Measured sensors and motors: gain, offset, noise and delay, by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from schema.errors import ExperimentError
+from schema.experiment.calibration import Calibration, Response
+from schema.experiment.document import Fitness, Simulation, Space, body_space
+from schema.experiment.file import parse_experiment
+from schema.experiment.identity import NO_IDENTITY, Identity, Origin
+from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.robot.brain import Widths
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from worker.bench.spider import spider
+from worker.robot.calibration import Calibrated
+from worker.robot.evaluation import evaluate
+
+TICK_S = 0.125
+SETTINGS = EvaluationSettings(
+    space=Space(), simulation=Simulation(window_steps=400), fitness=Fitness()
+)
+
+
+def calibrated(*entries: Calibration, robot: Robot | None = None) -> Calibrated:
+    return Calibrated(
+        robot or spider(),
+        body_space(Space()),
+        entries,
+        tick_s=TICK_S,
+        width=Widths(10, 10, 10),
+    )
+
+
+def course(found: Calibrated, *values: float) -> list[float]:
+    """Return the first output that arrives at each tick."""
+    outputs = np.zeros(10)
+    arrived = []
+    for value in values:
+        outputs[0] = value
+        arrived.append(float(found.outputs(outputs)[0]))
+    return arrived
+
+
+def test_motor_by_hand() -> None:
+    motor = Response(gain=0.8, offset=0.05, delay_s=2 * TICK_S)
+    found = calibrated(Calibration(part="ActiveHinge", motor=motor))
+    # Neutral until the first output arrives; 7.0 is clipped to 1.
+    wanted = [0.55, 0.55, 0.5 + 0.8 * 0.5 + 0.05, 0.5 - 0.8 * 0.5 + 0.05]
+    assert course(found, 7.0, 0.0, 0.3, 0.5) == pytest.approx(wanted)
+
+
+def test_sensor_by_hand() -> None:
+    """A core with six inputs, and four pads that are ideal."""
+    sensor = Response(gain=2.0, offset=-1.0, delay_s=TICK_S)
+    found = calibrated(Calibration(part="Core", sensor=sensor))
+    first, second = np.arange(10.0)[None], np.full((1, 10), 10.0)
+    # Before the first tick the readings were those of the first tick.
+    wanted = [-1.0, 1.0, 3.0, 5.0, 7.0, 9.0]
+    assert found.readings(first).tolist() == [[*wanted, 6.0, 7.0, 8.0, 9.0]]
+    assert found.readings(second).tolist() == [[*wanted, *[10.0] * 4]]
+    assert found.readings(first).tolist() == [[*[19.0] * 6, 6.0, 7.0, 8.0, 9.0]]
+
+
+def test_other_part_types_are_ideal() -> None:
+    found = calibrated(Calibration(part="ParametricBarJoint"))
+    readings = np.arange(10.0)[None]
+    assert found.readings(readings).tolist() == readings.tolist()
+    assert course(found, 0.3, 0.9) == [0.3, 0.9]
+    assert found.noise is None
+
+
+def test_ideal_responses_change_nothing() -> None:
+    ideal = replace(SETTINGS, calibration=(Calibration(part="ActiveHinge"),))
+    found, plain = evaluate(spider(), ideal), evaluate(spider(), SETTINGS)
+    # Sums with 0.5 may round the last bit of an output.
+    assert found.fitness == pytest.approx(plain.fitness, rel=1e-3)
+
+
+def test_gain_zero_stops_a_robot() -> None:
+    still = Calibration(part="ActiveHinge", motor=Response(gain=0.0))
+    found = evaluate(spider(), replace(SETTINGS, calibration=(still,)))
+    assert evaluate(spider(), SETTINGS).fitness > 0.01
+    assert abs(found.fitness) < 1e-4
+
+
+def test_noise_is_of_the_parts_and_of_the_identity() -> None:
+    motor = Response(noise=0.2)
+    found = calibrated(Calibration(part="ActiveHinge", motor=motor)).noise
+    assert found is not None
+    motors = sum(part.kind == "ActiveHinge" for part in spider().parts)
+    assert found[0].tolist() == [0.0] * 10
+    assert found[1].tolist() == [0.2] * motors + [0.0] * (10 - motors)
+    noisy = replace(
+        SETTINGS, calibration=(Calibration(part="ActiveHinge", motor=motor),)
+    )
+    names = (NO_IDENTITY, Identity(Origin(seed=1), BirthId(0, 0), 0))
+    first, second = (evaluate(spider(), noisy, each) for each in names)
+    assert first == evaluate(spider(), noisy, NO_IDENTITY)
+    assert len({first.fitness, second.fitness}) == 2
+
+
+def test_noise_of_the_simulation_is_added_to_that_of_a_part() -> None:
+    """0.3 and 0.4 together are 0.5, of the same draws."""
+    world = replace(SETTINGS.simulation, actuator_noise=0.3)
+    motor = Response(noise=0.4)
+    both = replace(
+        SETTINGS,
+        simulation=world,
+        calibration=(Calibration(part="ActiveHinge", motor=motor),),
+    )
+    one = replace(
+        SETTINGS,
+        calibration=(Calibration(part="ActiveHinge", motor=Response(noise=0.5)),),
+    )
+    assert evaluate(spider(), both).fitness == pytest.approx(
+        evaluate(spider(), one).fitness, rel=1e-3
+    )
+
+
+FILE = """
+[[calibration]]
+part = "ActiveHinge"
+motor = {gain = 0.9, delay_s = 0.125}
+[[calibration]]
+part = "TouchSensor"
+[calibration.sensor]
+noise = 0.1
+"""
+
+
+def test_a_file_is_read_beside_the_document(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(FILE)
+    text = 'name = "a"\ncalibration = "mine.toml"\n'
+    found = parse_experiment(text, str(tmp_path / "a.toml"))
+    assert found.calibration == (
+        Calibration(part="ActiveHinge", motor=Response(gain=0.9, delay_s=0.125)),
+        Calibration(part="TouchSensor", sensor=Response(noise=0.1)),
+    )
+    inline = parse_experiment(f'name = "a"\n{FILE}', "a.toml")
+    assert inline == found
+    assert evaluation_settings_of(found).calibration == found.calibration
+    (tmp_path / "mine.toml").write_text("births = 3")
+    with pytest.raises(ExperimentError, match=r"mine.toml: must hold .*, got births"):
+        parse_experiment(text, str(tmp_path / "a.toml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("calibration = 'x.toml'", "calibration: x.toml: cannot be read: No such file"),
+        ("[calibration]", r"calibration: must be \[\[calibration\]\]"),
+        (
+            "[[calibration]]\npart = 'ActivHinge'",
+            r"calibration\[0\].part: no part type .* did you mean 'ActiveHinge'",
+        ),
+        (
+            "[[calibration]]\npart = 'Core'\nmotor = {gain = 2.0}",
+            r"calibration\[0\].motor: 'Core' has no motor",
+        ),
+        (
+            "[[calibration]]\npart = 'Hinge'\nsensor = {gain = 2.0}",
+            r"calibration\[0\].sensor: 'Hinge' has no sensor",
+        ),
+        (
+            "[[calibration]]\npart = 'Core'\n[[calibration]]\npart = 'Core'",
+            r"calibration\[0\].part: two entries are of 'Core'",
+        ),
+        (
+            "[[calibration]]\npart = 'Core'\nsensor = {delay_s = 0.02}",
+            r"calibration\[0\].sensor.delay_s: must be a whole multiple of 0.125 s",
+        ),
+        ("[[calibration]]\npart = 'Core'\n[arena]", "calibration: is for off-line"),
+        (
+            "[[calibration]]\npart = 'Core'\nsensor = {gian = 1.0}",
+            r"calibration\[0\].sensor.gian: no such key; did you mean 'gain'",
+        ),
+    ],
+)
+def test_refused_values_name_the_key(text: str, message: str) -> None:
+    with pytest.raises(ExperimentError, match=message):
+        parse_experiment(f'name = "a"\n{text}', "a.toml")
