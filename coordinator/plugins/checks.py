@@ -34,8 +34,10 @@ from schema.experiment.file import (
 )
 from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
+from schema.parts import PartType
 from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
+from schema.plugins.part_checks import check_slot_directions
 from schema.plugins.permission import FLAG, allow, allow_references, allowed, is_own
 from schema.tables.description import allow_plugins_of
 
@@ -180,6 +182,9 @@ def check_here(
         with _time_limit(limit_s):
             try:
                 where = check_use(use, lambda at: say("begin", f"{use.key}: {at}"))
+                plugin = use.load()
+                if isinstance(plugin, PartType) and not _is_folder(Path(word)):
+                    check_slot_directions(plugin, use.key)
             except ExperimentError as error:
                 raise _placed(error, word, use) from error
         say("fine", f"{use.path}: {name} at {where}: in order")

@@ -3,7 +3,7 @@
 import argparse
 from importlib import import_module
 
-from revolve.command import COMMANDS
+from revolve.cli.commands import COMMANDS
 from schema.agent.flags import Flags
 
 

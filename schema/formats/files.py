@@ -7,17 +7,16 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 
 from pathlib import Path
 
-from schema.errors import InvalidRobot, MalformedMessage, unreadable
-from schema.experiment.bounded import read_bytes
+from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.formats.contents import read_data, read_text
 from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
 from schema.formats.yaml import robot_to_yaml
 from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_node import compose
 from schema.formats.yaml_reader import Reader
-from schema.limits import MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS
@@ -102,7 +101,7 @@ def read_robot(
         robot, _ = read_mjcf(path)
     else:
         try:
-            robot = decode_robot(_read(path))
+            robot = decode_robot(read_data(path))
         except MalformedMessage as error:
             raise MalformedMessage(f"{path}: {error}") from None
     try:
@@ -113,35 +112,12 @@ def read_robot(
     return robot
 
 
-def read_text(path: Path, most: int = MOST_TEXT_BYTES) -> str:
-    """Return the text of a file.
-
-    Args:
-        path: of the file.
-        most: greatest allowed size [bytes].
-
-    Raises:
-        InvalidRobot: a file that cannot be read, is larger, or is not UTF-8.
-    """
-    try:
-        return _read(path, most).decode()
-    except UnicodeDecodeError as error:
-        raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
-
-
 def _robogen_text(path: Path) -> str:
     """Return the text of a RoboGen robot; its binary dumps are refused by name."""
     try:
-        return _read(path).decode()
+        return read_data(path).decode()
     except UnicodeDecodeError:
         raise InvalidRobot(f"{path}: {_BINARY_DUMP}") from None
-
-
-def _read(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
-    try:
-        return read_bytes(path, most)
-    except OSError as error:
-        raise InvalidRobot(f"{path}: {unreadable(error)}") from None
 
 
 def write_robot(

@@ -28,7 +28,7 @@ from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
-from schema.formats.files import read_text
+from schema.formats.contents import read_text
 from schema.formats.mjcf_export import add_sensors, portable
 from schema.limits import MOST_MJCF_BYTES, MOST_OTHERS
 from schema.mjcf.model import solo_spec

@@ -43,9 +43,8 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
     Raises:
         ExperimentError: slots that do not fit the arity; a name used twice; sizes,
             masses, ranges, axes, normals or tangents that are not what they must be;
-            a slot that points into its own part; segments without joint; a motor
-            without joint; sensors of no box; a shape that raises, differs from call to
-            call, or is not hashable.
+            segments without joint; a motor without joint; sensors of no box; a shape
+            that raises, differs from call to call, or is not hashable.
     """
     if problem := next(_problems(kind), ""):
         raise _refusal(kind, where, problem)
@@ -53,6 +52,27 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
     for number, sensor in enumerate(kind.sensors):
         if not isinstance(sensor, Sensor):
             check_sensor(sensor, f"{where}: {kind.name}.sensors[{number}]", shape)
+
+
+def check_slot_directions(kind: PartType, where: str = "part type") -> None:
+    """Raise if a slot of a consistent part type points into its own part.
+
+    It is not part of ``check_part_type``: runs that were started before this check can
+    be resumed.
+
+    Args:
+        kind: the part type.
+        where: the key that names it, for messages.
+
+    Raises:
+        ExperimentError: there is such a slot, for extreme or other parameters.
+    """
+    for values in _extremes(kind):
+        shape = kind.shape(values)
+        for number, slot in enumerate(shape.slots):
+            at = f"slots[{number}]"
+            if problem := next(_direction_problems(slot, shape.boxes, at), ""):
+                raise _refusal(kind, where, problem)
 
 
 def _refusal(kind: PartType, where: str, problem: str) -> ExperimentError:
@@ -162,8 +182,6 @@ def _shape_problems(kind: PartType, values: tuple[float, ...]) -> Iterator[str]:
         yield f"boxes: two are named {shown(doubled)}"
     for number, box in enumerate(shape.boxes):
         yield from _box_problems(box, f"boxes[{number}] ({box.name})")
-    for number, slot in enumerate(shape.slots):
-        yield from _direction_problems(slot, shape.boxes, f"slots[{number}]")
     yield from _joint_problems(kind, shape)
     for number, sensor in enumerate(kind.sensors):
         if isinstance(sensor, Sensor) and sensor.box not in names:

@@ -8,8 +8,9 @@ from collections import defaultdict
 
 import pytest
 
+from revolve.cli.commands import COMMANDS
 from revolve.cli.parsers import actions, all_parsers, parser_of
-from revolve.command import COMMANDS, main
+from revolve.command import main
 from schema.agent.flags import Flags
 
 

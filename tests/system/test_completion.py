@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from revolve.cli.commands import COMMANDS
 from revolve.cli.completion import main
-from revolve.command import COMMANDS
 from schema.experiment.file import shipped_experiments
 
 pytestmark = pytest.mark.system

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from revolve.command import COMMANDS
+from revolve.cli.commands import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
 from schema.experiment.settings import fitness_function

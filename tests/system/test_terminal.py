@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from revolve import command as revolve
+from revolve.cli.commands import COMMANDS
 
 pytestmark = pytest.mark.system
 
@@ -57,7 +58,7 @@ def test_ctrl_c_during_the_import_of_an_engine(
         "except KeyboardInterrupt as error:\n    raise ImportError('no') from error\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(revolve.COMMANDS, "status", ("engine_of_a_test", "is odd"))
+    monkeypatch.setitem(COMMANDS, "status", ("engine_of_a_test", "is odd"))
     assert revolve.main(["status"]) == 130
 
 

@@ -23,7 +23,7 @@ from schema.parts import (
     Sensor,
     Shape,
 )
-from schema.plugins.part_checks import check_part_type
+from schema.plugins.part_checks import check_part_type, check_slot_directions
 from schema.plugins.sensor_checks import check_sensor
 
 HINGED = ACTIVE_HINGE.shape(())
@@ -109,10 +109,6 @@ WRONG = {
         slotted(tangent=(0.0, 0.6, 0.8)),
         r"slots\[1\].tangent: must be at right angles .* got \(0.0, 0.6, 0.8\)",
     ),
-    "slot into its box": (
-        slotted(normal=(0.0, -1.0, 0.0)),
-        r"slots\[1\].normal: .* points into its box 'body', 41 mm deep",
-    ),
     "slot beyond": (slotted(segment=1), r"segment: must be 0 without a joint, got 1"),
     "third segment": (
         shaped(HINGE, changed(HINGED, slots=(
@@ -187,6 +183,15 @@ WRONG = {
 @pytest.mark.parametrize("kind", [*BUILT_IN.values(), *ROBOGEN])
 def test_built_in_part_types_pass(kind: PartType) -> None:
     check_part_type(kind)
+    check_slot_directions(kind)
+
+
+def test_a_slot_into_its_own_box_is_refused_by_a_check_of_its_own() -> None:
+    kind = slotted(normal=(0.0, -1.0, 0.0))
+    check_part_type(kind)
+    message = r"x: .*slots\[1\].normal: .* points into its box 'body', 41 mm deep"
+    with pytest.raises(ExperimentError, match=message):
+        check_slot_directions(kind, "x")
 
 
 @pytest.mark.parametrize("name", WRONG)

@@ -1,0 +1,35 @@
+"""The commands of `revolve`: their modules and summaries."""
+
+_COORDINATOR = "coordinator.__main__"
+COMMANDS = {
+    "run": (_COORDINATOR, "evolve experiments on this machine"),
+    "resume": (_COORDINATOR, "resume a run or campaign after a stop or crash"),
+    "coordinator": (_COORDINATOR, "run experiments for remote workers"),
+    "hub": ("coordinator.cli.hub", "connect coordinators, workers and viewers"),
+    "cluster": ("coordinator.cluster.command", "make certificates for a lab"),
+    "doctor": ("coordinator.doctor.command", "check this machine and its fleet"),
+    "status": ("coordinator.cli.status", "show the progress of runs"),
+    "log": ("coordinator.cli.log", "print the journal of a run"),
+    "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
+    "compare": (_COORDINATOR, "compare two runs that should be equal"),
+    "plugins": (_COORDINATOR, "list plug-ins, built-in or found"),
+    "check": (_COORDINATOR, "check plug-ins as a run does"),
+    "worker": ("worker.__main__", "simulate robots for a coordinator"),
+    "analyzer": ("analyzer.__main__", "vet robot bodies for a coordinator"),
+    "robot": ("schema.__main__", "check, convert or show a robot file"),
+    "robot random": ("coordinator.cli.robot", "generate random robots"),
+    "robot render": ("analysis.__main__", "render a robot as picture or film"),
+    "robot simulate": ("worker.robot_command", "simulate a robot and show its fitness"),
+    "view": ("analysis.__main__", "view a run, live or from its tables"),
+    "analyze": ("analysis.__main__", "compute measures, figures and a report"),
+    "robustness": ("revolve.cli.robustness", "re-evaluate a run under changes"),
+    "completion": ("revolve.cli.completion", "print a completion script for a shell"),
+    "bench": ("worker.__main__", "benchmark this machine"),
+    "bench dispatch": (_COORDINATOR, "benchmark the coordinator"),
+}
+"""Module and summary of each command.
+
+The module's ``main`` gets the arguments, the command's name first; its ``parser``
+returns the parser of the command with that name. Names of two words take precedence
+over their first word; ``main`` gets them as one argument.
+"""
