@@ -230,7 +230,8 @@ def _figures(figures: Iterable[DrawnFigure]) -> str:
 def _figure(drawn: DrawnFigure) -> str:
     one = drawn.figure
     name = f"{one.title}."
-    wide = ' class="wide"' * (one.number == GAITS)
+    is_wide = one.number == GAITS or one.section == "sweeps"
+    wide = ' class="wide"' * is_wide
     return (
         f'<figure id="figure-{escape(one.number)}"{wide}>'
         f'<img loading="lazy" alt="{escape(name)}" src="{_embedded(drawn)}">'
