@@ -132,6 +132,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "ancestors": "number of different ancestors",
         **BODY,
         **PER_PART,
+        "fitness_max": "greatest fitness recorded at a birth, or the last one; in an "
+        "arena it can be greater than the last",
     },
     "extremities": {
         **_RUN,

@@ -41,6 +41,10 @@ _COURSES = (
         "all robots born before them in their run."
     ),
 )
+_COURSES_OF_ARENAS = (
+    " In arenas lines are means of the windows at each number of births, and each dot "
+    "is at the best window of its robot, which may be long after its birth."
+)
 _LAST = (
     "6.2",
     "Fitness of the last populations",
@@ -112,7 +116,9 @@ def _sections(
 ) -> dict[str, tuple[str, str]]:
     """Return heading and content of all sections by anchor, empty ones included."""
     by_number = {one.figure.number: one for one in drawings.figures}
-    courses = _of_functions(tables, fitness_over_births, _COURSES, by_number)
+    has_arena = tables["runs"]["simulated_s"].null_count < tables["runs"].num_rows
+    over_births = (*_COURSES[:2], _COURSES[2] + _COURSES_OF_ARENAS * has_arena)
+    courses = _of_functions(tables, fitness_over_births, over_births, by_number)
     last = _of_functions(tables, last_populations, _LAST, by_number)
     plots = {"6.3": courses, "6.2": last}
 

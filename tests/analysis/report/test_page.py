@@ -154,6 +154,18 @@ def test_an_arena_is_summed_up() -> None:
         "soft, run 1, seed 7: 60 robots were born in 2 min 05 s of simulated time, "
         "9 died, 4 were alive at the last birth." in text
     )
+    assert "each dot is at the best window of its robot" in text
+
+
+def test_dots_over_births_are_at_the_greatest_fitness_of_robots() -> None:
+    given = tables()
+    place = given["robots"].schema.get_field_index("fitness_max")
+    doubled = pc.multiply(given["robots"]["fitness"], 2.0)
+    given["robots"] = given["robots"].set_column(place, "fitness_max", doubled)
+    text = read_page(given).text
+    assert text.count("robot 0:2, soft, run 1, seed 7 fitness 0.6;") == 1
+    assert text.count("robot 0:2, soft, run 1, seed 7 fitness 0.3;") == 1
+    assert "In arenas" not in text
 
 
 def test_marks_tell_run_seed_and_robot(read: Reader) -> None:
