@@ -115,6 +115,15 @@ def test_differences_have_an_interval_where_both_have_two_runs(read: Reader) -> 
     assert "0.02" not in read.text
 
 
+def test_compared_measures_are_explained_and_equal_ones_counted(read: Reader) -> None:
+    assert "1 measure is equal in all runs: size mean." in read.text
+    assert "What the measures mean" in read.folds
+    meaning = "fitness best maximum of judged robots, in the same unit"
+    assert "measure meaning fitness mean of judged robots" in read.text
+    assert meaning in read.text
+    assert "size mean mean over" not in read.text
+
+
 def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
     given = tables()
     functions = ["locomotion", "locomotion", "goals:far (limit = 2.0, source 1a)"]
