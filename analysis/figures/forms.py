@@ -124,8 +124,8 @@ def _by_function(rows: Any, functions: Mapping[str, str]) -> Any:  # noqa: ANN40
     return rows.assign(panel=rows["experiment"].map(functions))
 
 
-def spread_caption(tables: Tables, panels: Panels) -> str:
-    """Return what points, boxes, bars and violins of ``over_runs`` show."""
+def spread_caption(tables: Tables, panels: Panels, note: str = "") -> str:
+    """Return what points, boxes, bars and violins of ``over_runs`` show, and a note."""
     runs = stacked(tables["outcomes"], panels)
     known = runs[runs["panel"] == next(iter(panels.values()))]
     sizes = known.groupby("experiment", observed=True).size().to_dict()
@@ -138,12 +138,13 @@ def spread_caption(tables: Tables, panels: Panels) -> str:
             "the height of the box."
         )
     if min(sizes.values(), default=BOX_RUNS) < BOX_RUNS:
-        texts.append(f"Bars show the median of fewer than {BOX_RUNS} runs.")
+        texts.append(f"With fewer than {BOX_RUNS} runs a bar shows their median.")
     if _violins(tables, panels, {}, in_order(sizes)):
         texts.append(
             "Pale shapes show the robots of all last populations, from the least to "
             "the greatest value."
         )
+    texts += [note] if note else []
     return " ".join(texts) + (fitness_note(tables) if FITNESS in panels else "")
 
 
