@@ -8,6 +8,7 @@ from html import escape
 from importlib.resources import files
 
 import pyarrow as pa
+import pyarrow.compute as pc
 from PIL import Image
 
 from analysis.figures.catalogue import DrawnFigure, Section
@@ -196,8 +197,12 @@ def _of_functions(
 
 def _films(tables: Tables, drawings: Drawings) -> str:
     names = run_names(tables["runs"])
+    arenas = tables["runs"].filter(pc.field("simulated_s").is_valid())
+    folders = frozenset(arenas["folder"].to_pylist())
     shown = "".join(
-        _film(one, str(names[str(one.best.folder)])) for one in drawings.films
+        _film(one, str(names[folder]), has_arena=folder in folders)
+        for one in drawings.films
+        if (folder := str(one.best.folder))
     )
     reasons = "".join(
         f"<p>{escape(label(name))}: no moving picture: {escape(why)}</p>"
@@ -211,15 +216,17 @@ def _films(tables: Tables, drawings: Drawings) -> str:
     return (f'<div class="films">{shown}</div>{note}' if shown else "") + reasons
 
 
-def _film(one: Film, run: str) -> str:
+def _film(one: Film, run: str, *, has_arena: bool) -> str:
     best = one.best
     data = base64.b64encode(one.path.read_bytes()).decode()
     name = f"Robot {best.birth_island}:{best.birth} of {run}"
+    others = " Among the robots of an arena it may move differently." * has_arena
     return (
         f'<figure><img alt="{escape(name)}" src="data:image/gif;base64,{data}">'
         f"<figcaption><b>{escape(label(best.experiment))}: fitness "
-        f"{number(best.fitness)}.</b> {escape(name)}, three seconds from the middle of "
-        f"its evaluation. File: <code>figures/{escape(one.path.name)}</code>."
+        f"{number(best.fitness)}.</b> {escape(name)}, simulated alone: three seconds "
+        f"from the middle of its evaluation.{others} "
+        f"File: <code>figures/{escape(one.path.name)}</code>."
         "</figcaption></figure>"
     )
 

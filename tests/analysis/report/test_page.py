@@ -3,6 +3,7 @@
 import base64
 import io
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -146,7 +147,7 @@ def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
     assert found.text.count("robot 0:2, hard & <b>, run 0") == 2
 
 
-def test_an_arena_is_summed_up() -> None:
+def test_an_arena_is_summed_up(tmp_path: Path) -> None:
     given = tables()
     runs = given["runs"].drop_columns(["deaths", "simulated_s"])
     runs = runs.append_column("deaths", pa.array([None, 9, None], pa.int64()))
@@ -164,6 +165,9 @@ def test_an_arena_is_summed_up() -> None:
         "9 died, 4 were alive at the last birth." in text
     )
     assert "each dot is at the best window of its robot" in text
+    with_film = read_page(given, drawings(tmp_path)).text
+    assert "simulated alone: three seconds" in with_film
+    assert "Among the robots of an arena it may move differently." in with_film
 
 
 def test_dots_over_births_are_at_the_greatest_fitness_of_robots() -> None:
