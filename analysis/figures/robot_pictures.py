@@ -227,19 +227,20 @@ def _motion(
         step = max(step, (len(poses) - 1 - first) // (FRAMES - 1))
         chosen = range(first, len(poses), step)[:FRAMES]
 
-    def drawn(
-        ticks: Sequence[int], size: tuple[int, int], cut: tuple[float, float, float]
-    ) -> tuple[Picture, ...]:
-        middle = np.mean([poses[at][:3] for at in ticks], axis=0)
-        with RobotRenderer(robot, settings, size=size) as renderer:
-            return tuple(
-                _cut(renderer.picture(poses[at], look_at=middle), cut) for at in ticks
-            )
-
     times_s = tuple((at - first) * tick_s for at in chosen)
-    film = drawn(filmed, _FILMED, _FILM)
-    gait, way_m = drawn(chosen, _LARGE, _WIDE), _way_m(poses, chosen)
-    return gait, times_s, film, film_step * tick_s, way_m
+    with RobotRenderer(robot, settings, size=_FILMED) as renderer:
+        shown = [poses[at] for at in filmed]
+        look_at, distance_m = renderer.framing(shown, _FILM[:2])
+        film = tuple(
+            _cut(renderer.picture(pose, look_at=look_at, distance_m=distance_m), _FILM)
+            for pose in shown
+        )
+    middle = np.mean([poses[at][:3] for at in chosen], axis=0)
+    with RobotRenderer(robot, settings, size=_LARGE) as renderer:
+        gait = tuple(
+            _cut(renderer.picture(poses[at], look_at=middle), _WIDE) for at in chosen
+        )
+    return gait, times_s, film, film_step * tick_s, _way_m(poses, chosen)
 
 
 def _way_m(poses: Sequence[Floats], ticks: Sequence[int]) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
+from analysis.render.framing import framed
 from schema.agent.log import tell_user
 from schema.errors import RevolveError, one_line
 from schema.experiment.document import body_space
@@ -117,6 +118,7 @@ class RobotRenderer:
         mujoco.mj_forward(self.model, self._data)
         own = self.model.body("root").id
         geoms = self.model.body_rootid[self.model.geom_bodyid] == own
+        self._size, self._geoms = size, geoms
         centres = self._data.geom_xpos[geoms]
         reaches = self.model.geom_rbound[geoms, np.newaxis]
         low, high = (centres - reaches).min(axis=0), (centres + reaches).max(axis=0)
@@ -133,13 +135,19 @@ class RobotRenderer:
         self._renderer.close()
 
     def picture(
-        self, pose: Floats | None = None, *, look_at: Floats | None = None
+        self,
+        pose: Floats | None = None,
+        *,
+        look_at: Floats | None = None,
+        distance_m: float | None = None,
     ) -> Picture:
         """Return a picture of the robot in a pose.
 
         Args:
             pose: (nq,) ``qpos`` of the model; the previous pose if None.
             look_at: (3,) point that the camera looks at [m]; the robot if None.
+            distance_m: of the camera from there [m]; None: just enough for the robot
+                in neutral pose.
         """
         if pose is not None:
             self._data.qpos[:] = pose
@@ -148,10 +156,35 @@ class RobotRenderer:
         camera = mujoco.MjvCamera()
         middle = self._data.qpos[:3] + self._middle
         camera.lookat[:] = middle if look_at is None else look_at
-        camera.distance = 1.05 * self._radius / np.sin(np.radians(_FIELD_OF_VIEW / 2))
+        near_m = 1.05 * self._radius / np.sin(np.radians(_FIELD_OF_VIEW / 2))
+        camera.distance = near_m if distance_m is None else distance_m
         camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
         self._renderer.update_scene(self._data, camera)
         return np.array(self._renderer.render())
+
+    def framing(
+        self, poses: Sequence[Floats], cut: tuple[float, float]
+    ) -> tuple[Floats, float]:
+        """Return where a camera that stands still sees the robot in all of some poses.
+
+        Args:
+            poses: (nq,) each; at least one.
+            cut: shares of the picture's height that are cut off above and below.
+
+        Returns:
+            ``look_at`` and ``distance_m`` of ``picture``.
+        """
+        centres = []
+        for pose in poses:
+            self._data.qpos[:] = pose
+            self._mujoco.mj_kinematics(self.model, self._data)
+            centres.append(self._data.geom_xpos[self._geoms])
+        radii = np.tile(self.model.geom_rbound[self._geoms], len(poses))
+        edge, (width, height) = np.tan(np.radians(_FIELD_OF_VIEW / 2)), self._size
+        above, below = ((1 - 2 * share) * edge for share in cut)
+        view = np.radians(_AZIMUTH), np.radians(_ELEVATION)
+        tangents = above, below, width / height * edge
+        return framed(np.concatenate(centres), radii, *view, tangents)
 
 
 def _renderer(
