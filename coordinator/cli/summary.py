@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +54,20 @@ def conclude(run: RunSession) -> Conclusion:
     lines = _results(run)
     if failures:
         lines.insert(1, failures)
-    lines += [f"tables: {folder / 'tables'}", "try next:"]
-    if (folder / BEST).exists():
-        lines.append(f"  {command('robot', 'render', folder / BEST, 'best.gif')}")
-    lines += [f"  {command(what, folder)}" for what in ("view", "analyze")]
+    lines += [f"tables: {folder / 'tables'}", "try next:", *next_steps(folder)]
     return Conclusion("\n".join(lines), failures, has_evaluated(folder))
+
+
+def next_steps(folder: Path) -> list[str]:
+    """Return commands that show the results; those of the viewer if it is installed."""
+    best, steps = folder / BEST, [command("analyze", folder)]
+    if find_spec("rerun") is not None:
+        steps.insert(0, command("view", folder))
+    elif best.exists():
+        steps.insert(0, command("robot", "show", best))
+    if best.exists():
+        steps.insert(0, command("robot", "render", best, "best.gif"))
+    return [f"  {step}" for step in steps]
 
 
 def _results(run: RunSession) -> list[str]:
