@@ -147,7 +147,8 @@ def _about(plugin: object) -> str:
         )
     if not callable(plugin):
         names = [each.name for each in plugin.parameters]  # type: ignore[attr-defined]
-        return f"neuron with parameters {', '.join(names)}"
+        formula = "[formula](../brains.md#the-network-of-the-thesis)"
+        return f"neuron with parameters {', '.join(names)}; {formula}"
     text = introduction(plugin).partition("\n\n")[0].replace("\n", " ")
     return text.replace("|", "\\|")
 

@@ -34,7 +34,7 @@ class Robot:
     """A body and its brain.
 
     In a notebook it shows its picture, if this machine can render
-    (``pip install 'revolve-islands[view]'``).
+    (``pip install 'revolve-islands[pictures]'``).
 
     Attributes:
         parts: of the body, in depth-first order; the first is the core.

@@ -11,7 +11,7 @@ from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.run_settings import experiment_of
 from schema.parts import BUILT_IN, PARAMETRIC_BAR_JOINT, BodySpace
 from schema.plugins.permission import allow
-from schema.robot.brain import neuron_names
+from schema.robot.brain import NeuronKinds, neuron_names
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot
 
@@ -45,7 +45,7 @@ def main(argv: list[str] | None = None) -> int:
         write_robot(robot, options.output, space, settings_of(experiment), kinds)
         print(f"{options.output}: written")
     else:
-        _show(robot, space, options.file.name)
+        _show(robot, space, kinds, options.file.name)
     return 0
 
 
@@ -104,7 +104,7 @@ def _summary(robot: Robot) -> str:
     )
 
 
-def _show(robot: Robot, space: BodySpace, title: str) -> None:
+def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> None:
     """Print the parts of a robot as a tree, each with its neurons and their inputs."""
     from rich.console import Console
     from rich.text import Text
@@ -128,7 +128,11 @@ def _show(robot: Robot, space: BodySpace, title: str) -> None:
         if index:
             trees[part.parent].children.append(trees[index])
     for number, neuron in enumerate(robot.brain.neurons):
-        values = ", ".join(f"{value:g}" for value in neuron.parameters)
+        own_names = [each.name for each in kinds.get(neuron.kind, ())]
+        values = ", ".join(
+            f"{name} {value:g}"
+            for name, value in zip(own_names, neuron.parameters, strict=False)
+        )
         kind = f"{neuron.kind}({values})" if values else neuron.kind
         branch = trees[neuron.part].add(Text(f"{names[number]} {kind}", style="cyan"))
         for edge in robot.brain.connections:

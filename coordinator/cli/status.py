@@ -65,7 +65,7 @@ def main(arguments: list[str]) -> int:
     if options.folder is not None and options.connect is not None:
         flags.error("give either a folder or --connect")
     if options.folder is None:
-        found = ask_status(options)
+        found = _at_hub(options)
         sources = [Source(status, name) for name, status in found.items()]
         code = 0
     else:
@@ -79,6 +79,24 @@ def main(arguments: list[str]) -> int:
     for source in sources:
         _show(source)
     return code
+
+
+def _at_hub(options: argparse.Namespace) -> dict[str, Status]:
+    """Return the status of each coordinator at an address, by its name.
+
+    Raises:
+        NetworkError: no coordinator answers; without ``--connect`` with what to do.
+    """
+    connect_of(options)  # an invalid address needs other advice
+    try:
+        return ask_status(options)
+    except NetworkError as error:
+        if options.connect is not None:
+            raise
+        raise NetworkError(
+            f"{error}; of a run without a hub, name the folder (revolve status "
+            "runs/NAME), or start it with --listen hub"
+        ) from None
 
 
 def ask_status(options: argparse.Namespace) -> dict[str, Status]:

@@ -1,8 +1,9 @@
 """Summary of a finished run: best robot, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +54,20 @@ def conclude(run: RunSession) -> Conclusion:
     lines = _results(run)
     if failures:
         lines.insert(1, failures)
-    lines += [f"tables: {folder / 'tables'}", "try next:"]
-    if (folder / BEST).exists():
-        lines.append(f"  {command('robot', 'render', folder / BEST, 'best.gif')}")
-    lines += [f"  {command(what, folder)}" for what in ("view", "analyze")]
+    lines += [f"tables: {folder / 'tables'}", "try next:", *next_steps(folder)]
     return Conclusion("\n".join(lines), failures, has_evaluated(folder))
+
+
+def next_steps(folder: Path) -> list[str]:
+    """Return commands that show the results; those of the viewer if it is installed."""
+    best, steps = folder / BEST, [command("analyze", folder)]
+    if find_spec("rerun") is not None:
+        steps.insert(0, command("view", folder))
+    elif best.exists():
+        steps.insert(0, command("robot", "show", best))
+    if best.exists():
+        steps.insert(0, command("robot", "render", best, "best.gif"))
+    return [f"  {step}" for step in steps]
 
 
 def _results(run: RunSession) -> list[str]:
@@ -75,30 +85,48 @@ def _results(run: RunSession) -> list[str]:
     }
     if not alive:
         return [f"extinct after {births}: too few robots are left to mate"]
-    judged = _last_judged(folder, alive)
+    last = _last_populations(folder, alive)
+    judged = [row for row in last if row["fitness"] is not None]
     if not judged:
-        return [f"{births}; no robot of the last population has a fitness"]
+        none = f"{births}; no robot of the last population has a fitness"
+        return [none, *_counted_as_zero(run, last)]
     best = min(judged, key=lambda row: (-row["fitness"], individual(row)))
     mean = sum(row["fitness"] for row in judged) / len(judged)
     lines = [
         f"{births}; mean fitness of the last population {rounded(mean)}",
         *_best_robot(run, individual(best), best["fitness"]),
     ]
+    lines[1:1] = _counted_as_zero(run, last)
     if any(isinstance(islands[number], Arena) for number in alive):
-        lines[2:2] = _windows(folder, run.experiment.simulation)
+        lines[-1:-1] = _windows(folder, run.experiment.simulation)
     return lines
 
 
-def _last_judged(folder: Path, islands: Collection[int]) -> list[dict[str, Any]]:
-    """Return the population rows of some islands' last populations with a fitness."""
+def _last_populations(folder: Path, islands: Collection[int]) -> list[dict[str, Any]]:
+    """Return the population rows of some islands' last populations."""
     rows = read_table(folder, "population")
     newest = rows.group_by("island").aggregate([("births", "max")]).to_pylist()
     last = {(row["island"], row["births_max"]) for row in newest}
     return [
         row
-        for row in rows.filter(pc.is_valid(rows["fitness"])).to_pylist()
+        for row in rows.to_pylist()
         if row["island"] in islands and (row["island"], row["births"]) in last
     ]
+
+
+def _counted_as_zero(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a line about failed robots that win over others, or are the only ones."""
+    # Robots of an arena without a fitness are young, not failed.
+    off_line = [
+        row for row in last if not isinstance(run.loop.islands[row["island"]], Arena)
+    ]
+    fitness = [row["fitness"] for row in off_line if row["fitness"] is not None]
+    failed, worse = len(off_line) - len(fitness), sum(each < 0.0 for each in fitness)
+    if not failed or (fitness and not worse):
+        return []
+    line = f"{failed} of {len(off_line)} robots of the last population failed: "
+    line += "selection counts them as fitness 0"
+    return [f"{line}, more than the {worse} negative ones" if worse else line]
 
 
 def _best_robot(run: RunSession, birth: BirthId, fitness: float) -> list[str]:

@@ -19,6 +19,7 @@ from typing import IO
 from coordinator.storage.campaign import campaign_plugins, is_campaign, read_campaign
 from coordinator.storage.folder import holds_run, read_details
 from schema.agent.import_path import environment, python_command
+from schema.agent.log import warn_user
 from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
 from schema.experiment.document import (
     Experiment,
@@ -90,7 +91,7 @@ def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
 
 
 def _refuse(words: Sequence[str]) -> None:
-    if words and (problems := check_apart(words)):
+    if words and (problems := check_apart(words, warn=warn_user)):
         raise ExperimentError(problems[0])
 
 
@@ -114,6 +115,7 @@ def check_apart(
     words: Sequence[str],
     tell: Callable[[str], None] = lambda _: None,
     limit_s: float = LIMIT_S,
+    warn: Callable[[str], None] = lambda _: None,
 ) -> list[str]:
     """Check plug-ins in a process of their own; return a line for each faulty one.
 
@@ -121,6 +123,7 @@ def check_apart(
         words: arguments of ``revolve check``.
         tell: called with a line for each plug-in that is in order.
         limit_s: time for the import, and for the check, of one plug-in [s].
+        warn: called with a line for each warning about a plug-in that is in order.
     """
     flags = [HERE, str(limit_s)]
     for entry in allowed():
@@ -137,6 +140,8 @@ def check_apart(
         begun = text if step == "begin" else ""
         if step == "fine":
             tell(text)
+        elif step == "warn":
+            warn(text)
         elif step == "fault":
             problems.append(text)
     if not begun and child.returncode == (1 if problems else 0):
@@ -177,18 +182,6 @@ def check_here(
         output.write(f"{json.dumps([step, text])}\n")
         output.flush()
 
-    def check(word: str, name: str, use: Use) -> None:
-        say("begin", f"{use.key}: {use.path}")
-        with _time_limit(limit_s):
-            try:
-                where = check_use(use, lambda at: say("begin", f"{use.key}: {at}"))
-                plugin = use.load()
-                if isinstance(plugin, PartType) and not _is_folder(Path(word)):
-                    check_slot_directions(plugin, use.key)
-            except ExperimentError as error:
-                raise _placed(error, word, use) from error
-        say("fine", f"{use.path}: {name} at {where}: in order")
-
     # A plug-in may print.
     with redirect_stdout(sys.stderr):
         for word in words:
@@ -197,7 +190,8 @@ def check_here(
                 with _time_limit(limit_s):
                     uses = list(_uses(word, kinds, kind, births))
                 for name, use in uses:
-                    check(word, name, use)
+                    with _time_limit(limit_s):
+                        _check_plugin(word, name, use, say)
                 if ":" not in word and not _is_folder(Path(word)):
                     _check_document(word, births, limit_s)
                 if not uses:
@@ -206,6 +200,28 @@ def check_here(
                 is_fine = False
                 say("fault", one_line(error))
     return is_fine
+
+
+def _check_plugin(
+    word: str, name: str, use: Use, say: Callable[[str, str], None]
+) -> None:
+    """Check a plug-in of a kind; say that it is in order, and what to beware of.
+
+    Raises:
+        ExperimentError: it is not in order.
+    """
+    say("begin", f"{use.key}: {use.path}")
+    try:
+        where = check_use(use, lambda at: say("begin", f"{use.key}: {at}"))
+        plugin = use.load()
+        if isinstance(plugin, PartType) and not _is_folder(Path(word)):
+            check_slot_directions(plugin, use.key)
+        warning = use.advise(plugin)
+    except ExperimentError as error:
+        raise _placed(error, word, use) from error
+    say("fine", f"{use.path}: {name} at {where}: in order")
+    if warning:
+        say("warn", f"{use.key}: {where}: warning: {warning}")
 
 
 def _check_document(source: str, births: int | None, limit_s: float) -> None:

@@ -59,7 +59,7 @@ def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
         )
         return 0 if is_fine else 1
     words = [*options.plugin, *(("--kind", options.kind) if options.kind else ())]
-    problems = check_apart(words, print)
+    problems = check_apart(words, print, warn=print)
     for problem in problems:
         print(problem)
     return 1 if problems else 0

@@ -29,12 +29,14 @@ class Use:
         path: short name or ``module:attribute``.
         load: returns the plug-in; raises ``ExperimentError`` if it cannot be had.
         check: takes the plug-in; raises any error if it breaks its contract.
+        advise: takes a plug-in that is in order; returns a warning, or nothing.
     """
 
     key: str
     path: str
     load: Callable[[], object]
     check: Callable[[Any], None]
+    advise: Callable[[Any], str] = lambda _: ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,7 @@ def test_show(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "slot 3: part-2 ParametricBarJoint, by its slot 0, orientation 0",
         "connection_length 33 mm",
         "alpha 0 rad",
-        "part-1-out-0 Sigmoid(0.125, 0.5)",
+        "part-1-out-0 Sigmoid(bias 0.125, gain 0.5)",
         "0.25 × part-0-in-2",
     ):
         assert words in shown

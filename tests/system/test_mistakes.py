@@ -112,6 +112,11 @@ MISTAKES = {
         "no coordinator at tcp/127.0.0.1:1",
         2,
     ),
+    "no hub": (
+        "status",
+        "tcp/127.0.0.1:1; of a run without a hub, name the folder (revolve status ",
+        2,
+    ),
     "table of another version": (
         "compare later later",
         "was written by another version of Revolve",
@@ -166,6 +171,7 @@ def test_each_mistake_gives_one_line(
 ) -> None:
     words, message, code = MISTAKES[mistake]
     monkeypatch.chdir(folder)
+    monkeypatch.setenv("REVOLVE_CONNECT", "tcp/127.0.0.1:1")
     before = sorted(Path().iterdir())
     try:
         found = main(words.split())

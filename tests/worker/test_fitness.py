@@ -13,6 +13,7 @@ from schema.robot.results import Track
 from schema.robot.trace import Trace
 from worker.fitness import (
     FitnessFunction,
+    advise_fitness,
     check_fitness,
     path_velocity,
     straight_velocity,
@@ -138,6 +139,17 @@ def test_message_names_file_and_line_that_raised() -> None:
     line = rf"{place}: must return a number, raised .*by nothing \({line}\)$"
     with pytest.raises(ExperimentError, match=line):
         check_fitness(_always_raises, WEIGHTS)
+
+
+def test_a_negative_fitness_is_advised_against() -> None:
+    def loses(trace: Trace, _fitness: Fitness) -> float:
+        return -2.5 if trace.core_position[-1, 0] == 0.6 else 0.0
+
+    advice = advise_fitness(loses, WEIGHTS)
+    assert advice.startswith("returned -2.5 for a straight trace, but a failed")
+    assert advise_fitness(thesis, WEIGHTS) == ""
+    # A function that raises for all traces is refused by its check.
+    assert advise_fitness(_always_raises, WEIGHTS) == ""
 
 
 def test_function_may_raise_for_some_traces() -> None:

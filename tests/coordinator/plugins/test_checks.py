@@ -61,6 +61,16 @@ def test_a_fitness_function_is_recognised_and_in_order(
     ]
 
 
+def test_a_negative_fitness_makes_a_warning_and_no_fault(
+    lab: Callable[[str], Path],
+) -> None:
+    file = lab("def f(a, b):\n    return -1.0")
+    *_, fine, (step, text) = checked(f"{file}:f")
+    assert fine == ("fine", f"{file.stem}:f: fitness at {file.name}:1: in order")
+    assert step == "warn"
+    assert text.startswith(f"fitness.function: {file.name}:1: warning: returned -1 ")
+
+
 def test_a_part_type_is_recognised() -> None:
     (*_, (step, text)) = checked("schema.parts:HINGE")
     assert step == "fine"

@@ -1,0 +1,22 @@
+"""Tests of the commands that the summary of a run suggests."""
+
+from pathlib import Path
+
+import pytest
+
+from coordinator.cli import summary
+
+
+@pytest.mark.parametrize("viewer", [None, object()])
+def test_only_commands_that_work_are_suggested(
+    viewer: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(summary, "find_spec", lambda _name: viewer)
+    best = tmp_path / summary.BEST
+    show = f"robot show {best}" if viewer is None else f"view {tmp_path}"
+    analyze = f"  revolve analyze {tmp_path}"
+    extinct = [] if viewer is None else [f"  revolve view {tmp_path}"]
+    assert summary.next_steps(tmp_path) == [*extinct, analyze]
+    best.touch()
+    render = f"  revolve robot render {best} best.gif"
+    assert summary.next_steps(tmp_path) == [render, f"  revolve {show}", analyze]
