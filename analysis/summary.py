@@ -33,7 +33,7 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     """
     populations = _last_populations(tables["populations"])
     if populations:
-        heads = ("experiment", "run", "births", "size", "mean of population", "best")
+        heads = ("experiment", "run", "births", "judged", "mean of population", "best")
         _print_table(console, heads, populations, words={0, 1})
     else:
         print_line(console, "no population could be measured")
@@ -105,7 +105,7 @@ def _print_table(
 
 
 def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
-    """Return experiment, run, births, size, mean and best of each island's last."""
+    """Return name, run, births, judged robots, mean and best of each island's last."""
     return [
         (
             row["experiment"],

@@ -20,7 +20,7 @@ version = release = _PROJECT["version"]
 html_title = f"{project} {version}"
 
 extensions = ["myst_nb"]
-exclude_patterns = ["_build", "data"]
+exclude_patterns = ["_build"]
 myst_heading_anchors = 4
 nb_execution_mode = "off"
 # Code without a language is a command, its output or a message.

@@ -38,7 +38,8 @@ class Robot:
 
     Attributes:
         parts: of the body, in depth-first order; the first is the core.
-        brain: network of neurons.
+        brain: network of neurons. It has the connections of the genome that lead to a
+            neuron (resolved); the births table counts the others, too.
         experiment: whose part types and simulation apply; None: those of ``scenario1``
             with all built-in part types.
     """
@@ -139,7 +140,7 @@ class Robot:
 
     def __repr__(self) -> str:
         neurons = counted(len(self.brain.neurons), "neuron")
-        edges = counted(len(self.brain.connections), "connection")
+        edges = counted(len(self.brain.connections), "resolved connection")
         return f"<Robot: {counted(len(self.parts), 'part')}, {neurons}, {edges}>"
 
 

@@ -101,7 +101,8 @@ def comparison(outcomes: RunOutcomes) -> pa.Table:
     Returns:
         One row per measure and pair for which both experiments have values, with the
         columns of ``outputs``. Pairs with different fitness functions have no rows of
-        the measures ``OF_FITNESS``.
+        the measures ``OF_FITNESS``. A measure that is equal in all runs of both is no
+        test: it has no p, and does not count for the correction of the others.
     """
     rows = []
     for a, b in combinations(outcomes.experiments, 2):
@@ -113,5 +114,8 @@ def comparison(outcomes: RunOutcomes) -> pa.Table:
             samples = [outcomes.values(name, measure, births) for name in (a, b)]
             if measure != "births" and all(map(len, samples)):
                 named = {"measure": measure, "a": a, "b": b, "births": births}
-                rows.append({**named, **two_samples(*samples)})
+                row = {**named, **two_samples(*samples)}
+                if not np.ptp(np.concatenate(samples)):
+                    row["p"] = None
+                rows.append(row)
     return pa.Table.from_pylist(correct(rows), schema("comparison"))

@@ -83,11 +83,14 @@ class DrawnFigure:
     picture: Path
 
 
-def _spread(section: Section, number: str, title: str, panels: Panels) -> Figure:
+def _spread(
+    section: Section, number: str, title: str, panels: Panels, note: str = ""
+) -> Figure:
+    """Return a figure of outcomes; its caption ends with a note."""
     return Figure(
         number,
         title,
-        partial(spread_caption, panels=panels),
+        partial(spread_caption, panels=panels, note=note),
         ("outcomes", "robots"),
         partial(over_runs, panels=panels),
         section,
@@ -172,7 +175,9 @@ FIGURES: tuple[Figure, ...] = (
            (_BENCHMARK,), spider_speed, "speed"),
     _spread("bodies", "A", "Connections at the end",
             {"connections": "connections",
-             "connections_per_part": "connections per part"}),
+             "connections_per_part": "connections per part"},
+            "Connections are those of the genome, also those that lead to no neuron "
+            "of the robot; the robot's own brain and file have only the others."),
     Figure("B", "Fitness of islands",
            partial(_with_note, text="Each line is the mean fitness of one island, for "
            "all runs with several islands."),

@@ -16,6 +16,7 @@ from analysis.figures.forms import (
     counted_runs,
     fitness_note,
     fitness_panels,
+    fitness_text,
 )
 from analysis.figures.style import in_order, label, scales, theme_of_size
 
@@ -104,6 +105,8 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     shown = course(tables, measure)
     functions = fitness_panels(tables) if measure == FITNESS else {}
 
+    y_text = fitness_text(tables, text) if measure == FITNESS else text
+
     def frame(rows: pa.Table) -> Any:  # noqa: ANN401 - pandas
         made = rows.to_pandas()
         return made.assign(function=made["experiment"].map(functions))
@@ -129,7 +132,7 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     if functions:
         figure += p9.facet_wrap("function", scales="free_y", ncol=_NARROW)
     rows = -(-len(set(functions.values())) // _NARROW) or 1
-    return figure + p9.labs(x="births", y=text) + theme_of_size(0.8 + 3.0 * rows)
+    return figure + p9.labs(x="births", y=y_text) + theme_of_size(0.8 + 3.0 * rows)
 
 
 def course_caption(tables: Tables, measure: str) -> str:

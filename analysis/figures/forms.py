@@ -15,7 +15,7 @@ from analysis.figures.style import (
     theme_of_size,
     two_line_label,
 )
-from analysis.measures.fitness_functions import functions_of
+from analysis.measures.fitness_functions import axis_text, functions_of
 from schema.errors import RevolveError
 
 Tables = Mapping[str, pa.Table]
@@ -51,6 +51,12 @@ def fitness_panels(tables: Tables) -> dict[str, str]:
     """
     functions = functions_of(tables["runs"]) if "runs" in tables else {}
     return functions if len(set(functions.values())) > 1 else {}
+
+
+def fitness_text(tables: Tables, text: str) -> str:
+    """Return the label of an axis of fitness, with the unit if all runs share one."""
+    names = set(functions_of(tables["runs"]).values()) if "runs" in tables else set()
+    return axis_text(names.pop(), text) if len(names) == 1 else text
 
 
 def fitness_note(tables: Tables) -> str:
@@ -114,7 +120,9 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
         look = theme_of_size(0.6 + 3.0 * rows) + p9.theme(legend_position="none")
     else:
         figure += p9.scale_x_discrete(limits=experiments, labels=list(labels.values()))
-    return figure + p9.labs(x="", y=next(iter(panels.values()))) + look
+    measure, text = next(iter(panels.items()))
+    y_text = fitness_text(tables, text) if measure == FITNESS else text
+    return figure + p9.labs(x="", y=y_text) + look
 
 
 def _by_function(rows: Any, functions: Mapping[str, str]) -> Any:  # noqa: ANN401 - pandas
@@ -124,8 +132,8 @@ def _by_function(rows: Any, functions: Mapping[str, str]) -> Any:  # noqa: ANN40
     return rows.assign(panel=rows["experiment"].map(functions))
 
 
-def spread_caption(tables: Tables, panels: Panels) -> str:
-    """Return what points, boxes, bars and violins of ``over_runs`` show."""
+def spread_caption(tables: Tables, panels: Panels, note: str = "") -> str:
+    """Return what points, boxes, bars and violins of ``over_runs`` show, and a note."""
     runs = stacked(tables["outcomes"], panels)
     known = runs[runs["panel"] == next(iter(panels.values()))]
     sizes = known.groupby("experiment", observed=True).size().to_dict()
@@ -138,12 +146,13 @@ def spread_caption(tables: Tables, panels: Panels) -> str:
             "the height of the box."
         )
     if min(sizes.values(), default=BOX_RUNS) < BOX_RUNS:
-        texts.append(f"Bars show the median of fewer than {BOX_RUNS} runs.")
+        texts.append(f"With fewer than {BOX_RUNS} runs a bar shows their median.")
     if _violins(tables, panels, {}, in_order(sizes)):
         texts.append(
             "Pale shapes show the robots of all last populations, from the least to "
             "the greatest value."
         )
+    texts += [note] if note else []
     return " ".join(texts) + (fitness_note(tables) if FITNESS in panels else "")
 
 

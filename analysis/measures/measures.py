@@ -48,6 +48,7 @@ def robots(run: RunTables) -> pa.Table:
             "rank": births["rank"],
             "ancestors": [run.lines[row].bit_count() for row in chosen.tolist()],
             **{name: values[chosen] for name, values in run.sizes.items()},
+            "fitness_max": _greatest(run, fitness)[chosen],
         }
     )
 
@@ -68,6 +69,13 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Booleans]:
     is_last = np.zeros(len(fitness), np.bool_)
     is_last[table.members[chosen]] = True
     return fitness, is_last
+
+
+def _greatest(run: RunTables, last: Numbers) -> Numbers:
+    """Return each individual's greatest fitness, given its last one; NaN if none."""
+    table, greatest = run.population_table, last.copy()
+    np.fmax.at(greatest, table.members, table.fitness)
+    return greatest
 
 
 _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {

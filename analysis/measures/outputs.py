@@ -98,7 +98,7 @@ _TWO_SAMPLES = {
     "effect": "-1..1; Cliff's delta of a and b, or rank-biserial correlation of a",
     "effect_low": "lower end of delta's 95 % interval (Newcombe's score)",
     "effect_high": "upper end of that interval",
-    "p": "two-sided exact p value",
+    "p": "two-sided exact p value; null in comparison if all runs are equal",
     "q": "p value corrected for all tests of the table (Benjamini-Hochberg)",
 }
 
@@ -132,6 +132,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "ancestors": "number of different ancestors",
         **BODY,
         **PER_PART,
+        "fitness_max": "greatest fitness recorded at a birth, or the last one; in an "
+        "arena it can be greater than the last",
     },
     "extremities": {
         **_RUN,

@@ -1,6 +1,6 @@
 """Differences of fitness and of all measures between experiments."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -76,7 +76,7 @@ def not_compared(tables: Tables) -> str:
 def _differences_of(comparison: pa.Table, measure: str, title: str) -> str:
     """Return the differences of one measure; empty if nothing is compared."""
     rows = comparison.filter(pc.field("measure") == measure).to_pylist()
-    rows.sort(key=lambda row: row["p"])
+    rows.sort(key=lambda row: 1.0 if row["p"] is None else row["p"])
     shown = rows[:_MOST_PAIRS]
     if not shown:
         return ""
@@ -150,6 +150,9 @@ def _bar(value: float, both: tuple[float, float] | None, reach: float) -> str:
 def all_differences(tables: Tables) -> str:
     """Return a folded table of all measures for each pair of experiments.
 
+    Measures without a p are equal in all runs of the pair: they are only counted. The
+    meanings of the others are in a folded list below.
+
     Args:
         tables: ``comparison`` and ``runs``.
     """
@@ -158,8 +161,10 @@ def all_differences(tables: Tables) -> str:
         pairs.setdefault((row["a"], row["b"]), []).append(row)
     columns = ("mean_a", "mean_b", "difference", "difference_low", "difference_high",
                "effect", "p", "q")  # fmt: skip
-    folds = []
-    for (a, b), mine in pairs.items():
+    folds, shown = [], set()
+    for (a, b), every in pairs.items():
+        mine = [row for row in every if row["p"] is not None]
+        shown |= {row["measure"] for row in mine}
         heads = ("measure", label(a), label(b), "difference", "low", "high", "effect",
                  "p", "q")  # fmt: skip
         rows = []
@@ -167,13 +172,13 @@ def all_differences(tables: Tables) -> str:
             known = row if _interval(row) else {**row, "difference_low": None,
                                                 "difference_high": None}  # fmt: skip
             name = row["measure"]
-            first = f'<td title="{escape(OUTCOME[name])}">{name.replace("_", " ")}</td>'
+            first = f'<td title="{escape(OUTCOME[name])}">{_words(name)}</td>'
             rows.append([first, *(cell(known[column]) for column in columns)])
         title = (
-            f"{label(a)} ({plural(mine[0]['runs_a'], 'run')}) and {label(b)} "
-            f"({plural(mine[0]['runs_b'], 'run')}) at {mine[0]['births']} births"
+            f"{label(a)} ({plural(every[0]['runs_a'], 'run')}) and {label(b)} "
+            f"({plural(every[0]['runs_b'], 'run')}) at {every[0]['births']} births"
         )
-        folds.append(folded(title, table(heads, rows)))
+        folds.append(folded(title, table(heads, rows) + _equal(every)))
     if not folds:
         return ""
     note = (
@@ -181,8 +186,30 @@ def all_differences(tables: Tables) -> str:
         "interval (Welch's t). The effect is Cliff's delta: how much more often a run "
         "of the first experiment is above one of the second than below. p is that of "
         "the exact rank-sum test (Wilcoxon, Mann and Whitney), which assumes no "
-        "distribution; q is p, corrected for all tests of this section. The pointer on "
-        "a measure shows its meaning."
+        "distribution; q is p, corrected for all tests of this section. Measures that "
+        "are equal in all runs of both experiments are not tested."
     )
+    folds.append(folded("What the measures mean", _meanings(shown)))
     apart = not_compared(tables)
     return f'{apart}<p class="note">{escape(note)}</p>{"".join(folds)}'
+
+
+def _equal(rows: Sequence[Row]) -> str:
+    """Return how many measures of a pair are equal in all runs; empty for none."""
+    names = [_words(row["measure"]) for row in rows if row["p"] is None]
+    if not names:
+        return ""
+    count = f"{plural(len(names), 'measure')} {'is' if len(names) == 1 else 'are'}"
+    text = f"{count} equal in all runs: {', '.join(names)}."
+    return f'<p class="note">{escape(text)}</p>'
+
+
+def _meanings(measures: Collection[str]) -> str:
+    """Return a table of the meanings of measures, in the order of ``OUTCOME``."""
+    named = [name for name in OUTCOME if name in measures]
+    rows = [[cell(_words(name)), cell(OUTCOME[name])] for name in named]
+    return table(("measure", "meaning"), rows)
+
+
+def _words(measure: str) -> str:
+    return measure.replace("_", " ")

@@ -71,6 +71,9 @@ def of_each_function(tables: Tables) -> dict[str, Tables]:
 def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
     """Return the plot of runs, their means, and robots fitter than all before.
 
+    Robots of arenas are at their greatest fitness, because the lines are means of the
+    fitness at each birth: at their last fitness they could all be below the lines.
+
     Args:
         tables: ``runs``, ``robots``, ``populations``, ``progression``.
         y_text: label of the y axis.
@@ -89,7 +92,7 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
     means = shown.mean.to_pylist()
     sure = [row for row in means if row["runs"] >= BAND_RUNS]
     heights = [row[end] for row in sure for end in ("low", "high")]
-    heights += shown.by_run["mean"].to_pylist() + robots["fitness"].to_pylist()
+    heights += shown.by_run["mean"].to_pylist() + robots["fitness_max"].to_pylist()
     last = max(shown.by_run["births"].to_pylist())
     axes = Axes((0.0, float(last)), with_margin(heights))
     marks = [_band(axes, sure, name, paint[name]) for name in in_order(shown.sizes)]
@@ -115,7 +118,7 @@ def _records(robots: pa.Table, *, few: bool) -> pa.Table:
     """Return the robots that are fitter than all that were born before in their run."""
     keys = ["folder", "birth", "birth_island"]
     born = robots.sort_by([(key, "ascending") for key in keys])
-    fitness = np.asarray(born["fitness"], np.float64)
+    fitness = np.asarray(born["fitness_max"], np.float64)
     folders = np.asarray(born["folder"].combine_chunks().dictionary_encode().indices)
     starts = np.flatnonzero(np.diff(folders, prepend=-1))
     kept = []
@@ -163,16 +166,17 @@ def _dots(
     for row in robots.to_pylist():
         name = names[row["folder"]]
         births = row["birth"] + 1
-        text = f"robot {row['birth_island']}:{row['birth']}, {name}\n{_described(row)}"
+        described = _described(row, row["fitness_max"])
+        text = f"robot {row['birth_island']}:{row['birth']}, {name}\n{described}"
         if births <= axes.x_range[1]:
-            place = axes.x(births), axes.y(row["fitness"])
+            place = axes.x(births), axes.y(row["fitness_max"])
             marks.setdefault(name.experiment, []).append(dot(*place, text, 2.6))
     return [painted(paint[name], *marks[name], kind="dots") for name in in_order(marks)]
 
 
-def _described(row: Row) -> str:
+def _described(row: Row, fitness: float) -> str:
     return (
-        f"fitness {row['fitness']:.3g}; {row['parts']} parts, "
+        f"fitness {fitness:.3g}; {row['parts']} parts, "
         f"{row['active_joints']} motors, {row['hidden']} hidden neurons"
     )
 
@@ -227,7 +231,7 @@ def _columns(
             aside = width * 0.6 * ((count * 0.618) % 1 - 0.5)
             text = f"robot {row['birth_island']}:{row['birth']}, {name}"
             spot = axes.x(middle + aside), axes.y(row["fitness"])
-            marks.append(dot(*spot, f"{text}\n{_described(row)}", 2.6))
+            marks.append(dot(*spot, f"{text}\n{_described(row, row['fitness'])}", 2.6))
         mean = float(np.mean([row["fitness"] for row in rows]))
         ends = [(middle - 0.4 * width, mean), (middle + 0.4 * width, mean)]
         text = f"{name}\nmean {mean:.3g} of {len(rows)} robots"

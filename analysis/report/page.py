@@ -8,6 +8,7 @@ from html import escape
 from importlib.resources import files
 
 import pyarrow as pa
+import pyarrow.compute as pc
 from PIL import Image
 
 from analysis.figures.catalogue import DrawnFigure, Section
@@ -40,6 +41,10 @@ _COURSES = (
         "are the mean fitness of single runs. Dots are robots that were fitter than "
         "all robots born before them in their run."
     ),
+)
+_COURSES_OF_ARENAS = (
+    " In arenas lines are means of the windows at each number of births, and each dot "
+    "is at the best window of its robot, which may be long after its birth."
 )
 _LAST = (
     "6.2",
@@ -112,7 +117,9 @@ def _sections(
 ) -> dict[str, tuple[str, str]]:
     """Return heading and content of all sections by anchor, empty ones included."""
     by_number = {one.figure.number: one for one in drawings.figures}
-    courses = _of_functions(tables, fitness_over_births, _COURSES, by_number)
+    has_arena = tables["runs"]["simulated_s"].null_count < tables["runs"].num_rows
+    over_births = (*_COURSES[:2], _COURSES[2] + _COURSES_OF_ARENAS * has_arena)
+    courses = _of_functions(tables, fitness_over_births, over_births, by_number)
     last = _of_functions(tables, last_populations, _LAST, by_number)
     plots = {"6.3": courses, "6.2": last}
 
@@ -190,8 +197,12 @@ def _of_functions(
 
 def _films(tables: Tables, drawings: Drawings) -> str:
     names = run_names(tables["runs"])
+    arenas = tables["runs"].filter(pc.field("simulated_s").is_valid())
+    folders = frozenset(arenas["folder"].to_pylist())
     shown = "".join(
-        _film(one, str(names[str(one.best.folder)])) for one in drawings.films
+        _film(one, str(names[folder]), has_arena=folder in folders)
+        for one in drawings.films
+        if (folder := str(one.best.folder))
     )
     reasons = "".join(
         f"<p>{escape(label(name))}: no moving picture: {escape(why)}</p>"
@@ -205,15 +216,17 @@ def _films(tables: Tables, drawings: Drawings) -> str:
     return (f'<div class="films">{shown}</div>{note}' if shown else "") + reasons
 
 
-def _film(one: Film, run: str) -> str:
+def _film(one: Film, run: str, *, has_arena: bool) -> str:
     best = one.best
     data = base64.b64encode(one.path.read_bytes()).decode()
     name = f"Robot {best.birth_island}:{best.birth} of {run}"
+    others = " Among the robots of an arena it may move differently." * has_arena
     return (
         f'<figure><img alt="{escape(name)}" src="data:image/gif;base64,{data}">'
         f"<figcaption><b>{escape(label(best.experiment))}: fitness "
-        f"{number(best.fitness)}.</b> {escape(name)}, three seconds from the middle of "
-        f"its evaluation. File: <code>figures/{escape(one.path.name)}</code>."
+        f"{number(best.fitness)}.</b> {escape(name)}, simulated alone: three seconds "
+        f"from the middle of its evaluation.{others} "
+        f"File: <code>figures/{escape(one.path.name)}</code>."
         "</figcaption></figure>"
     )
 

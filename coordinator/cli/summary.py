@@ -164,8 +164,9 @@ def _windows(folder: Path, simulation: Simulation) -> list[str]:
     birth = individual(row)
     return [
         (
-            f"{line}; the best such window of the run: {birth.island}:{birth.number}, "
-            f"fitness {rounded(row['fitness'])}, up to {row['sim_time_s']:g} s"
+            f"{line}; the best window of the whole run is that of robot "
+            f"{birth.island}:{birth.number} that ended at {row['sim_time_s']:g} s: "
+            f"fitness {rounded(row['fitness'])}"
         )
     ]
 

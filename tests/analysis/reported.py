@@ -43,6 +43,7 @@ def tables() -> dict[str, pa.Table]:
         "robots": [
             {"experiment": run["experiment"], "folder": run["folder"],
              "birth_island": 0, "birth": birth, "fitness": fitness,
+             "fitness_max": fitness,
              "is_last": birth > 0, "parts": 9, "active_joints": 3, "hidden": 2}
             for run in RUNS
             for birth, fitness in enumerate((0.2, 0.1, 0.3))
@@ -56,6 +57,9 @@ def tables() -> dict[str, pa.Table]:
              "runs_a": 2, "runs_b": 1, "mean_a": 0.2, "mean_b": 0.15,
              "difference": -0.05, "difference_low": -0.1, "difference_high": 0.02,
              "effect": 1.0, "p": 1.0, "q": 1.0},
+            {"measure": "size_mean", "a": "hard & <b>", "b": "soft", "births": 30,
+             "runs_a": 2, "runs_b": 2, "mean_a": 15.0, "mean_b": 15.0,
+             "difference": 0.0, "effect": 0.0},
         ],
         "findings": [
             {"figure": "6.2", "claim": "a <b> fitter", "expected": ">", "runs_a": 2,

@@ -110,6 +110,26 @@ def test_every_measure_of_every_pair_is_compared_once() -> None:
     assert first["difference_low"] < 3 < first["difference_high"]
 
 
+def test_measures_that_are_equal_in_all_runs_are_not_tested() -> None:
+    made = []
+    for name, values in (("a", (1.0, 2.0)), ("b", (3.0, 4.0)), ("c", (5.0, 6.0))):
+        parts = 8.0 if name == "c" else 7.0
+        for number, value in enumerate(values):
+            level = {"births": 15, "fitness": value, "parts": parts, "hidden": 1.0}
+            made.append(measured(name, number, tables([level])))
+    rows = comparison(Outcomes(made)).to_pylist()
+    found = {(row["a"], row["b"], row["measure"]): row for row in rows}
+    equal = found["a", "b", "parts"]
+    assert (equal["p"], equal["q"], equal["difference"]) == (None, None, 0)
+    # Equal in the runs of each experiment, but not between them: 2 of the 6 orders of
+    # four runs are as extreme.
+    assert found["a", "c", "parts"]["p"] == pytest.approx(1 / 3)
+    assert all(row["p"] is None for row in rows if row["measure"] == "hidden")
+    # All tests have the same p, so that the correction changes none.
+    tested = [row["q"] for row in rows if row["p"] is not None]
+    assert tested == pytest.approx([1 / 3] * len(tested))
+
+
 def test_fitness_is_compared_only_with_the_same_function() -> None:
     """The function of c is another one; sizes of its robots are compared."""
     levels = [{"births": 15, "fitness": 0.1, "parts": 1.0, "fitness_best": 9.0}]

@@ -244,11 +244,13 @@ def test_robots_of_an_arena_count_if_they_were_ever_mature() -> None:
         {"birth": 0, "sim_time_s": 15.0, "fitness": 0.1, "is_mature": True},
         {"birth": 1, "sim_time_s": 20.0, "fitness": 0.9, "is_mature": False},
     ]
-    living = population((0, 2, {A: 0.15, B: None}), is_online=True)
+    earlier, last = (0, 1, {A: 0.3}), (0, 2, {A: 0.15, B: None})
+    living = population(earlier, last, is_online=True)
     tables = run(births=FAMILY, population=living, fitness=table("fitness", samples))
     (row,) = robots(RunTables(tables)).to_pylist()
     # Alive at the last birth: as it was judged then.
     assert (row["birth"], row["fitness"], row["is_last"]) == (0, 0.15, True)
+    assert row["fitness_max"] == 0.3
 
 
 def test_extremities_against_fitness() -> None:

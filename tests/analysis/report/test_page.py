@@ -3,6 +3,7 @@
 import base64
 import io
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -115,6 +116,15 @@ def test_differences_have_an_interval_where_both_have_two_runs(read: Reader) -> 
     assert "0.02" not in read.text
 
 
+def test_compared_measures_are_explained_and_equal_ones_counted(read: Reader) -> None:
+    assert "1 measure is equal in all runs: size mean." in read.text
+    assert "What the measures mean" in read.folds
+    meaning = "fitness best maximum of judged robots, in the same unit"
+    assert "measure meaning fitness mean of judged robots" in read.text
+    assert meaning in read.text
+    assert "size mean mean over" not in read.text
+
+
 def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
     given = tables()
     functions = ["locomotion", "locomotion", "goals:far (limit = 2.0, source 1a)"]
@@ -137,7 +147,7 @@ def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
     assert found.text.count("robot 0:2, hard & <b>, run 0") == 2
 
 
-def test_an_arena_is_summed_up() -> None:
+def test_an_arena_is_summed_up(tmp_path: Path) -> None:
     given = tables()
     runs = given["runs"].drop_columns(["deaths", "simulated_s"])
     runs = runs.append_column("deaths", pa.array([None, 9, None], pa.int64()))
@@ -154,6 +164,21 @@ def test_an_arena_is_summed_up() -> None:
         "soft, run 1, seed 7: 60 robots were born in 2 min 05 s of simulated time, "
         "9 died, 4 were alive at the last birth." in text
     )
+    assert "each dot is at the best window of its robot" in text
+    with_film = read_page(given, drawings(tmp_path)).text
+    assert "simulated alone: three seconds" in with_film
+    assert "Among the robots of an arena it may move differently." in with_film
+
+
+def test_dots_over_births_are_at_the_greatest_fitness_of_robots() -> None:
+    given = tables()
+    place = given["robots"].schema.get_field_index("fitness_max")
+    doubled = pc.multiply(given["robots"]["fitness"], 2.0)
+    given["robots"] = given["robots"].set_column(place, "fitness_max", doubled)
+    text = read_page(given).text
+    assert text.count("robot 0:2, soft, run 1, seed 7 fitness 0.6;") == 1
+    assert text.count("robot 0:2, soft, run 1, seed 7 fitness 0.3;") == 1
+    assert "In arenas" not in text
 
 
 def test_marks_tell_run_seed_and_robot(read: Reader) -> None:
