@@ -60,6 +60,7 @@ class Display:
         self._console = console or Console(stderr=True)
         self._quiet = quiet
         self._place = place
+        self._patience_s = _SOON_S if place and not quiet else SPAN_S
         # Bars would break lines of JSON.
         self._has_bars = self._console.is_terminal and log_form() != "json"
         self._progress = Progress(
@@ -145,7 +146,7 @@ class Display:
             self._missing_since_s = None
         elif self._missing_since_s is None:
             self._missing_since_s = now_s
-        elif now_s - self._missing_since_s > (_SOON_S if self._place else SPAN_S):
+        elif now_s - self._missing_since_s > self._patience_s:
             self._missing_since_s = now_s + 6 * SPAN_S
             line = f"waiting for {' and '.join(missing)}: none has joined"
             starts = [

@@ -14,10 +14,11 @@ LONGEST_PAUSE_S = 32.0
 
 
 class InfoQueue:
-    """Order in which agents are asked: the newest first, then the silent ones.
+    """Order in which agents are asked: newest and oldest in turn, then silent ones.
 
     A query takes the hub longer the more tokens there are, milliseconds with thousands.
-    Tokens without an agent must not delay the runs, nor an agent that comes later.
+    Thousands of tokens without an agent must not delay the runs, nor an agent that came
+    just before or comes just after them.
     """
 
     def __init__(self) -> None:
@@ -25,6 +26,7 @@ class InfoQueue:
         self._again: list[tuple[float, int, Member]] = []
         self._order = count()
         self._pause_until_s = 0.0
+        self._is_oldest_next = False
 
     def add(self, member: Member) -> None:
         """Add an agent that is to be asked as soon as possible."""
@@ -46,7 +48,9 @@ class InfoQueue:
         if now_s < self._pause_until_s:
             return None
         if self._new:
-            return self._new.pop()
+            is_oldest = self._is_oldest_next
+            self._is_oldest_next = not is_oldest
+            return self._new.popleft() if is_oldest else self._new.pop()
         if self._again and self._again[0][0] <= now_s:
             return heappop(self._again)[2]
         return None

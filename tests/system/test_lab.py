@@ -83,9 +83,14 @@ def test_commands_of_the_page(network: Network, lab: Path, undisturbed: Path) ->
     folder = network["hub"].home / "run"
     wait_until(lambda: size(folder) > 0, "the run begins")
     network["laptop"].install(lab / "members" / "operator")
-    status = [network[name].start("status") for name in ("laptop", "hub")]
-    for each in status:
-        assert "3 workers, 1 analyzer" in each.end()
+    for name in ("laptop", "hub"):
+        machine = network[name]
+        wait_until(
+            lambda machine=machine: (  # type: ignore[misc]
+                "3 workers, 1 analyzer" in machine.start("status").end()
+            ),
+            "all have joined",
+        )
     coordinator.end()
     assert compare(folder, undisturbed) == []
 

@@ -1,4 +1,4 @@
-"""Agents are asked the newest first, and asking has a limited share of the time."""
+"""In which order agents are asked; asking has a limited share of the time."""
 
 from coordinator.network.info_queue import LONGEST_PAUSE_S, SHARE, InfoQueue
 from schema.agent.topics import Member
@@ -8,13 +8,13 @@ def member(name: str) -> Member:
     return Member("f", "worker", name)
 
 
-def test_the_newest_agent_is_asked_first() -> None:
+def test_the_newest_and_the_oldest_agent_are_asked_in_turn() -> None:
     queue = InfoQueue()
     queue.add_again(member("silent"), 1, 0.0)
     for name in ("a", "b", "c"):
         queue.add(member(name))
     names = [taken.name for _ in range(4) if (taken := queue.take(5.0))]
-    assert names == ["c", "b", "a", "silent"]
+    assert names == ["c", "a", "b", "silent"]
     assert queue.take(5.0) is None
 
 
