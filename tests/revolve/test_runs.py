@@ -80,6 +80,7 @@ def test_finished_run_is_resumed_to_itself(done: rv.Run) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)  # Four processes share two cores, and one draws films.
 def test_analysis_has_tables_and_a_report(done: rv.Run, tmp_path: Path) -> None:
     found = rv.analyze(done, out=tmp_path / "report")
     assert found.report.read_text().startswith("<!")
