@@ -13,7 +13,6 @@ from coordinator.storage.disk import storage_errors
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.segment import remove_segment
 from coordinator.storage.table_file import TableFile
-from schema.tables.arrow import skip_pandas
 from schema.tables.columns import TABLES
 from schema.tables.files import parquet_path
 from schema.tables.segments import SEGMENTS, segments_of
@@ -46,7 +45,6 @@ class Recorder:
         Raises:
             RunFolderError: a segment has another version, or the disk fails.
         """
-        skip_pandas()
         self._folder = folder
         self._seal = seal
         with storage_errors(folder):
