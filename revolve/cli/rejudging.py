@@ -25,7 +25,7 @@ from schema.errors import RunFolderError, counted
 from schema.experiment.document import Experiment as Document
 from schema.experiment.document import island_experiment, light_of
 from schema.experiment.settings import evaluation_settings_of
-from schema.tables.description import check_folder
+from schema.tables.description import check_folder, make_folder
 from worker.robot.robustness import all_changes
 
 TABLE, FIGURE = "robustness.parquet", "robustness"
@@ -44,11 +44,7 @@ def rejudge_runs(folders: Sequence[Path], out: Path, workers: int) -> None:
         RevolveError: no worker is left.
     """
     chosen = [robot for folder in folders for robot in _chosen(folder)]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        why = f"cannot be written: {error.strerror}"
-        raise RunFolderError(f"{out}: {why}") from None
+    make_folder(out)
     table = table_of(_rejudged(chosen, workers))
     pq.write_table(table, out / TABLE)
     for folder in folders:
