@@ -79,6 +79,7 @@ def execute_runs(
         place = _place_to_join(folder, deployment)
         with Display(scheduler, quiet=deployment.quiet, place=place) as display:
             shown_s = done_s = -math.inf
+            exits = 0
             while not (scheduler.is_finished or stop.is_set()):
                 scheduler.turn(_TURN_S, time.monotonic)
                 now_s = time.monotonic()
@@ -96,6 +97,12 @@ def execute_runs(
                     _tell_faults(scheduler)
                     for pool in pools:
                         pool.look_after()
+                    if sum(pool.exits for pool in pools) > exits:
+                        exits = sum(pool.exits for pool in pools)
+                        warn_user(
+                            "a worker or analyzer process of this run ended outside a "
+                            "job, for the reason that it wrote above; it is restarted"
+                        )
             if server is not None:
                 server.serve(time.monotonic())
         scheduler.stop()

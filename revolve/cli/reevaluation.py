@@ -17,9 +17,10 @@ from revolve.cli.winners import Chosen
 from revolve.evaluation import Result
 from revolve.fleet import Fleet
 from revolve.robot import Robot
-from schema.errors import RunFolderError, counted
+from schema.errors import counted
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.robot import Robot as PlainRobot
+from schema.tables.description import make_folder
 
 Row = dict[str, Any]
 
@@ -97,11 +98,7 @@ def write_results(
     Raises:
         RunFolderError: the folder cannot be written.
     """
-    try:
-        stem.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        why = f"cannot be written: {error.strerror}"
-        raise RunFolderError(f"{stem.parent}: {why}") from None
+    make_folder(stem.parent)
     table, path = rows(), stem.with_suffix(".parquet")
     pq.write_table(table, path)
     for folder in folders:
