@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from analysis.figures.bench import arena_speed, spider_speed
+from analysis.figures.brains import changes_over_births
 from analysis.figures.courses import course_caption, over_births
 from analysis.figures.forms import (
     Panels,
@@ -202,5 +203,11 @@ FIGURES: tuple[Figure, ...] = (
            "Mean over the population of each measure that the experiment names. Each "
            "line is an island of a run; units are those of the measure.",
            ("named_measures",), measures_over_births, "measures"),
+    Figure("I", "Body and brain change over births",
+           "Mean distance between a child and its first parent, the one whose copy was "
+           "changed, by the child's number of birth. Left: bodies, tree edit distance. "
+           "Right: brains, neurons and connections that are new, lost or changed "
+           "(changes count 0 to 1). Thick lines are means over runs, thin lines runs.",
+           ("brains",), changes_over_births, "bodies"),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

@@ -25,7 +25,7 @@ class Purpose(IntEnum):
     """Purpose of a stream; the numbers are part of what a seed means.
 
     The birth id that names a stream of migration is (island, epoch); for the place of
-    an immigrant it is (island, number of immigrants). 11 belongs to workers (noise).
+    an immigrant it is (island, number of immigrants). 11 to 13 belong to workers.
     """
 
     GENERATE = 1
@@ -38,6 +38,7 @@ class Purpose(IntEnum):
     EMIGRANTS = 8
     REPLACED = 9
     IMMIGRANT_PLACE = 10
+    OTHER_BRAIN = 20
 
 
 def stream(
