@@ -63,7 +63,7 @@ def parser(_command: str = "ablate") -> Flags:
         flags,
         "--robots",
         5,
-        "robots of the last population, the fittest first",
+        "number of robots, the fittest of the last populations",
         least=0,
     )
     add_count(flags, "--brains", 5, "random brains for each body", least=0)
