@@ -168,11 +168,21 @@ def parts() -> dict[str, list[str]]:
 
 
 def _winners(table: pa.Table) -> dict[str, list[Row]]:
-    """Return the rows of each run's best robot."""
-    found: dict[str, list[Row]] = {}
-    for row in table.filter(pc.field("is_best")).to_pylist():
-        found.setdefault(row["folder"], []).append(row)
-    return found
+    """Return the rows of each run's robot of the greatest fitness alone.
+
+    In a run off-line it is the best robot. That of an arena may owe its fitness to
+    others, or to its state at that time.
+    """
+    robots: dict[tuple[str, int, int], list[Row]] = {}
+    for row in table.to_pylist():
+        robots.setdefault((row["folder"], row["island"], row["birth"]), []).append(row)
+    by_run: dict[str, list[list[Row]]] = {}
+    for (folder, _, _), rows in robots.items():
+        by_run.setdefault(folder, []).append(rows)
+    return {
+        folder: max(own, key=lambda rows: rows[0]["undisturbed"] or 0.0)
+        for folder, own in by_run.items()
+    }
 
 
 Winners = Mapping[str, Sequence[Row]]

@@ -130,8 +130,17 @@ def _of_best(rows: Sequence[Row]) -> str:
     carried = [
         f"the {row['change']} carries {percent(1 - row['share'])}" for row in first
     ]
-    line = f"the best, {name}, keeps {', '.join(kept)}" if kept else f"the best, {name}"
-    return ", ".join([f"{line} of its fitness ({rounded(undisturbed)})", *carried])
+    line = f"the best, {name} ({_fitness(rows[0])})"
+    line += f", keeps {', '.join(kept)}" if kept else ""
+    return "; ".join([line, *([", ".join(carried)] if carried else [])])
+
+
+def _fitness(row: Row) -> str:
+    """Return the fitness alone, and the recorded one if it is another, of an arena."""
+    alone, recorded = rounded(row["undisturbed"]), rounded(row["recorded"])
+    if alone == recorded:
+        return f"fitness {alone}"
+    return f"fitness {alone} alone, {recorded} recorded"
 
 
 def _of_last(robots: Sequence[Sequence[Row]]) -> str:
