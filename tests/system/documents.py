@@ -14,6 +14,24 @@ take = "least"
 """
 """Off-line island of short evaluations under drawn disturbances."""
 
+LEARNING = """
+name = "pupils"
+births = 12
+[selection]
+population = 8
+children = 8
+[simulation]
+window_steps = 400
+[robust]
+draws = 1
+[learning]
+budget = 6
+inherit = "lamarckian"
+[learning.parameters]
+population = 4
+"""
+"""Off-line island whose newborns learn in two generations, under a disturbance."""
+
 BRIDGE = """
 name = "short-bridge"
 births = 24
