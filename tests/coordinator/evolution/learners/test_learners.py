@@ -1,5 +1,6 @@
 """Learners: against hand-made quadratics, and what they ask and are told."""
 
+import re
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
@@ -112,6 +113,17 @@ def test_one_plus_one_by_hand() -> None:
     assert step((0.6, 0.6)) == pytest.approx(0.015 * 1.5**-0.25)
     own.tell((((0.1, 0.1),), (-inf,)))
     assert step((0.6, 0.6)) == pytest.approx(0.015 * 1.5**-0.5)
+
+
+def test_the_learner_of_the_page_keeps_its_contract(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(permission, "_allowed", {})
+    page = (Path(__file__).parents[4] / "docs" / "learning.md").read_text()
+    (text,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    (tmp_path / "halves.py").write_text(text)
+    permission.allow([str(tmp_path / "halves.py")])
+    check_learner(Learning(learner="halves:Halves", parameters={"points": 3}))
 
 
 OWN = """
