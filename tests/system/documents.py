@@ -14,24 +14,6 @@ take = "least"
 """
 """Off-line island of short evaluations under drawn disturbances."""
 
-LEARNING = """
-name = "pupils"
-births = 12
-[selection]
-population = 8
-children = 8
-[simulation]
-window_steps = 400
-[robust]
-draws = 1
-[learning]
-budget = 6
-inherit = "lamarckian"
-[learning.parameters]
-population = 4
-"""
-"""Off-line island whose newborns learn in two generations, under a disturbance."""
-
 BRIDGE = """
 name = "short-bridge"
 births = 24
@@ -84,6 +66,31 @@ window_steps = 400
 population = 5
 tournament_size = 2
 """
+
+LEARNING = f"""
+name = "pupils"
+births = 9
+{SHORT_EVALUATIONS}
+children = 4
+[robust]
+draws = 1
+[learning]
+budget = 6
+inherit = "lamarckian"
+[learning.parameters]
+population = 4
+[[islands]]
+[[islands]]
+[islands.learning]
+learner = "(1+1)-es"
+budget = 3
+inherit = "darwinian"
+parameters = {{}}
+[migration]
+topology = "ring"
+epoch = 5
+"""
+"""Two off-line islands that learn in different ways, under a disturbance."""
 
 MIXED = f"""
 name = "mixed"
