@@ -29,8 +29,8 @@ from analysis.progress import bars
 from analysis.render.picture import Simulate
 from analysis.report.page import report
 from analysis.summary import show
-from schema.errors import RunFolderError, counted
-from schema.tables.description import check_folder
+from schema.errors import counted
+from schema.tables.description import check_folder, make_folder
 
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
 _ALWAYS = ("populations", "robots", "extremities")
@@ -62,11 +62,8 @@ def analyze(
     runs = with_distinct_names(found)
     benchmark, not_benchmarks = read_benchmarks(options.runs)
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
-    try:
-        (options.out / FIGURES).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        why = f"cannot be written: {error.strerror}"
-        raise RunFolderError(f"{options.out}: {why}") from None
+    for folder in (options.out, options.out / FIGURES):
+        make_folder(folder)
     _tell_replaced(options.out / REPORT)
     with bars(
         f"measuring {counted(len(runs), 'run')}", *columns, TimeRemainingColumn()

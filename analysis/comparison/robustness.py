@@ -15,7 +15,10 @@ from schema.errors import rounded
 
 Row = dict[str, Any]
 
-_COLUMNS: dict[str, tuple[pa.DataType, str]] = {
+Columns = dict[str, tuple[pa.DataType, str]]
+"""Types and meanings of columns."""
+
+ROBOT: Columns = {
     "experiment": (pa.string(), "name of the experiment"),
     "folder": (pa.string(), "path of the run folder"),
     "island": (pa.int32(), "island of birth"),
@@ -27,28 +30,47 @@ _COLUMNS: dict[str, tuple[pa.DataType, str]] = {
         pa.float64(),
         "fitness alone without changes; null if the evaluation failed",
     ),
-    "group": (pa.string(), "what is changed"),
-    "change": (pa.string(), "the change in words"),
+}
+"""Columns that say which robot is re-evaluated."""
+RESULT: Columns = {
     "fitness": (pa.float64(), "fitness under it; null if the evaluation failed"),
     "share": (pa.float64(), "fitness divided by undisturbed; null if that is not > 0"),
     "failure": (pa.string(), "why an evaluation failed; empty if none did"),
+}
+"""Columns of the result of an evaluation under a change."""
+
+_COLUMNS: Columns = {
+    **ROBOT,
+    "group": (pa.string(), "what is changed"),
+    "change": (pa.string(), "the change in words"),
+    **RESULT,
 }
 
 
 def schema() -> pa.Schema:
     """Return the Arrow schema, with ``meaning`` in each field's metadata."""
+    return schema_of(_COLUMNS)
+
+
+def schema_of(columns: Columns) -> pa.Schema:
+    """Return the Arrow schema of columns, with ``meaning`` in their metadata."""
     return pa.schema(
         [
             pa.field(name, kind, metadata={"meaning": meaning})
-            for name, (kind, meaning) in _COLUMNS.items()
+            for name, (kind, meaning) in columns.items()
         ]
     )
 
 
 def table_of(rows: Iterable[Row]) -> pa.Table:
     """Return the table of some rows, with their shares."""
+    return with_shares(rows, schema())
+
+
+def with_shares(rows: Iterable[Row], columns: pa.Schema) -> pa.Table:
+    """Return the table of some rows, whose shares are computed here."""
     return pa.Table.from_pylist(
-        [{**row, "share": _share(row)} for row in rows], schema()
+        [{**row, "share": _share(row)} for row in rows], columns
     )
 
 
@@ -90,8 +112,8 @@ def summary(table: pa.Table) -> str:
     texts = [_of_best(best)]
     if shares:
         texts.append(
-            f"the last population of {len(last)} keeps {_percent(median(shares))} in "
-            f"the median, {_percent(min(shares))} to {_percent(max(shares))}"
+            f"the last population of {len(last)} keeps {percent(median(shares))} in "
+            f"the median, {percent(min(shares))} to {percent(max(shares))}"
         )
     evaluations = [row for rows in robots.values() for row in rows]
     failed = sum(row["fitness"] is None for row in evaluations)
@@ -109,11 +131,12 @@ def _of_best(rows: Sequence[Row]) -> str:
         return f"the best, {name}, has a fitness of {rounded(undisturbed)} undisturbed"
     least = min((r for r in rows if r["share"] is not None), key=lambda r: r["share"])
     return (
-        f"the best, {name}, keeps {_percent(share)} of its fitness "
-        f"({rounded(undisturbed)}), least {_percent(least['share'])} under "
+        f"the best, {name}, keeps {percent(share)} of its fitness "
+        f"({rounded(undisturbed)}), least {percent(least['share'])} under "
         f"{least['change']}"
     )
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """Return a share as text."""
     return f"{100 * share:.0f} %"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from analysis.figures.bench import arena_speed, spider_speed
+from analysis.figures.brains import changes_over_births
 from analysis.figures.courses import course_caption, over_births
 from analysis.figures.forms import (
     Panels,
@@ -208,17 +209,23 @@ FIGURES: tuple[Figure, ...] = (
            "Mean over the population of each measure that the experiment names. Each "
            "line is an island of a run; units are those of the measure.",
            ("named_measures",), measures_over_births, "measures"),
-    Figure("I", "Learning curves",
+    Figure("I", "Body and brain change over births",
+           "Mean distance between a child and its first parent, the one whose copy was "
+           "changed, by the child's number of birth. Left: bodies, tree edit distance. "
+           "Right: brains, neurons and connections that are new, lost or changed "
+           "(changes count 0 to 1). Thick lines are means over runs, thin lines runs.",
+           ("brains",), changes_over_births, "bodies"),
+    Figure("J", "Learning curves",
            "Best fitness of a newborn so far by trial: the line is the median over all "
            "robots of a run, the band their quartiles, both as means over runs. Trial "
            "0 is the brain at birth; failed trials count 0.",
            ("learning_curves",), learning_curves, "learning"),
-    Figure("J", "Fitness at birth and after learning",
+    Figure("K", "Fitness at birth and after learning",
            "Medians over the newborns of each interval of births, with the brain at "
            "birth and with the best one that they tried; bands are quartiles. The "
            "distance of the lines is what learning gains.",
            ("learning",), learning_gain, "learning"),
-    Figure("K", "Bodies that learning saved",
+    Figure("L", "Bodies that learning saved",
            "Share of newborns that are in the next recorded population, after the "
            "founders. Learning has saved a body if its robot is there although its "
            "fitness at birth is below that of each robot of that population.",

@@ -73,19 +73,22 @@ def family_tree(
     figure = Figure(figsize=(8.0, 8.0 / width * (top + 1.75)))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
+    # As large as the space below a picture allows.
+    size = max(6.5, min(10.0, 90.0 / width))
     for child, parent in relatives.edges:
         _line(axes, spots[child], spots[parent])
     for row, spot in spots.items():
         known = fitness.get(one.births[row])
         text = "" if known is None else f"{known:.3g}"
-        _add_picture(axes, one, row, spot, text=f"{_name(one, row)}  {text}")
+        text = f"{_name(one, row)}  {text}"
+        _add_picture(axes, one, row, spot, text=text, size=size)
     line = top + 0.35
     axes.plot([0, width], [line, line], "--", color=_FAINT, linewidth=0.8)
     for at, row in enumerate(relatives.founders):
         spot = ((at + 0.5) * width / len(relatives.founders), line + 0.35)
         colour = FOUNDERS[min(at, len(FOUNDERS) - 1)]
         text = f"founder {_name(one, row)}"
-        _add_picture(axes, one, row, spot, text=text, colour=colour)
+        _add_picture(axes, one, row, spot, text=text, size=size, colour=colour)
     axes.set_xlim(0, width)
     axes.set_ylim(-0.25, line + 0.35 + _HEIGHT + 0.1)
     axes.set_aspect("equal")
@@ -109,6 +112,7 @@ def _add_picture(
     spot: Spot,
     *,
     text: str,
+    size: float,
     colour: Colour | None = None,
 ) -> None:
     """Put a robot's picture into a figure, with a text below."""
@@ -123,7 +127,7 @@ def _add_picture(
         )
     )  # fmt: skip
     axes.text(
-        x, y - 0.03, text, ha="center", va="top", fontsize=6.5, color=_INK, zorder=4,
+        x, y - 0.03, text, ha="center", va="top", fontsize=size, color=_INK, zorder=4,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
     )  # fmt: skip
 

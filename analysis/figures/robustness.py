@@ -1,5 +1,8 @@
 """Figure of the fitness that robots keep under changes of the simulation."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import plotnine as p9
 import pyarrow as pa
 
@@ -26,8 +29,23 @@ def robustness(table: pa.Table) -> p9.ggplot:
         raise NothingToDraw("no robot has a positive fitness without changes")
     raised = rows["change"].str.contains("higher")
     rows["label"] = rows["change"].where(~raised, "start raised by < 0.2 mm")
+    return points_of_shares(rows, list(dict.fromkeys(rows["label"])), 5.2)
+
+
+def points_of_shares(
+    rows: Any,  # noqa: ANN401 - pandas
+    labels: Sequence[str],
+    height_in: float,
+) -> p9.ggplot:
+    """Return a row of points for each label, and boxes of the last population.
+
+    Args:
+        rows: data frame with ``label``, ``share``, ``is_best`` and ``is_last``; its
+            shares are clipped.
+        labels: from top to bottom.
+        height_in: of the figure [inches].
+    """
     rows["share"] = rows["share"].clip(-_MOST, _MOST)
-    labels = list(dict.fromkeys(rows["label"]))[::-1]
     best = rows[rows["is_best"]].assign(of=_BEST)
     last = rows[rows["is_last"]].assign(of=_LAST)
     figure = p9.ggplot(mapping=p9.aes("label", "share"))
@@ -47,9 +65,9 @@ def robustness(table: pa.Table) -> p9.ggplot:
     return (
         figure
         + p9.scale_fill_manual({_LAST: "#0072B2", _BEST: "#D55E00"}, name="")
-        + p9.scale_x_discrete(limits=labels)
+        + p9.scale_x_discrete(limits=labels[::-1])
         + p9.coord_flip()
         + p9.expand_limits(y=[0, 1])
         + p9.labs(x="", y="fitness divided by fitness without changes")
-        + theme_of_size(5.2)
+        + theme_of_size(height_in)
     )

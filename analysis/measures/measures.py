@@ -79,10 +79,37 @@ def _greatest(run: RunTables, last: Numbers) -> Numbers:
     return greatest
 
 
+def brains(run: RunTables) -> pa.Table:
+    """Return measures of the brains of all robots, in the order of birth.
+
+    Returns:
+        One row per robot, with the columns of ``outputs.OUTPUTS["brains"]`` except the
+        run's.
+    """
+    found = run.brains
+    own = {
+        "body_change": found.body_change,
+        "brain_change": found.varied + found.new + found.lost,
+        "brain_varied": found.varied,
+        "brain_new": found.new,
+        "brain_lost": found.lost,
+        "recurrent": found.recurrent,
+        "sensed": found.sensed,
+    }
+    return pa.table(
+        {
+            "birth_island": run.births["island"],
+            "birth": run.births["birth"],
+            **{name: pa.array(each, from_pandas=True) for name, each in own.items()},
+        }
+    )
+
+
 _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
     "robots": (robots, _OF_ROBOTS),
     "extremities": (lambda run: extremity_bins(robots(run)), _OF_ROBOTS),
     "families": (families, ("births", "population")),
+    "brains": (brains, ("births",)),
     "variability": (lambda run: variability(run.tables["fitness"]), ("fitness",)),
     "interactions": (
         lambda run: interactions(
@@ -125,7 +152,7 @@ def measure(
     found = {}
     found["populations"], problems = populations(run)
     for name, (function, needed) in _OTHERS.items():
-        if name not in {"robots", "extremities", "families"} | wanted:
+        if name not in {"robots", "extremities", "families", "brains"} | wanted:
             continue
         missing = [table for table in needed if table in unread]
         if missing:

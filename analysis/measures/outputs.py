@@ -58,6 +58,8 @@ POPULATION = {
     "without_touch": "share of judged robots without touch sensors",
     "one_touch": "share of judged robots with one touch sensor",
     "two_touch": "share of judged robots with two or more touch sensors",
+    "recurrent": "mean of judged robots: share of weight that lies on cycles",
+    "sensed": "mean of judged robots: share of motors that a sensor can influence",
 }
 """Measures of a population at a number of births."""
 
@@ -144,6 +146,20 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "bin": "number of extremities, or lower end of a bin of width 0.1",
         "robots": "number of robots in the bin",
         "fitness": "mean fitness of the bin",
+    },
+    "brains": {
+        **_RUN,
+        **_ROBOT,
+        "body_change": "tree edit distance to the first parent; null for founders",
+        "brain_change": "neurons and connections that are new or lost, and the sum of "
+        "the changes of all others, 0..1 each, against the first parent; null for "
+        "founders and for parts without identity",
+        "brain_varied": "part of brain_change: the sum of the changes",
+        "brain_new": "part of brain_change: new neurons and connections",
+        "brain_lost": "part of brain_change: lost neurons and connections",
+        "recurrent": "share of the weight of connections that lies on cycles; "
+        "connections to oscillators, which ignore them, are left out",
+        "sensed": "share of motors that a sensor can influence",
     },
     "variability": {
         **_RUN,

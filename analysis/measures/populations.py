@@ -87,6 +87,12 @@ def _means(run: RunTables) -> Columns:
     return {name: _mean(run, values) for name, values in of_births.items()}
 
 
+def _brains(run: RunTables) -> Columns:
+    """Return means of measures of brains."""
+    own = {"recurrent": run.brains.recurrent, "sensed": run.brains.sensed}
+    return {name: _mean(run, values) for name, values in own.items()}
+
+
 def _mean(run: RunTables, values: Numbers) -> Numbers:
     """Return each population's mean of one value per birth; unevaluated are ignored."""
     table = run.population_table
@@ -94,7 +100,8 @@ def _mean(run: RunTables, values: Numbers) -> Numbers:
 
 
 _POPULATION: tuple[Callable[[RunTables], Columns], ...] = (
-    _fitness, _ancestors, _diversity, _retention, _foreign, _means
+    _fitness, _ancestors, _diversity, _retention, _foreign, _means,
+    _brains,
 )  # fmt: skip
 
 

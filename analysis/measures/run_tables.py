@@ -7,6 +7,7 @@ import pyarrow as pa
 
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import body_sizes
+from analysis.measures.brains.measures import Brains, brain_measures
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
@@ -62,3 +63,8 @@ class RunTables:
     def sizes(self) -> dict[str, Numbers]:
         """Sizes of each individual."""
         return body_sizes(self.births)
+
+    @cached_property
+    def brains(self) -> Brains:
+        """Measures of each individual's brain."""
+        return brain_measures(self.births, self.parents, self.trees)

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
+from math import comb
 from typing import Any
 
 import pyarrow as pa
@@ -21,6 +22,8 @@ _COMPARED = {
     "fitness": "Difference of mean fitness",
     "fitness_best": "Difference of best fitness",
 }
+_LEVEL = 0.05
+"""Greatest p of a difference that counts as shown."""
 _SURE = 2
 """Runs of both experiments from which on their difference has an interval."""
 
@@ -48,7 +51,7 @@ def differences(tables: Tables) -> str:
         '<p class="note">Dot: difference of the means over finished runs. Bar: its '
         "95 % interval (Welch's t, which is about means). p: exact rank-sum test, "
         "which is about how often a run of one experiment is fitter than one of the "
-        "other; with few runs the two can disagree, and then nothing is certain. The "
+        "other. A difference is shown if the interval excludes 0 and p < 0.05. The "
         'meaning of all columns is in <a href="#comparison">Comparison</a>.</p>'
     )
     return "".join(parts) + apart + note
@@ -115,13 +118,24 @@ def _difference(row: Row, reach: float) -> str:
         )
         verdict = "the interval includes 0: these runs do not tell which is fitter"
         if low > 0 or high < 0:
-            higher = row["a"] if low > 0 else row["b"]
-            verdict = f"{label(higher)} is fitter: the interval excludes 0"
+            verdict = _verdict(row, label(row["a"] if low > 0 else row["b"]))
     return (
         f'<div class="difference"><p>{a} minus {b}: {text}<br>'
         f'<span class="verdict">{escape(verdict)}</span></p>'
         f"{_bar(row['difference'], both, reach)}</div>"
     )
+
+
+def _verdict(row: Row, higher: str) -> str:
+    """Return what both tests say together, if the interval excludes 0."""
+    if row["p"] < _LEVEL:
+        return f"{higher} is fitter: the interval excludes 0, and p < {_LEVEL:g}"
+    verdict = f"undecided: the interval excludes 0, but p is not below {_LEVEL:g}"
+    least = 2.0 / comb(row["runs_a"] + row["runs_b"], row["runs_a"])
+    if least < _LEVEL:
+        return verdict
+    counts = f"{row['runs_a']} and {plural(row['runs_b'], 'run')}"
+    return f"{verdict}; with {counts} it cannot be below {number(least)}"
 
 
 def _bar(value: float, both: tuple[float, float] | None, reach: float) -> str:

@@ -14,6 +14,7 @@ from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import by_function, functions_of
 from analysis.report.html import legend
 from analysis.report.plots import Axes, band, dot, line, painted, plot, with_margin
+from schema.errors import counted
 
 Tables = Mapping[str, pa.Table]
 Row = Mapping[str, Any]
@@ -23,6 +24,8 @@ _MANY_RUNS = 40
 _MOST_DOTS = 3000
 _NAME, _NAMED = 14, 3
 """Characters of names along an axis, and their number; others are in a legend."""
+_COLUMNS = 4
+"""Number of runs for which columns have room; fewer runs have no wider ones."""
 
 
 class RunName(NamedTuple):
@@ -176,8 +179,9 @@ def _dots(
 
 def _described(row: Row, fitness: float) -> str:
     return (
-        f"fitness {fitness:.3g}; {row['parts']} parts, "
-        f"{row['active_joints']} motors, {row['hidden']} hidden neurons"
+        f"fitness {fitness:.3g}; {counted(row['parts'], 'part')}, "
+        f"{counted(row['active_joints'], 'motor')}, "
+        f"{counted(row['hidden'], 'hidden neuron')}"
     )
 
 
@@ -223,10 +227,10 @@ def _columns(
     for row in living.to_pylist():
         by_run.setdefault(row["folder"], []).append(row)
     marks = []
-    width = 0.8 / len(by_run)
+    width = 0.8 / max(len(by_run), _COLUMNS)
     for at, (folder, rows) in enumerate(by_run.items()):
         name = names[folder]
-        middle = place + 0.1 + width * (at + 0.5)
+        middle = place + 0.5 + width * (at - 0.5 * (len(by_run) - 1))
         for count, row in enumerate(rows):
             aside = width * 0.6 * ((count * 0.618) % 1 - 0.5)
             text = f"robot {row['birth_island']}:{row['birth']}, {name}"

@@ -43,15 +43,16 @@ _COURSES = (
     ),
 )
 _COURSES_OF_ARENAS = (
-    " In arenas lines are means of the windows at each number of births, and each dot "
-    "is at the best window of its robot, which may be long after its birth."
+    " In arenas lines are means of the windows at each number of births. Each dot is "
+    "at the birth of its robot; its height is the robot's greatest fitness at any "
+    "later birth."
 )
 _LAST = (
     "6.2",
     "Fitness of the last populations",
     (
-        "Each dot is a robot of a last population, each column of dots a run; short "
-        "bars are the means of runs."
+        "Each dot is a robot of a last population, each column of dots a run; bars are "
+        "the means of runs."
     ),
 )
 """Number of the figure, title and text of the interactive plots."""

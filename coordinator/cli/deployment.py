@@ -13,6 +13,7 @@ from coordinator.network.service import Network
 from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.live_server import open_viewer
 from coordinator.storage.disk import replace_text
+from coordinator.storage.hints import keep_flags
 from schema.agent.access import Certificate
 from schema.agent.address import ADDRESS
 from schema.agent.log import tell_user
@@ -86,6 +87,7 @@ def connected_agents(
     Yields:
         The connection, and the process pools that need regular supervision.
     """
+    keep_flags(folder, deployment.resume_flags)
     if deployment.answers is not None:
         yield LocalAgents(deployment.answers, platform_tag()), []
         return

@@ -20,6 +20,7 @@ from coordinator.run.session import RunSession
 from schema.agent.log import tell_user, warn_user
 from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
+from schema.plugins.permission import allowed
 from schema.wire.status import RunStatus, Status
 
 _LOG = logging.getLogger(__name__)
@@ -77,8 +78,11 @@ def execute_runs(
         stack.callback(scheduler.close)
         server = None if network is None else _Server(scheduler, network)
         place = _place_to_join(folder, deployment)
-        with Display(scheduler, quiet=deployment.quiet, place=place) as display:
+        with Display(
+            scheduler, quiet=deployment.quiet, place=place, plugins=allowed()
+        ) as display:
             shown_s = done_s = -math.inf
+            exits = 0
             while not (scheduler.is_finished or stop.is_set()):
                 scheduler.turn(_TURN_S, time.monotonic)
                 now_s = time.monotonic()
@@ -96,6 +100,12 @@ def execute_runs(
                     _tell_faults(scheduler)
                     for pool in pools:
                         pool.look_after()
+                    if sum(pool.exits for pool in pools) > exits:
+                        exits = sum(pool.exits for pool in pools)
+                        warn_user(
+                            "a worker or analyzer process of this run ended outside a "
+                            "job, for the reason that it wrote above; it is restarted"
+                        )
             if server is not None:
                 server.serve(time.monotonic())
         scheduler.stop()

@@ -1,6 +1,7 @@
 """Progress of a coordinator's runs on the terminal: bars, or lines in a log."""
 
 import math
+from collections.abc import Sequence
 from typing import Self
 
 from rich.console import Console
@@ -26,6 +27,7 @@ from coordinator.run.session import SPAN_S
 from coordinator.storage.hints import command
 from schema.agent.log import log_form, tell_user, warn_user
 from schema.errors import counted
+from schema.plugins.permission import FLAG
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
@@ -46,6 +48,7 @@ class Display:
         quiet: bool,
         console: Console | None = None,
         place: str = "",
+        plugins: Sequence[str] = (),
     ) -> None:
         """Show all runs of a scheduler; if ``quiet``, only what they wait for.
 
@@ -55,11 +58,13 @@ class Display:
             console: where to draw; None: on standard error.
             place: to which the user has to connect agents; empty: this command has
                 started some.
+            plugins: modules and files that these agents need to import.
         """
         self._scheduler = scheduler
         self._console = console or Console(stderr=True)
         self._quiet = quiet
         self._place = place
+        self._flags = [word for each in plugins for word in (FLAG, each)]
         self._patience_s = _SOON_S if place and not quiet else SPAN_S
         # Bars would break lines of JSON.
         self._has_bars = self._console.is_terminal and log_form() != "json"
@@ -71,6 +76,7 @@ class Display:
         )
         self._tasks: dict[str, TaskID] = {}
         self._next_line_s = -math.inf
+        self._missing: list[str] = []
         self._missing_since_s: float | None = None
         self._shown_waiting: dict[str, str] = {}
 
@@ -144,13 +150,13 @@ class Display:
         missing = missing_agents(status)
         if not missing:
             self._missing_since_s = None
-        elif self._missing_since_s is None:
-            self._missing_since_s = now_s
+        elif self._missing_since_s is None or missing != self._missing:
+            self._missing, self._missing_since_s = missing, now_s
         elif now_s - self._missing_since_s > self._patience_s:
             self._missing_since_s = now_s + 6 * SPAN_S
             line = f"waiting for {' and '.join(missing)}: none has joined"
             starts = [
-                command(kind.removesuffix("s"), "--connect", self._place)
+                command(kind.removesuffix("s"), "--connect", self._place, *self._flags)
                 for kind in missing
             ]
             how = f"; to start some on this machine: {', '.join(starts)}"

@@ -20,7 +20,7 @@ from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, is_campaign, read_campaign
 from coordinator.storage.folder import EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
-from coordinator.storage.hints import command
+from coordinator.storage.hints import resume_command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, read_holder
 from schema.agent.address import read_address
@@ -261,7 +261,7 @@ def _without_coordinator(status: Status, root: Path | None) -> str:
     if any(run.state == "running" for run in status.runs):
         return "the coordinator does not answer"
     if root is not None and (is_campaign(root) or holds_run(root)):
-        return f"no coordinator is running; to continue: {command('resume', root)}"
+        return f"no coordinator is running; to continue: {resume_command(root)}"
     return "no coordinator is running"
 
 

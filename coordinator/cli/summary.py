@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from coordinator.arena.arena import Arena
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
+from schema.agent.screen import missing_screen
 from schema.errors import counted, rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
@@ -62,7 +63,8 @@ def next_steps(folder: Path) -> list[str]:
     """Return commands that show the results; those of the viewer if it is installed."""
     best, steps = folder / BEST, [command("analyze", folder)]
     if find_spec("rerun") is not None:
-        steps.insert(0, command("view", folder))
+        saved = ("--save", "run.rrd") if missing_screen() else ()
+        steps.insert(0, command("view", folder, *saved))
     elif best.exists():
         steps.insert(0, command("robot", "show", best))
     if best.exists():

@@ -1,4 +1,4 @@
-"""Random genomes, and the random parts that mutation adds.
+"""Random genomes, random brains, and the random parts that mutation adds.
 
 Source: Hupkes 2016, section 4.4.2; the code of the original. Two of its errors are
 avoided: no robot has fewer parts than the experiment allows, and every part has its own
@@ -17,6 +17,7 @@ from coordinator.evolution.mutable_genome import (
     level,
     preorder,
     size_of,
+    to_branches,
     to_genome,
 )
 from coordinator.evolution.random_streams import BufferedRng
@@ -24,9 +25,10 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import COLOURS, BodySpace, PartType
 from schema.plugins.protocols import BrainGenes
-from schema.robot.genome import Genome
+from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
-from schema.robot.robot import ORIENTATIONS
+from schema.robot.inverse_development import genome_of
+from schema.robot.robot import ORIENTATIONS, Robot
 
 Place = tuple[MutableGenome, int]
 """A branch and one of its slots."""
@@ -68,6 +70,28 @@ def generate(
         f"space.min_parts = {least} parts: the restrictions and "
         f"part types {experiment.space.part_types} allow (nearly) no robot"
     )
+
+
+def random_brain(
+    rng: np.random.Generator, robot: Robot, experiment: Experiment
+) -> Robot:
+    """Return a robot with another brain, drawn as those of random robots.
+
+    Each motor gets a random neuron, then the brain type adds hidden neurons and
+    connections. The body stays as it is.
+
+    Args:
+        rng: the stream to draw from.
+        robot: of the experiment.
+        experiment: brain type, restrictions, probabilities.
+    """
+    draws, brain = BufferedRng(rng), brain_genes(experiment)
+    types = body_space(experiment.space)
+    branches = to_branches(genome_of(Robot(robot.parts)), types)
+    for branch in branches:
+        branch.outputs = brain.outputs(draws, branch.kind)
+    brain.grow(draws, branches, branches, brain_rules(experiment))
+    return develop(to_genome(branches), types)
 
 
 def _random_body(

@@ -41,6 +41,7 @@ class Purpose(IntEnum):
     REPLACED = 9
     IMMIGRANT_PLACE = 10
     LEARNING = 14
+    OTHER_BRAIN = 20
 
 
 def stream(

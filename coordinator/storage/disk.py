@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from schema.errors import RunFolderError
-from schema.tables.description import check_folder
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -153,18 +152,6 @@ def _sync(path: Path, flags: int) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def make_folder(path: Path) -> None:
-    """Make a folder and those above it, unless it is there.
-
-    Raises:
-        RunFolderError: a file is in its place, or the disk refuses it.
-    """
-    if path.exists():
-        check_folder(path)
-    with storage_errors(path):
-        path.mkdir(parents=True, exist_ok=True)
 
 
 @contextlib.contextmanager

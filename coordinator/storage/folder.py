@@ -19,7 +19,6 @@ from typing import Self
 from msgspec import structs
 
 from coordinator.storage.disk import (
-    make_folder,
     replace_durably,
     replace_text,
     storage_errors,
@@ -38,6 +37,7 @@ from schema.tables.description import (
     Description,
     State,
     description_text,
+    make_folder,
     read_description,
     read_small,
 )

@@ -4,6 +4,15 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+from coordinator.storage.disk import replace_text
+from schema.errors import RunFolderError
+from schema.limits import printable_line
+from schema.tables.description import read_small
+
+FLAGS = "flags"
+"""File of a run or campaign folder: flags with which it has the same agents again."""
+_LONGEST = 4096
+
 
 def command(*words: object) -> str:
     """Return a ``revolve`` command, quoted for a shell."""
@@ -18,3 +27,24 @@ def stopped(folder: Path, flags: Sequence[str] = ()) -> str:
         flags: with which ``revolve resume`` has the same agents again.
     """
     return f"stopped; to resume: {command('resume', folder, *flags)}"
+
+
+def keep_flags(folder: Path, flags: Sequence[str]) -> None:
+    """Keep the flags of ``stopped`` for ``resume_command``, a word in each line.
+
+    Raises:
+        RunFolderError: the disk is full or failed.
+    """
+    replace_text(folder / FLAGS, "".join(f"{word}\n" for word in flags))
+
+
+def resume_command(folder: Path) -> str:
+    """Return the command that resumes a run or campaign with the same agents.
+
+    Runs of earlier versions have kept no flags.
+    """
+    try:
+        words = read_small(folder / FLAGS, _LONGEST).decode().splitlines()
+    except (FileNotFoundError, RunFolderError, UnicodeDecodeError):
+        words = []
+    return command("resume", folder, *map(printable_line, words))

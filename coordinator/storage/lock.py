@@ -8,9 +8,10 @@ import time
 from pathlib import Path
 from typing import Self
 
-from coordinator.storage.disk import make_folder, storage_errors
+from coordinator.storage.disk import storage_errors
 from schema.errors import RunFolderError
 from schema.limits import printable
+from schema.tables.description import make_folder
 
 LOCK = "lock"
 

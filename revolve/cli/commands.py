@@ -23,6 +23,7 @@ COMMANDS = {
     "view": ("analysis.__main__", "view a run, live or from its tables"),
     "analyze": ("analysis.__main__", "compute measures, figures and a report"),
     "robustness": ("revolve.cli.robustness", "re-evaluate a run under changes"),
+    "ablate": ("revolve.cli.ablate", "re-evaluate a run without sensors or motors"),
     "completion": ("revolve.cli.completion", "print a completion script for a shell"),
     "bench": ("worker.__main__", "benchmark this machine"),
     "bench dispatch": (_COORDINATOR, "benchmark the coordinator"),

@@ -27,6 +27,7 @@ HUB = "hub"
 """Short form of the address of this user's hub on this machine."""
 FORMS = "tcp/HOST:PORT, tls/HOST:PORT, unixsock-stream/PATH or hub"
 
+_PROTOCOLS = ("tcp", "tls")
 _ADDRESS = re.compile(r"(tcp|tls)/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):(\d{1,5})")
 _SOCKET = re.compile(rf"{UNIX}/(/[!-~]+)")
 _LAST_PORT = 65535
@@ -163,7 +164,8 @@ def hub_of(place: str) -> str:
     if place == HUB:
         return user_hub()
     folder = Path(place)
-    if "/" not in place or folder.is_dir():
+    is_address = place.startswith(tuple(f"{name}/" for name in (*_PROTOCOLS, UNIX)))
+    if folder.is_dir() or not is_address:
         return read_address(folder)
     parse_address(place)
     return place
@@ -179,7 +181,10 @@ def read_address(folder: Path) -> str:
     """
     file = folder / ADDRESS
     if not folder.is_dir():
-        raise NetworkError(f"must be {FORMS}, or a run folder, got {str(folder)!r}")
+        raise NetworkError(
+            f"must be {FORMS}, or the folder of an active run; no such folder: "
+            f"{str(folder)!r}"
+        )
     try:
         with file.open("rb") as source:
             lines = source.read(_LONGEST_FILE).decode("ascii").split()

@@ -136,7 +136,8 @@ class HubWatch:
             self._lost_s, self._has_been_there = None, True
         elif self._lost_s is None:
             self._lost_s = now_s
-            self.warn(f"no hub at {self.address}; retrying; press Ctrl-C to stop")
+            gone = " (it ended, or the network is down)" if self._has_been_there else ""
+            self.warn(f"no hub at {self.address}{gone}; retrying; press Ctrl-C to stop")
         elif now_s - self._lost_s >= self.give_up_after_s:
             raise HubLost(gave_up(self.address, self.give_up_after_s))
 

@@ -91,6 +91,7 @@ class ProcessPool:
 
     Attributes:
         restarts: number of restarts.
+        exits: number of processes that exited by themselves outside a job.
         deaths: of the processes that their jobs crashed.
     """
 
@@ -108,6 +109,7 @@ class ProcessPool:
         self._codes: list[int | None] = [None] * size
         self._until_s: float | None = None
         self.restarts = 0
+        self.exits = 0
         self.deaths: list[Death] = []
 
     def __enter__(self) -> Self:
@@ -153,6 +155,7 @@ class ProcessPool:
         slot.note.end()
         if task is None and code >= 0:
             self._codes[index] = code
+            self.exits += 1
             if now_s - self._started_s[index] > _LONGEST_REST_S:
                 self._rests_s[index] = _BETWEEN_STARTS_S
             self._due_s[index] = now_s + self._rests_s[index]

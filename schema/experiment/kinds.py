@@ -5,6 +5,7 @@ Each room lists its kinds; the commands put the lists together.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -16,6 +17,7 @@ from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
 from schema.plugins.load import load_instance, load_object
 from schema.plugins.origin import where_defined, where_raised
+from schema.plugins.part_checks import advise_slots
 from schema.plugins.sensor_checks import check_sensor
 from schema.robot.neurons import BUILT_IN_NEURONS
 
@@ -115,7 +117,8 @@ def _part_type(path: str) -> Use:
         core = () if kind.is_root else ("schema.parts:CORE",)
         body_space(Space(part_types=(*core, path)))
 
-    return Use(key, path, lambda: load_instance(path, key, PartType), check)
+    load = partial(load_instance, path, key, PartType)
+    return Use(key, path, load, check, advise_slots)
 
 
 def _part_types(experiment: Experiment) -> Iterator[Use]:

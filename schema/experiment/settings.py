@@ -8,6 +8,7 @@ import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
+from schema.experiment.ablation import Ablation
 from schema.experiment.calibration import Calibration
 from schema.experiment.document import (
     NETWORK,
@@ -57,9 +58,9 @@ class VettingSettings(Section, frozen=True):
 
 
 class EvaluationSettings(Section, frozen=True):
-    """Settings of an evaluation request."""
+    """Settings of an evaluation request; an experiment has all but ``ablation``."""
 
-    later: ClassVar = ("measures", "brain", "robust", "calibration")
+    later: ClassVar = ("measures", "brain", "robust", "calibration", "ablation")
 
     space: Space
     simulation: Simulation
@@ -69,6 +70,7 @@ class EvaluationSettings(Section, frozen=True):
     brain: BrainSection = NETWORK
     robust: Robust | None = None
     calibration: tuple[Calibration, ...] = ()
+    ablation: Ablation | None = None
 
     @property
     def light(self) -> Vector | None:

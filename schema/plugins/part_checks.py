@@ -22,6 +22,8 @@ from schema.plugins.sensor_checks import check_sensor
 
 _ROUNDING = 1e-6
 """Greatest deviation of a length from 1, and of a cosine from 0."""
+_OFF_SURFACE_M = 0.001
+"""Distance of a slot from the surface above which it gets a warning."""
 _MOST_TOGETHER = 8
 """Most parameters of which all combinations of extreme values are tried."""
 _KINDS = ("imu", "touch", "light")
@@ -73,6 +75,43 @@ def check_slot_directions(kind: PartType, where: str = "part type") -> None:
             at = f"slots[{number}]"
             if problem := next(_direction_problems(slot, shape.boxes, at), ""):
                 raise _refusal(kind, where, problem)
+
+
+def advise_slots(kind: PartType) -> str:
+    """Return a warning if a slot is not on the surface of its part, or nothing.
+
+    Args:
+        kind: a consistent part type.
+    """
+    for values in _extremes(kind):
+        shape = kind.shape(values)
+        for number, slot in enumerate(shape.slots):
+            away_m = _distance_from_surface(slot, shape.boxes)
+            if away_m > _OFF_SURFACE_M:
+                return (
+                    f"slots[{number}].position is {1000 * away_m:.3g} mm from the "
+                    f"surface of the boxes of segment {slot.segment}: attached parts "
+                    "float or sink by as much"
+                )
+    return ""
+
+
+def _distance_from_surface(slot: Slot, boxes: Sequence[Box]) -> float:
+    """Return how far a slot is from the nearest surface of its segment's boxes [m].
+
+    Within a box its nearest face counts, hidden or not. 0 if the segment has no box. A
+    cylinder counts as the box around it.
+    """
+    outside, inside = math.inf, 0.0
+    for box in boxes:
+        if box.segment != slot.segment:
+            continue
+        turn = np.array(box.rotation, dtype=np.float64).T
+        place = turn @ np.subtract(slot.position, box.position)
+        beyond = abs(place) - np.array(box.size) / 2.0
+        outside = min(outside, float(np.linalg.norm(np.maximum(beyond, 0.0))))
+        inside = max(inside, -float(beyond.max()))
+    return outside if 0.0 < outside < math.inf else inside
 
 
 def _refusal(kind: PartType, where: str, problem: str) -> ExperimentError:

@@ -101,6 +101,21 @@ def check_folder(folder: Path) -> None:
         raise RunFolderError(f"{folder}: must be a folder, got a file")
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, unless it is there.
+
+    Raises:
+        RunFolderError: a file is in its place, or the disk refuses it.
+    """
+    if path.exists():
+        check_folder(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = f"cannot be written: {error.strerror or error}"
+        raise RunFolderError(f"{path}: {why}") from None
+
+
 def run_columns(folder: Path) -> dict[str, int | str | None]:
     """Return the columns of tables that are the same in all rows of a run.
 

@@ -13,6 +13,7 @@ from docs.reference_pages import PAGES
 from docs.struct_tables import attributes, rows
 from revolve.cli.commands import COMMANDS
 from revolve.cli.parsers import parser_of
+from schema.experiment.ablation import Ablation
 from schema.experiment.document import Experiment
 from schema.experiment.section import PluginSection, Section
 from schema.experiment.settings import (
@@ -43,7 +44,9 @@ _INNER = ("Origin", "Range")
 
 def _sections(base: type[Section] = Section) -> Iterator[type[Section]]:
     """Yield the sections that users write; the others are parts of requests."""
-    others = (PluginSection, VettingSettings, EvaluationSettings, ArenaSettings)
+    others = (
+        PluginSection, VettingSettings, EvaluationSettings, ArenaSettings, Ablation
+    )  # fmt: skip
     for found in base.__subclasses__():
         in_document = found.__module__.startswith("schema.experiment.")
         if in_document and found not in others and found.__name__ not in _INNER:

@@ -131,7 +131,7 @@ def test_agents_do_not_outlive_their_command() -> None:
 @pytest.mark.parametrize(
     ("flags", "complaint"),
     [
-        ("--connect here", "or a run folder, got 'here'"),
+        ("--connect here", "active run; no such folder: 'here'"),
         ("--connect tls/h:1", "needs --tls-ca, --tls-certificate and --tls-key"),
         ("--connect tls/h:1 --tls-ca x", "--tls-ca: no such file: x"),
         ("--connect tcp/h:1 --processes 0", "must be a whole number >= 1, got '0'"),

@@ -149,7 +149,7 @@ def test_a_file_as_output_folder_is_refused(
 ) -> None:
     (workspace.folder / "file").write_text("mine")
     output = workspace.run("analyze", str(undisturbed), "--out", "file", code=2)
-    assert output == "revolve: file: cannot be written: Not a directory\n"
+    assert output == "revolve: file: must be a folder, got a file\n"
     assert (workspace.folder / "file").read_text() == "mine"
 
 

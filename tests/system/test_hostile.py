@@ -114,7 +114,13 @@ def outcome(
             told[name] = pool.submit(process.communicate)
         if messages:
             # Without an analyzer but the false ones, the run goes on for as long.
-            wait_until(half.exists, "half of the messages are sent", patience_s=3000.0)
+            client = told["client"]
+            wait_until(
+                lambda: half.exists() or client.done(),
+                "half of the messages are sent",
+                patience_s=3000.0,
+            )
+            assert not client.done(), client.result()
         fleet.join("judge", "analyzer")
         processes["judge"] = fleet.agents["judge"]
         told["judge"] = pool.submit(fleet.agents["judge"].communicate)

@@ -250,7 +250,10 @@ def test_a_lost_hub_is_told_once_and_its_return(
     for process in agents:
         assert said(process.stderr.readline()) == [f"connected to {place}"]
     first.terminate()
-    lost = f"no hub at {place}; retrying; press Ctrl-C to stop"
+    lost = (
+        f"no hub at {place} (it ended, or the network is down); retrying; press Ctrl-C "
+        "to stop"
+    )
     for process in (coordinator, *agents):
         assert said(process.stderr.readline()) == [lost]
     second = hub()

@@ -10,6 +10,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 
 from schema.errors import (
     FitnessUndefined,
@@ -26,6 +27,7 @@ from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.measures.functions import measures_of
+from worker.robot.ablation import Ablated
 from worker.robot.brains import controls_of
 from worker.robot.calibration import Calibrated
 from worker.robot.disturbances import combined, disturbances
@@ -122,8 +124,43 @@ def simulate(
         SensorFailed: a sensor of a plug-in raised or gave wrong values.
         ExperimentError: a sensor that has no stimulus in this environment, or an
             unknown fitness function or measure.
-        InvalidRobot: more neurons than the limits.
+        InvalidRobot: more neurons than the limits, or an ablation of another robot.
     """
+    means: tuple[float, ...] = ()
+    if settings.ablation is not None and settings.ablation.has_means:
+        means = mean_inputs(robot, replace(settings, ablation=None), identity)
+    return _run(_loop(robot, settings, identity, means), watch)
+
+
+@lru_cache(maxsize=4)
+def mean_inputs(
+    robot: Robot, settings: EvaluationSettings, identity: Identity = NO_IDENTITY
+) -> tuple[float, ...]:
+    """Return the mean of each input of a brain over all ticks of an evaluation, (I,).
+
+    Inputs are what the brain receives: readings after calibration and noise.
+
+    Args:
+        robot: a checked robot.
+        settings: as for ``simulate``.
+        identity: of the evaluation.
+
+    Raises:
+        RevolveError: as for ``simulate``.
+    """
+    loop = _loop(robot, settings, identity)
+    rows: list[list[float]] = []
+    _run(loop, lambda _data: rows.append(loop.inputs[0].tolist()))
+    return tuple(np.mean(rows, axis=0).tolist())
+
+
+def _loop(
+    robot: Robot,
+    settings: EvaluationSettings,
+    identity: Identity,
+    means: tuple[float, ...] = (),
+) -> "_ControlLoop":
+    """Return the control loop of a robot; ``means`` are those of ``mean_inputs``."""
     silence_engine()
     clock, space = settings.simulation, body_space(settings.space)
     try:
@@ -131,10 +168,21 @@ def simulate(
     except ValueError as error:
         raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
     loop = _ControlLoop(robot, settings, model, identity)
+    if settings.ablation is not None:
+        loop.ablated = Ablated(settings.ablation, robot, means)
+    return loop
+
+
+def _run(loop: "_ControlLoop", watch: Watch | None) -> Trace:
+    """Return the trace of a loop that has not run.
+
+    Raises:
+        SimulationDiverged: also if the engine cannot continue, for example when
+            contacts exceed its memory.
+    """
     try:
         return loop.run(watch)
     except mujoco.FatalError as error:
-        # The engine cannot continue, for example when contacts exceed its memory.
         raise SimulationDiverged(
             f"physics diverged by {loop.data.time:.3f} s: {one_line(error)}"
         ) from None
@@ -145,6 +193,8 @@ class _ControlLoop:
 
     Attributes:
         data: the engine's state.
+        inputs: (1, I) what the brain received at the last tick; unused inputs left out.
+        ablated: held inputs and dead motors; None if all work.
     """
 
     def __init__(
@@ -182,6 +232,7 @@ class _ControlLoop:
                 robot, types, settings.calibration, tick_s=self._tick_s, width=width
             )
             further = self._calibrated.noise
+        self.ablated: Ablated | None = None
         self._noise: Noise | None = None
         if simulation.sensor_noise or simulation.actuator_noise or further:
             source = NoiseSource(simulation, width, identity.origin, further)
@@ -191,12 +242,12 @@ class _ControlLoop:
             environment = settings.environment
             self._pushes = Pushes(environment, simulation, identity, model, self.data)
         inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
-        self._inputs = self._controller.readings[:, :inputs]
+        self.inputs = self._controller.readings[:, :inputs]
         self._channels = Channels(robot, model, settings)
         self._recorder: Recorder | None = None
         if self._channels.names:
             self._recorder = Recorder(self._channels, robot, model, self.data)
-            self._recorder.readings = self._inputs
+            self._recorder.readings = self.inputs
 
     def run(self, watch: Watch | None) -> Trace:
         """Step warm-up and window, and return the trace of the window."""
@@ -259,22 +310,28 @@ class _ControlLoop:
         tick = step // self._simulation.brain_steps
         if self._pushes is not None:
             self._pushes.apply(tick)
-        noise, calibrated = self._noise, self._calibrated
-        if noise is None and calibrated is None:
+        if self._noise is None and self._calibrated is None and self.ablated is None:
             self._servos.drive(self._controller.step(tick))
             return
         if self._recorder is not None:
-            self._recorder.readings = self._inputs.copy()
+            self._recorder.readings = self.inputs.copy()
+        self._servos.drive(self._disturbed(tick))
+
+    def _disturbed(self, tick: int) -> Floats:
+        """Update the controller with disturbed readings; return disturbed outputs."""
+        noise, calibrated, ablated = self._noise, self._calibrated, self.ablated
         if calibrated is not None:
-            self._inputs[:] = calibrated.readings(self._inputs)
+            self.inputs[:] = calibrated.readings(self.inputs)
         if noise is not None:
-            self._inputs[:] = noise.perturb_readings(tick, self._inputs)
+            self.inputs[:] = noise.perturb_readings(tick, self.inputs)
+        if ablated is not None:
+            ablated.hold(self.inputs)
         outputs = self._controller.step(tick)
         if calibrated is not None:
             outputs = calibrated.outputs(outputs)
         if noise is not None:
             outputs = noise.perturb_outputs(tick, outputs[np.newaxis])[0]
-        self._servos.drive(outputs)
+        return outputs if ablated is None else ablated.outputs(outputs)
 
     def _read_light(self) -> None:
         if self._light is not None:

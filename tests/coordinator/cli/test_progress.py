@@ -78,16 +78,40 @@ def test_a_run_without_agents_says_how_to_start_some(
     scheduler: Any = SimpleNamespace(active=[], status=lambda _now_s: status)
     waiting = "waiting for workers and analyzers: none has joined"
     how = (
-        "; to start some on this machine: revolve worker --connect runs/a, revolve "
-        "analyzer --connect runs/a\n"
+        "; to start some on this machine: revolve worker --connect runs/a --plugins "
+        "own.py, revolve analyzer --connect runs/a --plugins own.py\n"
     )
     for place, seconds, told in (
         ("runs/a", (0.0, 3.0, 30.0), f"{waiting}{how}"),
         ("", (0.0, 3.0), ""),
         ("", (0.0, 11.0), f"{waiting}\n"),
     ):
-        with Display(scheduler, quiet=is_quiet, place=place) as display:
+        with Display(
+            scheduler, quiet=is_quiet, place=place, plugins=["own.py"]
+        ) as display:
             for now_s in seconds:
                 display.update(now_s)
         lines = capsys.readouterr().err.splitlines(keepends=True)
         assert "".join(line for line in lines if "waiting" in line) == told
+
+
+def test_a_run_that_misses_others_than_before_says_so_again(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    run = RunStatus("/r", "a", 0, "running", 0.0, (_ISLAND,))
+    shown_status = [Status((run,), workers=0, analyzers=0, births_per_s=0.0)]
+    scheduler: Any = SimpleNamespace(active=[], status=lambda _now_s: shown_status[0])
+    with Display(scheduler, quiet=False, place="runs/a") as display:
+        display.update(0.0)
+        display.update(3.0)
+        shown_status[0] = Status((run,), workers=1, analyzers=0, births_per_s=0.0)
+        display.update(6.0)
+        display.update(9.0)
+    lines = capsys.readouterr().err.splitlines()
+    waiting = [line.partition("waiting for ")[2] for line in lines if "waiting" in line]
+    how = "none has joined; to start some on this machine: "
+    analyzer = "revolve analyzer --connect runs/a"
+    assert waiting == [
+        f"workers and analyzers: {how}revolve worker --connect runs/a, {analyzer}",
+        f"analyzers: {how}{analyzer}",
+    ]

@@ -7,15 +7,19 @@ import pytest
 from coordinator.cli import summary
 
 
+@pytest.mark.parametrize("screen", ["", ":0"])
 @pytest.mark.parametrize("viewer", [None, object()])
 def test_only_commands_that_work_are_suggested(
-    viewer: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    viewer: object, screen: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", screen)
     monkeypatch.setattr(summary, "find_spec", lambda _name: viewer)
     best = tmp_path / summary.BEST
-    show = f"robot show {best}" if viewer is None else f"view {tmp_path}"
+    view = f"view {tmp_path}" if screen else f"view {tmp_path} --save run.rrd"
+    show = f"robot show {best}" if viewer is None else view
     analyze = f"  revolve analyze {tmp_path}"
-    extinct = [] if viewer is None else [f"  revolve view {tmp_path}"]
+    extinct = [] if viewer is None else [f"  revolve {view}"]
     assert summary.next_steps(tmp_path) == [*extinct, analyze]
     best.touch()
     render = f"  revolve robot render {best} best.gif"

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.generation import generate
+from coordinator.evolution.generation import generate, random_brain
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Generation, Space, body_space
 from schema.robot.brain import NEURON_TYPES
@@ -159,3 +159,32 @@ def test_impossible_restrictions_raise_an_error() -> None:
     )
     with pytest.raises(ExperimentError, match=r"space\.min_parts = 13 parts"):
         make(0, Experiment(name="test", space=space))
+
+
+def test_other_brains_of_a_body_are_drawn_as_those_of_random_robots() -> None:
+    """Means of counts over many brains, as of random robots with the same body."""
+    body = robots(1)[0]
+    rngs = (np.random.default_rng(seed) for seed in range(400))
+    made = [random_brain(rng, body, DEFAULT) for rng in rngs]
+    assert all(robot.parts == body.parts for robot in made)
+    for robot in made[:20]:
+        check_robot(robot, body_space(DEFAULT.space))
+    assert len({robot.brain for robot in made}) == 400
+    hidden = [robot.brain.count("hidden") for robot in made]
+    assert {*hidden} == {*range(11)}
+    assert 4.6 < np.mean(hidden) < 5.4
+    outputs = [
+        n.kind for robot in made for n in robot.brain.neurons if n.layer == "output"
+    ]
+    assert all(
+        0.28 < outputs.count(kind) / len(outputs) < 0.39 for kind in NEURON_TYPES
+    )
+    possible = sum(
+        len(robot.brain.neurons)
+        * (len(robot.brain.neurons) - robot.brain.count("input"))
+        for robot in made
+    )
+    edges = sum(len(robot.brain.connections) for robot in made)
+    assert edges / possible == pytest.approx(
+        DEFAULT.generation.p_connect_neurons, rel=0.03
+    )

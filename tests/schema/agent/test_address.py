@@ -106,6 +106,8 @@ def test_folder_of_a_run_gives_its_hubs_address(tmp_path: Path) -> None:
         server.bind(str(path))
         assert hub_of(str(folder)) == f"unixsock-stream/{path}"
     assert hub_of("tcp/127.0.0.1:7447") == "tcp/127.0.0.1:7447"
+    with pytest.raises(NetworkError, match="no such folder: 'runs/three'"):
+        hub_of("runs/three")
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe", b"tcp/h:1\nrubbish\n", b"x" * 10000])
@@ -129,5 +131,5 @@ def test_address_file_without_reachable_address_is_refused(
 
 
 def test_neither_address_nor_folder_is_refused() -> None:
-    with pytest.raises(NetworkError, match="or a run folder, got 'nowhere'"):
+    with pytest.raises(NetworkError, match="active run; no such folder: 'nowhere'"):
         hub_of("nowhere")

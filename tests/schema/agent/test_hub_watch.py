@@ -12,8 +12,8 @@ from schema.agent.service import HubLost, HubWatch
         (False, [True, True], []),
         (True, [False, True], ["gone", "connected to hub"]),
         (False, [False, True], ["gone", "connected to hub"]),
-        (True, [True, False, False, True], ["connected to hub", "gone", "back"]),
-        (False, [True, False, True], ["gone", "back"]),
+        (True, [True, False, False, True], ["connected to hub", "lost", "back"]),
+        (False, [True, False, True], ["lost", "back"]),
     ],
 )
 def test_it_tells_when_the_hub_comes_and_goes(
@@ -25,6 +25,8 @@ def test_it_tells_when_the_hub_comes_and_goes(
         watch.seen(is_there=is_there)
     names = {
         "no hub at hub; retrying; press Ctrl-C to stop": "gone",
+        "no hub at hub (it ended, or the network is down); retrying; "
+        "press Ctrl-C to stop": "lost",
         "reconnected to hub": "back",
     }
     assert [names.get(line, line) for line in lines] == told

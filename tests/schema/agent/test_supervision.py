@@ -141,6 +141,7 @@ def test_process_that_exits_by_itself_is_restarted_later_each_time(
     with ProcessPool(leave, (how,), size=1) as process_pool:
         until(process_pool, lambda: process_pool.exit_codes == [code])
         assert process_pool.restarts == 0
+        assert process_pool.exits == 1
         until(process_pool, lambda: process_pool.restarts == 2)
         assert process_pool.exit_codes == []
         assert time.monotonic() - began_s > 3.0

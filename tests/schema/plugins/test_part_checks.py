@@ -23,7 +23,11 @@ from schema.parts import (
     Sensor,
     Shape,
 )
-from schema.plugins.part_checks import check_part_type, check_slot_directions
+from schema.plugins.part_checks import (
+    advise_slots,
+    check_part_type,
+    check_slot_directions,
+)
 from schema.plugins.sensor_checks import check_sensor
 
 HINGED = ACTIVE_HINGE.shape(())
@@ -184,6 +188,7 @@ WRONG = {
 def test_built_in_part_types_pass(kind: PartType) -> None:
     check_part_type(kind)
     check_slot_directions(kind)
+    assert advise_slots(kind) == ""
 
 
 def test_a_slot_into_its_own_box_is_refused_by_a_check_of_its_own() -> None:
@@ -192,6 +197,13 @@ def test_a_slot_into_its_own_box_is_refused_by_a_check_of_its_own() -> None:
     message = r"x: .*slots\[1\].normal: .* points into its box 'body', 41 mm deep"
     with pytest.raises(ExperimentError, match=message):
         check_slot_directions(kind, "x")
+
+
+@pytest.mark.parametrize(("y", "away"), [(0.0305, "10"), (0.0105, "10")])
+def test_a_slot_off_the_surface_gets_a_warning(y: float, away: str) -> None:
+    """The brick's faces are 20.5 mm from its centre."""
+    advice = advise_slots(slotted(position=(0.0, y, 0.0)))
+    assert advice.startswith(f"slots[1].position is {away} mm from the surface")
 
 
 @pytest.mark.parametrize("name", WRONG)

@@ -1,4 +1,4 @@
-"""``revolve robustness`` against evaluations of the same robots here."""
+"""``revolve robustness`` and ``ablate`` against evaluations of the robots here."""
 
 from pathlib import Path
 
@@ -7,10 +7,15 @@ import pytest
 from msgspec.structs import replace
 
 import revolve as rv
+from coordinator.evolution.generation import random_brain
+from coordinator.evolution.random_streams import Purpose, stream
 from revolve.command import main
 from revolve.robot import plain
+from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import evaluation_settings_of
+from schema.robot.ids import BirthId
+from worker.robot.ablation import all_ablations
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import all_changes
 
@@ -63,6 +68,38 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
         assert row["undisturbed"] == evaluate(robot, settings).fitness
         assert row["fitness"] == evaluate(robot, changes[row["change"]]).fitness
 
+    _check_ablations(capsys, run)
     (Path("a") / "state").write_text("running")
-    assert main(["robustness", "a"]) == 2
-    assert "'revolve resume a' finishes it" in capsys.readouterr().err
+    for command in ("robustness", "ablate"):
+        assert main([command, "a"]) == 2
+        assert "'revolve resume a' finishes it" in capsys.readouterr().err
+
+
+def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
+    """Check what ``ablate`` writes, with ``[robust]``, as the run evaluates."""
+    words = ["ablate", "a", "--robots", "1", "--brains", "2", "--workers", "1"]
+    assert main([*words, "--out", "out"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("a: the best, 0:")
+    table = pq.read_table("out/ablation.parquet")
+    rows = table.to_pylist()
+    assert Path("out/ablation.png").stat().st_size > 10_000
+    assert sum(each["is_last"] for each in rows) == len(
+        [each for each in rows if each["birth"] == rows[0]["birth"]]
+    )
+    settings = evaluation_settings_of(read_experiment("short.toml"))
+    for birth in {each["birth"] for each in rows}:
+        robot = plain(run.robot(birth))
+        own = [each for each in rows if each["birth"] == birth]
+        assert own[0]["undisturbed"] == evaluate(robot, settings).fitness
+        changes = all_ablations(robot, body_space(settings.space))
+        assert len(own) == len(changes) + 2
+        for change, each in zip(changes, own, strict=False):
+            assert (each["change"], each["channel"]) == (change.name, change.channel)
+        chosen = len(changes) - 1
+        ablated = replace(settings, ablation=changes[chosen].ablation)
+        assert own[chosen]["fitness"] == evaluate(robot, ablated).fitness
+        assert own[-1]["change"] == "random brain 2"
+        rng = stream(3, 0, BirthId(0, birth), 1, Purpose.OTHER_BRAIN)
+        other = random_brain(rng, robot, read_experiment("short.toml"))
+        assert own[-1]["fitness"] == evaluate(other, settings).fitness

@@ -1,0 +1,150 @@
+"""Table of fitness without sensors and motors, and what it comes to.
+
+Each row is one robot without some of its sensors or motors, or with another brain.
+"""
+
+from collections.abc import Iterable, Sequence
+from statistics import median
+
+import pyarrow as pa
+
+from analysis.comparison.robustness import (
+    RESULT,
+    ROBOT,
+    Columns,
+    Row,
+    percent,
+    schema_of,
+    with_shares,
+)
+from schema.errors import rounded
+
+HELD, MEAN, DEAD = "input at 0", "input at its mean", "motor dead"
+RANDOM = "random brain"
+ONE, KIND, ALL = "one", "kind", "all"
+_SHOWN = 3
+"""Motors that the line about a run names."""
+
+_COLUMNS: Columns = {
+    **ROBOT,
+    "is_last": (
+        pa.bool_(),
+        "whether it is among the fittest of the last populations, as many as asked for",
+    ),
+    "group": (pa.string(), f"'{HELD}', '{MEAN}', '{DEAD}' or '{RANDOM}'"),
+    "scope": (
+        pa.string(),
+        f"'{ONE}' input, motor or random brain, all of a '{KIND}', or '{ALL}'",
+    ),
+    "kind": (
+        pa.string(),
+        (
+            "of the sensors: imu, touch, light or a plug-in's class; part type of the "
+            f"motors; empty for '{ALL}' and random brains"
+        ),
+    ),
+    "part": (pa.int32(), f"index of the part in births.body; null unless '{ONE}'"),
+    "channel": (
+        pa.int32(),
+        (
+            "number of the input or motor of the brain, or of the random brain; null "
+            f"unless '{ONE}'"
+        ),
+    ),
+    "change": (pa.string(), "the change in words"),
+    **RESULT,
+}
+
+
+def schema() -> pa.Schema:
+    """Return the Arrow schema, with ``meaning`` in each field's metadata."""
+    return schema_of(_COLUMNS)
+
+
+def table_of(rows: Iterable[Row]) -> pa.Table:
+    """Return the table of some rows, with their shares."""
+    return with_shares(rows, schema())
+
+
+def shares(rows: Iterable[Row], group: str, scope: str, kind: str = "") -> list[float]:
+    """Return the known shares of some rows.
+
+    Args:
+        rows: of the table.
+        group: of the rows.
+        scope: likewise.
+        kind: likewise; empty for every kind.
+    """
+    return [
+        row["share"]
+        for row in rows
+        if row["share"] is not None
+        and (row["group"], row["scope"]) == (group, scope)
+        and kind in ("", row["kind"])
+    ]
+
+
+def summary(table: pa.Table) -> str:
+    """Return one line that says what carries the fitness of a run's robots.
+
+    Args:
+        table: rows of one run.
+    """
+    robots: dict[tuple[int, int], list[Row]] = {}
+    for row in table.to_pylist():
+        robots.setdefault((row["island"], row["birth"]), []).append(row)
+    best = next(rows for rows in robots.values() if rows[0]["is_best"])
+    texts = [_of_best(best), _of_last([r for r in robots.values() if r[0]["is_last"]])]
+    evaluations = [row for rows in robots.values() for row in rows]
+    failed = sum(row["fitness"] is None for row in evaluations)
+    if failed:
+        texts.append(f"{failed} of {len(evaluations)} evaluations failed")
+    return "; ".join(filter(None, texts))
+
+
+def _of_best(rows: Sequence[Row]) -> str:
+    name = f"{rows[0]['island']}:{rows[0]['birth']}"
+    undisturbed = rows[0]["undisturbed"]
+    if undisturbed is None:
+        return f"the best, {name}, has no fitness without changes"
+    if undisturbed <= 0:
+        return f"the best, {name}, has a fitness of {rounded(undisturbed)}"
+    kept = [
+        f"{percent(share)} without {row['kind']}"
+        for row in rows
+        if row["group"] == HELD and row["scope"] == KIND
+        and (share := row["share"]) is not None
+    ]  # fmt: skip
+    for text, found in (
+        ("without sensors", shares(rows, HELD, ALL)),
+        ("with sensors at their mean", shares(rows, MEAN, ALL)),
+        ("with a random brain", shares(rows, RANDOM, ONE)),
+    ):
+        kept += [f"{percent(median(found))} {text}"] if found else []
+    dead = [
+        row
+        for row in rows
+        if row["group"] == DEAD and row["scope"] == ONE and row["share"] is not None
+    ]
+    first = sorted(dead, key=lambda row: (row["share"], row["channel"]))[:_SHOWN]
+    carried = [
+        f"the {row['change']} carries {percent(1 - row['share'])}" for row in first
+    ]
+    line = f"the best, {name}, keeps {', '.join(kept)}" if kept else f"the best, {name}"
+    return ", ".join([f"{line} of its fitness ({rounded(undisturbed)})", *carried])
+
+
+def _of_last(robots: Sequence[Sequence[Row]]) -> str:
+    """Return what the medians over robots of the last population are."""
+    texts = []
+    for text, group, scope, least in (
+        ("without sensors", HELD, ALL, False),
+        ("without its most important motor", DEAD, ONE, True),
+        ("with a random brain", RANDOM, ONE, False),
+    ):
+        found = [shares(rows, group, scope) for rows in robots]
+        known = [min(each) if least else median(each) for each in found if each]
+        texts += [f"{percent(median(known))} {text}"] if known else []
+    if not texts:
+        return ""
+    return f"{len(robots)} of the last population keep {', '.join(texts)} in the median"

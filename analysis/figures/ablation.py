@@ -1,0 +1,63 @@
+"""Figure of the fitness that robots keep without sensors and motors."""
+
+import plotnine as p9
+import pyarrow as pa
+
+from analysis.comparison.ablation import ALL, DEAD, HELD, MEAN, ONE, RANDOM
+from analysis.figures.forms import NothingToDraw
+from analysis.figures.robustness import points_of_shares
+
+_SENSORS = {HELD: "at 0", MEAN: "at mean"}
+_MOTORS = ("most important", "2nd", "3rd", "4th", "5th", "6th")
+"""Motors with a row of their own, in the order of what robots lose without them."""
+_ROW_IN = 0.2
+
+
+def ablation(table: pa.Table) -> p9.ggplot:
+    """Return the share of its fitness that each robot keeps under each change.
+
+    Sensors are shown by kind, motors in the order of what the robot loses without
+    them.
+
+    Args:
+        table: of ``analysis.comparison.ablation``.
+
+    Raises:
+        NothingToDraw: no robot has a positive fitness without changes.
+    """
+    rows = table.to_pandas()
+    rows = rows[rows["share"].notna()].reset_index(drop=True)
+    if rows.empty:
+        raise NothingToDraw("no robot has a positive fitness without changes")
+    robot = ["folder", "island", "birth"]
+    is_motor = (rows["group"] == DEAD) & (rows["scope"] == ONE)
+    ordered = rows[is_motor].groupby(robot)["share"]
+    rows.loc[is_motor, "place"] = ordered.rank(method="first")
+    rows["label"] = [_label(row) for row in rows.to_dict("records")]
+    rows = rows[rows["label"] != ""]
+    labels = sorted(set(rows["label"]), key=_place)
+    return points_of_shares(rows, labels, 0.9 + _ROW_IN * len(labels))
+
+
+def _label(row: dict[str, object]) -> str:
+    """Return the row of the figure that shows a change; empty for none."""
+    group, scope, kind = (str(row[name]) for name in ("group", "scope", "kind"))
+    if group == RANDOM:
+        return "random brains"
+    if group == DEAD and scope == ONE:
+        place = int(float(str(row["place"]))) - 1
+        return f"{_MOTORS[place]} motor dead" if place < len(_MOTORS) else ""
+    if scope == ONE:
+        return ""
+    if group == DEAD:
+        return "all motors dead" if scope == ALL else ""
+    return f"{'all sensors' if scope == ALL else kind} {_SENSORS[group]}"
+
+
+def _place(label: str) -> tuple[int, int, str]:
+    """Return the sort key of a row of the figure."""
+    blocks = ("at 0", "at mean", "motor dead", "all motors", "random")
+    block = next(number for number, text in enumerate(blocks) if text in label)
+    first = label.removesuffix(" motor dead")
+    inner = _MOTORS.index(first) if first in _MOTORS else label.startswith("all")
+    return block, int(inner), label

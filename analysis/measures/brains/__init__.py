@@ -1,0 +1,1 @@
+"""Measures of brains: change from parent to child, recurrence, use of sensors."""

@@ -1,0 +1,140 @@
+"""Brains of the births table, with neurons named by the origin of their parts."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+from schema.robot.brain import Layer
+from schema.robot.genome import Genome, walk
+from schema.robot.robot import Robot
+from schema.wire.codec import decode_genome, decode_robot
+
+Name = tuple[int, int, Layer, str, int]
+"""Name of a neuron.
+
+The gene of its part, the number of that gene in the body (some parts are copies), the
+layer, its type, and its number among those of this layer and type in the part.
+"""
+
+Place = tuple[int, Layer, int]
+"""Index of a neuron's part, its layer, and its number in that layer of the part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Controller:
+    """Network of a robot by the names of its neurons.
+
+    Attributes:
+        neurons: parameters of output and hidden neurons.
+        edges: weights by source and target, where both neurons exist.
+        has_origin: all parts have a gene.
+    """
+
+    neurons: Mapping[Name, tuple[float, ...]]
+    edges: Mapping[tuple[Name, Name], float]
+    has_origin: bool
+
+
+def controllers(births: pa.Table) -> Iterator[Controller | None]:
+    """Yield the brain of each birth; None if the table does not have it.
+
+    Args:
+        births: ``genome``, ``robot``.
+
+    Raises:
+        MalformedMessage: damaged bytes, or no robot beside a genome of another encoding
+            than ``revolve-angle``, as in earlier runs.
+    """
+    columns = (births[name].to_pylist() for name in ("genome", "robot"))
+    for genome, robot in zip(*columns, strict=True):
+        if robot is not None:
+            yield of_robot(decode_robot(robot))
+        elif genome:
+            yield of_genome(decode_genome(genome))
+        else:
+            yield None
+
+
+def of_genome(genome: Genome) -> Controller:
+    """Return the network of a genome of ``revolve-angle``.
+
+    As in development, a connection whose path or target does not exist is left out,
+    and so is a second one between the same neurons.
+    """
+    entries = walk(genome)
+    neighbours: list[dict[int, int]] = [{} for _ in entries]
+    for index, (node, parent, slot) in enumerate(entries):
+        if parent >= 0:
+            neighbours[index][node.slot] = parent
+            neighbours[parent][slot] = index
+    neurons: dict[Place, tuple[str, tuple[float, ...]]] = {}
+    edges: dict[tuple[Place, Place], float] = {}
+    for index, (node, _, _) in enumerate(entries):
+        for number, gene in enumerate(node.outputs):
+            neurons[index, "output", number] = gene.kind, gene.parameters
+        for number, gene in enumerate(node.hidden):
+            neurons[index, "hidden", number] = gene.kind, gene.parameters
+        for edge in node.connections:
+            end = index
+            for slot in edge.path:
+                end = neighbours[end].get(slot, -1)
+                if end < 0:
+                    break
+            if end >= 0:
+                edges.setdefault(
+                    ((index, *edge.source), (end, *edge.target)), edge.weight
+                )
+    return _named([node.gene for node, _, _ in entries], neurons, edges)
+
+
+def of_robot(robot: Robot) -> Controller:
+    """Return the network of a robot."""
+    counts: Counter[tuple[int, Layer]] = Counter()
+    places: list[Place] = []
+    neurons: dict[Place, tuple[str, tuple[float, ...]]] = {}
+    for neuron in robot.brain.neurons:
+        place = neuron.part, neuron.layer, counts[neuron.part, neuron.layer]
+        counts[neuron.part, neuron.layer] += 1
+        places.append(place)
+        if neuron.layer != "input":
+            neurons[place] = neuron.kind, neuron.parameters
+    edges = {
+        (places[edge.source], places[edge.target]): edge.weight
+        for edge in robot.brain.connections
+    }
+    return _named([part.gene for part in robot.parts], neurons, edges)
+
+
+def _named(
+    genes: Sequence[int],
+    neurons: Mapping[Place, tuple[str, tuple[float, ...]]],
+    edges: Mapping[tuple[Place, Place], float],
+) -> Controller:
+    """Return a network by names; edges without one of their neurons are left out."""
+    seen: Counter[int] = Counter()
+    copies: list[int] = []
+    for gene in genes:
+        copies.append(seen[gene])
+        seen[gene] += 1
+    counts: Counter[tuple[int, Layer, str]] = Counter()
+    names: dict[Place, Name] = {}
+    for place, (kind, _) in neurons.items():
+        part, layer, _ = place
+        names[place] = genes[part], copies[part], layer, kind, counts[part, layer, kind]
+        counts[part, layer, kind] += 1
+
+    def name(place: Place) -> Name | None:
+        part, layer, number = place
+        if layer == "input":
+            return genes[part], copies[part], layer, "", number
+        return names.get(place)
+
+    found: dict[tuple[Name, Name], float] = {}
+    for (start, end), weight in edges.items():
+        source, target = name(start), names.get(end)
+        if source is not None and target is not None:
+            found[source, target] = weight
+    parameters = {names[place]: values for place, (_, values) in neurons.items()}
+    return Controller(parameters, found, all(genes))

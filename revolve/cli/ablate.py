@@ -1,0 +1,79 @@
+"""``revolve ablate``: re-evaluate robots without some sensors and motors."""
+
+from pathlib import Path
+
+from schema.agent.extras import install_advice
+from schema.agent.flags import Flags, add_count, add_plugins, whole_number
+from schema.agent.supervisor import cores
+from schema.errors import RevolveError
+from schema.plugins.permission import allow
+
+
+def main(arguments: list[str]) -> int:
+    """Re-evaluate robots, write table and figure, and return the exit code.
+
+    Args:
+        arguments: the command's name first.
+
+    Raises:
+        RunFolderError: no run, an unfinished one, or a folder that cannot be written.
+        RevolveError: a library is missing, or no worker is left.
+    """
+    options = parser().parse_args(arguments[1:])
+    allow(options.plugins)
+    try:
+        from revolve.cli.ablating import ablate_runs
+    except ImportError as error:
+        raise RevolveError(
+            f"ablate needs {error.name}: {install_advice('analysis')}"
+        ) from None
+    ablate_runs(
+        options.runs,
+        options.out,
+        robots=options.robots,
+        brains=options.brains,
+        workers=options.workers,
+    )
+    return 0
+
+
+def parser(_command: str = "ablate") -> Flags:
+    """Return the parser of ``revolve ablate``."""
+    flags = Flags(
+        prog="revolve ablate",
+        description="Re-evaluate the best robot and the fittest of the last population "
+        "of finished runs, alone: with sensors that read 0 or their mean, with dead "
+        "motors, and with random brains. Show how much of their fitness they keep.",
+        examples=(
+            "revolve ablate runs/scenario1-seed1",
+            "revolve ablate runs/a runs/b --out without --robots 10",
+        ),
+    )
+    flags.add_argument(
+        "runs", nargs="+", type=Path, metavar="RUN", help="run folder, finished"
+    )
+    flags.add_argument(
+        "--out",
+        type=Path,
+        default=Path("ablation"),
+        metavar="FOLDER",
+        help="folder to write to (default: ablation)",
+    )
+    add_count(
+        flags,
+        "--robots",
+        5,
+        "robots of the last population, the fittest first",
+        least=0,
+    )
+    add_count(flags, "--brains", 5, "random brains for each body", least=0)
+    flags.add_argument(
+        "--workers",
+        type=whole_number(),
+        default=cores(),
+        metavar="N",
+        help="number of workers, started on this machine; no result depends on it "
+        "(default: one per core)",
+    )
+    add_plugins(flags)
+    return flags

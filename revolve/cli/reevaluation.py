@@ -1,0 +1,113 @@
+"""Evaluation of the robots of finished runs once more, by workers, into a table."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
+
+from analysis.figures.forms import NothingToDraw
+from analysis.figures.style import save
+from analysis.progress import bars
+from revolve.cli.winners import Chosen
+from revolve.evaluation import Result
+from revolve.fleet import Fleet
+from revolve.robot import Robot
+from schema.errors import counted
+from schema.experiment.settings import EvaluationSettings
+from schema.robot.robot import Robot as PlainRobot
+from schema.tables.description import make_folder
+
+Row = dict[str, Any]
+
+
+class Job(NamedTuple):
+    """Evaluation of a robot, or of another one in its place.
+
+    Attributes:
+        one: the robot of the run.
+        columns: of the row; None for the evaluation without a change, which has no
+            row and precedes the others of its robot.
+        settings: of the evaluation.
+        robot: to evaluate.
+    """
+
+    one: Chosen
+    columns: Row | None
+    settings: EvaluationSettings
+    robot: Robot | PlainRobot
+
+
+def reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
+    """Yield a row for each job with columns, in their order; show progress.
+
+    Equal evaluations are computed once.
+
+    Args:
+        jobs: evaluations, for each robot the one without a change first.
+        workers: worker processes on this machine.
+
+    Raises:
+        RevolveError: no worker is left.
+    """
+    robots = counted(len({id(job.one) for job in jobs}), "robot")
+    title = f"re-evaluating {robots} {len(jobs)} times in all"
+    columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
+    with Fleet(workers) as fleet, bars(title, *columns, TimeRemainingColumn()) as bar:
+        known: dict[tuple[Robot | PlainRobot, EvaluationSettings], Future[Result]] = {}
+        for job in jobs:
+            key = job.robot, job.settings
+            if key not in known:
+                # Settings of a request; an experiment has no ablation.
+                known[key] = fleet._submit(*key)  # noqa: SLF001 - of this package
+        undisturbed: float | None = None
+        for job in bar.track(jobs, description="re-evaluating"):
+            result = known[job.robot, job.settings].result()
+            if job.columns is None:
+                undisturbed = result.fitness
+                continue
+            yield {
+                **job.one.row,
+                "undisturbed": undisturbed,
+                **job.columns,
+                "fitness": result.fitness,
+                "failure": result.failure,
+            }
+
+
+def write_results(
+    rows: Callable[[], pa.Table],
+    folders: Iterable[Path],
+    stem: Path,
+    summary: Callable[[pa.Table], str],
+    figure: Callable[[pa.Table], Any],
+) -> None:
+    """Write a table and its figure; print a line about each run and each file.
+
+    Args:
+        rows: returns the table, once its folder can be written.
+        folders: of the runs, as in the table's column ``folder``.
+        stem: path of the files without ending.
+        summary: returns the line about a run, from its rows.
+        figure: returns the figure of the table.
+
+    Raises:
+        RunFolderError: the folder cannot be written.
+    """
+    make_folder(stem.parent)
+    table, path = rows(), stem.with_suffix(".parquet")
+    pq.write_table(table, path)
+    for folder in folders:
+        own = table.filter(pc.field("folder") == str(folder))
+        print(f"{folder}: {summary(own)}")
+    print(f"{path}: {table.num_rows} evaluations under changes")
+    try:
+        save(figure(table), stem)
+    except NothingToDraw as error:
+        print(f"left out: figure: {error}")
+    else:
+        print(f"{stem}.png: figure, also as PDF")

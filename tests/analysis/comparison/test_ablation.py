@@ -1,0 +1,102 @@
+"""Fitness without sensors and motors: shares and the line about a run, by hand."""
+
+from typing import Any
+
+import plotnine as p9
+import pytest
+
+from analysis.comparison.ablation import schema, shares, summary, table_of
+from analysis.comparison.robustness import Row
+from analysis.figures.ablation import ablation
+from analysis.figures.forms import NothingToDraw
+
+HELD, MEAN, DEAD, RANDOM = (
+    "input at 0", "input at its mean", "motor dead", "random brain"
+)  # fmt: skip
+
+
+def row(
+    birth: int, group: str, scope: str, fitness: float | None, kind: str = "",
+    **rest: Any,  # noqa: ANN401 - of any column
+) -> Row:  # fmt: skip
+    is_one = scope == "one"
+    return {
+        "experiment": "a", "folder": "runs/a", "island": 0, "birth": birth,
+        "is_best": birth == 7, "is_last": birth != 7, "recorded": 0.1,
+        "undisturbed": 0.1, "group": group, "scope": scope, "kind": kind,
+        "part": 4 if is_one else None, "channel": 0 if is_one else None,
+        "change": "motor of part 4", "fitness": fitness,
+        "failure": "" if fitness is not None else "diverged",
+    } | rest  # fmt: skip
+
+
+ROWS = [
+    row(7, HELD, "one", 0.01, "touch"),
+    row(7, HELD, "kind", 0.096, "touch"),
+    row(7, HELD, "kind", 0.05, "imu"),
+    row(7, HELD, "all", 0.04),
+    row(7, MEAN, "all", 0.08),
+    row(7, DEAD, "one", 0.059, "ActiveHinge"),
+    row(7, DEAD, "one", None, "ActiveHinge", channel=1, change="motor of part 6"),
+    row(7, DEAD, "one", 0.1, "ActiveHinge", channel=2, change="motor of part 8"),
+    row(7, DEAD, "all", 0.0),
+    row(7, RANDOM, "one", 0.01),
+    row(7, RANDOM, "one", 0.02),
+    row(7, RANDOM, "one", 0.09),
+    row(8, HELD, "all", 0.1),
+    row(8, DEAD, "one", 0.02, "ActiveHinge"),
+    row(8, DEAD, "one", 0.07, "ActiveHinge"),
+    row(8, RANDOM, "one", 0.03),
+    row(9, HELD, "all", 0.05),
+    row(9, DEAD, "one", 0.06, "ActiveHinge"),
+]
+
+
+def test_shares_are_of_the_fitness_without_changes() -> None:
+    table = table_of(ROWS)
+    assert table.schema.equals(schema())
+    assert all(field.metadata[b"meaning"] for field in table.schema)
+    rows = table.to_pylist()
+    assert rows[6]["share"] is None
+    assert shares(rows[:12], HELD, "kind", "touch") == pytest.approx([0.96])
+    assert shares(rows[:12], HELD, "kind") == pytest.approx([0.96, 0.5])
+    assert shares(rows[:12], DEAD, "one") == pytest.approx([0.59, 1.0])
+
+
+def test_line_about_a_run() -> None:
+    assert summary(table_of(ROWS)) == (
+        "the best, 0:7, keeps 96 % without touch, 50 % without imu, 40 % without "
+        "sensors, 80 % with sensors at their mean, 20 % with a random brain of its "
+        "fitness (0.1000), the motor of part 4 carries 41 %, the motor of part 8 "
+        "carries 0 %; 2 of the last population keep 75 % without sensors, 40 % without "
+        "its most important motor, 30 % with a random brain in the median; "
+        "1 of 18 evaluations failed"
+    )
+    failed = [row(7, HELD, "all", None, undisturbed=None)]
+    assert summary(table_of(failed)) == (
+        "the best, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
+    )
+    still = [row(7, HELD, "all", 0.1, undisturbed=-0.2)]
+    assert summary(table_of(still)) == "the best, 0:7, has a fitness of -0.2000"
+
+
+def test_figure_orders_motors_by_what_robots_lose() -> None:
+    figure = ablation(table_of(ROWS))
+    assert figure.scales[1].limits == [
+        "random brains", "all motors dead", "2nd motor dead",
+        "most important motor dead", "all sensors at mean", "all sensors at 0",
+        "touch at 0", "imu at 0",
+    ]  # fmt: skip
+    points = [
+        layer._data for layer in figure.layers if isinstance(layer.geom, p9.geom_point)
+    ]
+    for last_or_best, first, second in zip(
+        points, ([0.2, 0.6], [0.59]), ([0.7], [1.0]), strict=True
+    ):
+        for label, wanted in (
+            ("most important motor dead", first), ("2nd motor dead", second)
+        ):  # fmt: skip
+            chosen = last_or_best[last_or_best["label"] == label]
+            assert sorted(chosen["share"]) == pytest.approx(wanted)
+    with pytest.raises(NothingToDraw, match="positive fitness"):
+        ablation(table_of([row(7, HELD, "all", 0.1, undisturbed=0.0)]))

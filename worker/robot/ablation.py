@@ -1,0 +1,162 @@
+"""Held inputs and dead motors of one robot, and the list of all that it can have."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from schema.errors import InvalidRobot
+from schema.experiment.ablation import Ablation, ablation_problems
+from schema.parts import BodySpace, Sensor
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+from worker.robot.calibration import NEUTRAL
+
+
+class Ablated:
+    """Held inputs and dead motors of one robot in an evaluation."""
+
+    def __init__(
+        self, ablation: Ablation, robot: Robot, means: Sequence[float] = ()
+    ) -> None:
+        """Look up the inputs and motors.
+
+        Args:
+            ablation: of the robot.
+            robot: the robot.
+            means: (I,) of its inputs, for those that are held at their mean.
+
+        Raises:
+            InvalidRobot: it has no such input or motor.
+        """
+        brain = robot.brain
+        sizes = brain.count("input"), brain.count("output")
+        for problem in ablation_problems(ablation, *sizes):
+            raise InvalidRobot(problem)
+        self._inputs = np.array([number for number, _ in ablation.inputs], np.intp)
+        self._values = np.array(
+            [
+                means[number] if value is None else value
+                for number, value in ablation.inputs
+            ],
+            np.float64,
+        )
+        self._motors = np.array(ablation.motors, np.intp)
+
+    def hold(self, inputs: Floats) -> None:
+        """Write the held values into what the brain receives at a tick, (1, I)."""
+        inputs[0, self._inputs] = self._values
+
+    def outputs(self, values: Floats) -> Floats:
+        """Return the outputs (O,) that reach the motors at a tick.
+
+        The array of the network stays as it is: its outputs are inputs of neurons.
+        """
+        if not len(self._motors):
+            return values
+        reached = values.copy()
+        reached[self._motors] = NEUTRAL
+        return reached
+
+
+_AXES = ("acceleration", "rotation")
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Ablation of one robot, and what it concerns.
+
+    Attributes:
+        group: ``HELD``, ``MEAN`` or ``DEAD``.
+        scope: ``one`` input or motor, all of a ``kind``, or ``all``.
+        kind: of the sensors (imu, touch, light, or name of a plug-in's class), or part
+            type of the motors; empty for ``all``.
+        part: index of the part; None unless the scope is ``one``.
+        channel: number of the input or motor of the brain; None likewise.
+        name: for people, such as ``touch left of part 5``.
+        ablation: of the robot.
+    """
+
+    group: str
+    scope: str
+    kind: str
+    part: int | None
+    channel: int | None
+    name: str
+    ablation: Ablation
+
+
+HELD, MEAN, DEAD = "input at 0", "input at its mean", "motor dead"
+
+
+def all_ablations(robot: Robot, space: BodySpace) -> tuple[Change, ...]:
+    """Return the ablations of a robot: one by one, by kind, and all together.
+
+    Args:
+        robot: the robot.
+        space: its part types.
+    """
+    inputs, motors = _inputs(robot, space), _motors(robot, space)
+    return (
+        *_changes(HELD, "sensors", inputs, partial(_held, value=0.0)),
+        *_changes(MEAN, "sensors", inputs, partial(_held, value=None)),
+        *_changes(DEAD, "motors", motors, _dead),
+    )
+
+
+def _held(numbers: Sequence[int], value: float | None) -> Ablation:
+    return Ablation(inputs=tuple((number, value) for number in numbers))
+
+
+def _dead(numbers: Sequence[int]) -> Ablation:
+    return Ablation(motors=tuple(numbers))
+
+
+_Channel = tuple[str, int, str]
+"""Kind, index of the part and name of an input or motor."""
+
+
+def _changes(
+    group: str,
+    what: str,
+    channels: Sequence[_Channel],
+    ablation: Callable[[Sequence[int]], Ablation],
+) -> Iterator[Change]:
+    for number, (kind, part, name) in enumerate(channels):
+        yield Change(group, "one", kind, part, number, name, ablation([number]))
+    numbers: dict[str, list[int]] = {}
+    for number, (kind, _, _) in enumerate(channels):
+        numbers.setdefault(kind, []).append(number)
+    for kind, own in numbers.items():
+        yield Change(group, "kind", kind, None, None, f"all {kind}", ablation(own))
+    if channels:
+        every = range(len(channels))
+        yield Change(group, "all", "", None, None, f"all {what}", ablation(every))
+
+
+def _inputs(robot: Robot, space: BodySpace) -> list[_Channel]:
+    """Return the inputs of a brain, in its order."""
+    found: list[_Channel] = []
+    for index, part in enumerate(robot.parts):
+        for sensor in space[part.kind].sensors:
+            if not isinstance(sensor, Sensor):
+                kind = type(sensor).__name__
+                names = [f"{kind} {number}" for number in range(sensor.inputs)]
+            elif sensor.kind == "imu":
+                kind = sensor.kind
+                names = [f"{what} {axis}" for what in _AXES for axis in "xyz"]
+            else:
+                kind = sensor.kind
+                names = [kind if kind == "light" else f"{kind} {sensor.box}"]
+            found += [(kind, index, f"{name} of part {index}") for name in names]
+    return found
+
+
+def _motors(robot: Robot, space: BodySpace) -> list[_Channel]:
+    """Return the motors of a robot, in the order of the brain's outputs."""
+    return [
+        (part.kind, index, f"motor of part {index}")
+        for index, part in enumerate(robot.parts)
+        if space[part.kind].motor is not None
+    ]
