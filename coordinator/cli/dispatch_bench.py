@@ -7,6 +7,7 @@ machine can hold are simulated (``coordinator.cli.fleet_model``).
 """
 
 import argparse
+import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from threading import Event
 
 import msgspec
 import numpy as np
@@ -25,14 +27,15 @@ from coordinator.cli.fleet_model import (
     most_workers,
 )
 from coordinator.dispatch.events import AgentKind, Client, Deliver, Job
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import End, Fleet
 from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.agent.network import Agent
+from schema.agent.stopping import STOP_SIGNALS
 from schema.agent.supervision import ProcessSlot
-from schema.agent.supervisor import ProcessPool
+from schema.agent.supervisor import ProcessPool, stop_on_signals
 from schema.agent.topics import unique_name
 from schema.experiment.document import body_space
 from schema.experiment.file import experiment_text, read_experiment
@@ -116,19 +119,50 @@ class Stream:
             self._ask()
 
 
+class _BenchFleet(Fleet):
+    """Fleet whose ``listen`` raises ``KeyboardInterrupt`` once a signal has come.
+
+    A signal handler that raises may do so while the network's engine runs Python code,
+    and the engine drops the exception.
+    """
+
+    stop: Event | None = None
+
+    def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
+        found = super().listen(timeout_s, now_s)
+        if self.stop is not None and self.stop.is_set():
+            raise KeyboardInterrupt
+        return found
+
+
 @contextmanager
-def real_fleet(bodies: dict[AgentKind, tuple[Body, int]]) -> Iterator[Fleet]:
+def _noted_signals() -> Iterator[Event]:
+    """Note stop signals in an event meanwhile, instead of interrupting."""
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    try:
+        yield stop_on_signals()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def real_fleet(
+    bodies: dict[AgentKind, tuple[Body, int]], stop: Event | None = None
+) -> Iterator[Fleet]:
     """Start a fleet of processes on this machine and wait until all have joined.
 
     Args:
         bodies: function and number of the processes of each kind.
+        stop: set when a signal asks to stop.
 
     Raises:
         RuntimeError: a process does not join.
     """
     with ExitStack() as stack:
         network = stack.enter_context(Network(name=unique_name("bench")))
-        fleet = Fleet(network)
+        fleet = _BenchFleet(network)
+        fleet.stop = stop
         for kind, (body, size) in bodies.items():
             agent = Agent(kind, kind, network.address)
             stack.enter_context(ProcessPool(body, (agent,), size=size))
@@ -162,19 +196,21 @@ def measure(stream: Stream, seconds: float) -> Rate:
     return rate
 
 
-def null_rate(body: Body, seconds: float) -> Rate:
+def null_rate(body: Body, seconds: float, stop: Event | None = None) -> Rate:
     """Measure null evaluations over the network."""
-    with real_fleet({"worker": (body, 1)}) as fleet:
+    with real_fleet({"worker": (body, 1)}, stop) as fleet:
         return measure(Stream(fleet, _IN_FLIGHT), seconds)
 
 
-def birth_cost(null: Body, analyzer: Body, births: int) -> Rate:
+def birth_cost(
+    null: Body, analyzer: Body, births: int, stop: Event | None = None
+) -> Rate:
     """Measure whole births without physics, journal and tables included."""
     shipped = read_experiment("scenario1")
     experiment = msgspec.structs.replace(shipped, births=births)
     with (
         tempfile.TemporaryDirectory() as folder,
-        real_fleet({"worker": (null, 1), "analyzer": (analyzer, 1)}) as fleet,
+        real_fleet({"worker": (null, 1), "analyzer": (analyzer, 1)}, stop) as fleet,
     ):
         details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
         run = RunSession(RunFolder(Path(folder) / "run", details), fleet)
@@ -201,27 +237,37 @@ def run(options: argparse.Namespace, null: Body, timed: Body, analyzer: Body) ->
     Returns:
         0 if all figures meet their requirements, 1 if not.
     """
+    with _noted_signals() as stop:
+        birth, is_met = _measured(options, (null, timed, analyzer), stop)
+    return 0 if simulate(birth.cpu_s) and is_met else 1
+
+
+def _measured(
+    options: argparse.Namespace, bodies: tuple[Body, Body, Body], stop: Event
+) -> tuple[Rate, bool]:
+    """Measure and print; return the cost of births, and whether dispatch is in time."""
+    null, timed, analyzer = bodies
     seconds = options.seconds
-    rate = null_rate(null, seconds)
+    rate = null_rate(null, seconds, stop)
     _say(
         f"null evaluations, real network, 1 worker: {rate.per_s:.0f}/s "
         f"(required: {LEAST_NULL_PER_S}), coordinator {1e3 * rate.cpu_s:.3f} ms CPU "
         f"each (required: {1e3 * MOST_NULL_CPU_S:.1f})"
     )
     is_met = rate.per_s >= LEAST_NULL_PER_S and rate.cpu_s <= MOST_NULL_CPU_S
-    with real_fleet({"worker": (timed, options.workers)}) as fleet:
+    with real_fleet({"worker": (timed, options.workers)}, stop) as fleet:
         slow = measure(Stream(fleet, 3 * options.workers), seconds)
     _say(
         f"evaluations of 40 ms, real network, {options.workers} workers: "
         f"{slow.per_s:.0f}/s, utilisation "
         f"{100 * slow.per_s * _SHORT_S / options.workers:.1f} %"
     )
-    birth = birth_cost(null, analyzer, options.births)
+    birth = birth_cost(null, analyzer, options.births, stop)
     _say(
         f"whole births without physics: {birth.per_s:.0f}/s, coordinator "
         f"{1e3 * birth.cpu_s:.2f} ms CPU per birth"
     )
-    return 0 if simulate(birth.cpu_s) and is_met else 1
+    return birth, is_met
 
 
 def simulate(coordinator_s: float) -> bool:

@@ -1,6 +1,6 @@
 """Settings in requests: the sections of an experiment that an answer depends on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import ClassVar, TypeVar
 
@@ -8,7 +8,6 @@ import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
-from schema.experiment.ablation import Ablation
 from schema.experiment.calibration import Calibration
 from schema.experiment.document import (
     NETWORK,
@@ -31,7 +30,7 @@ from schema.experiment.environment import (
 )
 from schema.experiment.identity import Origin
 from schema.experiment.robust import Robust, robust_problems
-from schema.experiment.section import Section
+from schema.experiment.section import Count, Section
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Vector
 from schema.plugins.load import full_name, load_function
@@ -55,6 +54,29 @@ class VettingSettings(Section, frozen=True):
 
     space: Space
     vetting: Vetting
+
+
+class Ablation(Section, frozen=True):
+    """Inputs of a brain that are held, and motors that are dead, in one evaluation.
+
+    It is a part of requests, not of an experiment: its numbers are those of one robot.
+
+    Attributes:
+        inputs: (number of the input, value) of each held input. The brain receives the
+            value at every tick, without noise; with None the mean of what it receives
+            at the ticks of the same evaluation without the ablation.
+        motors: numbers of the dead motors. A dead motor gets the neutral output 0.5 at
+            every tick: the middle of its joint's range, or velocity 0. The brain runs
+            on.
+    """
+
+    inputs: tuple[tuple[Count, float | None], ...] = ()
+    motors: tuple[Count, ...] = ()
+
+    @property
+    def has_means(self) -> bool:
+        """Whether some inputs are held at their mean."""
+        return any(value is None for _, value in self.inputs)
 
 
 class EvaluationSettings(Section, frozen=True):
@@ -255,3 +277,21 @@ def fitness_argument(
             "annotate its second argument with a msgspec Struct"
         )
     return fitness
+
+
+def ablation_problems(ablation: Ablation, inputs: int, motors: int) -> Iterator[str]:
+    """Yield which inputs and motors of an ablation a robot does not have.
+
+    Args:
+        ablation: of the robot.
+        inputs: number of its brain's inputs.
+        motors: number of its motors.
+    """
+    held = [number for number, _ in ablation.inputs]
+    for what, numbers, count in (
+        ("inputs", held, inputs),
+        ("motors", ablation.motors, motors),
+    ):
+        for number in numbers:
+            if number >= count:
+                yield f"ablation.{what}: the robot has {count}, got number {number}"

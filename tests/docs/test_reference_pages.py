@@ -13,10 +13,10 @@ from docs.reference_pages import PAGES
 from docs.struct_tables import attributes, rows
 from revolve.cli.commands import COMMANDS
 from revolve.cli.parsers import parser_of
-from schema.experiment.ablation import Ablation
 from schema.experiment.document import Experiment
 from schema.experiment.section import PluginSection, Section
 from schema.experiment.settings import (
+    Ablation,
     ArenaSettings,
     EvaluationSettings,
     VettingSettings,

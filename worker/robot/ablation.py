@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from schema.errors import InvalidRobot
-from schema.experiment.ablation import Ablation, ablation_problems
+from schema.experiment.settings import Ablation, ablation_problems
 from schema.parts import BodySpace, Sensor
 from schema.robot.results import Floats
 from schema.robot.robot import Robot

@@ -6,7 +6,6 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import InvalidRobot
-from schema.experiment.ablation import Ablation
 from schema.experiment.document import (
     Fitness,
     Measures,
@@ -15,7 +14,7 @@ from schema.experiment.document import (
     body_space,
 )
 from schema.experiment.identity import Identity, Origin
-from schema.experiment.settings import EvaluationSettings
+from schema.experiment.settings import Ablation, EvaluationSettings
 from schema.plugins.needs import needs
 from schema.robot.brain import INPUT, Brain, Connection, Neuron
 from schema.robot.ids import BirthId
