@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
     ablate_runs(
         options.runs,
         options.out,
-        robots=options.robots,
+        robots=options.last,
         brains=options.brains,
         workers=options.workers,
     )
@@ -46,7 +46,7 @@ def parser(_command: str = "ablate") -> Flags:
         "motors, and with random brains. Show how much of their fitness they keep.",
         examples=(
             "revolve ablate runs/scenario1-seed1",
-            "revolve ablate runs/a runs/b --out without --robots 10",
+            "revolve ablate runs/a runs/b --out without --last 10",
         ),
     )
     flags.add_argument(
@@ -61,7 +61,7 @@ def parser(_command: str = "ablate") -> Flags:
     )
     add_count(
         flags,
-        "--robots",
+        "--last",
         5,
         "robots of the last population, the fittest first",
         least=0,
