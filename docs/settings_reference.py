@@ -42,6 +42,7 @@ _KEYS = {
     "encoding": "`encoding.type`",
     "parents": "`selection.parents`",
     "survivors": "`selection.survivors`",
+    "learner": "`learning.learner`",
 }
 
 
@@ -131,6 +132,7 @@ def _plugins() -> Iterator[str]:
         *_with_parameters(every["fitness"], "fitness.parameters"),
         *_with_parameters(every["measure"], "measures.parameters.NAME"),
         *_with_parameters(every["encoding"], "encoding.parameters"),
+        *_with_parameters(every["learner"], "learning.parameters"),
         ("brain.parameters", "cpg", CpgParameters),
     ]
     for table, name, parameters in tables:

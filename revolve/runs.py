@@ -72,6 +72,11 @@ class Run:
         return self.table("evaluations")
 
     @property
+    def learning(self) -> pa.Table:
+        """One row per trial of a newborn that learns, off-line."""
+        return self.table("learning")
+
+    @property
     def population(self) -> pa.Table:
         """Members of each recorded population."""
         return self.table("population")

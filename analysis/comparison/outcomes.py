@@ -62,15 +62,16 @@ def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) ->
     """Return the share of a change that happened before or after ``middle``.
 
     ``is_late`` selects the share after it, of an increase; otherwise the share before
-    it, of a decrease. NaN without such an increase or decrease.
+    it, of a decrease. NaN without such an increase or decrease, and if nothing between
+    the first value and ``middle`` is recorded: the share would be 1 or 0 in any case.
     """
     known = ~np.isnan(values)
     values, counts = values[known], counts[known]
     if not len(values):
         return math.nan
-    until = max(int(np.searchsorted(counts, middle, side="right")) - 1, 0)
+    until = int(np.searchsorted(counts, middle, side="right")) - 1
     change = values[-1] - values[0]
-    if change <= 0 if is_late else change >= 0:
+    if until <= 0 or (change <= 0 if is_late else change >= 0):
         return math.nan
     part = values[-1] - values[until] if is_late else values[until] - values[0]
     return float(part / change)

@@ -129,11 +129,12 @@ def _of_best(rows: Sequence[Row]) -> str:
         return f"the best, {name}, has no fitness without changes"
     if share is None:
         return f"the best, {name}, has a fitness of {rounded(undisturbed)} undisturbed"
-    least = min((r for r in rows if r["share"] is not None), key=lambda r: r["share"])
+    known = sorted((r["share"], r["change"]) for r in rows if r["share"] is not None)
+    (low, worst), (high, gain) = known[0], known[-1]
     return (
         f"the best, {name}, keeps {percent(share)} of its fitness "
-        f"({rounded(undisturbed)}), least {percent(least['share'])} under "
-        f"{least['change']}"
+        f"({rounded(undisturbed)}) in the mean, from {percent(low)} under {worst} to "
+        f"{percent(high)} under {gain}"
     )
 
 

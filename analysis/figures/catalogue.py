@@ -18,6 +18,11 @@ from analysis.figures.forms import (
     spread_caption,
 )
 from analysis.figures.islands import between, fitness_by_island, migration_graph
+from analysis.figures.learning import (
+    bodies_saved,
+    learning_curves,
+    learning_gain,
+)
 from analysis.figures.named_measures import measures_over_births
 from analysis.figures.robots import (
     effects,
@@ -38,6 +43,7 @@ Section = Literal[
     "diversity",
     "islands",
     "measures",
+    "learning",
     "speed",
     "thesis",
 ]
@@ -209,5 +215,20 @@ FIGURES: tuple[Figure, ...] = (
            "Right: brains, neurons and connections that are new, lost or changed "
            "(changes count 0 to 1). Thick lines are means over runs, thin lines runs.",
            ("brains",), changes_over_births, "bodies"),
+    Figure("J", "Learning curves",
+           "Best fitness of a newborn so far by trial: the line is the median over all "
+           "robots of a run, the band their quartiles, both as means over runs. Trial "
+           "0 is the brain at birth; failed trials count 0.",
+           ("learning_curves",), learning_curves, "learning"),
+    Figure("K", "Fitness at birth and after learning",
+           "Medians over the newborns of each interval of births, with the brain at "
+           "birth and with the best one that they tried; bands are quartiles. The "
+           "distance of the lines is what learning gains.",
+           ("learning",), learning_gain, "learning"),
+    Figure("L", "Bodies that learning saved",
+           "Share of newborns that are in the next recorded population, after the "
+           "founders. Learning has saved a body if its robot is there although its "
+           "fitness at birth is below that of each robot of that population.",
+           ("learning",), bodies_saved, "learning"),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

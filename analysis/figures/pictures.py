@@ -145,7 +145,7 @@ def _line(axes: Axes, child: Spot, parent: Spot) -> None:
     bend = min(0.25, 0.45 / max(away, 1.0)) * (1 if end[0] < start[0] else -1)
     axes.add_patch(
         ConnectionPatch(
-            start, end, "data", "data", linestyle=":", linewidth=0.9, zorder=1,
+            start, end, "data", "data", linestyle=(0, (1, 3)), linewidth=1.2, zorder=1,
             connectionstyle=f"arc3,rad={bend}", color=_FAINT,
         )
     )  # fmt: skip

@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.style import theme_of_size
+from schema.errors import counted
 
 _LAST, _BEST = "last population", "best"
 _MOST = 2.0
@@ -45,6 +46,7 @@ def points_of_shares(
         labels: from top to bottom.
         height_in: of the figure [inches].
     """
+    beyond = int((abs(rows["share"]) > _MOST).sum())
     rows["share"] = rows["share"].clip(-_MOST, _MOST)
     best = rows[rows["is_best"]].assign(of=_BEST)
     last = rows[rows["is_last"]].assign(of=_LAST)
@@ -68,6 +70,13 @@ def points_of_shares(
         + p9.scale_x_discrete(limits=labels[::-1])
         + p9.coord_flip()
         + p9.expand_limits(y=[0, 1])
-        + p9.labs(x="", y="fitness divided by fitness without changes")
+        + p9.labs(x="", y=f"fitness divided by fitness without changes{_said(beyond)}")
         + theme_of_size(height_in)
     )
+
+
+def _said(beyond: int) -> str:
+    """Return the part of the axis title about points that stand at the edge."""
+    if not beyond:
+        return ""
+    return f"\n(at the edge: {counted(beyond, 'point')} beyond {_MOST:g})"

@@ -16,7 +16,7 @@ from msgspec import structs
 from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
-from schema.experiment.fitness_text import fitness_text
+from schema.experiment.fitness_keys import fitness_text
 from schema.plugins.source import modules_named
 from schema.tables.columns import TABLES, VERSION
 from schema.tables.description import DETAILS, STATE, read_description, read_state
@@ -28,7 +28,8 @@ TABLE = "table "
 
 _MOST_ISLANDS = 10_000
 _NEEDED = (
-    "births", "evaluations", "population", "fitness", "deaths", "touches", "migrations"
+    "births", "evaluations", "population", "fitness", "deaths", "touches",
+    "migrations", "learning",
 )  # fmt: skip
 
 
@@ -48,6 +49,7 @@ class IslandSettings:
     births: int
     is_online: bool
     records_touches: bool
+    learns: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,8 +246,9 @@ def _settings(document: dict[str, Any]) -> Iterable[IslandSettings]:
         count = int(entry.get("count", 1))
         if not 0 < count <= _MOST_ISLANDS:
             raise ValueError(f"islands: count must be from 1 to {_MOST_ISLANDS}")
+        learns = bool(entry.get("learning") or document.get("learning"))
         for _ in range(count):
-            yield IslandSettings(births, arena is not None, touches)
+            yield IslandSettings(births, arena is not None, touches, learns)
 
 
 def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
@@ -305,6 +308,7 @@ def _check_there(run: Run, name: str) -> None:
         "deaths": any(online),
         "touches": any(island.records_touches for island in run.islands),
         "migrations": len(run.islands) > 1,
+        "learning": any(island.learns for island in run.islands),
     }
     is_expected = run.is_finished and expected.get(name, True)
     if is_expected and not has_rows(run.folder, name):

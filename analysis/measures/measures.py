@@ -14,6 +14,7 @@ from analysis.measures.bodies import extremity_bins
 from analysis.measures.diversity import mean_distances
 from analysis.measures.families import families
 from analysis.measures.interactions import interactions
+from analysis.measures.learning import learning, learning_curves
 from analysis.measures.named_measures import named_measures
 from analysis.measures.population_table import (
     Booleans,
@@ -121,6 +122,8 @@ _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
         ("births", "population"),
     ),
     "named_measures": (named_measures, _OF_ROBOTS),
+    "learning": (learning, ("births", "population", "learning")),
+    "learning_curves": (learning_curves, ("births", "learning")),
     "migrants": (
         lambda run: migrants(
             run.tables["migrations"], run.births, run.population_table, run.lines
@@ -138,8 +141,8 @@ def measure(
 
     Args:
         run: the run's tables.
-        wanted: which of variability, interactions, between, migrants and
-            named_measures apply to the run.
+        wanted: which of variability, interactions, between, migrants, named_measures,
+            learning and learning_curves apply to the run.
         unread: tables that could not be read; measures that need them are left out.
 
     Returns:

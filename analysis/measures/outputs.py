@@ -13,6 +13,8 @@ _KINDS = {
     "birth_island": pa.int32(),
     "is_last": pa.bool_(),
     "near_automatic": pa.bool_(),
+    "kept": pa.bool_(),
+    "saved": pa.bool_(),
 }
 _RUN = {
     "experiment": "name of the experiment",
@@ -209,6 +211,27 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "mean": "mean of judged robots, in the measure's unit",
         "robots": "number of these robots",
     },
+    "learning": {
+        **_RUN,
+        **_ROBOT,
+        "trials": "number of brains that the robot tried",
+        "at_birth": "fitness with the brain at birth; 0 if that trial failed",
+        "fitness": "fitness with the best brain",
+        "gain": "fitness minus at_birth",
+        "kept": "whether it is in the first population recorded after its birth; null "
+        "for founders",
+        "saved": "whether it is kept, although its fitness at birth is below that of "
+        "each robot of that population; null for founders",
+    },
+    "learning_curves": {
+        **_RUN,
+        "trial": "number of the trial, 0 is the brain at birth",
+        "robots": "number of robots with such a trial",
+        "median": "median over these robots of the best fitness so far; failed trials "
+        "count 0",
+        "low": "lower quartile",
+        "high": "upper quartile",
+    },
     "sweeps": {
         **_RUN,
         "setting": "dotted key of a setting that the sweep changes",
@@ -265,7 +288,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
              "runs_a", "runs_b", "failures", "deaths", "finding", "births",
-             "birth", "members", "founders"}  # fmt: skip
+             "birth", "members", "founders", "trials", "trial"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
           "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "setting", "value", "differs", "function", "fitness_function",

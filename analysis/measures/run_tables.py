@@ -24,7 +24,7 @@ class RunTables:
 
     Attributes:
         tables: by name, as ``analysis.measures.load.read_tables`` returns them: births,
-            evaluations, population, fitness, deaths, touches, migrations.
+            evaluations, population, fitness, deaths, touches, migrations, learning.
         slots: slot that labels a part in tree edit distance.
     """
 

@@ -119,6 +119,8 @@ def _wanted(run: Run) -> frozenset[str]:
         wanted |= {"between", "migrants"}
     if run.has_measures:
         wanted.add("named_measures")
+    if any(island.learns for island in run.islands):
+        wanted |= {"learning", "learning_curves"}
     return frozenset(wanted)
 
 

@@ -141,6 +141,7 @@ def _sections(
         "diversity": ("Diversity and ancestry", shown("diversity")),
         "islands": ("Islands and arenas", shown("islands")),
         "measures": ("Measures of the experiments", shown("measures")),
+        "learning": ("Lifetime learning", shown("learning")),
         "speed": ("Speed", speed(tables) + shown("speed")),
         "thesis": ("Findings of the thesis", _thesis(tables) + shown("thesis")),
         "runs": ("Runs", folded("All runs", all_runs(tables))),

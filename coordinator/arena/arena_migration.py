@@ -103,7 +103,7 @@ class ArenaMigration:
             name = BirthId(moment.island, self._settled)
             place = self._living.random_place(name, Purpose.IMMIGRANT_PLACE)
             immigrant = self._queue.pop(0)
-            robot = self._develop(immigrant.genome)
+            robot = immigrant.learnt or self._develop(immigrant.genome)
             self._living.insert(immigrant, robot, place)
         return records
 

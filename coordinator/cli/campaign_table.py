@@ -12,7 +12,7 @@ from rich.table import Table
 from coordinator.cli.format import duration
 from coordinator.storage.folder_status import folder_status
 from schema.errors import RevolveError, rounded
-from schema.experiment.fitness_text import fitness_text
+from schema.experiment.fitness_keys import fitness_text
 from schema.tables.files import read_table
 
 _WIDEST = 1000

@@ -7,6 +7,7 @@ from typing import Any
 from coordinator.islands.events import (
     Advanced,
     Answered,
+    Asked,
     Audited,
     Commanded,
     Insert,
@@ -26,6 +27,8 @@ _DETAILS = {
     "verdict": "{}",
     "reason": "{}",
     "outcomes": "{}",
+    "request": "request {}",
+    "trials": "trials {}",
     "fitness": "fitness {:.4f}",
     "age_s": "age {:.1f} s",
     "simulated_s": "{:.1f} s simulated",
@@ -109,6 +112,8 @@ def _words(named: object) -> str:
 
 
 def _answer(event: Answered) -> Fields:
+    if isinstance(event, Asked):
+        return {"request": event.number, "trials": len(event.points)}
     if not isinstance(event, Verdict):
         found = event.evaluation
         outcome = asdict(found) if found else {"reason": event.reason}

@@ -37,6 +37,7 @@ class Candidate:
         couple: its parents; None for a random robot.
         genome: what it inherits.
         robot: the robot that develops from the genome.
+        learnt: as of ``Individual``.
     """
 
     birth: BirthId
@@ -44,6 +45,7 @@ class Candidate:
     couple: Couple | None
     genome: object
     robot: Robot
+    learnt: Robot | None = None
 
     def individual(
         self,
@@ -61,6 +63,7 @@ class Candidate:
             generation=generation,
             parents=tuple(parent.birth for parent in parents),
             size=len(self.robot.parts),
+            learnt=self.learnt,
         )
         return individual.evaluated(fitness, measures)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from traceback import extract_tb
 from types import TracebackType
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -25,7 +25,9 @@ from schema.plugins.load import load_object
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Encoding, OneStepMating, RobotEncoding
 from schema.robot.brain import Brain
+from schema.robot.genome import Node
 from schema.robot.ids import BirthId
+from schema.robot.inverse_development import with_brain
 from schema.robot.robot import Robot, check_robot
 from schema.wire.codec import encode_robot
 
@@ -204,8 +206,34 @@ class IslandEncoding:
                 f"encoding {self.name!r} cannot describe this robot: {error}"
             ) from error
 
-    def stored_robot(self, robot: Robot) -> bytes | None:
-        """Return the column ``robot`` of births; None if the genome is enough."""
+    def with_brain(self, genome: object, robot: Robot) -> object:
+        """Return a genome that has also what a robot has learnt.
+
+        Args:
+            genome: of the robot at birth.
+            robot: with the brain that it has learnt.
+
+        Raises:
+            InvalidRobot: the encoding cannot describe the robot.
+        """
+        if self._is_thesis:
+            return with_brain(cast("Node", genome), robot, self.types)
+        return self.from_robot(robot)
+
+    @property
+    def describes_robots(self) -> bool:
+        """Whether it makes a genome of a given robot."""
+        return isinstance(self._encoding, RobotEncoding)
+
+    def stored_robot(self, robot: Robot, learnt: Robot | None = None) -> bytes | None:
+        """Return the column ``robot`` of births; None if the genome is enough.
+
+        Args:
+            robot: what develops from the genome.
+            learnt: the same with a brain that it has learnt.
+        """
+        if learnt is not None:
+            return encode_robot(learnt)
         return None if self._is_thesis else encode_robot(robot)
 
 

@@ -1,4 +1,4 @@
-"""Kinds of plug-ins that the coordinator runs: selections, encodings, brains."""
+"""Kinds of plug-ins that the coordinator runs: selection, encoding, brain, learner."""
 
 import inspect
 from collections import defaultdict
@@ -13,6 +13,10 @@ from coordinator.evolution.brains import BUILT_IN as BRAINS
 from coordinator.evolution.check_encoding import check_encoding
 from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
 from coordinator.evolution.encodings import METHODS, WHERE
+from coordinator.evolution.learners.check_learner import check_learner
+from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
+from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
+from coordinator.evolution.learners.learner import WHERE as LEARNER
 from coordinator.evolution.rules import PARENTS, SURVIVORS, Rule
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
@@ -25,6 +29,7 @@ from schema.experiment.document import (
     island_experiment,
 )
 from schema.experiment.kinds import Kind, Use
+from schema.experiment.learning import Learning
 from schema.experiment.selection_rules import own_rule
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
@@ -190,6 +195,19 @@ def brain_kind(check: Callable[[Experiment], None]) -> Kind:
     )
 
 
+def _learner(rules: Learning) -> Use:
+    def load() -> object:
+        return load_object(rules.learner, LEARNER, LEARNERS, LEARNER_METHODS)
+
+    return Use(LEARNER, rules.learner, load, lambda _: check_learner(rules))
+
+
+def _learners(experiment: Experiment) -> Iterator[Use]:
+    sections = [experiment.learning, *(each.learning for each in experiment.islands)]
+    for rules in dict.fromkeys(filter(None, sections)):
+        yield _learner(rules)
+
+
 ENCODING = Kind(
     "encoding",
     ENCODINGS,
@@ -212,5 +230,12 @@ KINDS = (
         partial(_takes, 4),
         lambda path: _use("survivors", Selection(survivors=path)),
         partial(_used, "survivors"),
+    ),
+    Kind(
+        "learner",
+        LEARNERS,
+        partial(_has, LEARNER_METHODS),
+        lambda path: _learner(Learning(learner=path)),
+        _learners,
     ),
 )

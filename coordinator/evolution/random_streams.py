@@ -25,7 +25,9 @@ class Purpose(IntEnum):
     """Purpose of a stream; the numbers are part of what a seed means.
 
     The birth id that names a stream of migration is (island, epoch); for the place of
-    an immigrant it is (island, number of immigrants). 11 to 13 belong to workers.
+    an immigrant it is (island, number of immigrants). 11 to 13 belong to workers
+    (noise, pushes, disturbances). The attempt that names a stream of a learner is the
+    number of its request.
     """
 
     GENERATE = 1
@@ -38,6 +40,7 @@ class Purpose(IntEnum):
     EMIGRANTS = 8
     REPLACED = 9
     IMMIGRANT_PLACE = 10
+    LEARNING = 14
     OTHER_BRAIN = 20
 
 

@@ -10,6 +10,7 @@ from math import fsum
 from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Arena, Culling
 from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
 
 Couple = tuple["Individual", "Individual"]
 
@@ -28,6 +29,8 @@ class Individual:
         parents: birth ids of its parents; empty for a random robot.
         size: number of parts of its body.
         measures: of its evaluation, by name.
+        learnt: the robot with the brain that it learnt, if it did and its genome has
+            another one.
     """
 
     birth: BirthId
@@ -39,6 +42,7 @@ class Individual:
     parents: tuple[BirthId, ...] = ()
     size: int = 0
     measures: Mapping[str, float] = field(default_factory=dict, hash=False)
+    learnt: Robot | None = None
 
     def evaluated(
         self, fitness: float | None, measures: Mapping[str, float] | None = None

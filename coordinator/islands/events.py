@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from msgspec import Struct
 
+from coordinator.evolution.learners.learner import Batch, Points
 from coordinator.evolution.selection import Individual
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
@@ -97,6 +98,20 @@ class EvaluationFailed(Message, frozen=True):
 
 Outcome = Evaluated | EvaluationFailed
 """Answers to a request to evaluate a robot: either a reason or an evaluation."""
+
+
+class Asked(Message, frozen=True):
+    """A learner answered which parameters to try.
+
+    Attributes:
+        birth: id of the newborn.
+        number: number of the request, from 0.
+        points: parameters of each trial, as shares of their ranges.
+    """
+
+    birth: BirthId
+    number: int
+    points: Points
 
 
 class Advanced(Message, frozen=True):
@@ -216,7 +231,7 @@ class Audited(Message, frozen=True):
         return (one.evaluation, one.reason) == (other.evaluation, other.reason)
 
 
-Answered = Verdict | Outcome
+Answered = Verdict | Outcome | Asked
 """Events that answer a request of an off-line island."""
 
 ExternalEvent = Answered | Advanced | Commanded
@@ -256,6 +271,24 @@ class Evaluate(Message, frozen=True):
     trial: int = 0
     steps: int = 0
     requester: int | None = None
+
+
+class Ask(Message, frozen=True):
+    """Ask the learner of a newborn which parameters to try.
+
+    Attributes:
+        birth: id of the newborn.
+        number: number of the request, from 0.
+        start: parameters of the brain at birth, as shares of their ranges.
+        most: greatest number of points, at least 1.
+        told: what was tried so far, all trials of a request together.
+    """
+
+    birth: BirthId
+    number: int
+    start: tuple[float, ...]
+    most: int
+    told: tuple[Batch, ...]
 
 
 class Record(Message, frozen=True):
@@ -321,7 +354,7 @@ class Finish(Message, frozen=True):
     neighbours: tuple[int, ...] = ()
 
 
-IslandCommand = Vet | Evaluate | Record | Emigrate | Finish
+IslandCommand = Vet | Evaluate | Ask | Record | Emigrate | Finish
 
 ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
 

@@ -14,6 +14,7 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
     Answered,
+    Asked,
     Evaluate,
     Evaluated,
     Finish,
@@ -29,6 +30,7 @@ from coordinator.islands.events import (
     measures_of,
 )
 from coordinator.islands.island_migration import IslandMigration
+from coordinator.islands.learning import IslandLearning, NewbornLearning
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.reevaluation import Reevaluations, with_durations
 from coordinator.islands.rows import (
@@ -49,11 +51,13 @@ class _Birth:
         candidate: candidate of the current attempt.
         is_viable: the candidate has passed vetting.
         outcome: its evaluation; None until it has arrived.
+        learning: its trials; None without learning, and before it is viable.
     """
 
     candidate: Candidate
     is_viable: bool = False
     outcome: Outcome | None = None
+    learning: NewbornLearning | None = None
 
 
 class Island:
@@ -93,6 +97,9 @@ class Island:
         self._breeder = Breeder(experiment, seed, run)
         self._reevaluations = (
             Reevaluations(experiment, number) if selection.reevaluation else None
+        )
+        self._learning = (
+            IslandLearning(experiment, self._encoding) if experiment.learning else None
         )
         self._migration = IslandMigration(experiment, epochs) if epochs else None
         self._generation = 0
@@ -134,7 +141,7 @@ class Island:
             isinstance(event, Outcome) and event.requester is not None
         ):
             commands = self._migrated(event)
-        elif isinstance(event, Outcome) and event.trial:
+        elif isinstance(event, Outcome) and event.trial and self._learning is None:
             if self._reevaluations is None:
                 raise self._unexpected(event, "it re-evaluates no robot")
             self._reevaluations.take(event)
@@ -147,19 +154,36 @@ class Island:
         return with_durations(commands, simulation, self._seed, self._run)
 
     def _answered(self, event: Answered) -> list[IslandCommand]:
-        """Handle the answer to a vetting or to the first evaluation of a robot."""
+        """Handle a vetting, a learner's answer, or an evaluation of a newborn."""
         found = self._birth_of(event)
         if found is None:
             return []
         candidate = found.candidate
-        if isinstance(event, Outcome):
+        if not isinstance(event, Verdict):
+            return self._judged_newborn(found, event)
+        if not event.is_viable:
+            attempt = candidate.attempt + 1
+            return [self._begin(event.birth, attempt, candidate.couple, event.reason)]
+        found.is_viable = True
+        if self._learning is None:
+            return [Evaluate(candidate.birth, candidate.robot)]
+        found.learning = NewbornLearning(candidate, self._learning)
+        return [*found.learning.start()]
+
+    def _judged_newborn(
+        self, found: _Birth, event: Outcome | Asked
+    ) -> list[IslandCommand]:
+        """Handle an evaluation of a newborn, or the answer of its learner."""
+        if found.learning is None:
+            if isinstance(event, Asked):
+                raise self._unexpected(event, "it has no learners")
             found.outcome = event
             return self._proceed()
-        if event.is_viable:
-            found.is_viable = True
-            return [Evaluate(candidate.birth, candidate.robot)]
-        attempt = candidate.attempt + 1
-        return [self._begin(event.birth, attempt, candidate.couple, event.reason)]
+        commands = found.learning.take(event)
+        if not found.learning.is_done:
+            return [*commands]
+        found.candidate, found.outcome = found.learning.conclude()
+        return self._proceed()
 
     def _birth_of(self, event: Answered) -> _Birth | None:
         """Return the birth that an answer belongs to; None for a duplicate answer.
@@ -194,7 +218,7 @@ class Island:
         """Commit evaluated births in order, and begin births up to the window."""
         commands: list[IslandCommand] = []
         while (first := self._in_flight.get(self.births)) and first.outcome:
-            commands += self._commit(first.candidate, first.outcome)
+            commands += self._commit(first, first.outcome)
         if self.births == self._brood_end and self._brood:
             reevaluations = self._reevaluations
             if reevaluations is not None:
@@ -221,16 +245,18 @@ class Island:
         self._in_flight[birth.number] = _Birth(candidate)
         return Vet(birth, candidate.attempt, candidate.robot)
 
-    def _commit(self, candidate: Candidate, outcome: Outcome) -> list[IslandCommand]:
+    def _commit(self, found: _Birth, outcome: Outcome) -> list[IslandCommand]:
         """Add an evaluated candidate to the brood; return its rows."""
         del self._in_flight[self.births]
+        candidate = found.candidate
         individual = candidate.individual(
             self._generation, fitness_of(outcome), measures_of(outcome, self._labels)
         )
         self._brood.append(individual)
         self.births += 1
         born = birth_record(candidate, individual, self._encoding)
-        return [born, evaluation_record(outcome, self._labels)]
+        trials = found.learning.records() if found.learning else ()
+        return [born, evaluation_record(outcome, self._labels), *trials]
 
     def _close_brood(self) -> list[IslandCommand]:
         """Select the survivors, and end the epoch of migration if it is due."""

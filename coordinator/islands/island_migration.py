@@ -105,7 +105,7 @@ class IslandMigration:
         evaluations = [
             Evaluate(
                 one.birth,
-                self._develop(one.genome),
+                one.learnt or self._develop(one.genome),
                 self.epochs.epoch,
                 requester=self.epochs.island,
             )

@@ -53,7 +53,7 @@ def birth_record(
         "sim_time_s": sim_time_s,
         "x": place and place[0],
         "y": place and place[1],
-        "robot": encoding.stored_robot(candidate.robot),
+        "robot": encoding.stored_robot(candidate.robot, candidate.learnt),
     }
     return Record("births", row)
 

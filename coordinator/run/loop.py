@@ -19,6 +19,8 @@ from coordinator.islands.events import (
     Answered,
     Append,
     ArenaCommand,
+    Ask,
+    Asked,
     Audited,
     Commanded,
     Emigrate,
@@ -38,6 +40,7 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.island import Island
 from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
+from coordinator.run.learners import Learners
 from coordinator.run.requests import (
     Key,
     Requests,
@@ -51,8 +54,8 @@ from coordinator.run.throttle import RealTimeThrottle
 from schema.agent.log import warn_user
 from schema.errors import RunPaused, UnexpectedEvent
 
-Request = Vet | Evaluate | AdvanceShard
-"""Commands of islands and arenas that agents carry out."""
+Request = Vet | Evaluate | AdvanceShard | Ask
+"""Commands of islands and arenas that agents or learners carry out."""
 
 Event = Started | ExternalEvent | MigrationEvent
 """Events of islands and arenas."""
@@ -115,6 +118,7 @@ class Loop:
         self.client = context.client
         self.shard_requests = ShardRequests(context, self.snapshot_store, fleet)
         self._requests = Requests(context, fleet, self.checks.audit)
+        self._learners = Learners(context.experiments, context.origin)
         self._now_s = 0.0
 
     @property
@@ -130,8 +134,9 @@ class Loop:
 
         Raises:
             UnexpectedEvent: the history of another kind of run.
+            ExperimentError: a learner fails.
         """
-        unanswered: dict[Key, Vet | Evaluate] = {}
+        unanswered: dict[Key, Vet | Evaluate | Ask] = {}
 
         def note(requests: Iterable[Request]) -> None:
             for request in requests:
@@ -146,9 +151,14 @@ class Loop:
             if isinstance(event, Answered):
                 unanswered.pop(key_of(event), None)
             note(self._act_on(event))
+        asks: list[Ask] = []
         for request in unanswered.values():
-            self._requests.send(request)
+            if isinstance(request, Ask):
+                asks.append(request)
+            else:
+                self._requests.send(request)
         self.shard_requests.send_noted()
+        self._take([self._learners.answer(each) for each in asks])
 
     def act(self, now_s: float, ends: Iterable[End] = ()) -> None:
         """Act on the ends of jobs and advances.
@@ -159,7 +169,7 @@ class Loop:
 
         Raises:
             JobRefused: no agent can do a job; the run stops as it is.
-            ExperimentError: restrictions that no robot meets.
+            ExperimentError: restrictions that no robot meets, or a learner that fails.
             RunFolderError: the disk is full or failed, or another coordinator has
                 taken the run over.
             RunPaused: the user has to decide first.
@@ -199,9 +209,12 @@ class Loop:
         self._take([event])
 
     def _take(self, events: Sequence[JournalledEvent]) -> None:
-        """Store events, then act on them."""
-        if not events:
-            return
+        """Store events, then act on them, and on the answers of learners."""
+        while events:
+            events = self._answers(events)
+
+    def _answers(self, events: Sequence[JournalledEvent]) -> list[Asked]:
+        """Store events, then act on them; return what learners answer."""
         # A process that was suspended while another took over must not write a byte.
         self.confirm()
         for event in events:
@@ -209,13 +222,17 @@ class Loop:
                 poses = event.advance.poses
                 self.rows.store(Append("poses", event.pose_rows, poses))
         self.log.append(events)
+        answers: list[Asked] = []
         for event in events:
             for request in self._act_on(event):
                 if isinstance(request, AdvanceShard):
                     self._advance(request)
+                elif isinstance(request, Ask):
+                    answers.append(self._learners.answer(request))
                 else:
                     self._requests.send(request)
         self._warn(events)
+        return answers
 
     def _act_on(self, event: JournalledEvent) -> list[Request]:
         """Act on an event that the journal holds; return the requests to send."""
@@ -265,7 +282,7 @@ class Loop:
                         self._write(command)
                     case Append():
                         self.rows.append(command)
-                    case Vet() | Evaluate() | AdvanceShard():
+                    case Vet() | Evaluate() | AdvanceShard() | Ask():
                         requests.append(command)
                     case Emigrate(island, to, epoch, migrants):
                         events.append((to, Immigrated(to, island, epoch, migrants)))
@@ -293,7 +310,7 @@ class Loop:
             ):
                 warn_user(str(drift))
                 self._write(drift.record)
-            if not isinstance(event, Outcome):
+            if not isinstance(event, Outcome | Asked):
                 return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):
             return machine.handle(event)

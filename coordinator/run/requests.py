@@ -9,6 +9,8 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import (
     Advanced,
     Answered,
+    Ask,
+    Asked,
     Audited,
     Commanded,
     Evaluate,
@@ -42,7 +44,7 @@ REMEMBERED = 256
 """Number of vetted bodies whose bytes are kept for the robot's evaluation."""
 
 Key = tuple[str, int, BirthId, int]
-"""Identifies an open request: kind, requester, birth, attempt or trial."""
+"""Identifies an open request: kind, requester, birth, number of its attempt."""
 
 
 class Requests:
@@ -154,11 +156,11 @@ class Requests:
         return self._cross_checks.settle(end.job.number, event)
 
 
-def requester_of(about: Vet | Evaluate | Answered) -> int:
+def requester_of(about: Vet | Evaluate | Ask | Answered) -> int:
     """Return the island that requests something, or that is answered."""
-    if isinstance(about, Vet | Vetted | VettingFailed) or about.requester is None:
+    if isinstance(about, Vet | Vetted | VettingFailed | Ask | Asked):
         return about.birth.island
-    return about.requester
+    return about.birth.island if about.requester is None else about.requester
 
 
 def island_of(event: ExternalEvent) -> int:
@@ -168,10 +170,10 @@ def island_of(event: ExternalEvent) -> int:
     return requester_of(event)
 
 
-def key_of(
-    about: Vet | Evaluate | Vetted | VettingFailed | Evaluated | EvaluationFailed,
-) -> Key:
+def key_of(about: Vet | Evaluate | Ask | Answered) -> Key:
     """Return what a request and its answer have in common."""
+    if isinstance(about, Ask | Asked):
+        return ("ask", about.birth.island, about.birth, about.number)
     if isinstance(about, Vet | Vetted | VettingFailed):
         return ("vet", about.birth.island, about.birth, about.attempt)
     return ("evaluate", requester_of(about), about.birth, about.trial)

@@ -5,7 +5,9 @@ from pathlib import Path
 from coordinator.evolution.encodings import encoding_of
 from schema.errors import InvalidRobot, RunFolderError
 from schema.experiment.document import REVOLVE_ANGLE, Experiment
+from schema.robot.robot import Robot
 from schema.tables.files import read_table
+from schema.wire.codec import decode_robot, encode_robot
 
 
 def check_stored_genomes(folder: Path, experiment: Experiment) -> None:
@@ -32,9 +34,16 @@ def check_stored_genomes(folder: Path, experiment: Experiment) -> None:
         problem = "develops into another robot now"
     except InvalidRobot as error:
         robot, problem = None, str(error)
-    if robot is None or encoding.stored_robot(robot) != row["robot"]:
+    if robot is None or not _is_same(robot, row["robot"], experiment):
         raise RunFolderError(
             f"{folder}: the genome of birth {row['birth']} was written by another "
             f"encoding than {encoding.name!r} is now: {problem}; restore its code, or "
             "start a new run"
         )
+
+
+def _is_same(robot: Robot, stored: bytes, experiment: Experiment) -> bool:
+    """Return whether a stored robot has developed from the genome of a robot."""
+    if experiment.learning or any(each.learning for each in experiment.islands):
+        return decode_robot(stored).parts == robot.parts
+    return encode_robot(robot) == stored

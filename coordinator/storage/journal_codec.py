@@ -2,6 +2,7 @@
 
 from coordinator.islands.events import (
     Advanced,
+    Asked,
     Audited,
     Commanded,
     Evaluated,
@@ -56,8 +57,12 @@ def decode_entry(data: bytes) -> JournalledEvent:
         MalformedMessage: the bytes are no entry, or it holds no event.
     """
     entry = parsed(data, pb.Entry(), ADVANCE_BYTES)
-    is_audit = entry.WhichOneof("event") == "audited"
-    return _audited(entry.audited) if is_audit else _event(entry)
+    match entry.WhichOneof("event"):
+        case "audited":
+            return _audited(entry.audited)
+        case "asked":
+            return _asked(entry)
+    return _event(entry)
 
 
 def _entry(event: JournalledEvent) -> pb.Entry:
@@ -74,6 +79,10 @@ def _entry(event: JournalledEvent) -> pb.Entry:
                 number=event.number, advance=advance, pose_rows=event.pose_rows
             )
             entry = pb.Entry(island=event.island, advanced=advanced)
+        case Asked(birth, number, points):
+            values = [value for point in points for value in point]
+            asked = pb.LearnerEntry(number=number, points=len(points), values=values)
+            return pb.Entry(island=birth.island, birth=birth.number, asked=asked)
         case Vetted() | VettingFailed():
             entry = pb.Entry(attempt=event.attempt)
             entry.island, entry.birth = event.birth
@@ -147,6 +156,20 @@ def _event(entry: pb.Entry) -> ExternalEvent:
             order = _order(command)
             return Commanded(entry.island, command.command_id, command.step, order)
     raise MalformedMessage("entry: holds no event")
+
+
+def _asked(entry: pb.Entry) -> Asked:
+    message = entry.asked
+    count, left = divmod(len(message.values), max(1, message.points))
+    if left or not count or not message.points:
+        raise MalformedMessage(
+            f"entry: {message.points} points must have equally many values, got "
+            f"{len(message.values)} values"
+        )
+    values = [finite(value, "asked.values") for value in message.values]
+    rows = zip(*[iter(values)] * count, strict=True)
+    birth = BirthId(entry.island, entry.birth)
+    return Asked(birth, message.number, tuple(rows))
 
 
 def _audited(message: pb.AuditEntry) -> Audited:

@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
     ablate_runs(
         options.runs,
         options.out,
-        robots=options.last,
+        robots=options.robots,
         brains=options.brains,
         workers=options.workers,
     )
@@ -46,7 +46,7 @@ def parser(_command: str = "ablate") -> Flags:
         "motors, and with random brains. Show how much of their fitness they keep.",
         examples=(
             "revolve ablate runs/scenario1-seed1",
-            "revolve ablate runs/a runs/b --out without --last 10",
+            "revolve ablate runs/a runs/b --out without --robots 10",
         ),
     )
     flags.add_argument(
@@ -61,9 +61,9 @@ def parser(_command: str = "ablate") -> Flags:
     )
     add_count(
         flags,
-        "--last",
+        "--robots",
         5,
-        "robots of the last population, the fittest first",
+        "number of robots, the fittest of the last populations",
         least=0,
     )
     add_count(flags, "--brains", 5, "random brains for each body", least=0)

@@ -20,6 +20,7 @@ from schema.experiment.document import (
     island_experiment,
     steps_of,
 )
+from schema.experiment.learning import learning_problems
 from schema.experiment.robust import robust_problems
 from schema.experiment.selection_rules import rule_problems
 from schema.experiment.sweep import sweep_problems
@@ -40,7 +41,8 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             migration that can never happen; measures that are named twice, or
             parameters of a measure that is not named; a range that ends before it
             begins; a calibration of an unknown part type, or with a delay between two
-            ticks; disturbances or calibrations in an arena.
+            ticks; disturbances, calibrations or learning in an arena; an unknown
+            learner, or learning with re-evaluations.
     """
     if problem := next(_problems(experiment), ""):
         raise ExperimentError(f"{where}: {problem}")
@@ -90,6 +92,12 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from world_problems(experiment)
     is_arena, clock = experiment.arena is not None, experiment.simulation
     yield from robust_problems(experiment.robust, is_arena=is_arena)
+    yield from learning_problems(
+        experiment.learning,
+        is_arena=is_arena,
+        is_reevaluated=experiment.selection.reevaluation is not None,
+        encoding=experiment.encoding.type,
+    )
     tick_s = clock.brain_steps * clock.timestep_s
     yield from delay_problems(experiment.calibration, tick_s, is_arena=is_arena)
     if experiment.arena is not None:

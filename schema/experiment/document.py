@@ -16,6 +16,7 @@ from msgspec import Meta, field, structs
 from schema.errors import ExperimentError
 from schema.experiment.calibration import Calibration
 from schema.experiment.environment import FLAT, Environment
+from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.experiment.robust import NoiseLevel, Robust
 from schema.experiment.section import (
@@ -429,6 +430,7 @@ class Islands(Section, frozen=True):
         arena: these islands are arenas.
         migration: exchange of migrants from and to these islands.
         robust: evaluation of these islands' robots under drawn disturbances.
+        learning: lifetime learning of these islands' newborns.
     """
 
     count: AtLeastOne = 1
@@ -442,6 +444,7 @@ class Islands(Section, frozen=True):
     arena: Arena | None = None
     migration: Migration | None = None
     robust: Robust | None = None
+    learning: Learning | None = None
 
 
 class Experiment(Section, frozen=True):
@@ -473,6 +476,8 @@ class Experiment(Section, frozen=True):
             relative to itself.
         sweep: makes the document a campaign of experiments that differ in some
             settings.
+        learning: lifetime learning, off-line; without it newborns are evaluated with
+            the brain that they inherit.
     """
 
     name: str
@@ -494,6 +499,7 @@ class Experiment(Section, frozen=True):
     robust: Robust | None = None
     calibration: tuple[Calibration, ...] = ()
     sweep: Sweep | None = None
+    learning: Learning | None = None
 
     @property
     def window(self) -> int:
@@ -555,12 +561,15 @@ def references(experiment: Experiment) -> list[str]:
         for selection in (experiment.selection, *islands)
         for path in (selection.parents, selection.survivors)
     ]
+    learning = [each.learning for each in experiment.islands]
+    learners = [each.learner for each in (experiment.learning, *learning) if each]
     named = [
         *experiment.space.part_types,
         *experiment.space.neuron_types,
         *functions,
         *experiment.measures.names,
         *rules,
+        *learners,
         experiment.encoding.type,
         experiment.brain.type,
     ]

@@ -379,8 +379,15 @@ def _complete(document: dict[str, Any]) -> None:
 
 
 def experiment_text(experiment: Experiment) -> str:
-    """Return an experiment as one line of JSON with all defaults."""
-    return msgspec.json.encode(experiment).decode()
+    """Return an experiment as one line of JSON with all defaults.
+
+    The text of an experiment without learning is that of versions without it.
+    """
+    document = msgspec.to_builtins(experiment)
+    for section in (document, *document["islands"]):
+        if section["learning"] is None:
+            del section["learning"]
+    return msgspec.json.encode(document).decode()
 
 
 def experiment_from_text(text: str) -> Experiment:

@@ -1,16 +1,25 @@
-"""Check that the keys of ``[fitness]`` have an effect on the experiment's function."""
+"""The section ``[fitness]``: a check that its keys have an effect, and its text.
 
-from collections.abc import Callable
+The text tells whose fitness is comparable.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
+from msgspec import to_builtins
+
 from schema.errors import ExperimentError
 from schema.experiment.document import Fitness
-from schema.experiment.settings import fitness_argument, fitness_function
+from schema.experiment.settings import FITNESS, fitness_argument, fitness_function
+from schema.plugins.permission import ROOMS
 from schema.plugins.simple_traces import simple_traces
 
 _KEYS = ("path_weight", "straight_weight", "limit")
 _TABLE = "fitness.parameters"
+_SHORT = {path: name for name, path in FITNESS.items()}
+_DEFAULTS: dict[str, Any] = to_builtins(Fitness())
 
 
 def check_fitness_keys(fitness: Fitness) -> None:
@@ -69,3 +78,47 @@ def _keys_read(function: Callable[..., float], fitness: Fitness) -> set[str]:
             function(trace, watched)
             is_called = True
     return watched.read if is_called else set(_KEYS)
+
+
+def fitness_text(
+    document: Mapping[str, Any], digests: Mapping[str, str] | None = None
+) -> str:
+    """Return the fitness functions of an experiment, with what changes their values.
+
+    Fitness has the same meaning in two experiments if these texts are equal.
+
+    Args:
+        document: an experiment as JSON, perhaps of an earlier version.
+        digests: of the sources of plug-ins, by module; None leaves sources out.
+
+    Returns:
+        For example ``locomotion``, ``locomotion (limit = 2.0)`` or ``goals:fast
+        (source 6f1d2a)``; several functions of islands with ``and`` between. Keys with
+        default values are left out.
+    """
+    sections = (
+        each.get("fitness") or document.get("fitness") or {}
+        for each in document.get("islands") or [{}]
+    )
+    return " and ".join(dict.fromkeys(_text(each, digests) for each in sections))
+
+
+def _text(section: Mapping[str, Any], digests: Mapping[str, str] | None) -> str:
+    known = {**_DEFAULTS, **section}
+    function = str(known["function"])
+    notes = list(_changed(known, _DEFAULTS))
+    module = function.partition(":")[0].partition(".")[0]
+    if digests is not None and ":" in function and module not in ROOMS:
+        notes.append(f"source {digests.get(module, 'unknown')}")
+    name = _SHORT.get(function, function)
+    return f"{name} ({', '.join(notes)})" if notes else name
+
+
+def _changed(entries: Mapping[str, Any], usual: Mapping[str, Any]) -> Iterator[str]:
+    """Yield ``key = value`` for each key but the function whose value is not usual."""
+    for key in sorted(entries):
+        value = entries[key]
+        if key == "parameters":
+            yield from _changed(value, {})
+        elif key != "function" and value != usual.get(key):
+            yield f"{key} = {json.dumps(value, sort_keys=True)}"

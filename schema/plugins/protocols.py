@@ -556,6 +556,45 @@ class SurvivorSelection(Protocol):
         ...
 
 
+class Learner(Protocol):
+    """Learner of the brains of newborns, ``learning.learner``; runs in the coordinator.
+
+    The experiment names a class. It is called once for each newborn, as
+    ``Class(start, sigma, parameters)``: the parameters of the newborn's brain, (N,);
+    the key ``learning.sigma``; and an instance of the msgspec Struct that the class has
+    as its attribute ``Parameters``, read from the table ``[learning.parameters]``; None
+    without it. All parameters are shares of their ranges, from 0 to 1.
+
+    The run asks for points, evaluates all of them together, tells their fitness, and
+    asks again until the budget is spent. Points are stored when they are asked for. A
+    run that is resumed makes a new learner, tells it what was tried, and asks for the
+    next points. `ask` therefore changes nothing in the learner, and draws from ``rng``
+    alone.
+    """
+
+    def ask(self, rng: np.random.Generator, most: int, /) -> Sequence[Any] | Floats:
+        """Return the next points to try, all of them at the same time.
+
+        Args:
+            rng: stream of this request, of this newborn alone.
+            most: greatest number of points: what is left of the budget.
+
+        Returns:
+            (P, N), 1 <= P <= most, from 0 to 1.
+        """
+        ...
+
+    def tell(self, points: Floats, fitness: Floats, /) -> None:
+        """Take the fitness of all points that were tried together.
+
+        Args:
+            points: (P, N) in the order of `ask`. At the first call the start comes
+                first, which is always tried.
+            fitness: (P,), higher is better; -inf for a failed trial.
+        """
+        ...
+
+
 class FitnessFunction(Protocol):
     """Fitness function, ``fitness.function``; runs in the worker.
 

@@ -1,7 +1,20 @@
 """Genome of a given robot: the inverse of development."""
 
+from collections.abc import Sequence
+from itertools import count
+
+from msgspec.structs import replace
+
+from schema.parts import BodySpace
 from schema.robot.brain import Brain, Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, assemble
+from schema.robot.genome import (
+    ConnectionGene,
+    Genome,
+    NeuronGene,
+    assemble,
+    develop,
+    walk,
+)
 from schema.robot.robot import Part, Robot
 
 
@@ -31,6 +44,51 @@ def genome_of(robot: Robot) -> Genome:
             tuple(neurons.get((index, "hidden"), ())),
             tuple(connections.get(index, ())),
         ),
+    )
+
+
+def with_brain(genome: Genome, robot: Robot, space: BodySpace) -> Genome:
+    """Return a genome with the parameters and weights of a brain.
+
+    Connections that the robot does not have stay as they are.
+
+    Args:
+        genome: to change.
+        robot: what develops from the genome, with other parameters and weights.
+        space: its part types.
+    """
+    neurons, _ = _shares(robot.brain)
+    own = [node.connections for node, _, _ in walk(genome)]
+
+    def rebuilt(connections: Sequence[tuple[ConnectionGene, ...]]) -> Genome:
+        return assemble(
+            robot.parts,
+            lambda index: (
+                tuple(neurons.get((index, "output"), ())),
+                tuple(neurons.get((index, "hidden"), ())),
+                connections[index],
+            ),
+        )
+
+    # Numbers in place of weights tell which gene a connection of the robot is from.
+    numbers = count()
+    numbered = [
+        tuple(replace(gene, weight=float(next(numbers))) for gene in genes)
+        for genes in own
+    ]
+    developed = develop(rebuilt(numbered), space).brain.connections
+    learnt = {
+        edge.weight: new.weight
+        for edge, new in zip(developed, robot.brain.connections, strict=True)
+    }
+    return rebuilt(
+        [
+            tuple(
+                replace(gene, weight=learnt.get(number.weight, gene.weight))
+                for gene, number in zip(genes, marks, strict=True)
+            )
+            for genes, marks in zip(own, numbered, strict=True)
+        ]
     )
 
 

@@ -247,8 +247,9 @@ BIRTHS = _table(
     _column(
         "robot",
         pa.binary(),
-        "Protobuf bytes of the robot; null with the encoding revolve-angle, whose "
-        "genomes are enough, and in runs that are older than this column",
+        "Protobuf bytes of the robot, with the brain that it has learnt; null if it is "
+        "what develops from the genome with the encoding revolve-angle, and in runs "
+        "that are older than this column",
         is_repeatable=False,
         is_nullable=True,
     ),
@@ -260,8 +261,8 @@ EVALUATIONS = _table(
     _column(
         "trial",
         pa.int32(),
-        "number of the evaluation of this robot: 0 is the one at birth, others are "
-        "re-evaluations",
+        "number of the evaluation of this robot: 0 is the one at birth (with learning "
+        "the best trial, which the table learning numbers), others are re-evaluations",
         absent=0,
     ),
     _column("status", pa.string(), '"ok" or "failed"'),
@@ -277,6 +278,53 @@ EVALUATIONS = _table(
     _column("worker", pa.string(), "name of the worker", is_repeatable=False),
     _column("platform", pa.string(), "platform of the worker", is_repeatable=False),
     _MEASURES,
+)
+LEARNING = _table(
+    "learning",
+    "a trial of a newborn whose brain is learnt, off-line",
+    _ISLAND,
+    _BIRTH,
+    _column(
+        "trial",
+        pa.int32(),
+        "number of the trial of this robot, from 0: the brain at birth",
+    ),
+    _column(
+        "request",
+        pa.int32(),
+        "number of the request to the learner that led to this trial; trials of one "
+        "request are tried together",
+    ),
+    _column(
+        "fitness",
+        _FLOAT,
+        "higher is better; null if the trial failed",
+        unit=_FITNESS_UNIT,
+        is_nullable=True,
+    ),
+    _column("reason", pa.string(), "of a failure; otherwise empty"),
+    _column(
+        "distance",
+        _FLOAT,
+        "root mean square of the differences to the parameters at birth",
+        unit="1",
+    ),
+    _column(
+        "parameters",
+        pa.list_(_inner("item", _FLOAT)),
+        "what is learnt, as shares of the ranges, from 0 to 1: parameters of neurons, "
+        "then weights, in the order of the brain",
+        unit="1",
+    ),
+    _column(
+        "wall_s",
+        _FLOAT,
+        "duration by the worker's clock",
+        unit="s",
+        is_repeatable=False,
+    ),
+    _column("worker", pa.string(), "name of the worker", is_repeatable=False),
+    _column("platform", pa.string(), "platform of the worker", is_repeatable=False),
 )
 POPULATION = _table(
     "population",

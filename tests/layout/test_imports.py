@@ -36,10 +36,10 @@ PERMITTED = {
     "numba": ("analysis/measures/distance.py",),
     "matplotlib": ("analysis/figures/*.py",),
     "networkx": ("coordinator/islands/topology.py",),
+    "cmaes": ("coordinator/evolution/learners/cma_es.py",),
 }
 # Reference implementations for tests and developer tools: no room imports them.
 TEST_ONLY = {
-    "cmaes",
     "duckdb",
     "grpc_tools",
     "hypothesis",

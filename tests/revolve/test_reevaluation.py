@@ -77,7 +77,7 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
 
 def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
     """Check what ``ablate`` writes, with ``[robust]``, as the run evaluates."""
-    words = ["ablate", "a", "--last", "1", "--brains", "2", "--workers", "1"]
+    words = ["ablate", "a", "--robots", "1", "--brains", "2", "--workers", "1"]
     assert main([*words, "--out", "out"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("a: the best, 0:")

@@ -67,6 +67,31 @@ population = 5
 tournament_size = 2
 """
 
+LEARNING = f"""
+name = "pupils"
+births = 9
+{SHORT_EVALUATIONS}
+children = 4
+[robust]
+draws = 1
+[learning]
+budget = 6
+inherit = "lamarckian"
+[learning.parameters]
+population = 4
+[[islands]]
+[[islands]]
+[islands.learning]
+learner = "(1+1)-es"
+budget = 3
+inherit = "darwinian"
+parameters = {{}}
+[migration]
+topology = "ring"
+epoch = 5
+"""
+"""Two off-line islands that learn in different ways, under a disturbance."""
+
 MIXED = f"""
 name = "mixed"
 births = 9

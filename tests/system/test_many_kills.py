@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.system.documents import BRIDGE, MIXED, OFF_LINE, SMALL_ARENA
+from tests.system.documents import BRIDGE, LEARNING, MIXED, OFF_LINE, SMALL_ARENA
 
 pytestmark = [
     pytest.mark.system,
@@ -22,7 +22,13 @@ pytestmark = [
 
 ROOT = Path(__file__).parents[2]
 KILLING = Path(__file__).with_name("killing.py")
-DOCUMENTS = {"off": OFF_LINE, "bridge": BRIDGE, "arena": SMALL_ARENA, "mixed": MIXED}
+DOCUMENTS = {
+    "off": OFF_LINE,
+    "bridge": BRIDGE,
+    "arena": SMALL_ARENA,
+    "mixed": MIXED,
+    "learning": LEARNING,
+}
 KILLS = int(os.environ.get("REVOLVE_KILLS", "1000"))
 OF_COORDINATORS = {"instants": 0.7, "fleet": 0.3}
 """Shares of the kills of coordinators."""
@@ -65,7 +71,10 @@ def killed(folder: Path, mode: str, kills: tuple[int, int], seed: int) -> Any:  
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "kinds", "kills"),
-    [("instants", ("bridge", "arena"), (15, 0)), ("fleet", ("off", "mixed"), (5, 20))],
+    [
+        ("instants", ("bridge", "arena"), (15, 0)),
+        ("fleet", ("learning", "mixed"), (5, 20)),
+    ],
 )
 def test_kills_in_runs_of_all_kinds_give_equal_runs(
     tmp_path: Path, mode: str, kinds: tuple[str, ...], kills: tuple[int, int]

@@ -160,7 +160,7 @@ def parser() -> Flags:
         ),
     )
     arena_bench.add_experiment(timing, "scenario1")
-    add_count(timing, "--robots", 30, "number of random robots")
+    add_count(timing, "--robots", 30, "number of robots, drawn at random")
     add_count(timing, "--seed", 1, "random seed, of the robots", least=0)
     study = kinds.add_parser(
         "fidelity",

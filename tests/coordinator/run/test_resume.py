@@ -4,17 +4,20 @@ Everything but the physics is real: island, loop, analyzer, journal and tables.
 """
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from zlib import crc32
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import analyzer.report
 from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.events import Ask, Asked
 from coordinator.islands.island import Island
 from coordinator.network.local import LocalAgents
+from coordinator.run.learners import Learners
 from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
 from coordinator.storage.compare import compare
@@ -24,12 +27,18 @@ from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.experiment.document import Experiment, Selection
 from schema.experiment.file import experiment_text
+from schema.experiment.learning import Learning
 from schema.robot.results import Evaluation
 from schema.tables.files import read_table
 from schema.wire.codec import Answer, decode_request, encode_answer, encode_robot
 
 EXPERIMENT = Experiment(
     name="resume", births=40, selection=Selection(population=8, children=6)
+)
+LEARNING = structs.replace(
+    EXPERIMENT,
+    births=20,
+    learning=Learning(budget=7, inherit="lamarckian", parameters={"population": 4}),
 )
 DETAILS = RunDetails("resume", 0, 3, experiment_text(EXPERIMENT))
 
@@ -57,10 +66,13 @@ class Worker:
         return encode_answer(Answer(context.epoch, context.number, 0.0, result))
 
 
-def run(path: Path, *, answers: int = 10**9) -> int:
+def run(
+    path: Path, *, answers: int = 10**9, experiment: Experiment = EXPERIMENT
+) -> int:
     """Start or resume until the end or N evaluations; return their number."""
     worker = Worker(answers)
-    details = None if (path / NAME).exists() else DETAILS
+    text = experiment_text(experiment)
+    details = None if (path / NAME).exists() else replace(DETAILS, document=text)
     with RunFolder(path, details) as folder, Journal.open(path) as journal:
         rows = Recorder(path, DETAILS)
         fleet = Fleet(
@@ -69,8 +81,8 @@ def run(path: Path, *, answers: int = 10**9) -> int:
             )
         )
         loop = Loop(
-            {0: Island(EXPERIMENT, DETAILS.seed, DETAILS.run)},
-            context=RunContext.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
+            {0: Island(experiment, DETAILS.seed, DETAILS.run)},
+            context=RunContext.of("resume", folder.epoch, experiment, DETAILS.origin),
             fleet=fleet,
             log=journal,
             rows=rows,
@@ -131,3 +143,29 @@ def test_resuming_a_finished_run_changes_nothing(
     run(path)
     assert run(path) == 0
     assert compare(undisturbed, path) == []
+
+
+def test_newborns_that_learn_are_resumed_in_the_middle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also after a kill between the answer of a learner and what follows from it."""
+    whole, path = tmp_path / "whole", tmp_path / "run"
+    assert run(whole, experiment=LEARNING) == LEARNING.births * 7
+    answer, rng = Learners.answer, np.random.default_rng(1)
+    asked: list[Ask] = []
+
+    def counted(self: Learners, ask: Ask) -> Asked:
+        asked.append(ask)
+        if len(asked) in (3, 9, 21):
+            raise Killed
+        return answer(self, ask)
+
+    monkeypatch.setattr(Learners, "answer", counted)
+    for _ in range(12):
+        run(path, answers=int(rng.integers(0, 20)), experiment=LEARNING)
+    run(path, experiment=LEARNING)
+    assert compare(whole, path) == []
+    assert read_table(path, "learning").num_rows == LEARNING.births * 7
+    # Two requests for each newborn; those three were lost, and no answer was asked for
+    # twice.
+    assert len(asked) == LEARNING.births * 2 + 3

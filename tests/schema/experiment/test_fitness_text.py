@@ -7,7 +7,7 @@ import pytest
 
 from schema.experiment.document import Experiment, Fitness, Islands
 from schema.experiment.file import experiment_text
-from schema.experiment.fitness_text import fitness_text
+from schema.experiment.fitness_keys import fitness_text
 
 OWN: dict[str, Any] = {"function": "goals.fast:speed", "parameters": {"b": 2, "a": [1]}}
 

@@ -1,0 +1,140 @@
+"""Figures of lifetime learning: learning curves, gain over births, bodies saved."""
+
+from typing import Any
+
+import plotnine as p9
+
+from analysis.figures.forms import NothingToDraw, Tables, fitness_text
+from analysis.figures.style import in_order, label, scales, theme_of_size
+
+_BINS, _WIDTH = 20, 10
+"""Most intervals of births of a figure, and their least length."""
+_KEPT, _SAVED = "also with the brain at birth", "saved by learning"
+
+
+def _frame(tables: Tables, name: str) -> Any:  # noqa: ANN401 - pandas
+    rows = tables.get(name)
+    if not rows:
+        raise NothingToDraw("no robot learns")
+    return rows.to_pandas()
+
+
+def learning_curves(tables: Tables) -> p9.ggplot:
+    """Return the best fitness so far by trial: median and quartiles over robots.
+
+    Args:
+        tables: ``learning_curves``, and ``runs`` for the unit.
+
+    Raises:
+        NothingToDraw: no robot learns, or none has two trials.
+    """
+    frame = _frame(tables, "learning_curves")
+    mean = frame.groupby(["experiment", "trial"], as_index=False)[
+        ["median", "low", "high"]
+    ].mean()
+    mean = _in_lines(mean, "trial", "two trials")
+    colours = scales(in_order(mean["experiment"]))
+    return (
+        p9.ggplot(mean, p9.aes("trial"))
+        + p9.geom_ribbon(p9.aes(ymin="low", ymax="high", fill="experiment"), alpha=0.25)
+        + p9.geom_line(p9.aes(y="median", colour="experiment"), size=0.9)
+        + colours
+        + p9.expand_limits(y=0)
+        + p9.labs(
+            x="trial (0: the brain at birth)",
+            y=fitness_text(tables, "best fitness so far"),
+        )
+        + theme_of_size(3.6)
+    )
+
+
+def _binned(frame: Any) -> Any:  # noqa: ANN401 - pandas
+    """Return robots with the middle of their bin of births, equal for all runs."""
+    width = max(_WIDTH, -(-(int(frame["birth"].max()) + 1) // _BINS))
+    middle = (frame["birth"] // width + 0.5) * width
+    return frame.assign(births=middle, width=width)
+
+
+def learning_gain(tables: Tables) -> p9.ggplot:
+    """Return the fitness at birth and after learning over births: medians of bins.
+
+    Args:
+        tables: ``learning``, and ``runs`` for the unit.
+
+    Raises:
+        NothingToDraw: no robot learns, or for less than two intervals of births.
+    """
+    frame = _binned(_frame(tables, "learning"))
+    texts = {"at_birth": "with the brain at birth", "fitness": "after learning"}
+    long = frame.melt(
+        ["experiment", "births"], [*texts], var_name="when", value_name="value"
+    )
+    long["when"] = _ordered(long["when"].map(texts), [*texts.values()][::-1])
+    grouped = long.groupby(["experiment", "births", "when"], observed=True)["value"]
+    found = grouped.quantile([0.25, 0.5, 0.75]).unstack().reset_index()
+    found.columns = ["experiment", "births", "when", "low", "median", "high"]
+    found = _in_lines(found, "births", f"births in two intervals of {_WIDTH}")
+    count = found["experiment"].nunique()
+    figure = (
+        p9.ggplot(found, p9.aes("births", "median", fill="when", colour="when"))
+        + p9.geom_ribbon(p9.aes(ymin="low", ymax="high"), alpha=0.25, colour="none")
+        + p9.geom_line(size=0.9)
+        + p9.scale_fill_manual(["#D55E00", "#0072B2"], name="")
+        + p9.scale_colour_manual(["#D55E00", "#0072B2"], name="")
+        + p9.expand_limits(y=0)
+        + p9.labs(x="births", y=fitness_text(tables, "fitness of newborns"))
+        + theme_of_size(3.6 if count == 1 else 1.2 + 2.4 * -(-count // 2))
+    )
+    return figure if count == 1 else figure + _panels(found)
+
+
+def bodies_saved(tables: Tables) -> p9.ggplot:
+    """Return the shares of newborns that were kept, and of those saved, over births.
+
+    Args:
+        tables: ``learning``.
+
+    Raises:
+        NothingToDraw: no robot that learns was born after the founders.
+    """
+    frame = _frame(tables, "learning")
+    frame = _binned(frame[frame["kept"].notna()])
+    if frame.empty:
+        raise NothingToDraw("no robot that learns was born after the founders")
+    saved = frame["saved"].astype(float)
+    kept = frame["kept"].astype(float) - saved
+    frame = frame.assign(**{_SAVED: saved, _KEPT: kept})
+    found = frame.groupby(["experiment", "births", "width"], as_index=False)[
+        [_KEPT, _SAVED]
+    ].mean()
+    long = found.melt(["experiment", "births", "width"], var_name="how")
+    long["how"] = _ordered(long["how"], [_SAVED, _KEPT])
+    count = found["experiment"].nunique()
+    figure = (
+        p9.ggplot(long, p9.aes("births", "value", fill="how"))
+        + p9.geom_col(p9.aes(width="width"), colour="white", size=0.3)
+        + p9.scale_fill_manual(["#E69F00", "#7F9FBF"], name="")
+        + p9.expand_limits(y=[0, 1])
+        + p9.labs(x="births", y="share in the next population")
+        + theme_of_size(3.6 if count == 1 else 1.2 + 2.4 * -(-count // 2))
+    )
+    return figure if count == 1 else figure + _panels(found)
+
+
+def _in_lines(frame: Any, along: str, needed: str) -> Any:  # noqa: ANN401 - pandas
+    """Return the rows of experiments with two points of a line at least."""
+    points = frame.groupby("experiment")[along].transform("nunique")
+    found = frame[points > 1]
+    if found.empty:
+        raise NothingToDraw(f"no experiment with learning has {needed}")
+    return found
+
+
+def _ordered(names: Any, order: list[str]) -> Any:  # noqa: ANN401 - pandas
+    """Return names as categories, in an order from the top of a column."""
+    return names.astype("category").cat.set_categories(order)
+
+
+def _panels(frame: Any) -> p9.facet_wrap:  # noqa: ANN401 - pandas
+    names = {name: label(name) for name in in_order(frame["experiment"])}
+    return p9.facet_wrap("experiment", ncol=2, labeller=p9.as_labeller(names))

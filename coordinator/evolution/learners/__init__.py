@@ -1,0 +1,1 @@
+"""Learners of lifetime learning, and the brain parameters that they change."""

@@ -1,0 +1,130 @@
+"""The learner of an island: loading, and checks of what it proposes."""
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from coordinator.evolution.learners.cma_es import CmaEs
+from coordinator.evolution.learners.simple import OnePlusOne, RandomSearch
+from schema.errors import ExperimentError, one_line
+from schema.experiment.learning import LEARNERS, Learning
+from schema.plugins.load import load_object
+from schema.plugins.origin import where_defined, where_raised
+from schema.plugins.parameters import read_parameters
+from schema.plugins.protocols import Learner
+from schema.robot.results import Floats
+
+WHERE = "learning.learner"
+METHODS = ("ask", "tell")
+BUILT_IN: dict[str, Callable[..., Learner]] = dict(
+    zip(LEARNERS, (CmaEs, OnePlusOne, RandomSearch), strict=True)
+)
+"""Built-in learners by their short names."""
+
+Points = tuple[tuple[float, ...], ...]
+"""Points that are tried together, each a share for each parameter."""
+Batch = tuple[Points, tuple[float, ...]]
+"""Points and their fitness, -inf for a failed trial."""
+
+
+class _NoParameters(Struct, frozen=True):
+    """Parameters of a learner that declares none."""
+
+
+@lru_cache(maxsize=64)
+def _class_of(rules: Learning) -> tuple[Callable[..., Learner], Struct | None]:
+    """Return the class of a learner, and its parameters or None."""
+    found = load_object(rules.learner, WHERE, BUILT_IN, METHODS)
+    if not isinstance(found, type):
+        raise ExperimentError(
+            f"{WHERE}: {where_defined(found)}: must be a class, not an object"
+        )
+    kind = getattr(found, "Parameters", None)
+    table = rules.parameters
+    parameters = read_parameters(table, kind or _NoParameters, "learning.parameters")
+    return found, parameters if kind else None
+
+
+class NewbornLearner:
+    """The learner of one newborn; an error of its own code becomes one line."""
+
+    def __init__(self, rules: Learning, start: Sequence[float]) -> None:
+        """Make the learner.
+
+        Args:
+            rules: the section ``learning``.
+            start: parameters of the brain at birth, as shares of their ranges.
+
+        Raises:
+            UnknownPlugin: no such learner, or a module that is not allowed.
+            ExperimentError: a class without the methods of a learner, invalid
+                parameters, or an error when the class is called.
+        """
+        self._class, parameters = _class_of(rules)
+        self._count = len(start)
+        point = np.array(start, float)
+        self._learner: Learner = self._called(
+            self._class, point, rules.sigma, parameters
+        )
+
+    def tell(self, batch: Batch) -> None:
+        """Tell the fitness of all points that were tried together.
+
+        Raises:
+            ExperimentError: the learner raises.
+        """
+        points, fitness = (np.array(each, float) for each in batch)
+        self._called(self._learner.tell, points, fitness)
+
+    def ask(self, rng: np.random.Generator, most: int) -> Points:
+        """Return the next points to try together.
+
+        Args:
+            rng: stream of this request alone.
+            most: greatest number of points, at least 1.
+
+        Raises:
+            ExperimentError: the learner raises, or returns anything else.
+        """
+        answer = self._called(self._learner.ask, rng, most)
+        try:
+            points: Floats = np.array(answer, float)
+        except (TypeError, ValueError):
+            points = np.empty(0)
+        if (
+            points.ndim != 2  # noqa: PLR2004 - a point in each row
+            or not 1 <= len(points) <= most
+            or points.shape[1] != self._count
+        ):
+            raise self._broken(
+                f"1 to {most} points of {self._count} numbers", f"shape {points.shape}"
+            )
+        # Also false for what is not a number.
+        if not ((points >= 0.0) & (points <= 1.0)).all():
+            worst = points[~((points >= 0.0) & (points <= 1.0))][0]
+            raise self._broken("numbers from 0 to 1", str(worst))
+        return tuple(map(tuple, points.tolist()))
+
+    def _broken(self, expected: str, got: str) -> ExperimentError:
+        return ExperimentError(
+            f"{WHERE}: {where_defined(self._class)}: ask must return {expected}, "
+            f"got {got}"
+        )
+
+    def _called(
+        self,
+        function: Callable[..., Any],
+        *arguments: Any,  # noqa: ANN401 - those of the function
+    ) -> Any:  # noqa: ANN401 - what it returns
+        try:
+            return function(*arguments)
+        except Exception as error:
+            where = where_defined(self._class)
+            line = where_raised(error, where.partition(":")[0])
+            raise ExperimentError(
+                f"{WHERE}: {where}: raised {type(error).__name__}: {one_line(error)}"
+                + (f" ({line})" if line else "")
+            ) from error

@@ -1,0 +1,209 @@
+"""Lifetime learning of an off-line island: the trials of its newborns.
+
+The island asks the learner of a newborn for parameters, evaluates all trials of the
+answer together, and asks again until the budget is spent. Answers of learners are
+events, as evaluations are: a replay does not need the learners.
+"""
+
+from dataclasses import replace
+from math import inf, sqrt
+
+from msgspec import structs
+
+from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.encodings import IslandEncoding
+from coordinator.evolution.learners.brain_parameters import BrainParameters
+from coordinator.evolution.learners.learner import Batch, Points
+from coordinator.islands.events import (
+    Ask,
+    Asked,
+    Evaluate,
+    Outcome,
+    Record,
+    fitness_of,
+)
+from schema.errors import ExperimentError, UnexpectedEvent
+from schema.experiment.brains import neuron_kinds
+from schema.experiment.document import Experiment
+from schema.experiment.learning import Learning
+from schema.robot.robot import Robot
+
+
+class IslandLearning:
+    """What all newborns of an island that learns have in common.
+
+    Attributes:
+        rules: the section ``learning``.
+        parameters: what is learnt of a brain.
+    """
+
+    def __init__(self, experiment: Experiment, encoding: IslandEncoding) -> None:
+        """Initialise.
+
+        Raises:
+            ExperimentError: what is learnt cannot be inherited with this encoding.
+        """
+        assert experiment.learning is not None
+        self.rules: Learning = experiment.learning
+        self._encoding = encoding
+        self._is_lamarckian = self.rules.inherit == "lamarckian"
+        if self._is_lamarckian and not encoding.describes_robots:
+            raise ExperimentError(
+                "learning.inherit: must be 'darwinian' with encoding.type = "
+                f"{encoding.name!r}: it has no method from_robot"
+            )
+        kinds = neuron_kinds(experiment.brain, experiment.space)
+        self.parameters = BrainParameters(self.rules, kinds)
+
+    def grown(self, candidate: Candidate, robot: Robot) -> Candidate:
+        """Return a newborn with the brain that it has learnt.
+
+        Raises:
+            InvalidRobot: an own encoding cannot describe the robot.
+        """
+        if robot is candidate.robot:
+            return candidate
+        if self._is_lamarckian:
+            genome = self._encoding.with_brain(candidate.genome, robot)
+            return replace(candidate, genome=genome, robot=robot)
+        return replace(candidate, learnt=robot)
+
+
+class NewbornLearning:
+    """The trials of one newborn."""
+
+    def __init__(self, candidate: Candidate, island: IslandLearning) -> None:
+        self._candidate = candidate
+        self._island = island
+        self._start = island.parameters.read(candidate.robot.brain)
+        # With nothing to learn, a second trial would be the first one again.
+        self._budget = island.rules.budget if self._start else 1
+        # Parameters and outcome of each trial, and number of its request.
+        self._points: list[tuple[float, ...]] = [self._start]
+        self._outcomes: list[Outcome | None] = [None]
+        self._requests = [0]
+        self._told: tuple[Batch, ...] = ()
+        self._is_waiting = self._budget > 1
+
+    @property
+    def is_done(self) -> bool:
+        """All trials have an outcome."""
+        return len(self._outcomes) == self._budget and None not in self._outcomes
+
+    def start(self) -> list[Evaluate | Ask]:
+        """Return the first trial, and the first request to the learner."""
+        candidate = self._candidate
+        first = Evaluate(candidate.birth, candidate.robot)
+        return [first, self._ask()] if self._is_waiting else [first]
+
+    def take(self, event: Outcome | Asked) -> list[Evaluate | Ask]:
+        """Take an answer; return what follows from it. Duplicates are ignored.
+
+        Raises:
+            UnexpectedEvent: the answer to a request that was never sent.
+        """
+        if isinstance(event, Asked):
+            return self._begin(event)
+        if event.trial >= len(self._outcomes):
+            raise self._unexpected(event)
+        if self._outcomes[event.trial] is not None:
+            return []
+        self._outcomes[event.trial] = event
+        if self._is_waiting or None in self._outcomes or self.is_done:
+            return []
+        self._tell()
+        return [self._ask()]
+
+    def _begin(self, event: Asked) -> list[Evaluate | Ask]:
+        """Begin the trials that the learner wants."""
+        known = len(self._told)
+        if event.number < known or (event.number == known and not self._is_waiting):
+            return []
+        left = self._budget - len(self._points)
+        is_wrong = any(len(each) != len(self._start) for each in event.points)
+        if event.number > known or not 1 <= len(event.points) <= left or is_wrong:
+            raise self._unexpected(event)
+        self._is_waiting = False
+        first = len(self._points)
+        self._points += event.points
+        self._outcomes += [None] * len(event.points)
+        self._requests += [event.number] * len(event.points)
+        birth = self._candidate.birth
+        return [
+            Evaluate(birth, self._robot(trial), trial)
+            for trial in range(first, len(self._points))
+        ]
+
+    def _tell(self) -> None:
+        """Note what the learner is to be told: all trials of the last request."""
+        number = len(self._told)
+        batch: Points = tuple(
+            point
+            for point, request in zip(self._points, self._requests, strict=True)
+            if request == number
+        )
+        fitness = tuple(map(_told_fitness, self._outcomes[-len(batch) :]))
+        self._told = (*self._told, (batch, fitness))
+        self._is_waiting = True
+
+    def _ask(self) -> Ask:
+        left = self._budget - len(self._points)
+        number = len(self._told)
+        return Ask(self._candidate.birth, number, self._start, left, self._told)
+
+    def _robot(self, trial: int) -> Robot:
+        """Return the robot of a trial."""
+        robot = self._candidate.robot
+        if not trial:
+            # The brain at birth may have values outside the ranges.
+            return robot
+        written = self._island.parameters.written(robot.brain, self._points[trial])
+        return Robot(robot.parts, written)
+
+    def conclude(self) -> tuple[Candidate, Outcome]:
+        """Return the newborn with its best brain, and that trial's outcome.
+
+        Of equal trials the first counts. If all failed, it is the brain at birth with
+        its failure.
+        """
+        trials = range(len(self._outcomes))
+        best = max(trials, key=lambda trial: _told_fitness(self._outcomes[trial]))
+        outcome = self._outcomes[best]
+        assert outcome is not None
+        grown = self._island.grown(self._candidate, self._robot(best))
+        return grown, structs.replace(outcome, trial=0)
+
+    def records(self) -> list[Record]:
+        """Return the rows of all trials."""
+        return [self._record(trial) for trial in range(len(self._outcomes))]
+
+    def _record(self, trial: int) -> Record:
+        outcome, point = self._outcomes[trial], self._points[trial]
+        assert outcome is not None
+        squares = [(to - old) ** 2 for to, old in zip(point, self._start, strict=True)]
+        row = {
+            "island": outcome.birth.island,
+            "birth": outcome.birth.number,
+            "trial": trial,
+            "request": self._requests[trial],
+            "fitness": fitness_of(outcome),
+            "reason": outcome.reason,
+            "distance": sqrt(sum(squares) / len(squares)) if squares else 0.0,
+            "parameters": point,
+            "wall_s": outcome.provenance.wall_s,
+            "worker": outcome.provenance.agent,
+            "platform": outcome.provenance.platform,
+        }
+        return Record("learning", row)
+
+    def _unexpected(self, event: Outcome | Asked) -> UnexpectedEvent:
+        return UnexpectedEvent(
+            f"birth {self._candidate.birth} has {len(self._points)} of {self._budget} "
+            f"trials and {len(self._told)} requests that are done, got {event}"
+        )
+
+
+def _told_fitness(outcome: Outcome | None) -> float:
+    """Return the fitness of a trial; -inf if it failed."""
+    fitness = fitness_of(outcome) if outcome else None
+    return -inf if fitness is None else fitness

@@ -1,0 +1,93 @@
+"""The section ``[learning]``: lifetime learning of newborn robots."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from msgspec import Meta, field
+
+from schema.errors import nearest, shown
+from schema.experiment.section import Parameters, PluginSection
+
+LEARNERS = ("cma-es", "(1+1)-es", "random")
+"""Built-in learners."""
+MOST_TRIALS = 1000
+"""Most trials of one newborn."""
+
+
+class Learning(PluginSection, frozen=True):
+    """Lifetime learning: the brain of each newborn is tuned before it counts, off-line.
+
+    A newborn is evaluated ``budget`` times. Trial 0 has the brain that develops from
+    its genome; a learner proposes the parameters of the others. The robot keeps the
+    brain of its best trial, and that trial's fitness.
+
+    Attributes:
+        learner: ``cma-es``, ``(1+1)-es``, ``random`` or ``module:attribute``.
+        budget: trials of each newborn; 1 is no learning.
+        what: what is learnt: ``weights`` of connections; parameters of ``neurons``,
+            such as bias and gain, or period, phase and amplitude of an oscillator; or
+            ``all`` of them.
+        sigma: standard deviation of the learner's first steps, as a share of the range
+            of each parameter; ``random`` ignores it.
+        inherit: ``darwinian``: children inherit the genome that the robot was born
+            with; ``lamarckian``: its genome gets what it learnt.
+        weight_limits: least and greatest weight; random weights of the built-in brain
+            types are from 0 to 1. The range of a neuron's parameter is that of its
+            type.
+        parameters: parameters of the learner.
+    """
+
+    learner: str = "cma-es"
+    budget: Annotated[int, Meta(ge=1, le=MOST_TRIALS)] = 20
+    what: Literal["all", "weights", "neurons"] = "all"
+    sigma: Annotated[float, Meta(gt=0, le=1)] = 0.2
+    inherit: Literal["darwinian", "lamarckian"] = "darwinian"
+    weight_limits: tuple[float, float] = (0.0, 1.0)
+    parameters: Parameters = field(default_factory=dict)
+
+
+def learning_problems(
+    learning: Learning | None,
+    *,
+    is_arena: bool = False,
+    is_reevaluated: bool = False,
+    encoding: str = "",
+) -> Iterator[str]:
+    """Yield what is wrong with the section of one island.
+
+    Args:
+        learning: the section; None if there is none.
+        is_arena: whether the island is an arena.
+        is_reevaluated: whether the island re-evaluates its robots.
+        encoding: key ``encoding.type``.
+    """
+    if learning is None:
+        return
+    name = learning.learner
+    if ":" not in name and name not in LEARNERS:
+        allowed = ", ".join(map(repr, LEARNERS))
+        yield (
+            f"learning.learner: must be one of {allowed} or 'module:attribute', "
+            f"got {shown(name)}{nearest(name, LEARNERS)}"
+        )
+    low, high = learning.weight_limits
+    if low >= high:
+        yield (
+            "learning.weight_limits: must be [least, greatest], got "
+            f"[{low:g}, {high:g}]"
+        )
+    if is_arena:
+        yield (
+            "learning: is for off-line evaluations; arenas do not try newborns. Remove "
+            "it, or give it to off-line [[islands]] only"
+        )
+    if is_reevaluated:
+        yield (
+            "learning: cannot be combined with selection.reevaluation; remove one of "
+            "them"
+        )
+    if learning.inherit == "lamarckian" and encoding == "cppn":
+        yield (
+            "learning.inherit: must be 'darwinian' with encoding.type = 'cppn': no "
+            "pattern can be made of a given brain"
+        )

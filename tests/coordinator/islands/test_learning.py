@@ -1,0 +1,271 @@
+"""Lifetime learning of an off-line island: events in, commands out."""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from math import log
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from coordinator.islands.events import (
+    Answered,
+    Ask,
+    Asked,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    IslandCommand,
+    Record,
+    Started,
+    Vet,
+    Vetted,
+)
+from coordinator.islands.island import Island
+from coordinator.run.learners import Learners
+from schema.errors import ExperimentError, UnexpectedEvent
+from schema.experiment.document import (
+    BrainSection,
+    Encoding,
+    Experiment,
+    Selection,
+    body_space,
+)
+from schema.experiment.identity import Origin
+from schema.experiment.learning import Learning
+from schema.robot.genome import develop
+from schema.robot.ids import BirthId
+from schema.robot.results import Evaluation, Provenance
+from schema.robot.robot import Robot
+from schema.tables.columns import ROWS
+from schema.wire.codec import decode_genome, decode_robot
+from tests.coordinator.arena_world import VIABLE
+
+PROVENANCE = Provenance("worker-1", "x86", 0.5)
+FIRST = BirthId(0, 0)
+PLAIN = Experiment(
+    name="test", births=14, selection=Selection(population=6, children=4)
+)
+
+
+def learning(**keys: Any) -> Experiment:  # noqa: ANN401 - any key
+    return replace(PLAIN, learning=Learning(**{"budget": 5, **keys}))
+
+
+def weight_sum(robot: Robot) -> float:
+    """Return a fitness that depends on the brain: the mean parameter."""
+    values = [edge.weight for edge in robot.brain.connections]
+    values += [each for neuron in robot.brain.neurons for each in neuron.parameters]
+    return sum(values) / len(values)
+
+
+def judge(command: Evaluate) -> Answered:
+    """Return a fitness of the brain; one trial in six fails."""
+    if (command.birth.number + command.trial) % 6 == 4:
+        return EvaluationFailed(command.birth, "diverged", PROVENANCE, command.trial)
+    found = Evaluation(weight_sum(command.robot), 0.1, 0.0, 12.0)
+    return Evaluated(command.birth, found, PROVENANCE, command.trial)
+
+
+Open = Vet | Evaluate | Ask
+
+
+def opened(commands: Sequence[IslandCommand]) -> list[Open]:
+    return [one for one in commands if isinstance(one, Open)]
+
+
+def live(
+    experiment: Experiment, order: Iterator[int] | None = None
+) -> tuple[Island, list[IslandCommand]]:
+    """Run an island to its end, with requests answered in some order."""
+    island = Island(experiment, 1, 0)
+    learners = Learners({0: experiment}, Origin(seed=1))
+    commands = island.handle(Started())
+    waiting = deque(opened(commands))
+    while waiting:
+        waiting.rotate(-next(order) if order else 0)
+        asked = waiting.popleft()
+        if isinstance(asked, Vet):
+            event: Answered = Vetted(asked.birth, asked.attempt, VIABLE)
+        else:
+            is_ask = isinstance(asked, Ask)
+            event = learners.answer(asked) if is_ask else judge(asked)  # type: ignore[arg-type]
+        found = island.handle(event)
+        # A duplicate changes nothing.
+        assert island.handle(event) == []
+        commands += found
+        waiting += opened(found)
+    assert island.is_finished
+    return island, commands
+
+
+def rows(commands: Sequence[IslandCommand], table: str) -> list[Any]:
+    records = [one for one in commands if isinstance(one, Record)]
+    return [one.row for one in records if one.table == table]
+
+
+def begun(experiment: Experiment) -> tuple[Island, list[Open]]:
+    """Return an island whose first body is viable, and the requests that follow."""
+    island = Island(experiment, 1, 0)
+    island.handle(Started())
+    return island, opened(island.handle(Vetted(FIRST, 0, VIABLE)))
+
+
+def test_a_budget_of_one_is_no_learning() -> None:
+    _, plain = live(PLAIN)
+    _, found = live(learning(budget=1))
+    assert rows(found, "births") == rows(plain, "births")
+    assert rows(found, "evaluations") == rows(plain, "evaluations")
+    assert rows(found, "population") == rows(plain, "population")
+    assert [row["trial"] for row in rows(found, "learning")] == [0] * 14
+
+
+@pytest.mark.parametrize("learner", ["cma-es", "(1+1)-es", "random"])
+def test_trials_of_a_request_are_in_flight_together(learner: str) -> None:
+    island, (first, ask) = begun(learning(learner=learner, budget=30))
+    assert isinstance(first, Evaluate)
+    assert isinstance(ask, Ask)
+    assert (first.trial, ask.number, ask.most, ask.told) == (0, 0, 29, ())
+    count, size = len(ask.start), {"random": 29, "(1+1)-es": 1}.get(learner)
+    asked = Learners({0: island.experiment}, Origin()).answer(ask)
+    trials = opened(island.handle(asked))
+    assert len(trials) == len(asked.points) == (size or 3 + int(3 * log(count)))
+    assert [each.trial for each in trials] == [*range(1, len(trials) + 1)]  # type: ignore[union-attr]
+    commands = [each for one in (*trials, first) for each in island.handle(judge(one))]  # type: ignore[arg-type]
+    if learner != "random":
+        (again,) = commands
+        assert isinstance(again, Ask)
+        ((points, fitness),) = again.told
+        assert points == (ask.start, *asked.points)
+        assert fitness[0] == weight_sum(first.robot)
+        assert (again.number, again.most) == (1, 29 - len(trials))
+
+
+@pytest.mark.parametrize("inherit", ["darwinian", "lamarckian"])
+@pytest.mark.parametrize("brain", ["network", "cpg"])
+def test_the_best_trial_counts_and_is_inherited_or_not(
+    inherit: str, brain: str
+) -> None:
+    experiment = replace(learning(inherit=inherit), brain=BrainSection(type=brain))
+    island, commands = live(experiment)
+    trials = rows(commands, "learning")
+    assert [row["birth"] for row in trials] == sorted(5 * [*range(14)])
+    assert all(row.keys() == set(ROWS["learning"].names) for row in trials)
+    types, learnt = body_space(experiment.space), 0
+    born = {row["birth"]: row for row in rows(commands, "births")}
+    for row in rows(commands, "evaluations"):
+        number = row["birth"]
+        own = [each for each in trials if each["birth"] == number]
+        assert [each["trial"] for each in own] == [0, 1, 2, 3, 4]
+        found = [each["fitness"] for each in own]
+        assert found.count(None) == sum((number + k) % 6 == 4 for k in range(5))
+        assert all((each["fitness"] is None) == bool(each["reason"]) for each in own)
+        best = max(each for each in found if each is not None)
+        assert (row["fitness"], row["trial"]) == (best, 0)
+        assert own[0]["distance"] == 0.0 < own[1]["distance"] < 1.0
+        inherited = develop(decode_genome(born[number]["genome"]), types)
+        has_learnt = best != found[0]
+        learnt += has_learnt
+        assert (born[number]["robot"] is None) == (
+            inherit == "lamarckian" or not has_learnt
+        )
+        stored = born[number]["robot"]
+        robot = decode_robot(stored) if stored else inherited
+        assert weight_sum(robot) == best
+        if inherit == "darwinian" and found[0] is not None:
+            assert weight_sum(inherited) == found[0]
+    assert learnt > 8
+    for one in island.population:
+        robot = one.learnt or develop(one.genome, types)  # type: ignore[arg-type]
+        assert weight_sum(robot) == one.fitness
+
+
+@given(st.lists(st.integers(0, 40), min_size=1, max_size=20))
+@settings(max_examples=8, deadline=None)
+def test_rows_do_not_depend_on_the_order_of_answers(turns: list[int]) -> None:
+    def forever() -> Iterator[int]:
+        while True:
+            yield from turns
+
+    experiment = learning(learner="(1+1)-es", budget=3)
+    both = (live(experiment, forever())[1], live(experiment)[1])
+    for table in ("births", "learning", "evaluations"):
+        found, wanted = (rows(commands, table) for commands in both)
+        assert found == wanted
+
+
+def test_a_failure_of_all_trials_is_a_failure() -> None:
+    island, (first, ask) = begun(learning(budget=3, learner="random"))
+    assert isinstance(ask, Ask)
+    trials = island.handle(Asked(FIRST, 0, ((0.5,) * len(ask.start),) * 2))
+    for each in (*trials, first):
+        assert isinstance(each, Evaluate)
+        reason = f"diverged in {each.trial}"
+        commands = island.handle(
+            EvaluationFailed(FIRST, reason, PROVENANCE, each.trial)
+        )
+    (row,) = rows(commands, "evaluations")
+    assert (row["status"], row["reason"], row["fitness"]) == (
+        "failed", "diverged in 0", None
+    )  # fmt: skip
+    (born,) = rows(commands, "births")
+    assert born["robot"] is None
+
+
+def test_answers_to_nothing_are_unexpected() -> None:
+    island, (_, ask) = begun(learning(budget=3))
+    assert isinstance(ask, Ask)
+    point = ask.start
+    for event in (
+        Asked(FIRST, 1, (point,)),
+        Asked(FIRST, 0, ()),
+        Asked(FIRST, 0, (point,) * 3),
+        Asked(FIRST, 0, (point[1:],)),
+        Asked(BirthId(0, 1), 0, (point,)),
+        EvaluationFailed(FIRST, "diverged", PROVENANCE, 1),
+    ):
+        with pytest.raises(UnexpectedEvent):
+            island.handle(event)
+    plain, _ = begun(PLAIN)
+    with pytest.raises(UnexpectedEvent, match="it has no learners"):
+        plain.handle(Asked(FIRST, 0, (point,)))
+
+
+def test_a_learner_that_is_made_again_asks_for_the_same() -> None:
+    """As after a restart, whatever the learner."""
+    experiment = learning(budget=12, learner="(1+1)-es")
+    island, waiting = begun(experiment)
+    kept = Learners({0: experiment}, Origin(seed=1))
+    asked = 0
+    while waiting:
+        each = waiting.pop(0)
+        if isinstance(each, Ask):
+            event: Answered = kept.answer(each)
+            new = Learners({0: experiment}, Origin(seed=1)).answer(each)
+            assert new == event
+            asked += 1
+        else:
+            assert isinstance(each, Evaluate)
+            event = judge(each)
+        waiting += opened(island.handle(event))
+    assert asked == 11
+
+
+def test_nothing_to_learn_is_one_trial() -> None:
+    experiment = replace(learning(what="weights"), brain=BrainSection(type="cpg"))
+    _, commands = live(experiment)
+    counts = [
+        sum(row["birth"] == number for row in rows(commands, "learning"))
+        for number in range(14)
+    ]
+    # A single motor has no coupling.
+    assert {*counts} == {1, 5}
+
+
+def test_own_encodings_without_from_robot_inherit_nothing() -> None:
+    patterns = Encoding(type="cppn")
+    experiment = replace(learning(inherit="lamarckian"), encoding=patterns)
+    with pytest.raises(ExperimentError, match="it has no method from_robot"):
+        Island(experiment, 1, 0)
