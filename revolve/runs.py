@@ -177,7 +177,10 @@ class Run:
         ]
 
     def best(self, count: int = 1) -> list[Robot]:
-        """Return the robots with the highest fitness of all off-line evaluations.
+        """Return the robots with the highest fitness of all evaluations.
+
+        Robots of arenas count with the best sample (table ``fitness``) while they were
+        mature; the end of a run names the best robot of its last population instead.
 
         Args:
             count: number of robots; fewer if there are no more.
@@ -185,11 +188,16 @@ class Run:
         Raises:
             RunFolderError: a table is damaged.
         """
-        found = self.evaluations
+        columns = ["island", "birth_island", "birth", "fitness"]
+        samples = self.fitness.filter(pc.field("is_mature"))
+        found = pa.concat_tables(
+            [self.evaluations.select(columns), samples.select(columns)],
+            promote_options="default",  # the fitness of a sample is never null
+        )
         found = found.filter(pc.is_valid(found["fitness"]))
-        rows = found.sort_by([("fitness", "descending"), ("record", "ascending")])
+        order = pc.sort_indices(found, [("fitness", "descending")])
         born: dict[tuple[int, int], None] = {}
-        for row in rows.select(["island", "birth_island", "birth"]).to_pylist():
+        for row in found.take(order).to_pylist():
             home = row["birth_island"]
             born[row["island"] if home is None else home, row["birth"]] = None
             if len(born) == count:

@@ -32,7 +32,7 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
         raise NothingToDraw("no robot has parents")
     rows = known.filter(known["body_change"].is_valid()).to_pandas()
     width = max(int(rows["birth"].max()) // _BINS + 1, _LEAST)
-    rows["births"] = (rows["birth"] // width + 0.5) * width
+    rows["births"] = rows.groupby(rows["birth"] // width)["birth"].transform("mean")
     stacked = rows.melt(
         ["experiment", "folder", "births"], list(_PANELS), "panel", "value"
     )
@@ -55,7 +55,7 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
         + p9.facet_wrap("panel", scales="free_y", ncol=2)
         + scales(in_order(sizes.index), is_filled=False)
         + p9.expand_limits(y=0)
-        + p9.labs(x="births", y="change")
+        + p9.labs(x=f"births (means over {width})", y="change")
         + theme_of_size(3.4)
     )
 

@@ -221,7 +221,7 @@ def _films(tables: Tables, drawings: Drawings) -> str:
 def _film(one: Film, run: str, *, has_arena: bool) -> str:
     best = one.best
     data = base64.b64encode(one.path.read_bytes()).decode()
-    name = f"Robot {best.birth_island}:{best.birth} of {run}"
+    name = f"Robot {best.birth_island}:{best.birth} of {best.folder.name} ({run})"
     others = " Among the robots of an arena it may move differently." * has_arena
     return (
         f'<figure><img alt="{escape(name)}" src="data:image/gif;base64,{data}">'

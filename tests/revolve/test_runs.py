@@ -2,6 +2,7 @@
 
 import html
 from pathlib import Path
+from zipfile import ZipFile
 
 import pyarrow.compute as pc
 import pytest
@@ -14,6 +15,7 @@ from schema.tables.columns import TABLES
 pytestmark = pytest.mark.system
 
 BIRTHS = 20
+OLD = Path(__file__).parents[1] / "data" / "runs-3063df1"
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +53,15 @@ def test_best_robot_has_the_best_fitness(done: rv.Run) -> None:
     assert done.robots()[3] == done.robot(done.births["birth"][3].as_py())
     with pytest.raises(rv.RunFolderError, match="has no birth 999"):
         done.robot(999)
+
+
+def test_best_robot_of_an_arena_has_the_best_mature_sample(tmp_path: Path) -> None:
+    with ZipFile(OLD / "arena.zip") as archive:
+        archive.extractall(tmp_path)
+    arena_run = rv.read(tmp_path / "undisturbed")
+    samples = arena_run.fitness.filter(pc.field("is_mature"))
+    row = samples.take(pc.sort_indices(samples, [("fitness", "descending")])[:1])
+    assert arena_run.best() == [arena_run.robot(row["birth"][0].as_py())]
 
 
 def test_notebook_gets_a_table(done: rv.Run) -> None:

@@ -194,7 +194,7 @@ def test_marks_tell_run_seed_and_robot(read: Reader) -> None:
 
 
 def test_films_are_shown_or_the_reason_is_given(read: Reader) -> None:
-    assert "soft: fitness 0.3. Robot 0:2 of soft, run 1, seed 7" in read.text
+    assert "soft: fitness 0.3. Robot 0:2 of soft-1 (soft, run 1, seed 7)" in read.text
     assert "hard & <b>: no moving picture: no driver <x>" in read.text
 
 
