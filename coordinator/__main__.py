@@ -15,6 +15,7 @@ from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.kinds import KINDS, brain_kind
+from coordinator.islands.learning import IslandLearning
 from coordinator.plugins.checks import refuse_faulty, refuse_faulty_of
 from coordinator.plugins.command import check, check_flags, list_flags, list_plugins
 from coordinator.run.cross_checks import Checks
@@ -178,7 +179,9 @@ def _check_built_in(experiment: Experiment) -> None:
         own = island_experiment(experiment, number)
         if not is_own(own.fitness.function):
             check_fitness_keys(own.fitness)
-        if not is_own(own.encoding.type):
+        if own.learning is not None:
+            IslandLearning(own, encoding_of(own))
+        elif not is_own(own.encoding.type):
             encoding_of(own)
 
 

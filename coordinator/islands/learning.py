@@ -13,7 +13,7 @@ from msgspec import structs
 from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.learners.brain_parameters import BrainParameters
-from coordinator.evolution.learners.learner import Batch, Points
+from coordinator.evolution.learners.learner import Batch, Points, learner_class
 from coordinator.islands.events import (
     Ask,
     Asked,
@@ -41,7 +41,8 @@ class IslandLearning:
         """Initialise.
 
         Raises:
-            ExperimentError: what is learnt cannot be inherited with this encoding.
+            ExperimentError: what is learnt cannot be inherited with this encoding, or
+                as of ``learner_class``.
         """
         assert experiment.learning is not None
         self.rules: Learning = experiment.learning
@@ -52,6 +53,8 @@ class IslandLearning:
                 "learning.inherit: must be 'darwinian' with encoding.type = "
                 f"{encoding.name!r}: it has no method from_robot"
             )
+        # A run refuses wrong parameters before its first birth.
+        learner_class(self.rules)
         kinds = neuron_kinds(experiment.brain, experiment.space)
         self.parameters = BrainParameters(self.rules, kinds)
 

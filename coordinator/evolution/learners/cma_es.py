@@ -16,8 +16,8 @@ from schema.robot.results import Floats
 class CmaEs:
     """Evolution strategy that adapts the covariance matrix of its steps.
 
-    The first generation contains the start, so that no trial is wasted. Points outside
-    the range are drawn again.
+    The first generation contains the start, so that no trial is wasted. A point outside
+    the range is drawn again, up to 100 times; then it moves to the ends of the range.
     """
 
     class Parameters(Struct, frozen=True):

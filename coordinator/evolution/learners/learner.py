@@ -35,8 +35,14 @@ class _NoParameters(Struct, frozen=True):
 
 
 @lru_cache(maxsize=64)
-def _class_of(rules: Learning) -> tuple[Callable[..., Learner], Struct | None]:
-    """Return the class of a learner, and its parameters or None."""
+def learner_class(rules: Learning) -> tuple[Callable[..., Learner], Struct | None]:
+    """Return the class of a learner, and its parameters or None.
+
+    Raises:
+        UnknownPlugin: no such learner, or a module that is not allowed.
+        ExperimentError: a class without the methods of a learner, or invalid
+            parameters.
+    """
     found = load_object(rules.learner, WHERE, BUILT_IN, METHODS)
     if not isinstance(found, type):
         raise ExperimentError(
@@ -63,7 +69,7 @@ class NewbornLearner:
             ExperimentError: a class without the methods of a learner, invalid
                 parameters, or an error when the class is called.
         """
-        self._class, parameters = _class_of(rules)
+        self._class, parameters = learner_class(rules)
         self._count = len(start)
         point = np.array(start, float)
         self._learner: Learner = self._called(

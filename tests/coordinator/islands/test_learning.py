@@ -269,3 +269,9 @@ def test_own_encodings_without_from_robot_inherit_nothing() -> None:
     experiment = replace(learning(inherit="lamarckian"), encoding=patterns)
     with pytest.raises(ExperimentError, match="it has no method from_robot"):
         Island(experiment, 1, 0)
+
+
+def test_wrong_parameters_are_refused_before_the_first_birth() -> None:
+    experiment = learning(parameters={"population": 3})
+    with pytest.raises(ExperimentError, match="must be a whole number >= 4"):
+        Island(experiment, 1, 0)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pyarrow as pa
 import pytest
+from msgspec import structs
 
 from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.encodings import encoding_of
@@ -11,16 +12,21 @@ from coordinator.run import stored_genomes
 from coordinator.run.stored_genomes import check_stored_genomes
 from schema.errors import RunFolderError
 from schema.experiment.document import Encoding, Experiment, Space
+from schema.experiment.learning import Learning
+from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from schema.wire.codec import decode_robot, encode_robot
 
 CPPN = Experiment(name="test", encoding=Encoding(type="cppn"))
+SMALL = Space(max_parts=3)
 FOLDER = Path("runs/a")
 
 
 def stored(
     monkeypatch: pytest.MonkeyPatch, experiment: Experiment, count: int = 1
-) -> None:
-    """Let the folder hold births of an experiment."""
+) -> pa.Table:
+    """Let the folder hold births of an experiment; return them."""
     encoding, breeder = encoding_of(experiment), Breeder(experiment, 7, 0)
     rows = []
     for number in range(count):
@@ -36,6 +42,7 @@ def stored(
     columns = {"birth": pa.int64(), "genome": pa.binary(), "robot": pa.binary()}
     table = pa.Table.from_pylist(rows, schema=pa.schema(columns))
     monkeypatch.setattr(stored_genomes, "read_table", lambda *_: table)
+    return table
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])
@@ -72,3 +79,19 @@ def test_births_of_the_thesis_encoding_are_not_read(
 ) -> None:
     monkeypatch.delattr(stored_genomes, "read_table")
     check_stored_genomes(FOLDER, Experiment(name="test"))
+
+
+def test_a_learnt_brain_is_not_another_encoding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A smaller body is, also where brains are learnt."""
+    rows = stored(monkeypatch, CPPN).to_pylist()
+    learnt = Robot(decode_robot(rows[0]["robot"]).parts, Brain())
+    table = pa.Table.from_pylist([{**rows[0], "robot": encode_robot(learnt)}])
+    monkeypatch.setattr(stored_genomes, "read_table", lambda *_: table)
+    learning = structs.replace(CPPN, learning=Learning())
+    check_stored_genomes(FOLDER, learning)
+    with pytest.raises(RunFolderError, match="into another robot now"):
+        check_stored_genomes(FOLDER, CPPN)
+    with pytest.raises(RunFolderError, match="into another robot now"):
+        check_stored_genomes(FOLDER, structs.replace(learning, space=SMALL))

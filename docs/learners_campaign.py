@@ -1,0 +1,239 @@
+"""Compares learners with random search on fixed bodies, for docs/learning.md.
+
+    python -m docs.learners_campaign run random     # start, or go on after an end
+    python -m docs.learners_campaign run evolved
+    python -m docs.learners_campaign table          # draw the picture, print the table
+
+The bodies are ten random robots of scenario 1 and ten that evolved in scenario 3. Each
+learner starts with the robot's own brain, ten times with other random streams. Rows are
+kept in docs/learners_data/, one per finished search. Evaluations take 4 s, a
+third of the time of scenario 1.
+"""
+
+import argparse
+import csv
+from collections.abc import Callable, Iterator
+from itertools import product
+from math import inf, sqrt
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pyarrow.parquet as pq
+from msgspec import structs
+
+from analyzer.report import analyze
+from coordinator.evolution.breeding import Breeder
+from coordinator.evolution.learners.brain_parameters import BrainParameters
+from coordinator.evolution.learners.learner import Batch, NewbornLearner, Points
+from coordinator.evolution.random_streams import Purpose, stream
+from schema.errors import FitnessUndefined, SimulationDiverged
+from schema.experiment.brains import neuron_kinds
+from schema.experiment.document import Vetting, body_space
+from schema.experiment.file import read_experiment
+from schema.experiment.learning import Learning
+from schema.experiment.settings import evaluation_settings_of
+from schema.robot.genome import develop
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from schema.wire.codec import decode_genome
+from worker.robot.evaluation import evaluate
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT / "docs" / "learners_data"
+EVOLVED = ROOT / "tests" / "benchmarks" / "evolved.parquet"
+EXPERIMENT = read_experiment("scenario1")
+SHORT = structs.replace(EXPERIMENT.simulation, window_steps=800)
+"""Evaluations of 4 s: the ones of scenario 1 take 12 s."""
+SETTINGS = structs.replace(evaluation_settings_of(EXPERIMENT), simulation=SHORT)
+BODIES, SEEDS, BUDGET = 10, 10, 60
+PICTURE = ROOT / "docs" / "pictures" / "learners.png"
+COLOURS = ("#D55E00", "#E69F00", "#0072B2", "#7F7F7F")
+BASE = "random"
+LEARNERS = {
+    "cma-es": Learning(),
+    "cma-es, population 6": Learning(parameters={"population": 6}),
+    "(1+1)-es": Learning(learner="(1+1)-es"),
+    BASE: Learning(learner="random"),
+}
+_T_QUANTILE = 2.262
+"""97.5 % quantile of Student's t with nine degrees of freedom."""
+
+
+def random_bodies(count: int) -> list[Robot]:
+    """Return the first random robots of scenario 1 that pass vetting."""
+    breeder, robots = Breeder(EXPERIMENT, 1, 0), list[Robot]()
+    types = body_space(EXPERIMENT.space)
+    for number in range(10 * count):
+        candidate = breeder.candidate(BirthId(0, number), 0, ())
+        assert candidate is not None
+        if analyze(candidate.robot, types, Vetting()).is_viable:
+            robots.append(candidate.robot)
+    return robots[:count]
+
+
+def evolved_bodies(count: int) -> list[Robot]:
+    """Return robots that evolved in scenario 3."""
+    types = body_space(EXPERIMENT.space)
+    genomes = pq.read_table(EVOLVED, columns=["genome"])["genome"].to_pylist()
+    # Ten of each of three runs.
+    step = len(genomes) // count
+    return [develop(decode_genome(data), types) for data in genomes[::step]][:count]
+
+
+SETS: dict[str, Callable[[int], list[Robot]]] = {
+    "random": random_bodies,
+    "evolved": evolved_bodies,
+}
+
+
+def fitness_of(robot: Robot) -> float:
+    """Return the fitness of a robot; -inf if its evaluation fails."""
+    try:
+        return evaluate(robot, SETTINGS).fitness
+    except (SimulationDiverged, FitnessUndefined):
+        return -inf
+
+
+def search(
+    robot: Robot, rules: Learning, name: BirthId, seed: int, budget: int
+) -> list[float]:
+    """Return the best fitness after each trial.
+
+    Args:
+        robot: whose brain is learnt.
+        rules: learner and its parameters.
+        name: of the robot, for the random streams.
+        seed: of the search.
+        budget: number of trials.
+    """
+    kinds = neuron_kinds(EXPERIMENT.brain, EXPERIMENT.space)
+    parameters = BrainParameters(rules, kinds)
+    start = parameters.read(robot.brain)
+    own = NewbornLearner(rules, start)
+    found, begin = [fitness_of(robot)], 0
+    points: Points = (start,)
+    while len(found) < budget:
+        rng = stream(seed, 0, name, len(found), Purpose.LEARNING)
+        new = own.ask(rng, budget - len(found))
+        for each in new:
+            brain = parameters.written(robot.brain, each)
+            found.append(fitness_of(Robot(robot.parts, brain)))
+        points += new
+        batch: Batch = (points[begin:], tuple(found[begin:]))
+        own.tell(batch)
+        begin = len(found)
+    return np.maximum.accumulate(found).tolist()
+
+
+def _known(bodies: str) -> list[dict[str, str]]:
+    file = DATA / f"{bodies}.csv"
+    if not file.exists():
+        return []
+    with file.open(newline="") as rows:
+        return list(csv.DictReader(rows))
+
+
+def run(bodies: str) -> None:
+    """Make the searches on some bodies whose rows are missing."""
+    done = {(row["body"], row["learner"], row["seed"]) for row in _known(bodies)}
+    robots = SETS[bodies](BODIES)
+    DATA.mkdir(exist_ok=True)
+    with (DATA / f"{bodies}.csv").open("a", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        if not done:
+            trials = [f"best_{trial}" for trial in range(BUDGET)]
+            rows.writerow(["body", "learner", "seed", *trials])
+        for seed, learner in product(range(SEEDS), LEARNERS):
+            for number, robot in enumerate(robots):
+                if (str(number), learner, str(seed)) not in done:
+                    rules, name = LEARNERS[learner], BirthId(0, number)
+                    best = search(robot, rules, name, seed, BUDGET)
+                    short = [f"{each:.9g}" for each in best]
+                    rows.writerow([number, learner, seed, *short])
+                    file.flush()
+            print(f"seed {seed}, {bodies} bodies, {learner}", flush=True)
+
+
+def courses() -> dict[tuple[str, str], np.ndarray[tuple[int, int, int]]]:
+    """Return the best fitness by kind of bodies and learner: (seed, body, trial)."""
+    found: dict[tuple[str, str], dict[tuple[int, int], list[float]]] = {}
+    for bodies, row in ((name, row) for name in SETS for row in _known(name)):
+        best = [float(row[f"best_{trial}"]) for trial in range(BUDGET)]
+        at = found.setdefault((bodies, row["learner"]), {})
+        at[int(row["seed"]), int(row["body"])] = best
+    return {
+        name: np.array(
+            [[own[seed, body] for body in range(BODIES)] for seed in range(SEEDS)]
+        )
+        for name, own in found.items()
+        if len(own) == BODIES * SEEDS
+    }
+
+
+def lines() -> Iterator[str]:
+    """Yield the lines of the table: means over bodies, intervals over seeds."""
+    yield (
+        "| bodies | learner | at birth | after 20 trials | more than `random` "
+        "(95 % interval) | after 60 trials | more than `random` (95 % interval) "
+        "| better, of 100 |"
+    )
+    yield "|---|---|---|---|---|---|---|---|"
+    found = courses()
+    for (bodies, learner), best in found.items():
+        cells = [bodies, f"`{learner}`", f"{best[:, :, 0].mean():.4f}"]
+        for trials in (20, BUDGET):
+            reached, base = (
+                each[:, :, trials - 1] for each in (best, found[bodies, BASE])
+            )
+            cells.append(f"{reached.mean():.4f}")
+            cells.append("" if learner == BASE else _interval(reached - base))
+        cells.append("" if learner == BASE else str((reached > base).sum()))
+        yield f"| {' | '.join(cells)} |"
+
+
+def _interval(more: np.ndarray[tuple[int, int]]) -> str:
+    """Return the mean of differences (seed, body) and its interval over seeds."""
+    means = more.mean(axis=1)
+    half = _T_QUANTILE * means.std(ddof=1) / sqrt(len(means))
+    low, high = means.mean() - half, means.mean() + half
+    return f"{means.mean():+.4f} ({low:+.4f} to {high:+.4f})"
+
+
+def draw() -> None:
+    """Write the picture: means over bodies by trial, with intervals over seeds."""
+    figure, axes = plt.subplots(1, len(SETS), figsize=(9, 3.6), layout="constrained")
+    found, trials = courses(), np.arange(BUDGET)
+    for panel, bodies in zip(axes, SETS, strict=True):
+        for learner, colour in zip(LEARNERS, COLOURS, strict=True):
+            if (bodies, learner) not in found:
+                continue
+            means = found[bodies, learner].mean(axis=1)
+            half = _T_QUANTILE * means.std(axis=0, ddof=1) / sqrt(len(means))
+            middle = means.mean(axis=0)
+            panel.plot(trials, middle, color=colour, label=learner)
+            panel.fill_between(
+                trials, middle - half, middle + half, color=colour, alpha=0.2, lw=0
+            )
+        panel.set(title=f"{bodies} bodies", xlabel="trial", ylim=(0, None))
+        panel.spines[["top", "right"]].set_visible(False)
+    axes[0].set_ylabel("best fitness so far [m/s]")
+    axes[-1].legend(frameon=False, loc="lower right")
+    figure.savefig(PICTURE, dpi=120)
+
+
+def main() -> None:
+    """Do what the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=("run", "table"))
+    parser.add_argument("bodies", nargs="?", choices=tuple(SETS), default="random")
+    options = parser.parse_args()
+    if options.what == "run":
+        run(options.bodies)
+    else:
+        draw()
+        print("\n".join(lines()))
+
+
+if __name__ == "__main__":
+    main()
