@@ -101,12 +101,12 @@ class Table:
         Args:
             key: of the word.
             allowed: the words; a similar one is named.
-            hint: end of the message if none is similar.
+            hint: end of the message.
         """
         word = self.text(key)
         line = self._key_lines[key]
         problem = f"{self._at(key)} {shown(word)} is not supported"
-        end = nearest(word, allowed) or hint
+        end = f"{nearest(word, allowed)}{hint}"
         self._fail("", f"{problem}: {_one_of(allowed)}{end}", line)
 
     def refuse_others(self, *allowed: str) -> None:
