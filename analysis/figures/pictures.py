@@ -18,6 +18,8 @@ _HEIGHT = 0.53
 _WIDTH = 0.94
 _TITLE_IN = 0.36
 """Height of the two lines of text above a row of pictures [inches]."""
+_STILL_M = 1e-4
+"""Way during a gait below which a robot stands still [m]."""
 _STEP = 1.0
 """Distance of two levels."""
 
@@ -44,6 +46,8 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
             axis.imshow(picture)
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
         way = f"moved {100 * one.moved_m:.2g} cm"
+        if one.moved_m < _STILL_M:
+            way = "stood still then"
         text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}, {way}"
         row[0].set_title("")
         row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=12)

@@ -87,8 +87,8 @@ def connected_agents(
     Yields:
         The connection, and the process pools that need regular supervision.
     """
-    keep_flags(folder, deployment.resume_flags)
     if deployment.answers is not None:
+        keep_flags(folder, deployment.resume_flags)
         yield LocalAgents(deployment.answers, platform_tag()), []
         return
     with ExitStack() as stack:
@@ -103,6 +103,8 @@ def connected_agents(
                 give_up_after_s=deployment.give_up_after_s,
             )
         )
+        # The folder of a run that finds no hub stays empty.
+        keep_flags(folder, deployment.resume_flags)
         file = folder / ADDRESS
         # Written whole: other processes wait for the file and read it at once.
         text = "\n".join(dict.fromkeys((network.address, network.own_address, "")))

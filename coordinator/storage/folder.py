@@ -23,7 +23,7 @@ from coordinator.storage.disk import (
     replace_text,
     storage_errors,
 )
-from coordinator.storage.hints import command
+from coordinator.storage.hints import FLAGS, command
 from coordinator.storage.journal import MOST_RECORDED_EPOCH, newest_epoch
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, FolderLock
@@ -274,7 +274,7 @@ def _refuse_foreign(path: Path) -> None:
     """Raise if a folder without a run holds a foreign file."""
     names = sorted(entry.name for entry in path.iterdir())
     # A kill between locking the folder and describing the run may leave these.
-    expected = (LOCK, f".{DETAILS}.new", PLUGINS)
+    expected = (LOCK, f".{DETAILS}.new", PLUGINS, FLAGS)
     foreign = [name for name in names if name not in expected]
     if foreign and DETAILS not in names:
         raise RunFolderError(

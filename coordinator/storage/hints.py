@@ -9,7 +9,7 @@ from schema.errors import RunFolderError
 from schema.limits import printable_line
 from schema.tables.description import read_small
 
-FLAGS = "flags"
+FLAGS = ".resume_flags"
 """File of a run or campaign folder: flags with which it has the same agents again."""
 _LONGEST = 4096
 
