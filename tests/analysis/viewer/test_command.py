@@ -21,8 +21,10 @@ from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
 from analysis.viewer.output import Output, Window, keep_serving, ways_to_view
 from analysis.viewer.recording import ViewerError
+from analysis.viewer.replay import shown_run
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
+from schema.errors import RunFolderError
 from schema.experiment.document import Arena, Experiment
 from schema.experiment.file import read_experiment
 from schema.mjcf.world import add_ring_wall
@@ -228,3 +230,11 @@ def test_a_window_that_fails_late_is_reported(
 def test_an_invalid_address_is_refused(text: str) -> None:
     with pytest.raises(ViewerError, match="must be HOST:PORT"):
         Output.of(None, text)
+
+
+def test_a_campaign_is_told_to_name_a_run(tmp_path: Path) -> None:
+    for number in (1, 0):
+        (tmp_path / f"a-{number}").mkdir()
+        (tmp_path / f"a-{number}" / "run.json").touch()
+    with pytest.raises(RunFolderError, match=f"holds 2 runs: .* as {tmp_path}/a-0$"):
+        shown_run(tmp_path)
