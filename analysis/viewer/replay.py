@@ -8,9 +8,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.load import Run, read_run
-from schema.errors import RunFolderError, counted
+from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.description import DETAILS
 from schema.tables.files import campaign, read_table
 from schema.tables.segments import parquet_files
 from schema.wire.updates import (
@@ -36,12 +35,6 @@ def shown_run(folder: Path) -> Run:
     try:
         return read_run(folder)
     except RunFolderError as error:
-        runs = sorted(found.parent for found in folder.glob(f"*/{DETAILS}"))
-        if runs and not (folder / DETAILS).exists():
-            raise RunFolderError(
-                f"{folder}: holds {counted(len(runs), 'run')}: name one of them, such "
-                f"as {runs[0]}"
-            ) from None
         why = str(error).removeprefix(f"{folder}: ")
         raise RunFolderError(f"{folder}: no run found: {why}") from None
 

@@ -154,7 +154,13 @@ class Display:
             self._missing, self._missing_since_s = missing, now_s
         elif now_s - self._missing_since_s > self._patience_s:
             self._missing_since_s = now_s + 6 * SPAN_S
-            line = f"waiting for {' and '.join(missing)}: none has joined"
+            is_refused = any(each.kind == "refused" for each in status.faults)
+            who = (
+                "none that has joined can do the jobs"
+                if is_refused
+                else "none has joined"
+            )
+            line = f"waiting for {' and '.join(missing)}: {who}"
             starts = [
                 command(kind.removesuffix("s"), "--connect", self._place, *self._flags)
                 for kind in missing

@@ -390,7 +390,11 @@ def _answer(query: zenoh.Query, server: Server, me: Member, hub: "HubWatch") -> 
     reply = server.reply(b"" if payload is None else payload.to_bytes())
     if reply.reason:
         if reply.reason.startswith(UNFIT):
-            hub.refused(f"refused a run: {reply.reason.removeprefix(UNFIT)}")
+            why = reply.reason.removeprefix(UNFIT)
+            hub.refused(
+                "refused a run, and gets no more jobs from its coordinator, of other "
+                f"runs neither: {why}"
+            )
         query.reply_err(reply.reason)
     else:
         query.reply(me.jobs, reply.answer)

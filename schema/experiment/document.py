@@ -49,7 +49,9 @@ class Space(Section, frozen=True):
         max_inputs: greatest number of input neurons.
         max_outputs: greatest number of output neurons, one for each motor.
         max_hidden: greatest number of hidden neurons.
-        planar: keep all parts in the plane of the core.
+        planar: keep all parts in the plane of the core. Other bodies may be tall, and a
+            fall at the start counts as motion unless ``simulation.warmup_steps`` has
+            passed.
         neuron_types: types of output and hidden neurons: short names of built-in
             types, or ``module:attribute``; each is equally likely.
     """

@@ -73,9 +73,10 @@ def read_description(folder: Path) -> Description:
         data = read_small(file, MOST_DESCRIPTION)
     except FileNotFoundError:
         check_folder(folder)
-        raise RunFolderError(
-            f"{folder}: no run is there ({DETAILS} is missing)"
-        ) from None
+        why = f"no run is there ({DETAILS} is missing)"
+        if runs := sorted(each.parent for each in folder.glob(f"*/{DETAILS}")):
+            why = f"is a campaign; give one of its runs, such as {runs[0]}"
+        raise RunFolderError(f"{folder}: {why}") from None
     try:
         found = msgspec.json.decode(data, type=Description)
         why = _fault(found, data)

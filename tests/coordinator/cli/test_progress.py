@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from coordinator.cli.progress import Display
-from schema.wire.status import IslandStatus, RunStatus, Status
+from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 _ISLAND = IslandStatus(120, 600, 0.51234, 30)
 
@@ -107,11 +107,17 @@ def test_a_run_that_misses_others_than_before_says_so_again(
         shown_status[0] = Status((run,), workers=1, analyzers=0, births_per_s=0.0)
         display.update(6.0)
         display.update(9.0)
+        refused = (PeerFault("refused", "w-0", 1),)
+        shown_status[0] = Status((run,), 0, 1, 0.0, faults=refused)
+        display.update(12.0)
+        display.update(15.0)
     lines = capsys.readouterr().err.splitlines()
     waiting = [line.partition("waiting for ")[2] for line in lines if "waiting" in line]
     how = "none has joined; to start some on this machine: "
+    unfit = how.replace("none has joined", "none that has joined can do the jobs")
     analyzer = "revolve analyzer --connect runs/a"
     assert waiting == [
         f"workers and analyzers: {how}revolve worker --connect runs/a, {analyzer}",
         f"analyzers: {how}{analyzer}",
+        f"workers: {unfit}revolve worker --connect runs/a",
     ]
