@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.docs.page_runner import PageError, blocks, run_page
+from tests.system.workspace import runtime_directory
 
 TOP = Path(__file__).parents[2]
 DOCS = TOP / "docs"
@@ -142,7 +143,7 @@ def test_notebook_runs(name: str, tmp_path: Path) -> None:
         [sys.executable, "-c", program],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(TOP), "MPLBACKEND": "agg",
-             "TMPDIR": str(tmp_path)},
+             "TMPDIR": str(tmp_path), "XDG_RUNTIME_DIR": runtime_directory(tmp_path)},
         capture_output=True,
         text=True,
         check=False,

@@ -139,5 +139,8 @@ def test_different_platforms_are_named_beside_a_difference(
 
 def test_a_folder_without_a_run_is_refused(tmp_path: Path, make_records: Make) -> None:
     first = written(tmp_path / "a", make_records(3))
-    with pytest.raises(RunFolderError, match="no run is there"):
+    with pytest.raises(RunFolderError, match=rf"is a campaign; .* as {first}$"):
         compare(first, tmp_path)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(RunFolderError, match="no run is there"):
+        compare(first, tmp_path / "empty")
