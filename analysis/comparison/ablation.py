@@ -13,6 +13,7 @@ from analysis.comparison.robustness import (
     ROBOT,
     Columns,
     Row,
+    line_of,
     percent,
     schema_of,
     with_shares,
@@ -90,16 +91,7 @@ def summary(table: pa.Table) -> str:
     Args:
         table: rows of one run.
     """
-    robots: dict[tuple[int, int], list[Row]] = {}
-    for row in table.to_pylist():
-        robots.setdefault((row["island"], row["birth"]), []).append(row)
-    best = next(rows for rows in robots.values() if rows[0]["is_best"])
-    texts = [_of_best(best), _of_last([r for r in robots.values() if r[0]["is_last"]])]
-    evaluations = [row for rows in robots.values() for row in rows]
-    failed = sum(row["fitness"] is None for row in evaluations)
-    if failed:
-        texts.append(f"{failed} of {len(evaluations)} evaluations failed")
-    return "; ".join(filter(None, texts))
+    return line_of(table, _of_best, _of_last)
 
 
 def _of_best(rows: Sequence[Row]) -> str:

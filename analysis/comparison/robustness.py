@@ -5,7 +5,7 @@ fitness without changes; it is null if the evaluation failed or that fitness is 
 positive.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from statistics import fmean, median
 from typing import Any
 
@@ -103,23 +103,41 @@ def summary(table: pa.Table) -> str:
     Args:
         table: rows of one run.
     """
+    return line_of(table, _of_best, _of_last)
+
+
+def line_of(
+    table: pa.Table,
+    of_best: Callable[[Sequence[Row]], str],
+    of_last: Callable[[Sequence[Sequence[Row]]], str],
+) -> str:
+    """Return a line about the best robot, the last population, and failures.
+
+    Args:
+        table: rows of one run.
+        of_best: describes the best robot by its rows.
+        of_last: describes the last population by the rows of each robot; may be empty.
+    """
     robots: dict[tuple[int, int], list[Row]] = {}
-    for row in table.to_pylist():
+    rows = table.to_pylist()
+    for row in rows:
         robots.setdefault((row["island"], row["birth"]), []).append(row)
-    best = next(rows for rows in robots.values() if rows[0]["is_best"])
-    last = [kept(rows) for rows in robots.values() if rows[0]["is_last"]]
-    shares = [share for share in last if share is not None]
-    texts = [_of_best(best)]
-    if shares:
-        texts.append(
-            f"the last population of {len(last)} keeps {percent(median(shares))} in "
-            f"the median, {percent(min(shares))} to {percent(max(shares))}"
-        )
-    evaluations = [row for rows in robots.values() for row in rows]
-    failed = sum(row["fitness"] is None for row in evaluations)
-    if failed:
-        texts.append(f"{failed} of {len(evaluations)} evaluations failed")
-    return "; ".join(texts)
+    best = next(own for own in robots.values() if own[0]["is_best"])
+    last = [own for own in robots.values() if own[0]["is_last"]]
+    texts = [of_best(best), of_last(last)]
+    if failed := sum(row["fitness"] is None for row in rows):
+        texts.append(f"{failed} of {len(rows)} evaluations failed")
+    return "; ".join(filter(None, texts))
+
+
+def _of_last(robots: Sequence[Sequence[Row]]) -> str:
+    shares = [share for rows in robots if (share := kept(rows)) is not None]
+    if not shares:
+        return ""
+    return (
+        f"the last population of {len(robots)} keeps {percent(median(shares))} in "
+        f"the median, {percent(min(shares))} to {percent(max(shares))}"
+    )
 
 
 def _of_best(rows: Sequence[Row]) -> str:

@@ -100,8 +100,8 @@ def execute_runs(
                     _tell_faults(scheduler)
                     for pool in pools:
                         pool.look_after()
-                    if sum(pool.exits for pool in pools) > exits:
-                        exits = sum(pool.exits for pool in pools)
+                    before, exits = exits, sum(pool.exits for pool in pools)
+                    if exits > before:
                         warn_user(
                             "a worker or analyzer process of this run ended outside a "
                             "job, for the reason that it wrote above; it is restarted"

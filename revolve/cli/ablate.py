@@ -1,10 +1,8 @@
 """``revolve ablate``: re-evaluate robots without some sensors and motors."""
 
-from pathlib import Path
-
+from revolve.cli.reevaluation_flags import add_reevaluation
 from schema.agent.extras import install_advice
-from schema.agent.flags import Flags, add_count, add_plugins, whole_number
-from schema.agent.supervisor import cores
+from schema.agent.flags import Flags, add_count
 from schema.errors import RevolveError
 from schema.plugins.permission import allow
 
@@ -49,16 +47,7 @@ def parser(_command: str = "ablate") -> Flags:
             "revolve ablate runs/a runs/b --out without --robots 10",
         ),
     )
-    flags.add_argument(
-        "runs", nargs="+", type=Path, metavar="RUN", help="run folder, finished"
-    )
-    flags.add_argument(
-        "--out",
-        type=Path,
-        default=Path("ablation"),
-        metavar="FOLDER",
-        help="folder to write to (default: ablation)",
-    )
+    add_reevaluation(flags, "ablation")
     add_count(
         flags,
         "--robots",
@@ -67,13 +56,4 @@ def parser(_command: str = "ablate") -> Flags:
         least=0,
     )
     add_count(flags, "--brains", 5, "random brains for each body", least=0)
-    flags.add_argument(
-        "--workers",
-        type=whole_number(),
-        default=cores(),
-        metavar="N",
-        help="number of workers, started on this machine; no result depends on it "
-        "(default: one per core)",
-    )
-    add_plugins(flags)
     return flags

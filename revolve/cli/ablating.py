@@ -1,10 +1,8 @@
 """Re-evaluation of the robots of finished runs without some sensors and motors."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
-import pyarrow as pa
 from msgspec.structs import replace
 
 from analysis.comparison.ablation import RANDOM, summary, table_of
@@ -46,12 +44,13 @@ def ablate_runs(
                 "one genome"
             )
     jobs = [job for one in chosen for job in _jobs(one, brains)]
-    rows = partial(_table, jobs, workers)
-    write_results(rows, folders, out / STEM, summary, ablation)
-
-
-def _table(jobs: Sequence[Job], workers: int) -> pa.Table:
-    return table_of(reevaluated(jobs, workers))
+    write_results(
+        lambda: table_of(reevaluated(jobs, workers)),
+        folders,
+        out / STEM,
+        summary,
+        ablation,
+    )
 
 
 def _jobs(one: Chosen, brains: int) -> Iterator[Job]:

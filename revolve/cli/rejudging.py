@@ -1,10 +1,8 @@
 """Re-evaluation of the robots of finished runs under changes of the simulation."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
-import pyarrow as pa
 from msgspec.structs import replace
 
 from analysis.comparison.robustness import summary, table_of
@@ -30,12 +28,13 @@ def rejudge_runs(folders: Sequence[Path], out: Path, workers: int) -> None:
         RevolveError: no worker is left.
     """
     jobs = [job for one in chosen_robots(folders) for job in _jobs(one)]
-    rows = partial(_table, jobs, workers)
-    write_results(rows, folders, out / STEM, summary, robustness)
-
-
-def _table(jobs: Sequence[Job], workers: int) -> pa.Table:
-    return table_of(reevaluated(jobs, workers))
+    write_results(
+        lambda: table_of(reevaluated(jobs, workers)),
+        folders,
+        out / STEM,
+        summary,
+        robustness,
+    )
 
 
 def _jobs(one: Chosen) -> Iterator[Job]:

@@ -1,10 +1,8 @@
 """``revolve robustness``: re-evaluate the robots of finished runs under changes."""
 
-from pathlib import Path
-
+from revolve.cli.reevaluation_flags import add_reevaluation
 from schema.agent.extras import install_advice
-from schema.agent.flags import Flags, add_plugins, whole_number
-from schema.agent.supervisor import cores
+from schema.agent.flags import Flags
 from schema.errors import RevolveError
 from schema.plugins.permission import allow
 
@@ -43,23 +41,5 @@ def parser(_command: str = "robustness") -> Flags:
             "revolve robustness runs/a runs/b --out robust --workers 4",
         ),
     )
-    flags.add_argument(
-        "runs", nargs="+", type=Path, metavar="RUN", help="run folder, finished"
-    )
-    flags.add_argument(
-        "--out",
-        type=Path,
-        default=Path("robustness"),
-        metavar="FOLDER",
-        help="folder to write to (default: robustness)",
-    )
-    flags.add_argument(
-        "--workers",
-        type=whole_number(),
-        default=cores(),
-        metavar="N",
-        help="number of workers, started on this machine; no result depends on it "
-        "(default: one per core)",
-    )
-    add_plugins(flags)
+    add_reevaluation(flags, "robustness")
     return flags

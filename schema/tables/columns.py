@@ -254,6 +254,17 @@ BIRTHS = _table(
         is_nullable=True,
     ),
 )
+_PROVENANCE = (
+    _column(
+        "wall_s",
+        _FLOAT,
+        "duration by the worker's clock",
+        unit="s",
+        is_repeatable=False,
+    ),
+    _column("worker", pa.string(), "name of the worker", is_repeatable=False),
+    _column("platform", pa.string(), "platform of the worker", is_repeatable=False),
+)
 EVALUATIONS = _table(
     "evaluations",
     "a finished evaluation, off-line",
@@ -268,15 +279,7 @@ EVALUATIONS = _table(
     _column("status", pa.string(), '"ok" or "failed"'),
     _column("reason", pa.string(), "of a failure; otherwise empty"),
     *_OUTCOME,
-    _column(
-        "wall_s",
-        _FLOAT,
-        "duration by the worker's clock",
-        unit="s",
-        is_repeatable=False,
-    ),
-    _column("worker", pa.string(), "name of the worker", is_repeatable=False),
-    _column("platform", pa.string(), "platform of the worker", is_repeatable=False),
+    *_PROVENANCE,
     _MEASURES,
 )
 LEARNING = _table(
@@ -316,15 +319,7 @@ LEARNING = _table(
         "then weights, in the order of the brain",
         unit="1",
     ),
-    _column(
-        "wall_s",
-        _FLOAT,
-        "duration by the worker's clock",
-        unit="s",
-        is_repeatable=False,
-    ),
-    _column("worker", pa.string(), "name of the worker", is_repeatable=False),
-    _column("platform", pa.string(), "platform of the worker", is_repeatable=False),
+    *_PROVENANCE,
 )
 POPULATION = _table(
     "population",
