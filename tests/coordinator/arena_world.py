@@ -44,6 +44,7 @@ DT = 0.005
 POSE_STEPS = 40
 MATURE = 3000
 """Steps of 15 s: 3 s of warm-up and a window of 12 s."""
+WINDOW = 2400
 
 Fit = Callable[[BirthId, int], float]
 Verdict = Callable[[Vet], Vetted | VettingFailed]
@@ -91,6 +92,7 @@ class World:
     step: int = 0
     born: dict[BirthId, int] = field(default_factory=dict)
     places: dict[BirthId, tuple[float, float]] = field(default_factory=dict)
+    windows: dict[BirthId, int] = field(default_factory=dict)
 
     def advance(self, command: AdvanceShard) -> Advanced:
         """Return the result of an advance, as a worker does."""
@@ -100,7 +102,12 @@ class World:
             assert each.birth not in self.born
             self.born[each.birth] = self.step
             self.places[each.birth] = each.place
-        assert all(each.birth in self.born for each in command.changes.brains)
+            self.windows[each.birth] = self.step + MATURE - WINDOW
+        for change in command.changes.brains:
+            assert change.birth in self.born
+            if change.restarts_window:
+                assert self.step >= self.windows[change.birth]
+                self.windows[change.birth] = self.step
         self.step = command.until
         fallen = [one for one in sorted(self.born) if self.diverges(one, self.step)]
         casualties = tuple(
@@ -126,7 +133,7 @@ class World:
         age = self.step - self.born[birth]
         fitness = self.fit(birth, self.step)
         place = (*self.places[birth], 0.02)
-        is_mature = age >= MATURE
+        is_mature = self.step >= self.windows[birth] + WINDOW
         return Judgement(birth, age * DT, 0.0, fitness / 5, fitness, is_mature, place)
 
 
