@@ -16,6 +16,8 @@ from coordinator.islands.events import (
     Append,
     ArenaCommand,
     ArenaEvent,
+    Ask,
+    Asked,
     Finish,
     Record,
     Started,
@@ -72,6 +74,11 @@ def distinct_fitness(birth: BirthId, step: int) -> float:
 def viable(vet: Vet) -> Vetted:
     """Report that a body is viable."""
     return Vetted(vet.birth, vet.attempt, VIABLE)
+
+
+def no_learner(ask: Ask) -> Asked:
+    """Refuse requests to learners."""
+    raise AssertionError(ask)
 
 
 def reject_some(vet: Vet) -> Vetted | VettingFailed:
@@ -162,16 +169,19 @@ class ArenaRun:
     arena: Arena
     world: World = field(default_factory=World)
     verdict: Verdict = viable
+    learner: Callable[[Ask], Asked] = no_learner
     order: Iterator[int] | None = None
     events: list[ArenaEvent] = field(default_factory=list)
     commands: list[ArenaCommand] = field(default_factory=list)
-    waiting: deque[Vet | AdvanceShard] = field(default_factory=deque)
+    waiting: deque[Vet | Ask | AdvanceShard] = field(default_factory=deque)
 
     def tell(self, event: ArenaEvent) -> list[ArenaCommand]:
         found = self.arena.handle(event)
         self.events.append(event)
         self.commands += found
-        self.waiting += [one for one in found if isinstance(one, Vet | AdvanceShard)]
+        self.waiting += [
+            one for one in found if isinstance(one, Vet | Ask | AdvanceShard)
+        ]
         return found
 
     def turn(self) -> list[ArenaCommand]:
@@ -180,6 +190,8 @@ class ArenaRun:
         asked = self.waiting.popleft()
         if isinstance(asked, Vet):
             return self.tell(self.verdict(asked))
+        if isinstance(asked, Ask):
+            return self.tell(self.learner(asked))
         return self.tell(self.world.advance(asked))
 
     def live(self, until_s: float = 1e9) -> "ArenaRun":
