@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import UnexpectedEvent
-from schema.experiment.document import Space
+from schema.experiment.document import Fitness, Space
 from schema.experiment.settings import EvaluationSettings
 from schema.parts import LIGHT_SENSOR
 from schema.robot.brain import Brain, Neuron
@@ -207,9 +207,16 @@ def test_exchanged_brain_moves_a_robot_as_two_brains_by_hand(
     assert [one.age_s for one in advance.judgements] == [10.0]
 
 
-def test_restarted_window_begins_with_the_present_sample(turtle: Robot) -> None:
-    """A window of 12 s is whole 12 s after the restart, not before."""
-    world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
+@pytest.mark.parametrize("function", ["locomotion", "balance"])
+def test_restarted_window_begins_with_the_present_sample(
+    turtle: Robot, function: str
+) -> None:
+    """A window of 12 s is whole 12 s after the restart, not before.
+
+    Balance needs recorded channels.
+    """
+    settings = replace(SETTINGS, fitness=Fitness(function=function))
+    world = populated(settings, [Insertion(A, turtle, (0.0, 0.0))])
     change = BrainChange(A, turtle.brain, restarts_window=True)
     seconds(world, 14.125)
     with pytest.raises(UnexpectedEvent, match="pose_steps = 40, got step 2825"):
@@ -217,12 +224,14 @@ def test_restarted_window_begins_with_the_present_sample(turtle: Robot) -> None:
     assert seconds(world, 0.875).judgements[0].is_mature
     world.apply(Changes(brains=(change,)))
     place = world.population.find(A).place
-    assert list(world.population.find(A).window.positions) == [place]
-    copy = World.restore(SETTINGS, world.snapshot())
+    window = world.population.find(A).window
+    assert list(window.positions) == [place]
+    assert len(window.rows) == (function == "balance")
+    copy = World.restore(settings, world.snapshot())
     (before,) = seconds(world, 11.8).judgements
     (after,) = seconds(world, 0.2).judgements
     assert (before.is_mature, after.is_mature) == (False, True)
-    assert world.population.find(A).window.positions[0] == place
+    assert window.positions[0] == place
     seconds(copy, 12.0)
     assert copy.digest() == world.digest()
 
