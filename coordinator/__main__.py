@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -47,6 +47,9 @@ from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow, is_own
 from schema.tables.arrow import skip_pandas
 
+_LONGEST_NAME = 100
+"""Characters of the experiments' names in the name of a campaign's folder."""
+
 
 def main(arguments: list[str]) -> int:
     """Run one of the coordinator's commands and return its exit code.
@@ -78,12 +81,9 @@ def main(arguments: list[str]) -> int:
         return _resume(options)
     experiments = _experiments(options)
     is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
-    name = "+".join(
-        options.experiments
-        if is_campaign_wanted and options.experiments[0] in shipped_campaigns()
-        else [experiment.name for experiment in experiments]
-    )
-    folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
+    is_shipped = is_campaign_wanted and options.experiments[0] in shipped_campaigns()
+    names = options.experiments if is_shipped else _names(experiments)
+    folder = Path(options.out or Path("runs") / f"{_joined(names)}-seed{options.seed}")
     deployment = _deployment(options, experiments, folder)
     if not is_campaign_wanted:
         return _stoppable(
@@ -162,6 +162,24 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     for experiment in experiments:
         _check_built_in(experiment)
     return experiments
+
+
+def _names(experiments: Sequence[Experiment]) -> list[str]:
+    """Return the names of the documents of experiments; a sweep is one document."""
+    names = (
+        each.name.rpartition("-")[0] if each.sweep is not None else each.name
+        for each in experiments
+    )
+    return list(dict.fromkeys(names))
+
+
+def _joined(names: Sequence[str]) -> str:
+    """Return names joined by "+"; beyond the longest the number of the others."""
+    most = len(names)
+    while most > 1 and len("+".join(names[:most])) > _LONGEST_NAME:
+        most -= 1
+    rest = len(names) - most
+    return "+".join([*names[:most], *([f"{rest}-more"] if rest else [])])
 
 
 def _check_built_in(experiment: Experiment) -> None:

@@ -117,13 +117,18 @@ def arenas(tables: Tables) -> str:
     for row in rows.select(["folder", "size"]).to_pylist():
         living[row["folder"]] = living.get(row["folder"], 0) + (row["size"] or 0)
     names = run_names(tables["runs"])
-    lines = [
-        f"{names[row['folder']]}: {plural(row['births'], 'robot')} were born in "
-        f"{duration(row['simulated_s'])} of simulated time, {row['deaths']} died, "
-        f"{living.get(row['folder'], 0)} were alive at the last birth."
-        for row in tables["runs"].to_pylist()
-        if row["simulated_s"] is not None
-    ]
+    lines = []
+    for row in tables["runs"].to_pylist():
+        if row["simulated_s"] is None:
+            continue
+        alive = f"{living.get(row['folder'], 0)} were alive at the last birth"
+        if row["islands"] == 1:
+            alive = f"{row['births'] - row['deaths']} were alive at the end"
+        lines.append(
+            f"{names[row['folder']]}: {plural(row['births'], 'robot')} were born in "
+            f"{duration(row['simulated_s'])} of simulated time, {row['deaths']} died, "
+            f"{alive}."
+        )
     if not lines:
         return ""
     rule = (

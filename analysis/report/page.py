@@ -226,8 +226,8 @@ def _film(one: Film, run: str, *, has_arena: bool) -> str:
     return (
         f'<figure><img alt="{escape(name)}" src="data:image/gif;base64,{data}">'
         f"<figcaption><b>{escape(label(best.experiment))}: fitness "
-        f"{number(best.fitness)}.</b> {escape(name)}, simulated alone: three seconds "
-        f"from the middle of its evaluation.{others} "
+        f"{number(best.fitness)}.</b> {escape(name)}, simulated alone, from the "
+        f"middle of its evaluation on.{others} "
         f"File: <code>figures/{escape(one.path.name)}</code>."
         "</figcaption></figure>"
     )

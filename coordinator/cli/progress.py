@@ -156,9 +156,9 @@ class Display:
             self._missing_since_s = now_s + 6 * SPAN_S
             is_refused = any(each.kind == "refused" for each in status.faults)
             who = (
-                "none that has joined can do the jobs"
+                "none that is connected can do the jobs"
                 if is_refused
-                else "none has joined"
+                else "none is connected"
             )
             line = f"waiting for {' and '.join(missing)}: {who}"
             starts = [

@@ -4,13 +4,17 @@ revolve view runs/a --save run.rrd
 python viewer_picture.py run.rrd run.png [PORT]
 """
 
+import socket
 import sys
 import time
 from pathlib import Path
 
 from rerun.experimental import ViewerClient
 
-recording, picture, port = (*sys.argv[1:], "9876")[:3]
+with socket.socket() as free:  # another viewer may use Rerun's own port
+    free.bind(("", 0))
+    port = free.getsockname()[1]
+recording, picture, port = (*sys.argv[1:], port)[:3]
 program = str(Path(sys.executable).with_name("rerun"))
 with ViewerClient.spawn(
     headless=True, port=int(port), executable_path=program

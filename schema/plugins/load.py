@@ -166,7 +166,13 @@ def _load(path: str, where: str) -> object:
 def _loaded(module_name: str, attribute: str, where: str) -> object:
     module = _imported(module_name, where, f"{module_name}:{attribute}")
     if not hasattr(module, attribute):
-        names = [name for name in vars(module) if not name.startswith("_")]
+        names = [
+            name
+            for name, value in vars(module).items()
+            # What the module imports is not its own.
+            if not (name.startswith("_") or isinstance(value, ModuleType))
+            and getattr(value, "__module__", module_name) == module_name
+        ]
         near = get_close_matches(attribute, names, n=1)
         hint = f"; did you mean '{module_name}:{near[0]}'?" if near else ""
         place = where_named(module, attribute)

@@ -164,11 +164,11 @@ def test_an_arena_is_summed_up(tmp_path: Path) -> None:
     assert text.count("of simulated time") == 1
     assert (
         "soft, run 1, seed 7: 60 robots were born in 2 min 05 s of simulated time, "
-        "9 died, 4 were alive at the last birth." in text
+        "9 died, 51 were alive at the end." in text
     )
     assert "Each dot is at the birth of its robot" in text
     with_film = read_page(given, drawings(tmp_path)).text
-    assert "simulated alone: three seconds" in with_film
+    assert "simulated alone, from the middle of" in with_film
     assert "Among the robots of an arena it may move differently." in with_film
 
 

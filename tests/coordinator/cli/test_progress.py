@@ -77,7 +77,7 @@ def test_a_run_without_agents_says_how_to_start_some(
 ) -> None:
     status = Status((RunStatus("/r", "a", 0, "running", 0.0, (_ISLAND,)),), 0, 0, 0.0)
     scheduler: Any = SimpleNamespace(active=[], status=lambda _now_s: status)
-    waiting = "waiting for workers and analyzers: none has joined"
+    waiting = "waiting for workers and analyzers: none is connected"
     how = (
         "; to start some on this machine: revolve worker --connect runs/a --plugins "
         "own.py, revolve analyzer --connect runs/a --plugins own.py\n"
@@ -131,8 +131,8 @@ def test_a_run_that_misses_others_than_before_says_so_again(
         display.update(15.0)
     lines = capsys.readouterr().err.splitlines()
     waiting = [line.partition("waiting for ")[2] for line in lines if "waiting" in line]
-    how = "none has joined; to start some on this machine: "
-    unfit = how.replace("none has joined", "none that has joined can do the jobs")
+    how = "none is connected; to start some on this machine: "
+    unfit = how.replace("none is connected", "none that is connected can do the jobs")
     analyzer = "revolve analyzer --connect runs/a"
     assert waiting == [
         f"workers and analyzers: {how}revolve worker --connect runs/a, {analyzer}",
