@@ -47,7 +47,7 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
         way = f"moved {100 * one.moved_m:.2g} cm"
         if one.moved_m < _STILL_M:
-            way = "stood still then"
+            way = "stood still in these pictures"
         text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}, {way}"
         row[0].set_title("")
         row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=12)

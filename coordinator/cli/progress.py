@@ -1,7 +1,7 @@
 """Progress of a coordinator's runs on the terminal: bars, or lines in a log."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Self
 
 from rich.console import Console
@@ -23,7 +23,7 @@ from coordinator.cli.format import (
     run_details,
 )
 from coordinator.run.scheduler import RunScheduler
-from coordinator.run.session import SPAN_S
+from coordinator.run.session import SPAN_S, RunSession
 from coordinator.storage.hints import command
 from schema.agent.log import log_form, tell_user, warn_user
 from schema.errors import counted
@@ -78,7 +78,7 @@ class Display:
         self._next_line_s = -math.inf
         self._missing: list[str] = []
         self._missing_since_s: float | None = None
-        self._shown_waiting: dict[str, str] = {}
+        self._shown_waiting: set[str] = set()
 
     def __enter__(self) -> Self:
         """Start drawing."""
@@ -167,24 +167,38 @@ class Display:
             ]
             how = f"; to start some on this machine: {', '.join(starts)}"
             self._warn(f"{line}{how if self._place else ''}")
-        waiting = {
-            f"arena {shard} of {run.held.path.name}": platform
-            for run in self._scheduler.active
-            for shard, platform in run.waiting.items()
-        }
-        if "workers" not in missing and waiting != self._shown_waiting:
-            self._shown_waiting = waiting
-            for arena, platform in waiting.items():
-                self._warn(
-                    f"waiting: {arena} needs a worker of platform {platform}; on "
-                    "another platform its results differ (--allow-drift)"
-                )
+        active = self._scheduler.active
+        waiting = [line for run in active for line in _waiting(run, missing)]
+        for line in waiting:
+            if line not in self._shown_waiting:
+                self._warn(f"waiting: {line}")
+        self._shown_waiting = set(waiting)
 
     def _warn(self, line: str) -> None:
         if self._has_bars and not self._quiet:
             self._console.print(line, soft_wrap=True)
         else:
             warn_user(line)
+
+
+def _waiting(run: RunSession, missing: Sequence[str]) -> Iterator[str]:
+    """Yield what a run waits for although its coordinator has agents.
+
+    Args:
+        run: the run.
+        missing: kinds of agents of which no run has one.
+    """
+    kinds = [f"{kind}s" for kind in run.lacking]
+    lacking = [kind for kind in kinds if kind not in missing]
+    name = run.held.path.name
+    if lacking:
+        yield f"{name}: none of the {' and '.join(lacking)} can do its jobs"
+    elif "workers" not in missing:
+        for arena, platform in run.waiting.items():
+            yield (
+                f"arena {arena} of {name} needs a worker of platform {platform}; on "
+                "another platform its results differ (--allow-drift)"
+            )
 
 
 def _line(status: Status) -> str:

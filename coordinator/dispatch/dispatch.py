@@ -8,7 +8,8 @@ on its name.
 
 An agent that fails at a job, loses one without leaving, or declines the same one twice
 gets no job until a backoff ends. The backoff grows with consecutive failures, so that a
-broken agent cannot empty the queue.
+broken agent cannot empty the queue. One that is unfit for a client, such as without its
+plug-ins, gets no more jobs of that client.
 
 Overdue jobs are duplicated on idle agents; the first answer counts. If all agents that
 have a copy are silent, too, another one gets it, each time after twice the time. A job
@@ -29,6 +30,7 @@ from coordinator.dispatch.events import (
     Died,
     DispatchCommand,
     DispatchEvent,
+    Ended,
     Job,
     JobKind,
     Joined,
@@ -89,6 +91,7 @@ class Dispatch:
             Left: self._left,
             Requested: self._requested,
             Withdrawn: self._withdrawn,
+            Ended: self._ended,
             Returned: self._returned,
             Died: self._died,
             Ticked: self._ticked,
@@ -110,13 +113,13 @@ class Dispatch:
         pending = self._jobs.get(number)
         return pending.job.client if pending else None
 
-    def jobs_of(self, client: Client) -> list[int]:
-        """Return the numbers of a client's jobs that are not delivered."""
-        return [n for n, each in self._jobs.items() if each.job.client == client]
-
     def agents(self, kind: AgentKind) -> int:
         """Return the number of agents of a kind."""
         return len(self._pools[kind].agents)
+
+    def fit(self, kind: AgentKind, client: Client) -> set[str]:
+        """Return the names of the agents of a kind that can do a client's jobs."""
+        return set(self._pools[kind].fit(client))
 
     def names(self, kind: AgentKind) -> list[str]:
         """Return the names of the agents of a kind, ascending."""
@@ -219,6 +222,14 @@ class Dispatch:
             self._pools[AGENT_OF[pending.job.kind]].drop(event.number)
         yield from self._close(pending)
 
+    def _ended(self, event: Ended) -> Iterator[DispatchCommand]:
+        jobs = [j for j in self._jobs.values() if j.job.client == event.client]
+        for pending in jobs:
+            yield from self._withdrawn(Withdrawn(pending.job.number))
+        for pool in self._pools.values():
+            for agent in pool.agents.values():
+                agent.unfit_for.discard(event.client)
+
     def _returned(self, event: Returned) -> Iterator[DispatchCommand]:
         kind = self._kind_of.get(event.agent)
         if kind is None:
@@ -236,7 +247,12 @@ class Dispatch:
             self._note_late(event)
             return
         # A late copy only shows that the agent is free.
-        if pending := self._jobs.get(event.number):
+        pending = self._jobs.get(event.number)
+        if pending and event.outcome == "unfit":
+            self._faults.note("refused", event.agent, event.reason)
+            agent.unfit_for.add(pending.job.client)
+            self._put_back(pending, event.agent)
+        elif pending:
             answer, reason = self._read(pending.job, event)
             if event.outcome == "ok" and not reason:
                 agent.failures = 0
@@ -384,7 +400,8 @@ class Dispatch:
         """Give an overdue job to an idle agent, which is removed from the list."""
         now_s = self._now_s or 0.0
         avoid = {*self._pairs.avoided(pending), *pending.holders}
-        name = next((each for each in idle if each not in avoid), "")
+        fit = self.fit(AGENT_OF[pending.job.kind], pending.job.client)
+        name = next((each for each in idle if each in fit and each not in avoid), "")
         copies = len(pending.holders)
         # The second copy may only be faster; more of them need silent agents.
         if copies > 1 or not name:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 AgentKind = Literal["worker", "analyzer"]
+KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 
 JobKind = Literal["vet", "evaluate", "call"]
 
@@ -95,6 +96,13 @@ class Withdrawn:
 
 
 @dataclass(frozen=True, slots=True)
+class Ended:
+    """A client has ended: none of its jobs is wanted any more."""
+
+    client: Client
+
+
+@dataclass(frozen=True, slots=True)
 class Returned:
     """A job came back from an agent.
 
@@ -102,8 +110,9 @@ class Returned:
         number: of the job.
         agent: that had it.
         outcome: "ok" with an answer, "error" with a reason (the agent could not
-            do it), "lost" (no reply: the agent died, froze or was cut off),
-            "fenced" (the agent knows a later coordinator of the run) or "cancelled".
+            do it), "unfit" with a reason (it cannot do any job of this client),
+            "lost" (no reply: the agent died, froze or was cut off), "fenced" (it
+            knows a later coordinator of the run) or "cancelled".
         answer: encoded answer; empty unless ok.
         reason: of the agent; empty if ok or lost.
         took_s: time from sending the job to its answer [s]; None: not measured.
@@ -111,7 +120,7 @@ class Returned:
 
     number: int
     agent: str
-    outcome: Literal["ok", "error", "lost", "fenced", "cancelled"]
+    outcome: Literal["ok", "error", "unfit", "lost", "fenced", "cancelled"]
     answer: bytes = b""
     reason: str = ""
     took_s: float | None = None
@@ -152,7 +161,15 @@ class Progressed:
 
 
 DispatchEvent = (
-    Joined | Left | Requested | Withdrawn | Returned | Died | Ticked | Progressed
+    Joined
+    | Left
+    | Requested
+    | Withdrawn
+    | Ended
+    | Returned
+    | Died
+    | Ticked
+    | Progressed
 )
 
 
@@ -229,11 +246,13 @@ class ShardSeen:
         shard: the shard.
         platform: empty if it was never advanced.
         may_drift: it may move to another platform, if shards may.
+        client: the run of the arena.
     """
 
     shard: int
     platform: str
     may_drift: bool = True
+    client: Client = NO_CLIENT
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,14 +269,15 @@ class ShardReturned:
     Attributes:
         number: of the ``AssignShard``.
         outcome: "done"; "stateless" (the worker does not have the state); "error"
-            with a reason; "malformed" (an answer that is not believed) with a reason;
-            "lost" (no reply).
+            with a reason; "unfit" (it cannot do any job of the shard's client);
+            "malformed" (an answer that is not believed) with a reason; "lost" (no
+            reply).
         reason: empty unless error or malformed.
         answer: decoded; None unless done.
     """
 
     number: int
-    outcome: Literal["done", "stateless", "error", "malformed", "lost"]
+    outcome: Literal["done", "stateless", "error", "unfit", "malformed", "lost"]
     reason: str = ""
     answer: object = None
 

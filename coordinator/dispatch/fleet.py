@@ -23,6 +23,7 @@ from coordinator.dispatch.events import (
     Died,
     DispatchCommand,
     DispatchEvent,
+    Ended,
     Job,
     Joined,
     Killed,
@@ -40,7 +41,6 @@ from coordinator.dispatch.events import (
     ShardReturned,
     ShardSeen,
     Ticked,
-    Withdrawn,
 )
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.shards import ShardDispatch
@@ -160,7 +160,7 @@ class Fleet:
         """
         shard = next(self._shard_numbers)
         self._shard_clients[shard] = (client, encode)
-        self._move(ShardSeen(shard, platform, may_drift))
+        self._move(ShardSeen(shard, platform, may_drift, client))
         return shard
 
     def advance(self, shard: int) -> None:
@@ -170,8 +170,7 @@ class Fleet:
 
     def leave(self, client: Client) -> None:
         """Drop all jobs and shards of a client."""
-        for number in self.dispatch.jobs_of(client):
-            self._obey(self.dispatch.handle(Withdrawn(number)))
+        self._obey(self.dispatch.handle(Ended(client)))
         for shard, (owner, _) in list(self._shard_clients.items()):
             if owner == client:
                 self.release(shard)
@@ -259,10 +258,10 @@ class Fleet:
     def _read_advance(self, event: Returned, read: Read) -> ShardReturned:
         """Return the outcome of an advance."""
         if event.outcome != "ok":
-            if event.outcome != "error":
+            if event.outcome not in ("error", "unfit"):
                 return ShardReturned(event.number, "lost")
             self.faults.note("refused", event.agent, event.reason)
-            return ShardReturned(event.number, "error", event.reason)
+            return ShardReturned(event.number, event.outcome, event.reason)
         try:
             answer = read(event.answer)
         except MalformedMessage as error:

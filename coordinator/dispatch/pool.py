@@ -12,7 +12,7 @@ from math import inf
 from typing import Literal
 
 from coordinator.dispatch.deadlines import NEWEST_WEIGHT
-from coordinator.dispatch.events import Joined, Overdue
+from coordinator.dispatch.events import Client, Joined, Overdue
 from coordinator.dispatch.pending import Pending
 
 MOST_AHEAD = 16
@@ -48,6 +48,7 @@ class AgentState:
         asked_s: time of the last question about it [s].
         is_silent: it is silent until its next answer or report.
         is_told: the user knows that it is silent.
+        unfit_for: clients whose jobs it cannot do.
     """
 
     joined: Joined
@@ -62,6 +63,7 @@ class AgentState:
     asked_s: float = -inf
     is_silent: bool = False
     is_told: bool = False
+    unfit_for: set[Client] = field(default_factory=set)
 
     def occupy(self) -> None:
         """Update the number of slots that its advances occupy."""
@@ -239,11 +241,15 @@ class Pool:
         agent = self.agents.get(entry[1])
         return agent is not None and agent.stamp == entry[2]
 
-    def may_take(self, name: str, avoid: tuple[str, ...]) -> bool:
+    def fit(self, client: Client) -> Iterator[str]:
+        """Yield the names of the agents that can do a client's jobs."""
+        return (n for n, a in self.agents.items() if client not in a.unfit_for)
+
+    def may_take(self, name: str, client: Client, avoid: tuple[str, ...]) -> bool:
         """Return whether an agent may have a job that avoids others where it can."""
-        if name not in avoid:
-            return True
-        return sum(other in self.agents for other in avoid) == len(self.agents)
+        if client in self.agents[name].unfit_for:
+            return False
+        return name not in avoid or all(other in avoid for other in self.fit(client))
 
     def take(
         self,
@@ -263,7 +269,7 @@ class Pool:
         while self.waiting and taken is None:
             number = heappop(self.waiting)
             pending = jobs[number]
-            if self.may_take(name, avoided(pending)):
+            if self.may_take(name, pending.job.client, avoided(pending)):
                 taken = pending
             else:
                 passed.append(number)

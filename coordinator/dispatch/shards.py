@@ -3,8 +3,9 @@
 One worker holds the state of a shard and makes its advances. If that worker is gone,
 fails, lacks the state or is silent, the advance goes, with all that is needed to
 rebuild the state, to another worker of an equal platform: one that keeps more states
-than it has, with the lowest load; ties break on the name. A shard without such a worker
-waits. If the user allows a drift, a worker of another platform gets it after a while.
+than it has, with the lowest load; ties break on the name. A worker that is unfit for
+the shard's client never gets it. A shard without a worker waits. If the user allows a
+drift, one of another platform gets it after a while.
 
 An advance has a deadline. A silent worker loses it only to an idle one, and the next
 deadline is twice as long, so that an advance that takes long everywhere ends. A worker
@@ -17,9 +18,11 @@ from dataclasses import dataclass, field
 
 from coordinator.dispatch.deadlines import FIRST_S, LOOK_S, Deadlines
 from coordinator.dispatch.events import (
+    NO_CLIENT,
     Ask,
     AssignShard,
     CancelShard,
+    Client,
     Crowded,
     Joined,
     Killed,
@@ -49,6 +52,7 @@ class _Shard:
     """A shard and its present advance.
 
     Attributes:
+        client: the run of the arena.
         platform: of the last advance; empty before the first.
         holder: the worker that is bound to it; empty if none is.
         heir: the worker that takes over after the present advance; empty if none does.
@@ -65,6 +69,7 @@ class _Shard:
         drifts_at_s: when it may drift to another platform [s].
     """
 
+    client: Client = NO_CLIENT
     platform: str = ""
     holder: str = ""
     heir: str = ""
@@ -178,6 +183,7 @@ class ShardDispatch:
             case ShardSeen():
                 shard = self._shard(event.shard)
                 shard.platform, shard.may_drift = event.platform, event.may_drift
+                shard.client = event.client
             case ShardRequested():
                 self._want(event.shard)
             case ShardReturned():
@@ -312,6 +318,9 @@ class ShardDispatch:
             shard.has_state = False
             return []
         self._unbind(shard)
+        if event.outcome == "unfit":
+            self._workers.agents[agent].unfit_for.add(shard.client)
+            return []
         if event.outcome == "lost":
             shard.lost[event.number] = agent
         shard.avoid = (*shard.avoid, agent)
@@ -391,14 +400,15 @@ class ShardDispatch:
         fit = self._equal(shard)
         if fit or shard.drifts_at_s is None or self._now_s < shard.drifts_at_s:
             return fit
-        return sorted(self._workers.agents)
+        return sorted(self._workers.fit(shard.client))
 
     def _equal(self, shard: _Shard) -> list[str]:
         """Return the workers of a shard's platform, by name."""
+        agents = self._workers.agents
         return [
             name
-            for name, worker in sorted(self._workers.agents.items())
-            if shard.platform in ("", worker.joined.platform)
+            for name in sorted(self._workers.fit(shard.client))
+            if shard.platform in ("", agents[name].joined.platform)
         ]
 
     def _choice(self, shard: _Shard) -> str:

@@ -17,7 +17,7 @@ from coordinator.evolution.selection import Couple, Individual
 from schema.errors import ExperimentError, shown
 from schema.experiment.document import Selection
 from schema.experiment.selection_rules import own_rule
-from schema.plugins.origin import where_defined, where_raised
+from schema.plugins.origin import raised_by, where_defined
 from schema.plugins.protocols import ParentSelection, Selectable, SurvivorSelection
 
 
@@ -122,12 +122,8 @@ class Rule:
         try:
             answer = self.function(population, *rest, self.parameters)
         except Exception as error:
-            where = where_defined(self.function)
-            line = where_raised(error, where.partition(":")[0])
-            raise ExperimentError(
-                f"{self.key}: {where}: raised {type(error).__name__}: {error}"
-                + (f" ({line})" if line else "")
-            ) from error
+            what = raised_by(self.function, error)
+            raise ExperimentError(f"{self.key}: {what}") from error
         places = _whole_numbers(answer)
         if len(places) == len(set(places)) == count and (
             min(places) >= 0 and max(places) < len(population)

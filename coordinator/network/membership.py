@@ -115,19 +115,6 @@ class Membership:
         """Return how often an agent was asked without an answer."""
         return self._silent.get(member, 0)
 
-    def refuse(self, agent: str, why: str) -> Left | None:
-        """Exclude an agent; return the event if it had joined.
-
-        Args:
-            agent: its name.
-            why: for the user.
-        """
-        member = self._joined.get(agent)
-        if member is None:
-            return None
-        self._exclude(member, why)
-        return self._leave(member)
-
     def introduce(self, member: Member, data: bytes) -> list[Died | Joined]:
         """Take an agent's description of itself and of the processes it replaces.
 
@@ -149,9 +136,9 @@ class Membership:
         self._silent.pop(member, None)
         if info.version != self._version:
             version = printable(info.version)
-            self._exclude(
-                member,
-                f"is of version {version!r}, the coordinator of {self._version!r}",
+            self._refused_members[agent] = member
+            self.refused[agent] = (
+                f"is of version {version!r}, the coordinator of {self._version!r}"
             )
             return []
         kind: AgentKind = "analyzer" if member.role == "analyzer" else "worker"
@@ -181,10 +168,6 @@ class Membership:
     def _forget(self, member: Member) -> None:
         self._alive.discard(member)
         self._silent.pop(member, None)
-
-    def _exclude(self, member: Member, why: str) -> None:
-        self.refused[member.name] = why
-        self._refused_members[member.name] = member
 
     def _leave(self, member: Member) -> Left | None:
         if self._joined.get(member.name) != member:

@@ -449,11 +449,8 @@ class Network:
             self._info_queue.add_again(member, silences, time.monotonic())
             raise
         if member.name in self.refused:
-            self._note_refused(member.name)
+            self.faults.note("refused", member.name, self.refused[member.name])
         return events
-
-    def _note_refused(self, agent: str) -> None:
-        self.faults.note("refused", agent, self.refused[agent])
 
     def _returned(self, asked: _Asked) -> list[DispatchEvent]:
         number, agent, reply = asked.number, asked.member.name, asked.reply
@@ -470,18 +467,17 @@ class Network:
         told = reply.err.payload.to_bytes()[: 4 * LONGEST_REASON].decode(
             "utf-8", "replace"
         )
-        reason = printable(told, LONGEST_REASON) or "no reason given"
-        if not told.startswith(UNFIT):
-            return [Returned(number, agent, _outcome(told), reason=reason)]
-        left = self._membership.refuse(agent, reason[len(UNFIT) :])
-        if left is None:
-            return [Returned(number, agent, "lost")]
-        self._note_refused(agent)
-        return [left]
+        outcome, text = _outcome(told)
+        reason = printable(text, LONGEST_REASON) or "no reason given"
+        return [Returned(number, agent, outcome, reason=reason)]
 
 
-def _outcome(told: str) -> Literal["fenced", "cancelled", "error"]:
-    """Return the outcome of a job with a reason instead of an answer."""
+def _outcome(
+    told: str,
+) -> tuple[Literal["fenced", "cancelled", "unfit", "error"], str]:
+    """Return the outcome of a job without an answer, and the reason for it."""
     if told.startswith(FENCED):
-        return "fenced"
-    return "cancelled" if told == CANCELLED else "error"
+        return "fenced", told
+    if told.startswith(UNFIT):
+        return "unfit", told.removeprefix(UNFIT)
+    return ("cancelled" if told == CANCELLED else "error"), told

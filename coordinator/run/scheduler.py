@@ -13,7 +13,7 @@ from functools import partial
 
 from msgspec.structs import replace
 
-from coordinator.dispatch.events import AgentKind, Client
+from coordinator.dispatch.events import KINDS, AgentKind, Client
 from coordinator.dispatch.fleet import End, Fleet
 from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunFolder
@@ -208,8 +208,8 @@ class RunScheduler:
         self._rate.note(now_s, born)
         return Status(
             runs=tuple(runs),
-            workers=self.fleet.dispatch.agents("worker"),
-            analyzers=self.fleet.dispatch.agents("analyzer"),
+            workers=self._useful("worker"),
+            analyzers=self._useful("analyzer"),
             births_per_s=self._rate.per_s,
             faults=tuple(
                 PeerFault(each.kind, each.peer, each.count)
@@ -218,13 +218,19 @@ class RunScheduler:
             queues=_queues(self.fleet),
         )
 
+    def _useful(self, kind: AgentKind) -> int:
+        """Return how many agents of a kind can do the jobs of some run in progress."""
+        if not self._run_of:
+            return self.fleet.dispatch.agents(kind)
+        fit = (self.fleet.dispatch.fit(kind, client) for client in self._run_of)
+        return len(set().union(*fit))
+
 
 def _queues(fleet: Fleet) -> tuple[Queue, ...]:
     """Return how many requests of each kind wait, and how many agents have."""
-    kinds: tuple[AgentKind, ...] = ("worker", "analyzer")
     jobs = (
         Queue(kind, fleet.dispatch.waiting(kind), fleet.dispatch.assigned(kind))
-        for kind in kinds
+        for kind in KINDS
     )
     return (*jobs, Queue("arena", fleet.shards.unassigned, fleet.shards.assigned))
 

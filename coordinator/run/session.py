@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 
 from coordinator.arena.arena import Arena
+from coordinator.dispatch.events import KINDS, AgentKind
 from coordinator.dispatch.fleet import End, Fleet
 from coordinator.islands.events import JournalledEvent, Record
 from coordinator.islands.island import Island
@@ -242,6 +243,16 @@ class RunSession:
             return self.recovery.waiting
         return self.loop.shard_requests.waiting
 
+    @property
+    def lacking(self) -> list[AgentKind]:
+        """Kinds of agents that have joined but cannot do this run's jobs."""
+        dispatch, client = self._fleet.dispatch, self.loop.client
+        return [
+            kind
+            for kind in KINDS
+            if dispatch.agents(kind) and not dispatch.fit(kind, client)
+        ]
+
     def status(self, now_s: float) -> RunStatus:
         """Return the progress of the run.
 
@@ -255,11 +266,14 @@ class RunSession:
         simulated_s = sum(island.simulated_s or 0.0 for island in islands)
         self._simulated.note(now_s, simulated_s)
         details = self.held.details
+        state = "waiting" if self.lacking else "running"
+        if self.loop.is_finished:
+            state = "finished"
         return RunStatus(
             folder=str(self.held.path.resolve()),
             name=details.name,
             run=details.run,
-            state="finished" if self.loop.is_finished else "running",
+            state=state,
             births_per_s=self._births.per_s,
             islands=islands,
             simulated_per_s=self._simulated.per_s,

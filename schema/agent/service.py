@@ -391,10 +391,7 @@ def _answer(query: zenoh.Query, server: Server, me: Member, hub: "HubWatch") -> 
     if reply.reason:
         if reply.reason.startswith(UNFIT):
             why = reply.reason.removeprefix(UNFIT)
-            hub.refused(
-                "refused a run, and gets no more jobs from its coordinator, of other "
-                f"runs neither: {why}"
-            )
+            hub.refused(f"refused a run, and gets no more jobs of it: {why}")
         query.reply_err(reply.reason)
     else:
         query.reply(me.jobs, reply.answer)

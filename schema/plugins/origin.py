@@ -8,6 +8,8 @@ from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
 
+from schema.errors import one_line
+
 _CONSTANTS = (bool, int, float, complex, str, bytes, tuple, frozenset, type(None))
 
 
@@ -74,6 +76,19 @@ def where_raised(error: BaseException, file: str) -> str:
         if Path(frame.filename).name == file
     ]
     return lines[-1] if lines else ""
+
+
+def raised_by(plugin: object, error: BaseException) -> str:
+    """Return a line of where a plug-in is defined, what it raised, and where.
+
+    Args:
+        plugin: function, class or object.
+        error: that a call of it raised.
+    """
+    where = where_defined(plugin)
+    line = where_raised(error, where.partition(":")[0])
+    text = f"{where}: raised {type(error).__name__}: {one_line(error)}"
+    return f"{text} ({line})" if line else text
 
 
 def _where_assigned(value: object) -> str:

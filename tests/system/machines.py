@@ -16,7 +16,7 @@ from typing import Self
 
 import pytest
 
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace, runtime_directory, wait_until
 
 DOMAIN = "example"
 _NET = "10.231.78"
@@ -74,12 +74,14 @@ class Machine:
         name: its name, with ``.example`` its host name.
         space: its network namespace.
         home: home directory.
+        runtime: runtime directory, by a path that is short enough for sockets.
         workspace: starts its processes.
     """
 
     name: str
     space: str
     home: Path
+    runtime: str
     workspace: Workspace
 
     def start(self, *words: str, sources: bool = True) -> "Running":
@@ -100,7 +102,7 @@ class Machine:
         process = self.workspace.start_command(
             *("ip", "netns", "exec", self.space, *shell, *words),
             folder=self.home,
-            environment={"HOME": home, "XDG_RUNTIME_DIR": str(self.home / ".runtime")},
+            environment={"HOME": home, "XDG_RUNTIME_DIR": self.runtime},
             log=log,
         )
         return Running(process, log)
@@ -195,8 +197,8 @@ class Network:
         ip(f"-n {space} addr add {_NET}.{number}/24 dev wire")
         ip(f"-n {space} link set wire up")
         home = self.workspace.folder / name
-        (home / ".runtime").mkdir(parents=True, mode=0o700)
-        return Machine(name, space, home, self.workspace)
+        home.mkdir()
+        return Machine(name, space, home, runtime_directory(home), self.workspace)
 
     @staticmethod
     def _space(opened: ExitStack, name: str) -> None:

@@ -184,7 +184,7 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
     assert "its plug-in 'plugged' differs from the coordinator's" in lines[-1]
     log = fleet.agents["without"].stderr
     assert "connected to" in log.readline()
-    assert "of other runs neither: has no plug-in 'plugged' among" in log.readline()
+    assert "no more jobs of it: has no plug-in 'plugged' among" in log.readline()
     fleet.join("good", "worker", *allows)
     fleet.finish()
     assert compare(workspace.folder / "calm", fleet.folder) == []

@@ -59,7 +59,7 @@ def lab(workspace: Workspace, network: Network) -> Path:
 @contextmanager
 def all_rights(machine: Machine) -> Iterator[zenoh.Session]:
     """Yield a session with all rights, by the Unix socket of the hub's machine."""
-    address = f"unixsock-stream/{machine.home}/.runtime/revolve/hub.sock"
+    address = f"unixsock-stream/{machine.runtime}/revolve/hub.sock"
     with zenoh.open(zenoh.Config.from_json5(client_config(address))) as session:
         yield session
 

@@ -62,6 +62,5 @@ def test_commands_of_the_tutorial(network: Network, workspace: Workspace) -> Non
     assert (1 <= told["workers"] <= 3, told["analyzers"]) == (True, 1)
     workers[1].process.kill()
     run.end()
-    # In one process: the path of a socket would be too long here.
-    machine.start(*reference, "--quiet", "--in-process").end()
+    machine.start(*reference, "--quiet").end()
     assert "equal in all repeatable columns" in machine.start(*comparison).end()

@@ -9,10 +9,10 @@ from msgspec import Struct
 
 from coordinator.evolution.learners.cma_es import CmaEs
 from coordinator.evolution.learners.simple import OnePlusOne, RandomSearch
-from schema.errors import ExperimentError, one_line
+from schema.errors import ExperimentError
 from schema.experiment.learning import LEARNERS, Learning
 from schema.plugins.load import load_object
-from schema.plugins.origin import where_defined, where_raised
+from schema.plugins.origin import raised_by, where_defined
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Learner
 from schema.robot.results import Floats
@@ -128,9 +128,5 @@ class NewbornLearner:
         try:
             return function(*arguments)
         except Exception as error:
-            where = where_defined(self._class)
-            line = where_raised(error, where.partition(":")[0])
-            raise ExperimentError(
-                f"{WHERE}: {where}: raised {type(error).__name__}: {one_line(error)}"
-                + (f" ({line})" if line else "")
-            ) from error
+            what = raised_by(self._class, error)
+            raise ExperimentError(f"{WHERE}: {what}") from error

@@ -1,6 +1,7 @@
 """Bars on narrow and wide terminals."""
 
 import io
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -93,6 +94,23 @@ def test_a_run_without_agents_says_how_to_start_some(
                 display.update(now_s)
         lines = capsys.readouterr().err.splitlines(keepends=True)
         assert "".join(line for line in lines if "waiting" in line) == told
+
+
+def test_a_run_whose_jobs_no_worker_can_do_says_so_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    status = Status((RunStatus("/r", "a", 0, "waiting", 0.0, (_ISLAND,)),), 1, 1, 0.0)
+    folder = SimpleNamespace(path=Path("runs/all/a-0"))
+    run = SimpleNamespace(
+        lacking=["worker"], held=folder, waiting={0: ""}, recovery=None
+    )
+    scheduler: Any = SimpleNamespace(active=[run], status=lambda _now_s: status)
+    with Display(scheduler, quiet=False) as display:
+        for now_s in (0.0, 1.0, 30.0):
+            display.update(now_s)
+    lines = [line for line in capsys.readouterr().err.splitlines() if "jobs" in line]
+    assert len(lines) == 1
+    assert lines[0].endswith("waiting: a-0: none of the workers can do its jobs")
 
 
 def test_a_run_that_misses_others_than_before_says_so_again(

@@ -255,6 +255,59 @@ def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
     assert fleet.listen(0.0, 50.0) == {ARENA: [ShardDone(shard, agent, b"answer")]}
 
 
+def test_an_unfit_worker_gets_jobs_of_other_clients_only(
+    fleet: Fleet, agents: Agents
+) -> None:
+    """Jobs, and an arena, of a client; an agent that joins again is tried again."""
+    shard = new_shard(fleet, CLIENT)
+    fleet.advance(shard)
+    number, unfit, _ = agents.sent[0]
+    agents.news = [Returned(number, unfit, "unfit", reason="has no plug-in 'x'")]
+    assert fleet.listen(0.0, 1.0) == {}
+    (other,) = fleet.dispatch.fit("worker", CLIENT)
+    assert (unfit, other) == ("one", "two")
+    assert agents.sent[1][1] == other
+    assert fleet.faults.total("refused") == 1
+    for _ in range(4):
+        request(fleet, CLIENT)
+    assert {agent for _, agent, _ in agents.sent[1:]} == {other}
+    request(fleet, OTHER)
+    assert agents.sent[-1][1] == unfit
+    fleet.tell(Left(other))
+    assert fleet.shards.waiting == {0: ""}
+    assert fleet.dispatch.fit("worker", CLIENT) == set()
+    count = len(agents.sent)
+    fleet.tell(Left(unfit))
+    fleet.tell(Joined(unfit, "worker", 1, "p"))
+    assert len(agents.sent) > count + 1
+
+
+@pytest.mark.parametrize("is_late", [False, True])
+def test_an_unfit_worker_gets_no_copy_of_an_overdue_job(
+    fleet: Fleet, agents: Agents, *, is_late: bool
+) -> None:
+    first = request(fleet)
+    agents.news = [Returned(first, agents.sent[0][1], "unfit", reason="no plug-in")]
+    fleet.listen(0.0, 1.0)
+    assert agents.sent[1][1] != agents.sent[0][1]
+    fleet.tell(Ticked(1.5 if not is_late else 100.0 * FIRST_S))
+    assert len(agents.sent) == 2
+    agents.news = [Returned(first, agents.sent[1][1], "ok", b"x")]
+    assert [type(end) for end in fleet.listen(0.0, 1e6)[CLIENT]] == [Deliver]
+
+
+def test_a_worker_is_fit_again_for_a_client_that_has_ended(
+    fleet: Fleet, agents: Agents
+) -> None:
+    number = request(fleet)
+    agent = agents.sent[0][1]
+    agents.news = [Returned(number, agent, "unfit", reason="has no plug-in 'x'")]
+    fleet.listen(0.0, 1.0)
+    assert agent not in fleet.dispatch.fit("worker", CLIENT)
+    fleet.leave(CLIENT)
+    assert agent in fleet.dispatch.fit("worker", CLIENT)
+
+
 def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: Agents) -> None:
     shard = new_shard(fleet)
     for data in (b"answer", b"stateless"):

@@ -85,19 +85,6 @@ def test_agent_of_another_version_is_refused_until_it_vanishes(
     assert membership.refused == {}
 
 
-def test_refused_agent_joins_again_only_after_it_vanished(
-    membership: Membership,
-) -> None:
-    assert membership.refuse(NAME, "too early") is None
-    membership.introduce(WORKER, info())
-    assert membership.refuse(NAME, "has no plug-in") == Left(NAME)
-    assert membership.refused == {NAME: "has no plug-in"}
-    assert membership.refuse(NAME, "told twice") is None
-    assert not membership.is_stranger(WORKER)
-    assert membership.vanish(WORKER.alive) is None
-    assert (membership.refused, len(membership)) == ({}, 0)
-
-
 def with_death(member: Member, of: str, cause: str = "SIGSEGV") -> bytes:
     message = pb.AgentInfo.FromString(info(agent=member.name, kind=member.role))
     message.deaths.add(agent=of, run="r", epoch=3, number=7, cause=cause)

@@ -260,13 +260,15 @@ def test_cancelled_job_is_not_done(
     assert told == {0: "ok", 1: "cancelled"}
 
 
-def test_agent_without_a_plugin_is_refused_and_leaves(network: Network) -> None:
+def test_agent_without_a_plugin_is_unfit_for_the_run(network: Network) -> None:
     with agent(network, "w"):
         until(network, has(1))
         message = pb.Request(run="r", epoch=1, number=4, plugins="not_here=abc")
         network.send(4, "w", message.SerializeToString())
-        assert until(network, has(1)) == [Left("w")]
-        assert network.refused["w"].startswith("has no plug-in 'not_here' among")
+        (unfit,) = until(network, has(1))
+        assert isinstance(unfit, Returned)
+        assert (unfit.number, unfit.outcome) == (4, "unfit")
+        assert unfit.reason.startswith("has no plug-in 'not_here' among")
 
 
 def test_workers_connect_to_a_new_coordinator() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from schema.plugins import permission
 from schema.plugins.load import load_object
-from schema.plugins.origin import where_defined, where_named, where_raised
+from schema.plugins.origin import raised_by, where_defined, where_named, where_raised
 
 SOURCE = '''"""Plug-ins of a lab."""
 
@@ -90,3 +90,8 @@ def test_line_that_raised(lab: str) -> None:
     with pytest.raises(ZeroDivisionError) as caught_inside:
         load_object(f"{lab}:fails", "key", dict[str, Callable[[], None]]())()
     assert where_raised(caught_inside.value, f"{lab}.py") == f"{lab}.py:24"
+    assert raised_by(judge, ValueError("two\nlines")) == (
+        f"{where_defined(judge)}: raised ValueError: two lines"
+    )
+    told = raised_by(judge, caught_inside.value)
+    assert told.endswith(f"raised ZeroDivisionError: division by zero ({lab}.py:24)")
