@@ -86,8 +86,10 @@ class Engine:
 
     @property
     def workers(self) -> int:
-        """Number of workers that have joined."""
-        return 0 if self._fleet is None else self._fleet.dispatch.agents("worker")
+        """Number of workers that have joined and can do the jobs."""
+        if self._fleet is None:
+            return 0
+        return len(self._fleet.dispatch.fit("worker", self._client))
 
     def check(self) -> None:
         """Raise if there can be no more jobs.

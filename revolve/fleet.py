@@ -145,7 +145,7 @@ class Fleet:
 
     @property
     def workers(self) -> int:
-        """Number of workers that have joined."""
+        """Number of workers that have joined and can do the jobs."""
         return self._opened.workers
 
     def submit(

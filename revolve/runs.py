@@ -24,6 +24,7 @@ from schema.tables.description import (
     run_columns,
 )
 from schema.tables.files import read_table
+from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
 
 Folder = str | Path
@@ -73,7 +74,7 @@ class Run:
 
     @property
     def learning(self) -> pa.Table:
-        """One row per trial of a newborn that learns, off-line."""
+        """One row per trial of a newborn that learns."""
         return self.table("learning")
 
     @property
@@ -154,7 +155,7 @@ class Run:
         return self.robots(found)[0]
 
     def robots(self, births: pa.Table | None = None) -> list[Robot]:
-        """Return the robots of some births.
+        """Return the robots of some births, with the brains that they have learnt.
 
         Args:
             births: rows of the table ``births``; None: all of them.
@@ -164,6 +165,7 @@ class Run:
         """
         allow_plugins_of(self.folder)
         rows = self.births if births is None else births
+        rows = with_learnt(rows, self.learning)
         homes = rows["island"].to_pylist()
         documents = {
             island: island_experiment(document_of(self.experiment), island)

@@ -227,8 +227,9 @@ FIGURES: tuple[Figure, ...] = (
            ("learning",), learning_gain, "learning"),
     Figure("L", "Bodies that learning saved",
            "Share of newborns that are in the next recorded population, after the "
-           "founders. Learning has saved a body if its robot is there although its "
-           "fitness at birth is below that of each robot of that population.",
+           "founders; in an arena in the second one recorded since they are mature. "
+           "Learning has saved a body if its robot is there although its fitness at "
+           "birth is below that of each robot of that population.",
            ("learning",), bodies_saved, "learning"),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

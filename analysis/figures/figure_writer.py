@@ -31,6 +31,7 @@ from schema.plugins.source import modules_named
 from schema.robot.ids import BirthId
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
+from schema.tables.learnt import with_learnt
 
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
 _BASELINES = ("no-reproduction", "no-selection")
@@ -215,7 +216,9 @@ def _robot_pictures(
                 allow_plugins_of(run.folder)
             pictures[name] = robot_picture(
                 best[name],
-                read_table(run.folder, "births"),
+                with_learnt(
+                    read_table(run.folder, "births"), read_table(run.folder, "learning")
+                ),
                 own_experiment(document),
                 simulation,
                 origin=Origin(seed=run.seed, run=run.number),

@@ -1,9 +1,17 @@
 """What newborns gain by lifetime learning, and which bodies it saves."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
-from analysis.measures.population_table import Numbers, individual_ids, rows_of
+from analysis.measures.population_table import (
+    Numbers,
+    PopulationTable,
+    individual_ids,
+    rows_of,
+)
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import Integers
 
@@ -65,36 +73,66 @@ def _selected(
 ) -> tuple[pa.Array, pa.Array]:
     """Return which robots were kept, and which of them learning saved.
 
-    Both are null for robots that were born before the island's first recorded
-    population, and of a brood that is not recorded.
+    Off-line both are null for robots that were born before the island's first recorded
+    population, and of a brood that is not recorded; in an arena for robots that the run
+    ends with too early, or that an operator or a migration took away.
     """
-    table = run.population_table
-    islands = np.asarray(run.births["island"].to_numpy(), np.int64)
-    numbers = np.asarray(run.births["birth"].to_numpy(), np.int64)
     before = np.full(run.births.num_rows, np.nan)
     before[robots] = at_birth
-    kept: list[bool | None] = [None] * len(before)
-    saved: list[bool | None] = [None] * len(before)
+    kept: dict[int, bool] = {}
+    saved: dict[int, bool] = {}
+    islands = np.asarray(run.births["island"].to_numpy(), np.int64)
+    numbers = np.asarray(run.births["birth"].to_numpy(), np.int64)
+    is_online = np.asarray(run.births["sim_time_s"].is_valid())
     past: dict[int, int] = {}
-    for group, (island, births) in enumerate(
-        zip(table.islands.tolist(), table.births.tolist(), strict=True)
-    ):
+    matured: set[int] = set()
+    for group, members, fitness in _groups(run.population_table):
+        island = int(run.population_table.islands[group])
         first = past.get(island)
-        past[island] = births
-        if first is None:
+        past[island] = births = int(run.population_table.births[group])
+        judged = {*members[~np.isnan(fitness)].tolist()}
+        least = np.nanmin(fitness, initial=np.inf)
+        is_own = islands == island
+        if is_online[is_own].any():
+            new = [row for row in judged & matured if row not in kept and is_own[row]]
+            matured |= judged
+        elif first is not None:
+            is_new = is_own & (numbers >= first) & (numbers < births)
+            new = np.flatnonzero(is_new).tolist()
+        else:
             continue
-        own = slice(table.starts[group], table.starts[group + 1])
-        members = set(table.members[own].tolist())
-        least = np.nanmin(table.fitness[own], initial=np.inf)
-        is_new = (islands == island) & (numbers >= first) & (numbers < births)
-        for row in np.flatnonzero(is_new).tolist():
-            kept[row] = row in members
-            saved[row] = row in members and bool(before[row] < least)
+        for row in new:
+            kept[row] = row in judged
+            saved[row] = row in judged and bool(before[row] < least)
+    for row in _culled(run):
+        kept.setdefault(row, False)
+        saved.setdefault(row, False)
     chosen = robots.tolist()
     return (
-        pa.array([kept[row] for row in chosen], pa.bool_()),
-        pa.array([saved[row] for row in chosen], pa.bool_()),
+        pa.array([kept.get(row) for row in chosen], pa.bool_()),
+        pa.array([saved.get(row) for row in chosen], pa.bool_()),
     )
+
+
+def _groups(table: PopulationTable) -> Iterator[tuple[int, Integers, Numbers]]:
+    """Yield each recorded population: its number, members and their fitness."""
+    for group in range(len(table)):
+        own = slice(table.starts[group], table.starts[group + 1])
+        yield group, table.members[own], table.fitness[own]
+
+
+def _culled(run: RunTables) -> list[int]:
+    """Return the births rows of robots that died where they were born."""
+    deaths = run.tables["deaths"]
+    reasons = pa.array(["migrated", "removed"])
+    died = deaths.filter(
+        pc.and_(
+            pc.invert(pc.is_in(deaths["reason"], reasons)),
+            pc.equal(deaths["birth_island"], deaths["island"]),
+        )
+    )
+    rows = rows_of(individual_ids(died), run.births)
+    return [row for row in rows.tolist() if row >= 0]
 
 
 def learning_curves(run: RunTables) -> pa.Table:

@@ -21,6 +21,7 @@ from schema.plugins.source import modules_named
 from schema.tables.columns import TABLES, VERSION
 from schema.tables.description import DETAILS, STATE, read_description, read_state
 from schema.tables.files import finished_path, has_rows, is_sealed, read_table
+from schema.tables.learnt import with_learnt
 from schema.tables.segments import FINISHED, warn_once
 
 TABLE = "table "
@@ -259,7 +260,8 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
 
     Returns:
         Tables by name, and the tables that could not be read. An unreadable table, or
-        one that such a run does not have, is empty. ``birth_island`` is never null,
+        one that such a run does not have, is empty. ``births`` has robots with the
+        brains that they have learnt, ``birth_island`` is never null,
         and ``population`` has ``is_online``: whether the individual lives in an arena.
     """
     tables: dict[str, pa.Table] = {}
@@ -272,6 +274,7 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
         except (RunFolderError, pa.ArrowException, OSError) as error:
             tables[name] = _named(TABLES[name].empty_table())
             left_out.append(LeftOut(str(run.folder), TABLE + name, str(error)))
+    tables["births"] = with_learnt(tables["births"], tables["learning"])
     online = np.array([island.is_online for island in run.islands], np.bool_)
     islands = np.asarray(tables["population"]["island"], np.int64)
     # An island that is not in the document has the settings of the last one.

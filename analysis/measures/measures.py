@@ -122,7 +122,7 @@ _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
         ("births", "population"),
     ),
     "named_measures": (named_measures, _OF_ROBOTS),
-    "learning": (learning, ("births", "population", "learning")),
+    "learning": (learning, ("births", "population", "learning", "deaths")),
     "learning_curves": (learning_curves, ("births", "learning")),
     "migrants": (
         lambda run: migrants(

@@ -218,10 +218,11 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "at_birth": "fitness with the brain at birth; 0 if that trial failed",
         "fitness": "fitness with the best brain",
         "gain": "fitness minus at_birth",
-        "kept": "whether it is in the first population recorded after its birth; null "
-        "for founders",
+        "kept": "whether it is in the first population recorded after its birth, in an "
+        "arena in the second one recorded since it is mature; null off-line for "
+        "founders, and for robots that an arena did not decide on",
         "saved": "whether it is kept, although its fitness at birth is below that of "
-        "each robot of that population; null for founders",
+        "each robot of that population; null as kept is",
     },
     "learning_curves": {
         **_RUN,

@@ -2,13 +2,15 @@
 
 A worker advances the world from one decision to the next. At each decision the arena
 samples, begins a birth, culls, and inserts viable robots. Simulated time stops during
-vetting. The founders are inserted before all that, one by one, in reverse order of
-their generation. Source: Hupkes 2016, section 5.3.3; the code of the original.
+vetting, and while a learner is asked. The founders are inserted before all that, one by
+one, in reverse order of their generation. Source: Hupkes 2016, section 5.3.3; the code
+of the original.
 """
 
 from coordinator.arena.arena_migration import ArenaMigration
 from coordinator.arena.candidates import VettingQueue
 from coordinator.arena.clock import ArenaClock
+from coordinator.arena.infancy import Infancy
 from coordinator.arena.living import LivingRobots, Place
 from coordinator.arena.orders import Orders, inserted
 from coordinator.arena.rows import Moment, death_record, sample_records, touch_records
@@ -22,6 +24,8 @@ from coordinator.islands.events import (
     Append,
     ArenaCommand,
     ArenaEvent,
+    Ask,
+    Asked,
     Commanded,
     Finish,
     MigrationEvent,
@@ -78,7 +82,8 @@ class Arena:
         self._living = LivingRobots(
             rules, experiment.measures.labels, seed=seed, run=run
         )
-        self._orders = Orders(experiment, self._living)
+        self._infancy = Infancy(experiment, self.encoding, self.clock, self._living)
+        self._orders = Orders(experiment, self._living, self._infancy)
         self._migration = (
             None if epochs is None else ArenaMigration(experiment, epochs, self._living)
         )
@@ -130,6 +135,8 @@ class Arena:
             return self._advanced(event) if self._is_awaited(event) else []
         if isinstance(event, Commanded):
             return self._commanded(event)
+        if isinstance(event, Asked):
+            return self._asked(event)
         return self._migrated(event)
 
     def _vetted(self, event: Verdict) -> list[ArenaCommand]:
@@ -141,6 +148,18 @@ class Arena:
             return self._conclude()
         self._founders = self._vetting_queue.take_viable()
         return self._decide()
+
+    def _asked(self, event: Asked) -> list[ArenaCommand]:
+        """Take what a learner wants to try; duplicates are ignored."""
+        birth = event.birth
+        if not self._infancy.is_on:
+            raise self._unexpected(event, "it has no learners")
+        if birth.island != self._number or not self._vetting_queue.has_taken(birth):
+            raise self._unexpected(event, "no such robot has been born")
+        is_new = self._infancy.take(event, self.step)
+        if not is_new or self._infancy.is_waiting or self._vetting_queue.is_busy:
+            return []
+        return self._conclude()
 
     def _is_awaited(self, event: Advanced) -> bool:
         """Return whether an advance is the requested one; False for an old one.
@@ -177,13 +196,16 @@ class Arena:
             moment = self._moment._replace(sim_time_s=died_s)
             commands.append(death_record(casualty, "diverged", moment))
         self._living.update(advance)
+        commands += self._infancy.end_trials(event, self._moment)
         return commands + self._decide()
 
     def _decide(self) -> list[ArenaCommand]:
         """Do what is due at this step, up to the next vetting."""
-        if self._founders:
-            return [*self._insert(self._founders.pop()), *self._conclude()]
         commands: list[ArenaCommand] = []
+        if self._founders:
+            if self.step % self.clock.founder == 0:
+                commands += self._insert(self._founders.pop())
+            return commands + self._conclude()
         if self.step % self.clock.sample == 0:
             commands += sample_records(
                 self._living, self._moment, self.experiment.measures.labels
@@ -197,7 +219,7 @@ class Arena:
                 migration.is_starving = self.is_extinct and migration.may_bring_robots
                 self.is_extinct = self.is_extinct and not migration.is_starving
             if self.is_extinct or self.births >= self.experiment.births:
-                return [*commands, self._finish()]
+                return [*commands, *self._finish()]
             mature = self._living.mature()
             if self._living.has_room and len(mature) >= self._parents_needed:
                 commands += self._vetting_queue.begin_child(mature)
@@ -221,22 +243,24 @@ class Arena:
             order = orders.insertions.pop(0)
             birth = self._vetting_queue.take_number()
             commands += self._insert(inserted(order, birth, self.encoding), order.place)
+        if self._infancy.is_waiting:
+            return commands
         if self._migration is not None and not self._founders:
             commands += self._migration.exchange(self._moment)
             if self._migration.epochs.is_waiting:
                 return commands
             if self._migration.is_extinct:
                 self.is_extinct = True
-                return [*commands, self._finish()]
+                return [*commands, *self._finish()]
         self._is_held = orders.is_paused
         if not self._is_held:
             commands.append(self._advance())
         return commands
 
-    def _finish(self) -> Finish:
+    def _finish(self) -> list[Record | Finish]:
         self.is_finished = True
         links = self._migration.epochs.links.neighbours if self._migration else ()
-        return Finish(self._number, links)
+        return [*self._infancy.close(), Finish(self._number, links)]
 
     def _migrated(self, event: MigrationEvent) -> list[ArenaCommand]:
         """Handle an event of a neighbour; a finished arena ignores it."""
@@ -259,6 +283,7 @@ class Arena:
     def _advance(self) -> AdvanceShard:
         clock, step = self.clock, self.step
         until = clock.next_decision(step, is_founding=bool(self._founders))
+        until = self._infancy.next_end(until)
         changes = self._living.take_changes()
         is_saved = clock.is_snapshot_due(step, until)
         self._awaited = AdvanceShard(
@@ -266,8 +291,14 @@ class Arena:
         )
         return self._awaited
 
-    def _insert(self, candidate: Candidate, place: Place | None = None) -> list[Record]:
-        """Insert a robot at a place, random if None; return the rows of its birth."""
+    def _insert(
+        self, candidate: Candidate, place: Place | None = None
+    ) -> list[Record | Ask]:
+        """Insert a robot at a place, random if None.
+
+        Returns:
+            The rows of its birth; the first request to its learner if it learns.
+        """
         birth = candidate.birth
         individual = candidate.individual(generation=None)
         place = place or self._living.random_place(birth, Purpose.PLACE)
@@ -278,7 +309,9 @@ class Arena:
             candidate, individual, self.encoding, sim_time_s=now_s, place=place
         )
         fitness = [(one.birth, one.known_fitness) for one in self._living]
-        return [born, *population_records(self._number, self.births, fitness)]
+        population = population_records(self._number, self.births, fitness)
+        asks = self._infancy.begin(candidate, self.step)
+        return [born, *population, *asks]
 
     @property
     def _moment(self) -> Moment:

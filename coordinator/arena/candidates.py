@@ -56,6 +56,10 @@ class VettingQueue:
         self._next, self._failed = self._next + 1, 0
         return BirthId(self._island, self._next - 1)
 
+    def has_taken(self, birth: BirthId) -> bool:
+        """Return whether the number of a birth is used."""
+        return 0 <= birth.number < self._next
+
     def take(self, event: Verdict) -> list[Vet]:
         """Handle a report; return the vetting of the next attempt, if there is one.
 

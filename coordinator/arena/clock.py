@@ -8,6 +8,8 @@ class ArenaClock:
 
     Attributes:
         founder, birth, cull, sample, snapshot: intervals [steps].
+        window: length of a window of fitness [steps].
+        first_window: time from a birth to the end of its first window [steps].
     """
 
     def __init__(self, rules: Arena, simulation: Simulation) -> None:
@@ -17,6 +19,8 @@ class ArenaClock:
         self.cull = steps_of(rules.cull_interval_s, simulation)
         self.sample = steps_of(rules.sample_interval_s, simulation)
         self.snapshot = steps_of(rules.snapshot_interval_s, simulation)
+        self.window = simulation.window_steps
+        self.first_window = simulation.warmup_steps + simulation.window_steps
 
     def seconds(self, step: int) -> float:
         """Return the simulated time of a step [s]."""

@@ -25,12 +25,14 @@ class LivingRobot:
         robot: its current body and brain.
         inserted_at: place where it was inserted [m].
         judgement: the last report; None before the first advance.
+        is_infant: it learns, and does not count as mature.
     """
 
     individual: Individual
     robot: Robot
     inserted_at: Place
     judgement: Judgement | None = None
+    is_infant: bool = False
 
     @property
     def birth(self) -> BirthId:
@@ -40,7 +42,8 @@ class LivingRobot:
     @property
     def is_mature(self) -> bool:
         """It may mate, and may be culled."""
-        return self.judgement is not None and self.judgement.is_mature
+        judgement = self.judgement
+        return judgement is not None and judgement.is_mature and not self.is_infant
 
     @property
     def known_fitness(self) -> float | None:
@@ -109,14 +112,26 @@ class LivingRobots:
             self._removals.append(birth)
         return removed
 
-    def replace_brain(self, robot: LivingRobot, changed: Robot) -> None:
-        """Replace the brain of a living robot by that of ``changed``."""
+    def replace_brain(
+        self, robot: LivingRobot, changed: Robot, *, restarts_window: bool = False
+    ) -> None:
+        """Replace the brain of a living robot by that of ``changed``.
+
+        Args:
+            robot: the living robot.
+            changed: the same body with the new brain.
+            restarts_window: its window of fitness begins now, so it is immature.
+        """
         robot.robot, birth = changed, robot.birth
         inserted = self._insertions.get(birth)
-        if inserted is None:
-            self._brains[birth] = BrainChange(birth, changed.brain)
-        else:
+        if inserted is not None:
             self._insertions[birth] = replace(inserted, robot=changed)
+            return
+        if restarts_window and robot.judgement is not None:
+            robot.judgement = replace(robot.judgement, is_mature=False)
+        if (before := self._brains.get(birth)) is not None:
+            restarts_window = restarts_window or before.restarts_window
+        self._brains[birth] = BrainChange(birth, changed.brain, restarts_window)
 
     def mismatch(self, advance: Advance) -> str:
         """Return why an advance cannot be one of these robots; "" if it can."""

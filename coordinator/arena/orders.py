@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import isfinite
 
+from coordinator.arena.infancy import Infancy
 from coordinator.arena.living import LivingRobots
 from coordinator.arena.rows import Moment, death_record
 from coordinator.evolution.breeding import Candidate
@@ -34,13 +35,16 @@ class Orders:
         insertions: robots to insert as soon as there is room.
     """
 
-    def __init__(self, experiment: Experiment, living: LivingRobots) -> None:
+    def __init__(
+        self, experiment: Experiment, living: LivingRobots, infancy: Infancy
+    ) -> None:
         self.is_paused = False
         self.pending: list[Order] = []
         self.insertions: list[Insert] = []
         self._experiment = experiment
         self._encoding = encoding_of(experiment)
         self._living = living
+        self._infancy = infancy
         self.ids: set[str] = set()
 
     def take(self, event: Commanded) -> None:
@@ -54,8 +58,14 @@ class Orders:
         self.pending.append(event.order)
 
     def carry_out(self, moment: Moment) -> list[Record]:
-        """Carry out the pending orders; return rows of removed robots."""
-        records = []
+        """Carry out the pending orders.
+
+        The infancy of a robot that is removed or gets a brain ends.
+
+        Returns:
+            Rows of removed robots, and of the trials of infants.
+        """
+        records: list[Record] = []
         for order in self.pending:
             match order:
                 case Pause() | Resume():
@@ -63,15 +73,27 @@ class Orders:
                 case Insert():
                     self.insertions.append(order)
                 case Remove(birth=birth) if self._living.get(birth):
+                    now_s = moment.sim_time_s
+                    records += self._infancy.end(birth, "removed", now_s)
                     removed = self._living.remove(birth)
                     records.append(death_record(removed, "removed", moment))
                 case ReplaceBrain(birth=birth, brain=brain):
-                    living = self._living.get(birth)
-                    robot = living and self._with_brain(living.robot, brain)
-                    if living and robot:
-                        self._living.replace_brain(living, robot)
+                    records += self._replace_brain(birth, brain, moment)
         self.pending = []
         return records
+
+    def _replace_brain(
+        self, birth: BirthId, brain: Brain, moment: Moment
+    ) -> list[Record]:
+        """Replace a brain; no effect if the robot is dead or the brain does not fit."""
+        living = self._living.get(birth)
+        robot = living and self._with_brain(living.robot, brain)
+        if not (living and robot):
+            return []
+        was_infant = living.is_infant
+        rows = self._infancy.end(birth, "brain replaced", moment.sim_time_s)
+        self._living.replace_brain(living, robot, restarts_window=was_infant)
+        return rows
 
     def _with_brain(self, robot: Robot, brain: Brain) -> Robot | None:
         """Return a robot with another brain; None if the brain does not fit it."""

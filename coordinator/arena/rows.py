@@ -44,7 +44,7 @@ def sample_records(
                 "path_velocity": one.judgement.path_velocity,
                 "straight_velocity": one.judgement.straight_velocity,
                 "fitness": one.judgement.fitness,
-                "is_mature": one.judgement.is_mature,
+                "is_mature": one.is_mature,
                 "measures": named_measures(labels, one.judgement.measures),
             },
         )

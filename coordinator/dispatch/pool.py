@@ -243,7 +243,8 @@ class Pool:
 
     def fit(self, client: Client) -> Iterator[str]:
         """Yield the names of the agents that can do a client's jobs."""
-        return (n for n, a in self.agents.items() if client not in a.unfit_for)
+        # A copy: the Python API counts them while another thread lets agents join.
+        return (n for n, a in list(self.agents.items()) if client not in a.unfit_for)
 
     def may_take(self, name: str, client: Client, avoid: tuple[str, ...]) -> bool:
         """Return whether an agent may have a job that avoids others where it can."""

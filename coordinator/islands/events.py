@@ -232,7 +232,7 @@ class Audited(Message, frozen=True):
 
 
 Answered = Verdict | Outcome | Asked
-"""Events that answer a request of an off-line island."""
+"""Events that answer a request of an island; an arena requests no evaluation."""
 
 ExternalEvent = Answered | Advanced | Commanded
 """Journalled events that an island or an arena handles."""
@@ -242,7 +242,7 @@ JournalledEvent = ExternalEvent | Audited
 
 IslandEvent = Started | Answered | MigrationEvent
 
-ArenaEvent = Started | Verdict | Advanced | Commanded | MigrationEvent
+ArenaEvent = Started | Verdict | Asked | Advanced | Commanded | MigrationEvent
 
 # --- Commands ------------------------------------------------------
 
@@ -356,7 +356,7 @@ class Finish(Message, frozen=True):
 
 IslandCommand = Vet | Evaluate | Ask | Record | Emigrate | Finish
 
-ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
+ArenaCommand = Vet | Ask | AdvanceShard | Record | Append | Emigrate | Finish
 
 
 def fitness_of(outcome: Outcome) -> float | None:

@@ -1,8 +1,9 @@
-"""Lifetime learning of an off-line island: the trials of its newborns.
+"""Lifetime learning: the trials of an island's newborns.
 
 The island asks the learner of a newborn for parameters, evaluates all trials of the
-answer together, and asks again until the budget is spent. Answers of learners are
-events, as evaluations are: a replay does not need the learners.
+answer, and asks again until the budget is spent: off-line together, in an arena one by
+one. Answers of learners are events, as evaluations are: a replay does not need the
+learners.
 """
 
 from dataclasses import replace
@@ -73,7 +74,11 @@ class IslandLearning:
 
 
 class NewbornLearning:
-    """The trials of one newborn."""
+    """The trials of one newborn.
+
+    Attributes:
+        is_waiting: its learner is asked.
+    """
 
     def __init__(self, candidate: Candidate, island: IslandLearning) -> None:
         self._candidate = candidate
@@ -86,7 +91,18 @@ class NewbornLearning:
         self._outcomes: list[Outcome | None] = [None]
         self._requests = [0]
         self._told: tuple[Batch, ...] = ()
-        self._is_waiting = self._budget > 1
+        self.is_waiting = self.learns
+
+    @property
+    def learns(self) -> bool:
+        """There are trials of other brains than that at birth."""
+        return self._budget > 1
+
+    @property
+    def best(self) -> int:
+        """Number of the best trial; of equal ones the first."""
+        trials = range(len(self._outcomes))
+        return max(trials, key=lambda trial: _told_fitness(self._outcomes[trial]))
 
     @property
     def is_done(self) -> bool:
@@ -97,7 +113,7 @@ class NewbornLearning:
         """Return the first trial, and the first request to the learner."""
         candidate = self._candidate
         first = Evaluate(candidate.birth, candidate.robot)
-        return [first, self._ask()] if self._is_waiting else [first]
+        return [first, self._ask()] if self.is_waiting else [first]
 
     def take(self, event: Outcome | Asked) -> list[Evaluate | Ask]:
         """Take an answer; return what follows from it. Duplicates are ignored.
@@ -112,7 +128,7 @@ class NewbornLearning:
         if self._outcomes[event.trial] is not None:
             return []
         self._outcomes[event.trial] = event
-        if self._is_waiting or None in self._outcomes or self.is_done:
+        if self.is_waiting or None in self._outcomes or self.is_done:
             return []
         self._tell()
         return [self._ask()]
@@ -120,13 +136,13 @@ class NewbornLearning:
     def _begin(self, event: Asked) -> list[Evaluate | Ask]:
         """Begin the trials that the learner wants."""
         known = len(self._told)
-        if event.number < known or (event.number == known and not self._is_waiting):
+        if event.number < known or (event.number == known and not self.is_waiting):
             return []
         left = self._budget - len(self._points)
         is_wrong = any(len(each) != len(self._start) for each in event.points)
         if event.number > known or not 1 <= len(event.points) <= left or is_wrong:
             raise self._unexpected(event)
-        self._is_waiting = False
+        self.is_waiting = False
         first = len(self._points)
         self._points += event.points
         self._outcomes += [None] * len(event.points)
@@ -147,7 +163,7 @@ class NewbornLearning:
         )
         fitness = tuple(map(_told_fitness, self._outcomes[-len(batch) :]))
         self._told = (*self._told, (batch, fitness))
-        self._is_waiting = True
+        self.is_waiting = True
 
     def _ask(self) -> Ask:
         left = self._budget - len(self._points)
@@ -169,20 +185,22 @@ class NewbornLearning:
         Of equal trials the first counts. If all failed, it is the brain at birth with
         its failure.
         """
-        trials = range(len(self._outcomes))
-        best = max(trials, key=lambda trial: _told_fitness(self._outcomes[trial]))
+        best = self.best
         outcome = self._outcomes[best]
         assert outcome is not None
         grown = self._island.grown(self._candidate, self._robot(best))
         return grown, structs.replace(outcome, trial=0)
 
     def records(self) -> list[Record]:
-        """Return the rows of all trials."""
-        return [self._record(trial) for trial in range(len(self._outcomes))]
+        """Return the rows of the trials that have an outcome."""
+        return [
+            self._record(trial, outcome)
+            for trial, outcome in enumerate(self._outcomes)
+            if outcome is not None
+        ]
 
-    def _record(self, trial: int) -> Record:
-        outcome, point = self._outcomes[trial], self._points[trial]
-        assert outcome is not None
+    def _record(self, trial: int, outcome: Outcome) -> Record:
+        point = self._points[trial]
         squares = [(to - old) ** 2 for to, old in zip(point, self._start, strict=True)]
         row = {
             "island": outcome.birth.island,
@@ -196,6 +214,8 @@ class NewbornLearning:
             "wall_s": outcome.provenance.wall_s,
             "worker": outcome.provenance.agent,
             "platform": outcome.provenance.platform,
+            "sim_time_s": None,
+            "robot": None,
         }
         return Record("learning", row)
 

@@ -26,7 +26,7 @@ from schema.limits import (
 from schema.parts import BodySpace, Vector
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.arena import Advance, Casualty, Changes, Judgement, Touch
 from schema.wire.arena_codec import AdvanceAnswer
 
 _SHOWN = 3
@@ -36,19 +36,29 @@ _ROUNDING_S = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Inserted:
-    """A living robot of an arena: its step of insertion, and its number of joints.
+    """A living robot of an arena.
 
-    The number is None if its body is not known, as after a snapshot.
+    Attributes:
+        step: of its insertion.
+        joints: their number; None if its body is not known, as after a snapshot.
+        window: step at which the window of its fitness was restarted last; 0 if it
+            never was.
     """
 
     step: int
     joints: int | None
+    window: int = 0
 
 
 def inserted(robot: Robot, space: BodySpace, step: int) -> Inserted:
     """Return what advances are checked against for a robot inserted at a step."""
     shapes = (space[part.kind].shape(part.parameters) for part in robot.parts)
     return Inserted(step, sum(shape.joint is not None for shape in shapes))
+
+
+def restarted(changes: Changes) -> list[BirthId]:
+    """Return the robots whose windows changes restart."""
+    return [change.birth for change in changes.brains if change.restarts_window]
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,12 +191,12 @@ def _check_robots(advance: Advance, born: Mapping[BirthId, Inserted]) -> None:
 
 
 def _check_judgement(one: Judgement, expected: ExpectedAdvance) -> None:
-    name, born = names([one.birth]), expected.born[one.birth].step
+    name, robot = names([one.birth]), expected.born[one.birth]
     simulation = expected.experiment.simulation
-    age_s = (expected.until - born) * simulation.timestep_s
+    age_s = (expected.until - robot.step) * simulation.timestep_s
     if one.age_s != age_s:
         raise impossible(f"robot {name}: age must be {age_s} s, got {one.age_s} s")
-    is_mature = _window(born, expected) > (
+    is_mature = _window(robot, expected) > (
         simulation.window_steps // simulation.pose_steps
     )
     if one.is_mature != is_mature:
@@ -197,15 +207,18 @@ def _check_judgement(one: Judgement, expected: ExpectedAdvance) -> None:
     _check_place(one)
 
 
-def _window(born: int, expected: ExpectedAdvance) -> int:
+def _window(robot: Inserted, expected: ExpectedAdvance) -> int:
     """Return how many samples a robot's window has been given.
 
-    The first one is taken at birth if there is no warm-up.
+    The first one is taken at birth if there is no warm-up, and at a restart.
     """
-    simulation = expected.experiment.simulation
+    simulation, born = expected.experiment.simulation, robot.step
     interval, warmup = simulation.pose_steps, simulation.warmup_steps
+    last = expected.until // interval
+    if robot.window > born:
+        return last - (max(robot.window, born + warmup) - 1) // interval
     before = (born + warmup - 1) // interval if warmup else born // interval
-    return expected.until // interval - before + (not warmup)
+    return last - before + (not warmup)
 
 
 def _check_place(one: Judgement | Casualty) -> None:

@@ -310,7 +310,7 @@ class Loop:
             ):
                 warn_user(str(drift))
                 self._write(drift.record)
-            if not isinstance(event, Outcome | Asked):
+            if not isinstance(event, Outcome):
                 return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):
             return machine.handle(event)

@@ -101,7 +101,7 @@ class PoseRecovery:
                 if self._snapshots.has(
                     island, event.advance.step, event.advance.digest
                 ):
-                    self._requests.begin_at(event)
+                    self._requests.begin_at(own[:number])
                     begin = number
                     break
             self._arenas[island] = _Arena(deque(own[begin:]), first[island])

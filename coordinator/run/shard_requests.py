@@ -4,7 +4,7 @@ The changes and advances since a shard's newest snapshot are kept, so that anoth
 worker can rebuild its state. Nothing here decides what happens in an arena.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
@@ -20,6 +20,7 @@ from coordinator.run.advance_checks import (
     check_advance,
     check_snapshot,
     inserted,
+    restarted,
 )
 from coordinator.run.answer_checks import check_job
 from coordinator.run.drift import Drift, with_losses
@@ -85,10 +86,13 @@ class _Past:
         """Return the robots that live after changes."""
         gone = set(changes.removals)
         born = {birth: at for birth, at in self.born.items() if birth not in gone}
-        return born | {
+        born |= {
             each.birth: inserted(each.robot, space, self.step)
             for each in changes.insertions
         }
+        for birth in restarted(changes):
+            born[birth] = replace(born[birth], window=self.step)
+        return born
 
     def drifts_to(self, platform: str) -> bool:
         """Return whether a platform differs from that of the last advance."""
@@ -152,15 +156,30 @@ class ShardRequests:
         """Return the advance of a shard that is requested, or noted."""
         return self._past(shard).requested
 
-    def begin_at(self, event: Advanced) -> None:
-        """Let a shard begin with the snapshot of an advance, which the store has."""
+    def begin_at(self, advances: Sequence[tuple[AdvanceShard, Advanced]]) -> None:
+        """Let a shard begin with a snapshot, which the store has.
+
+        Args:
+            advances: commands and results from the arena's first advance to that of
+                the snapshot.
+        """
+        windows: dict[BirthId, int] = {}
+        begin = 0
+        for command, result in advances:
+            windows |= dict.fromkeys(restarted(command.changes), begin)
+            begin = result.advance.step
+        _, event = advances[-1]
         past, advance = self._past(event.island), event.advance
         past.step = past.base = advance.step
         past.digest, past.platform = advance.digest, event.provenance.platform
         past.places = {one.birth: one.place for one in advance.judgements}
         timestep_s = self._context.experiments[event.island].simulation.timestep_s
         past.born = {
-            one.birth: Inserted(advance.step - round(one.age_s / timestep_s), None)
+            one.birth: Inserted(
+                advance.step - round(one.age_s / timestep_s),
+                None,
+                windows.get(one.birth, 0),
+            )
             for one in advance.judgements
         }
 

@@ -41,8 +41,9 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             migration that can never happen; measures that are named twice, or
             parameters of a measure that is not named; a range that ends before it
             begins; a calibration of an unknown part type, or with a delay between two
-            ticks; disturbances, calibrations or learning in an arena; an unknown
-            learner, or learning with re-evaluations.
+            ticks; disturbances or calibrations in an arena; an unknown learner,
+            learning with re-evaluations, or in an arena with windows that end between
+            two ticks.
     """
     if problem := next(_problems(experiment), ""):
         raise ExperimentError(f"{where}: {problem}")
@@ -94,7 +95,6 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from robust_problems(experiment.robust, is_arena=is_arena)
     yield from learning_problems(
         experiment.learning,
-        is_arena=is_arena,
         is_reevaluated=experiment.selection.reevaluation is not None,
         encoding=experiment.encoding.type,
     )
@@ -103,6 +103,8 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     if experiment.arena is not None:
         yield from _arena_problems(experiment, experiment.arena)
         yield from _arena_clock_problems(experiment.arena, experiment.simulation)
+        if experiment.learning is not None:
+            yield from _infancy_problems(experiment.simulation)
 
 
 def _measures_problems(measures: Measures) -> Iterator[str]:
@@ -218,6 +220,17 @@ def _arena_clock_problems(arena: Arena, clock: Simulation) -> Iterator[str]:
                 f"simulation.brain_steps and pose_steps, got {seconds:g}"
             )
     yield from _pose_problems(clock, "warmup_steps")
+
+
+def _infancy_problems(clock: Simulation) -> Iterator[str]:
+    """Yield which part of an infant's trials does not end on a brain tick."""
+    for name in ("warmup_steps", "window_steps"):
+        steps: int = getattr(clock, name)
+        if steps % clock.brain_steps:
+            yield (
+                f"simulation.{name}: must be a multiple of simulation.brain_steps = "
+                f"{clock.brain_steps} with learning in an arena, got {steps}"
+            )
 
 
 def _culling_problems(experiment: Experiment) -> Iterator[str]:

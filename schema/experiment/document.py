@@ -478,8 +478,8 @@ class Experiment(Section, frozen=True):
             relative to itself.
         sweep: makes the document a campaign of experiments that differ in some
             settings.
-        learning: lifetime learning, off-line; without it newborns are evaluated with
-            the brain that they inherit.
+        learning: lifetime learning; without it newborns are evaluated with the brain
+            that they inherit.
     """
 
     name: str

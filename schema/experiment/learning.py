@@ -15,11 +15,12 @@ MOST_TRIALS = 1000
 
 
 class Learning(PluginSection, frozen=True):
-    """Lifetime learning: the brain of each newborn is tuned before it counts, off-line.
+    """Lifetime learning: the brain of each newborn is tuned before it counts.
 
     A newborn is evaluated ``budget`` times. Trial 0 has the brain that develops from
     its genome; a learner proposes the parameters of the others. The robot keeps the
-    brain of its best trial, and that trial's fitness.
+    brain of its best trial, and off-line that trial's fitness. In an arena each trial
+    is a fitness window of the infant among the other robots.
 
     Attributes:
         learner: ``cma-es``, ``(1+1)-es``, ``random`` or ``module:attribute``.
@@ -49,7 +50,6 @@ class Learning(PluginSection, frozen=True):
 def learning_problems(
     learning: Learning | None,
     *,
-    is_arena: bool = False,
     is_reevaluated: bool = False,
     encoding: str = "",
 ) -> Iterator[str]:
@@ -57,7 +57,6 @@ def learning_problems(
 
     Args:
         learning: the section; None if there is none.
-        is_arena: whether the island is an arena.
         is_reevaluated: whether the island re-evaluates its robots.
         encoding: key ``encoding.type``.
     """
@@ -75,11 +74,6 @@ def learning_problems(
         yield (
             "learning.weight_limits: must be [least, greatest], got "
             f"[{low:g}, {high:g}]"
-        )
-    if is_arena:
-        yield (
-            "learning: is for off-line evaluations; arenas do not try newborns. Remove "
-            "it, or give it to off-line [[islands]] only"
         )
     if is_reevaluated:
         yield (

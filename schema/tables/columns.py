@@ -284,7 +284,8 @@ EVALUATIONS = _table(
 )
 LEARNING = _table(
     "learning",
-    "a trial of a newborn whose brain is learnt, off-line",
+    "a trial of a newborn whose brain is learnt; in an arena an infant's, written when "
+    "it grows up or dies, or with the end of the run",
     _ISLAND,
     _BIRTH,
     _column(
@@ -320,6 +321,20 @@ LEARNING = _table(
         unit="1",
     ),
     *_PROVENANCE,
+    _column(
+        "sim_time_s",
+        _FLOAT,
+        "simulated time of the trial's end in an arena; null off-line",
+        unit="s",
+        is_nullable=True,
+    ),
+    _column(
+        "robot",
+        pa.binary(),
+        "Protobuf bytes of the robot that grew up in an arena with this trial's brain; "
+        "null in its other trials, and off-line, where births has it",
+        is_nullable=True,
+    ),
 )
 POPULATION = _table(
     "population",

@@ -32,10 +32,17 @@ class Insertion:
 
 @dataclass(frozen=True, slots=True)
 class BrainChange:
-    """Replacement of a living robot's brain; neuron states are reset."""
+    """Replacement of a living robot's brain; neuron states are reset.
+
+    Attributes:
+        birth: id of the robot.
+        brain: the new brain, whose first tick is the next one of the arena.
+        restarts_window: the window of its fitness begins now; its age goes on.
+    """
 
     birth: BirthId
     brain: Brain
+    restarts_window: bool = False
 
 
 @dataclass(frozen=True, slots=True)

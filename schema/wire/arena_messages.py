@@ -64,6 +64,7 @@ def write_brain_change(change: BrainChange, message: pb.BrainChange) -> None:
     """Fill a message with a change of a brain."""
     message.birth.CopyFrom(birth_to_message(change.birth))
     write_brain(change.brain, message)
+    message.restarts_window = change.restarts_window
 
 
 def read_brain_change(message: pb.BrainChange) -> BrainChange:
@@ -75,7 +76,11 @@ def read_brain_change(message: pb.BrainChange) -> BrainChange:
         MalformedMessage: a brain that breaks its rules, or an unknown layer.
     """
     parts = 1 + max((neuron.part for neuron in message.neurons), default=0)
-    return BrainChange(birth_from_message(message.birth), read_brain(message, parts))
+    return BrainChange(
+        birth_from_message(message.birth),
+        read_brain(message, parts),
+        message.restarts_window,
+    )
 
 
 def advance_to_message(advance: Advance) -> pb.Advance:

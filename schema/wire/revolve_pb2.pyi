@@ -291,14 +291,16 @@ class Insertion(_message.Message):
     def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., robot: _Optional[_Union[Robot, _Mapping]] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., heading: _Optional[float] = ...) -> None: ...
 
 class BrainChange(_message.Message):
-    __slots__ = ("birth", "neurons", "connections")
+    __slots__ = ("birth", "neurons", "connections", "restarts_window")
     BIRTH_FIELD_NUMBER: _ClassVar[int]
     NEURONS_FIELD_NUMBER: _ClassVar[int]
     CONNECTIONS_FIELD_NUMBER: _ClassVar[int]
+    RESTARTS_WINDOW_FIELD_NUMBER: _ClassVar[int]
     birth: BirthName
     neurons: _containers.RepeatedCompositeFieldContainer[Neuron]
     connections: _containers.RepeatedCompositeFieldContainer[Connection]
-    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., neurons: _Optional[_Iterable[_Union[Neuron, _Mapping]]] = ..., connections: _Optional[_Iterable[_Union[Connection, _Mapping]]] = ...) -> None: ...
+    restarts_window: bool
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., neurons: _Optional[_Iterable[_Union[Neuron, _Mapping]]] = ..., connections: _Optional[_Iterable[_Union[Connection, _Mapping]]] = ..., restarts_window: _Optional[bool] = ...) -> None: ...
 
 class Changes(_message.Message):
     __slots__ = ("removals", "insertions", "brains")

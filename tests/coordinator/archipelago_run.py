@@ -9,6 +9,7 @@ from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
     AdvanceShard,
     ArenaCommand,
+    Ask,
     Emigrate,
     Evaluate,
     Evaluated,
@@ -23,7 +24,9 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
-from schema.experiment.document import Experiment
+from coordinator.run.learners import Learners
+from schema.experiment.document import Experiment, island_experiment
+from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from tests.coordinator.arena_world import VIABLE, World, distinct_fitness
@@ -58,7 +61,7 @@ class ArchipelagoRun:
     commands: dict[int, list[IslandCommand | ArenaCommand]] = field(
         default_factory=dict
     )
-    waiting: deque[tuple[int, Vet | Evaluate | AdvanceShard]] = field(
+    waiting: deque[tuple[int, Vet | Evaluate | Ask | AdvanceShard]] = field(
         default_factory=deque
     )
 
@@ -67,6 +70,8 @@ class ArchipelagoRun:
         self.islands = archipelago(self.experiment, self.seed, 0)
         self.worlds = {number: World(distinct_fitness) for number in self.islands}
         self.commands = {number: [] for number in self.islands}
+        own = {each: island_experiment(self.experiment, each) for each in self.islands}
+        self.learners = Learners(own, Origin(seed=self.seed))
 
     def live(self, turns: int = 1_000_000) -> "ArchipelagoRun":
         """Run to the end, or for some turns."""
@@ -99,6 +104,8 @@ class ArchipelagoRun:
                     asked.birth, found, PROVENANCE, asked.trial, asked.requester
                 )
                 self.tell(number, answer)
+            case Ask():
+                self.tell(number, self.learners.answer(asked))
             case AdvanceShard():
                 self.tell(number, self.worlds[number].advance(asked))
 
@@ -109,7 +116,7 @@ class ArchipelagoRun:
             for command in self.islands[number].handle(event):
                 self.commands[number].append(command)
                 match command:
-                    case Vet() | Evaluate() | AdvanceShard():
+                    case Vet() | Evaluate() | Ask() | AdvanceShard():
                         self.waiting.append((number, command))
                     case Emigrate(island, to, epoch, migrants):
                         events.append((to, Immigrated(to, island, epoch, migrants)))

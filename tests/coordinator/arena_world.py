@@ -16,6 +16,8 @@ from coordinator.islands.events import (
     Append,
     ArenaCommand,
     ArenaEvent,
+    Ask,
+    Asked,
     Finish,
     Record,
     Started,
@@ -44,6 +46,7 @@ DT = 0.005
 POSE_STEPS = 40
 MATURE = 3000
 """Steps of 15 s: 3 s of warm-up and a window of 12 s."""
+WINDOW = 2400
 
 Fit = Callable[[BirthId, int], float]
 Verdict = Callable[[Vet], Vetted | VettingFailed]
@@ -73,6 +76,11 @@ def viable(vet: Vet) -> Vetted:
     return Vetted(vet.birth, vet.attempt, VIABLE)
 
 
+def no_learner(ask: Ask) -> Asked:
+    """Refuse requests to learners."""
+    raise AssertionError(ask)
+
+
 def reject_some(vet: Vet) -> Vetted | VettingFailed:
     """Reject every third attempt, and fail at some."""
     if (vet.birth.number + vet.attempt) % 3 == 1:
@@ -91,6 +99,7 @@ class World:
     step: int = 0
     born: dict[BirthId, int] = field(default_factory=dict)
     places: dict[BirthId, tuple[float, float]] = field(default_factory=dict)
+    windows: dict[BirthId, int] = field(default_factory=dict)
 
     def advance(self, command: AdvanceShard) -> Advanced:
         """Return the result of an advance, as a worker does."""
@@ -100,7 +109,12 @@ class World:
             assert each.birth not in self.born
             self.born[each.birth] = self.step
             self.places[each.birth] = each.place
-        assert all(each.birth in self.born for each in command.changes.brains)
+            self.windows[each.birth] = self.step + MATURE - WINDOW
+        for change in command.changes.brains:
+            assert change.birth in self.born
+            if change.restarts_window:
+                assert self.step >= self.windows[change.birth]
+                self.windows[change.birth] = self.step
         self.step = command.until
         fallen = [one for one in sorted(self.born) if self.diverges(one, self.step)]
         casualties = tuple(
@@ -126,7 +140,7 @@ class World:
         age = self.step - self.born[birth]
         fitness = self.fit(birth, self.step)
         place = (*self.places[birth], 0.02)
-        is_mature = age >= MATURE
+        is_mature = self.step >= self.windows[birth] + WINDOW
         return Judgement(birth, age * DT, 0.0, fitness / 5, fitness, is_mature, place)
 
 
@@ -155,16 +169,19 @@ class ArenaRun:
     arena: Arena
     world: World = field(default_factory=World)
     verdict: Verdict = viable
+    learner: Callable[[Ask], Asked] = no_learner
     order: Iterator[int] | None = None
     events: list[ArenaEvent] = field(default_factory=list)
     commands: list[ArenaCommand] = field(default_factory=list)
-    waiting: deque[Vet | AdvanceShard] = field(default_factory=deque)
+    waiting: deque[Vet | Ask | AdvanceShard] = field(default_factory=deque)
 
     def tell(self, event: ArenaEvent) -> list[ArenaCommand]:
         found = self.arena.handle(event)
         self.events.append(event)
         self.commands += found
-        self.waiting += [one for one in found if isinstance(one, Vet | AdvanceShard)]
+        self.waiting += [
+            one for one in found if isinstance(one, Vet | Ask | AdvanceShard)
+        ]
         return found
 
     def turn(self) -> list[ArenaCommand]:
@@ -173,6 +190,8 @@ class ArenaRun:
         asked = self.waiting.popleft()
         if isinstance(asked, Vet):
             return self.tell(self.verdict(asked))
+        if isinstance(asked, Ask):
+            return self.tell(self.learner(asked))
         return self.tell(self.world.advance(asked))
 
     def live(self, until_s: float = 1e9) -> "ArenaRun":

@@ -100,7 +100,11 @@ births = 9
 births = 35
 [[islands]]
 {SHORT_ARENA}
+[islands.learning]
+learner = "(1+1)-es"
+budget = 3
 [migration]
 topology = "ring"
 epoch = 6
 """
+"""An off-line island and an arena whose newborns learn, with migration."""

@@ -11,7 +11,7 @@ from schema.experiment.settings import ArenaSettings
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Changes, Judgement
-from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, poses
+from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, WINDOW, poses
 
 
 class FakeWorld:
@@ -27,6 +27,7 @@ class FakeWorld:
         self.step = 0
         self.born: dict[BirthId, int] = {}
         self.joints: dict[BirthId, int] = {}
+        self.windows: dict[BirthId, int] = {}
         self.past = "begun"
         self.is_closed = False
 
@@ -34,9 +35,10 @@ class FakeWorld:
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
         world = cls(settings, threads)
         world.step, born, world.past = json.loads(data)
-        for island, number, step, joints in born:
+        for island, number, step, joints, window in born:
             world.born[BirthId(island, number)] = step
             world.joints[BirthId(island, number)] = joints
+            world.windows[BirthId(island, number)] = window
         return world
 
     @property
@@ -48,10 +50,15 @@ class FakeWorld:
             del self.born[birth]
         for each in changes.insertions:
             self.born[each.birth] = self.step
+            self.windows[each.birth] = self.step + MATURE - WINDOW
             self.joints[each.birth] = sum(
                 BUILT_IN[part.kind].shape(part.parameters).joint is not None
                 for part in each.robot.parts
             )
+        for change in changes.brains:
+            if change.restarts_window:
+                self.windows[change.birth] = max(self.windows[change.birth], self.step)
+            self._record(repr(change))
         self._record(repr((changes.removals, [i.place for i in changes.insertions])))
 
     def advance(self, until: int) -> Advance:
@@ -78,7 +85,10 @@ class FakeWorld:
         )
 
     def snapshot(self) -> bytes:
-        born = [(*b, step, self.joints[b]) for b, step in sorted(self.born.items())]
+        born = [
+            (*b, step, self.joints[b], self.windows[b])
+            for b, step in sorted(self.born.items())
+        ]
         return json.dumps([self.step, born, self.past]).encode()
 
     def digest(self) -> bytes:
@@ -98,7 +108,7 @@ class FakeWorld:
         age = self.step - self.born[birth]
         fitness = self._chance(birth)
         place = (fitness, -fitness, 0.02)
-        is_mature = age >= MATURE
+        is_mature = self.step >= self.windows[birth] + WINDOW
         return Judgement(birth, age * DT, fitness, fitness, fitness, is_mature, place)
 
 

@@ -25,7 +25,8 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
 
     Raises:
         UnexpectedEvent: a robot that does not live here, lives here already, is named
-            twice, or is born between two ticks of the controllers.
+            twice, is born between two ticks of the controllers, or has its window
+            restarted between two samples.
         InvalidRobot: a robot that breaks the rules, or a brain that does not fit.
     """
     gone = _distinct(changes.removals)
@@ -38,7 +39,12 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
         if birth in population and birth not in gone:
             raise UnexpectedEvent(f"apply: {birth} lives here already")
     settings = population.model_cache.settings
-    tick = settings.simulation.brain_steps
+    tick, sample = settings.simulation.brain_steps, settings.simulation.pose_steps
+    if step % sample and any(change.restarts_window for change in changes.brains):
+        raise UnexpectedEvent(
+            "apply: windows must restart on multiples of simulation.pose_steps = "
+            f"{sample}, got step {step}"
+        )
     if new and step % tick:
         raise UnexpectedEvent(
             "apply: births must fall on multiples of simulation.brain_steps = "

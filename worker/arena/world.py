@@ -91,15 +91,17 @@ class World:
         """Remove robots, insert robots, replace brains, in this order.
 
         A robot that the engine cannot build, or fails on at once, is a casualty of
-        the next advance.
+        the next advance. A new brain starts at rest at the next tick, until which the
+        motors hold their commands; body and motion of the robot go on. A window that
+        is restarted has the present sample as its first.
 
         Args:
             changes: made before the next advance.
 
         Raises:
             UnexpectedEvent: a robot that does not live here, lives here already, is
-                named twice, or is born between two ticks of the controllers; nothing
-                is changed.
+                named twice, is born between two ticks of the controllers, or has its
+                window restarted between two samples; nothing is changed.
             InvalidRobot: a robot that breaks the rules, or a brain that does not
                 fit its body; nothing is changed.
         """
@@ -111,6 +113,8 @@ class World:
             robot = self.population.find(change.birth)
             start = self._schedule.next_tick(self.step)
             robot.set_brain(change.brain, self.population.model_cache.controls, start)
+            if change.restarts_window:
+                robot.window.restart()
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 

@@ -29,7 +29,8 @@ class Window:
 
     The first sample is taken after the warm-up, so that neither the fall nor the
     position in the air counts (traps B2, B19 of the original). From then on the
-    window holds the last ``window_steps``, both ends included.
+    window holds the last ``window_steps``, both ends included, or those since it was
+    restarted.
 
     Attributes:
         born: step of birth.
@@ -62,6 +63,12 @@ class Window:
             self.positions.append(position)
             if row is not None:
                 self.rows.append(row)
+
+    def restart(self) -> None:
+        """Forget all samples but the last one."""
+        for samples in (self.positions, self.rows):
+            for _ in range(len(samples) - 1):
+                samples.popleft()
 
     @property
     def is_mature(self) -> bool:

@@ -68,6 +68,40 @@ def test_learning_curves_by_hand() -> None:
     assert [row["high"] for row in found] == pytest.approx([2.0, 3.0, 3.0])
 
 
+def test_bodies_saved_in_an_arena_by_hand() -> None:
+    """0 and 2 are mature in two populations; at birth 0 was below all of the second.
+
+    1 was culled, 3 moved away, and 4 is still an infant.
+    """
+    found = learning(
+        RunTables(
+            run(
+                births=births(
+                    *(((1, number), []) for number in range(5)),
+                    sim_time_s=[float(number) for number in range(5)],
+                ),
+                population=population(
+                    (1, 2, {(1, 0): None, (1, 1): None}),
+                    (1, 3, {(1, 0): 3.0, (1, 1): 1.0, (1, 2): None, (1, 3): 9.0}),
+                    (1, 4, {(1, 0): 2.0, (1, 2): 4.0}),
+                    (1, 5, {(1, 0): 2.0, (1, 2): 4.0, (1, 4): None}),
+                    is_online=True,
+                ),
+                deaths=table(
+                    "deaths",
+                    [
+                        {"island": 1, "birth": 1, "reason": "selection"},
+                        {"island": 1, "birth": 3, "reason": "migrated"},
+                    ],
+                ),
+                learning=trials({number: [1.0 + number, 3.0] for number in range(5)}),
+            )
+        )
+    )
+    assert found["kept"].to_pylist() == [True, False, True, None, None]
+    assert found["saved"].to_pylist() == [True, False, False, None, None]
+
+
 def test_a_run_without_trials_has_empty_tables() -> None:
     empty = RunTables(
         run(births=births(((1, 0), [])), population=population(), learning=trials({}))

@@ -4,12 +4,14 @@ from math import dist
 from typing import Any
 
 from coordinator.arena.arena import Arena
-from coordinator.islands.events import Evaluate
+from coordinator.islands.events import AdvanceShard, Evaluate
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Arena as Rules
 from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
+from schema.wire.codec import decode_robot
 from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import World
 
@@ -21,6 +23,7 @@ CALM = Simulation(warmup_steps=600)
 def arenas(
     *births: int,
     rules: dict[str, Any] | None = None,
+    learning: Learning | None = None,
     **migration: Any,  # noqa: ANN401 - any setting
 ) -> ArchipelagoRun:
     """Return arenas: five founders in the first 4 s, then a birth every 15 s."""
@@ -31,6 +34,7 @@ def arenas(
         simulation=CALM,
         arena=Rules(**wanted),
         islands=tuple(Islands(births=each) for each in births),
+        learning=learning,
         migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
     )
     check_experiment(document, "test")
@@ -85,6 +89,38 @@ def test_copies_live_in_both_arenas_and_replace_the_worst() -> None:
     ]
     worst = min(samples, key=lambda row: row["fitness"])
     assert replaced[-1]["birth"] == worst["birth"]
+
+
+def test_infants_do_not_migrate_and_immigrants_keep_what_they_learnt() -> None:
+    rules = Learning(learner="random", budget=3)
+    lived = arenas(24, 24, epoch=4, handling="evict", learning=rules).live()
+    rows = lived.rows("learning")
+    learnt = {
+        BirthId(row["island"], row["birth"]): decode_robot(row["robot"])
+        for row in rows
+        if row["robot"] is not None
+    }
+    sent = lived.rows("migrations")
+    assert learnt.keys() >= {BirthId(r["birth_island"], r["birth"]) for r in sent}
+    changes = [
+        (number, command.changes)
+        for number, commands in lived.commands.items()
+        for command in commands
+        if isinstance(command, AdvanceShard)
+    ]
+    came = {
+        (number, each.birth): each.robot
+        for number, change in changes
+        for each in change.insertions
+        if each.birth.island != number
+    }
+    assert len(came) > 2
+    assert all(robot == learnt[birth] for (_, birth), robot in came.items())
+    # No immigrant learns, and no robot twice.
+    exchanged = {(n, each.birth) for n, change in changes for each in change.brains}
+    assert not exchanged & came.keys()
+    names = [(row["island"], row["birth"], row["trial"]) for row in rows]
+    assert len({*names}) == len(names)
 
 
 def test_immigrants_are_inserted_at_random_places() -> None:

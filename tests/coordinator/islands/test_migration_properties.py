@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import Evaluated, EvaluationFailed
@@ -17,6 +18,7 @@ from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Arena as Rules
 from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
@@ -30,6 +32,7 @@ ON_LINE = Islands(
     simulation=Simulation(warmup_steps=600),
     arena=Rules(population_limit=9, population_floor=4),
 )
+INFANTS = replace(ON_LINE, learning=Learning(learner="(1+1)-es", budget=2))
 SELECTION = Selection(population=5, children=3, tournament_size=2)
 
 
@@ -50,7 +53,13 @@ def shuffled(seed: int) -> Iterator[int]:
 
 
 @pytest.mark.parametrize(
-    "islands", [(OFF_LINE, OFF_LINE), (ON_LINE, ON_LINE), (OFF_LINE, ON_LINE)]
+    "islands",
+    [
+        (OFF_LINE, OFF_LINE),
+        (ON_LINE, ON_LINE),
+        (OFF_LINE, ON_LINE),
+        (ON_LINE, INFANTS),
+    ],
 )
 @pytest.mark.parametrize("handling", ["preserve", "evict"])
 def test_the_order_of_answers_changes_no_row(

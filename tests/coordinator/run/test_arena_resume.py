@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import analyzer.report
 from coordinator.arena.arena import Arena
@@ -28,7 +29,9 @@ from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import JobRefused, RunFolderError
+from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_text
+from schema.experiment.learning import Learning
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
@@ -48,6 +51,10 @@ from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.serve.shards import Shards
 
 EXPERIMENT = experiment(30, snapshot_interval_s=20.0)
+INFANCY = structs.replace(
+    experiment(20, snapshot_interval_s=20.0),
+    learning=Learning(learner="(1+1)-es", budget=2),
+)
 DETAILS = RunDetails("resume", 0, 3, experiment_text(EXPERIMENT))
 
 Point = Callable[[str], None]
@@ -109,7 +116,8 @@ class Run:
         stack.callback(self.rows.close)
         shards = other.pop("shards", None) or Shards(FakeWorld)
         agents = {"analyzer": analyzer.report.answer, "worker": shards.answer}
-        self.arena = Arena(EXPERIMENT, DETAILS.seed, DETAILS.run)
+        document = other.pop("document", EXPERIMENT)
+        self.arena = Arena(document, DETAILS.seed, DETAILS.run)
         platform = other.pop("platform", "any")
         self.fleet = Fleet(
             other.pop("agents", LocalAgents)(agents, platform),
@@ -117,7 +125,7 @@ class Run:
         )
         self.loop = Loop(
             {0: self.arena},
-            context=RunContext.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
+            context=RunContext.of("resume", folder.epoch, document, DETAILS.origin),
             fleet=self.fleet,
             log=Frail(journal, point, "append"),
             rows=Frail(self.rows, point, "store"),
@@ -186,19 +194,33 @@ def test_killed_between_any_two_steps(tmp_path: Path, calm: Path, name: str) -> 
     assert compare(calm, path) == []
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_killed_again_and_again(tmp_path: Path, calm: Path, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    path = tmp_path / "run"
-    shards = Shards(FakeWorld)
-    kills = 0
+def kill_repeatedly(path: Path, seed: int, document: Experiment) -> None:
+    """Kill and resume a run to its end."""
+    rng, shards, kills = np.random.default_rng(seed), Shards(FakeWorld), 0
     # A worker that outlives its coordinators, or a new one each time.
     while not run(
-        path, Fuse(int(rng.integers(20, 120))), shards=shards if seed % 2 else None
+        path,
+        Fuse(int(rng.integers(20, 120))),
+        shards=shards if seed % 2 else None,
+        document=document,
     ):
         kills += 1
     assert kills >= 3
-    assert compare(calm, path) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_killed_again_and_again(tmp_path: Path, calm: Path, seed: int) -> None:
+    kill_repeatedly(tmp_path / "run", seed, EXPERIMENT)
+    assert compare(calm, tmp_path / "run") == []
+
+
+def test_killed_while_newborns_learn(tmp_path: Path) -> None:
+    assert run(tmp_path / "calm", document=INFANCY)
+    kill_repeatedly(tmp_path / "killed", 4, INFANCY)
+    assert compare(tmp_path / "calm", tmp_path / "killed") == []
+    rows = read_table(tmp_path / "calm", "learning")
+    assert rows.num_rows >= 15 * 2
+    assert rows.num_rows - rows["robot"].null_count >= 10
 
 
 class Mortal(LocalAgents):

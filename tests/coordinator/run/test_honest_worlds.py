@@ -1,5 +1,6 @@
 """Advances of real arenas pass every check."""
 
+import dataclasses
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
@@ -20,9 +21,10 @@ from coordinator.run.pose_checks import read_poses
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings, read_arena_settings
+from schema.robot.brain import Brain
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
-from schema.wire.arena import Advance, Changes, Insertion
+from schema.wire.arena import Advance, BrainChange, Changes, Insertion
 from schema.wire.arena_codec import (
     AdvanceAnswer,
     decode_advance_answer,
@@ -42,10 +44,14 @@ def settings_of(*, arena: dict[str, Any], simulation: dict[str, Any]) -> Experim
 def advances(
     rules: Experiment, stops: list[int]
 ) -> Iterator[tuple[Advance, bytes, ExpectedAdvance]]:
-    """Advance a crowd from stop to stop; robots come and go at each."""
+    """Advance a crowd from stop to stop; robots come and go at each.
+
+    One of those that stay gets its brain anew, and its window restarts.
+    """
     settings = read_arena_settings(arena_settings(rules, Origin()))
     world, space = World(settings), body_space(rules.space)
     born: dict[BirthId, Inserted] = {}
+    brains: dict[BirthId, Brain] = {}
     try:
         for number, (begin, end) in enumerate(pairwise([0, *stops])):
             births = [BirthId(number % 2, 3 * number + each) for each in range(3)]
@@ -61,9 +67,19 @@ def advances(
             gone = tuple(sorted(born)[:1]) if begin % TICK == 0 else ()
             if begin % TICK:
                 came = ()
-            world.apply(Changes(gone, came))
+            stay = (
+                tuple(sorted(born)[-1:])
+                if begin % settings.simulation.pose_steps == 0
+                else ()
+            )
+            again = tuple(BrainChange(birth, brains[birth], True) for birth in stay)
+            world.apply(Changes(gone, came, again))
             born = {birth: at for birth, at in born.items() if birth not in gone}
             born |= {each.birth: inserted(each.robot, space, begin) for each in came}
+            born |= {
+                birth: dataclasses.replace(born[birth], window=begin) for birth in stay
+            }
+            brains |= {each.birth: each.robot.brain for each in came}
             advance, snapshot = world.advance(end), world.snapshot()
             yield advance, snapshot, ExpectedAdvance(begin, end, born, rules, True)
             born = {one.birth: born[one.birth] for one in advance.judgements}

@@ -22,6 +22,7 @@ from coordinator.storage.folder_status import table_damages
 from schema.errors import JobRefused
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_text, read_experiment
+from schema.experiment.learning import Learning
 from schema.tables.columns import TABLES
 from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path, segments_of
@@ -247,14 +248,23 @@ def test_random_flips_in_all_segments(
 
 
 def test_several_arenas_recover_in_the_order_of_the_journal(tmp_path: Path) -> None:
-    document = structs.replace(read_experiment("archipelago-arenas"), births=30)
+    shipped = read_experiment("archipelago-arenas")
+    assert shipped.arena is not None
+    document = structs.replace(
+        shipped,
+        births=18,
+        arena=structs.replace(shipped.arena, snapshot_interval_s=10.0),
+        learning=Learning(learner="(1+1)-es", budget=2),
+    )
     whole, path = tmp_path / "whole", tmp_path / "run"
     assert execute(whole, document=document)
-    assert not execute(path, 150, document=document)
+    assert not execute(path, 140, document=document)
     first = read_table(path, "poses")
     assert len(set(first["island"].to_pylist())) == 4
     flip(segment_path(path, "poses", 0), 0.3)
     assert not execute(path, 100)
+    # The newest snapshots are of infants in the middle of a trial.
+    flip(segments_of(path, "poses")[-1][1], 0.999)
     assert execute(path)
     assert compare(whole, path) == []
     parquet_path(path, document.name, 0, "poses").unlink()

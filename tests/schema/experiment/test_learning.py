@@ -56,10 +56,13 @@ def test_an_island_may_have_its_own() -> None:
             "[learning]\nweight_limits = [1, 1]",
             r"weight_limits: must be \[least, greatest\], got \[1, 1\]",
         ),
-        ("[arena]\n[learning]", "learning: is for off-line evaluations; arenas do"),
         (
-            "[learning]\n[[islands]]\n[[islands]]\narena = {}",
-            r"islands\[1\]: learning: is for off-line evaluations",
+            "[arena]\n[learning]\n[simulation]\nwindow_steps = 2440",
+            "window_steps: must be a multiple of simulation.brain_steps = 25 with lear",
+        ),
+        (
+            "simulation.warmup_steps = 240\n[learning]\n[[islands]]\n[islands.arena]",
+            r"islands\[0\]: simulation.warmup_steps: .* in an arena, got 240",
         ),
         (
             "[learning]\n[selection.reevaluation]",

@@ -83,7 +83,9 @@ REQUEST = AdvanceRequest(
 def changes_of(data: DataObject, robots: SearchStrategy[Robot]) -> Changes:
     places = st.tuples(NUMBER, NUMBER)
     insertions = st.builds(Insertion, BIRTHS, robots, places, heading=NUMBER)
-    brains = st.builds(BrainChange, BIRTHS, robots.map(lambda robot: robot.brain))
+    brains = st.builds(
+        BrainChange, BIRTHS, robots.map(lambda robot: robot.brain), st.booleans()
+    )
     made = st.builds(
         Changes,
         removals=some(BIRTHS),

@@ -8,11 +8,12 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import UnexpectedEvent
-from schema.experiment.document import Space
+from schema.experiment.document import Fitness, Space
 from schema.experiment.settings import EvaluationSettings
 from schema.parts import LIGHT_SENSOR
 from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
+from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
 from schema.tables.received import read_columns
 from schema.wire.arena import BrainChange, Changes, Insertion
@@ -27,10 +28,13 @@ from tests.worker.arena_cases import (
     state_of,
 )
 from worker.arena.world import World
+from worker.robot.brains import Controls, Solo
 from worker.robot.evaluation import simulate
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)
+TICK, EXCHANGE = 25, 800
+"""Physics steps between two ticks, and before a brain is exchanged."""
 
 
 @pytest.mark.slow
@@ -148,6 +152,87 @@ def test_replaced_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None
     seconds(world, 8.0)
     assert np.abs(world.population.find(A).view.qpos[7:]).max() < 0.02
     seconds(copy, 8.0)
+    assert copy.digest() == world.digest()
+
+
+class Switching:
+    """Brain that is exchanged by hand: the first one, then another one at rest."""
+
+    def __init__(self, *solos: Solo) -> None:
+        self.solos = solos
+        self.readings = solos[0].readings
+
+    def step(self, tick: int) -> Floats:
+        first, second = self.solos
+        if tick <= EXCHANGE // TICK:
+            return first.step(tick)
+        second.readings[:] = self.readings
+        return second.step(tick - EXCHANGE // TICK - 1)
+
+
+def test_exchanged_brain_moves_a_robot_as_two_brains_by_hand(
+    robot_of: Robots, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bit for bit: brain A to step 800, its last tick; then B at rest from 825 on."""
+    robot = robot_of(10)
+    neurons = tuple(
+        Neuron(
+            each.layer, each.kind, each.part, tuple(0.9 * v for v in each.parameters)
+        )
+        for each in robot.brain.neurons
+    )
+    learnt = Brain(neurons, robot.brain.connections[::2])
+    clock = replace(
+        SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m, window_steps=1400
+    )
+    off_line = EvaluationSettings(SETTINGS.space, clock, SETTINGS.fitness)
+    plain = simulate(robot, off_line).core_position
+
+    def solo(controls: Controls, brain: Brain, ticks: int) -> Switching:
+        return Switching(*(made(controls, each, ticks) for each in (brain, learnt)))
+
+    made = Controls.solo
+    monkeypatch.setattr(Controls, "solo", solo)
+    by_hand = simulate(robot, off_line).core_position
+    assert not np.array_equal(by_hand, plain)
+
+    world = populated(SETTINGS, [Insertion(A, robot, (0.0, 0.0))])
+    world.advance(EXCHANGE)
+    first = list(world.population.find(A).window.positions)
+    assert np.array_equal(first, by_hand[: len(first)])
+    world.apply(Changes(brains=(BrainChange(A, learnt, restarts_window=True),)))
+    advance = seconds(world, 6.0)
+    second = world.population.find(A).window.positions
+    assert np.array_equal(second, by_hand[len(first) - 1 :])
+    assert [one.age_s for one in advance.judgements] == [10.0]
+
+
+@pytest.mark.parametrize("function", ["locomotion", "balance"])
+def test_restarted_window_begins_with_the_present_sample(
+    turtle: Robot, function: str
+) -> None:
+    """A window of 12 s is whole 12 s after the restart, not before.
+
+    Balance needs recorded channels.
+    """
+    settings = replace(SETTINGS, fitness=Fitness(function=function))
+    world = populated(settings, [Insertion(A, turtle, (0.0, 0.0))])
+    change = BrainChange(A, turtle.brain, restarts_window=True)
+    seconds(world, 14.125)
+    with pytest.raises(UnexpectedEvent, match="pose_steps = 40, got step 2825"):
+        world.apply(Changes(brains=(change,)))
+    assert seconds(world, 0.875).judgements[0].is_mature
+    world.apply(Changes(brains=(change,)))
+    place = world.population.find(A).place
+    window = world.population.find(A).window
+    assert list(window.positions) == [place]
+    assert len(window.rows) == (function == "balance")
+    copy = World.restore(settings, world.snapshot())
+    (before,) = seconds(world, 11.8).judgements
+    (after,) = seconds(world, 0.2).judgements
+    assert (before.is_mature, after.is_mature) == (False, True)
+    assert window.positions[0] == place
+    seconds(copy, 12.0)
     assert copy.digest() == world.digest()
 
 

@@ -1,0 +1,31 @@
+"""Robots of the births table with the brains that they learnt in arenas."""
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+
+def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:
+    """Return births whose column ``robot`` has what robots of arenas have learnt.
+
+    An arena writes the births row first, and the table ``learning`` when the robot has
+    grown up. Off-line births have what was learnt already.
+
+    Args:
+        births: ``island``, ``birth``, ``robot`` and any other columns.
+        learning: of the same run.
+    """
+    grown = learning.filter(pc.is_valid(learning["robot"]))
+    if not grown.num_rows:
+        return births
+    columns = (grown[name].to_pylist() for name in ("island", "birth", "robot"))
+    learnt = {
+        (island, birth): robot for island, birth, robot in zip(*columns, strict=True)
+    }
+    columns = (births[name].to_pylist() for name in ("island", "birth", "robot"))
+    robots = [
+        learnt.get((island, birth), robot)
+        for island, birth, robot in zip(*columns, strict=True)
+    ]
+    index = births.schema.get_field_index("robot")
+    field = births.schema.field(index)
+    return births.set_column(index, field, pa.array(robots, field.type))
