@@ -2,13 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
-from schema.parts import IDENTITY, BodySpace, Shape, Vector
+from schema.parts import IDENTITY, BodySpace, Vector
 from schema.robot.frames import place_parts, round_reach, shapes_of
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
@@ -52,58 +51,25 @@ def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
     """
     shapes = shapes_of(robot, space)
     rotations, positions = place_parts(robot, shapes)
-    tables = [_table(shape) for shape in shapes]
-    count = np.array([len(table.masses) for table in tables])
-    lengths = np.concatenate([table.lengths for table in tables])
+    boxes = [box for shape in shapes for box in shape.boxes]
+    count = np.array([len(shape.boxes) for shape in shapes])
+    rows = chain.from_iterable([box.size + box.position for box in boxes])
+    lengths = np.fromiter(rows, float).reshape(-1, 6)
     half, local = lengths[:, :3] / 2, lengths[:, 3:]
     rotation = rotations.repeat(count, axis=0)
     centre = (rotation @ local[:, :, None])[:, :, 0]
     centre += positions.repeat(count, axis=0)
-    first, cylinders = 0, []
-    for table in tables:
-        for index, tilt in table.tilts:
-            rotation[first + index] = rotation[first + index].dot(tilt)
-        cylinders += [first + index for index in table.round]
-        first += len(table.masses)
+    for index, box in enumerate(boxes):
+        if box.rotation is not IDENTITY:
+            rotation[index] = rotation[index].dot(box.rotation)
     reach = (np.abs(rotation) @ half[:, :, None])[:, :, 0]
+    cylinders = tuple([index for index, box in enumerate(boxes) if box.is_round])
     for index in cylinders:
         own = half[index].tolist()
         reach[index] = [round_reach(row, own) for row in rotation[index].tolist()]
-    mass = math.fsum(chain.from_iterable([table.masses for table in tables]))
+    mass = math.fsum([box.mass for box in boxes])
     lower, upper = centre - reach, centre + reach
-    return Boxes(count, rotation, centre, half, lower, upper, mass, tuple(cylinders))
-
-
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """Boxes of a shape in the frame of its part.
-
-    Attributes:
-        lengths: (B, 6) size, then centre [m].
-        masses: mass of each box [kg].
-        tilts: index and (3, 3) rotation of each box that is rotated in its part.
-        round: indices of the cylinders.
-    """
-
-    lengths: Floats
-    masses: list[float]
-    tilts: list[tuple[int, Floats]]
-    round: list[int]
-
-
-@lru_cache(maxsize=1024)
-def _table(shape: Shape) -> _Table:
-    boxes = shape.boxes
-    return _Table(
-        np.array([box.size + box.position for box in boxes]).reshape(-1, 6),
-        [box.mass for box in boxes],
-        [
-            (index, np.array(box.rotation))
-            for index, box in enumerate(boxes)
-            if box.rotation is not IDENTITY
-        ],
-        [index for index, box in enumerate(boxes) if box.is_round],
-    )
+    return Boxes(count, rotation, centre, half, lower, upper, mass, cylinders)
 
 
 def bounding_box(boxes: Boxes) -> tuple[Vector, Vector]:

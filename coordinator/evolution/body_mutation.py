@@ -6,14 +6,14 @@ connect to every neuron, and the mean size of the subtrees that can be duplicate
 mean.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from math import ceil
 
 from coordinator.evolution.brains import brain_genes, brain_rules
 from coordinator.evolution.generation import pick_growth, random_part, usable_types
 from coordinator.evolution.mutable_genome import (
+    Counts,
     MutableGenome,
-    SizeCounts,
     copied,
     fitting_subtrees,
     free_places,
@@ -27,21 +27,17 @@ from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment, Space, body_space
 
 
-def deletable(
-    sizes: dict[MutableGenome, SizeCounts], space: Space
-) -> list[MutableGenome]:
+def deletable(sizes: dict[MutableGenome, Counts], space: Space) -> list[MutableGenome]:
     """Return the subtrees that can be deleted without falling below the least size."""
-    total = next(iter(sizes.values()))
+    most = next(iter(sizes.values()))[0] - space.min_parts
     return [
         branch
-        for branch, size in sizes.items()
-        if branch.parent and total.parts - size.parts >= space.min_parts
+        for branch, (parts, *_) in sizes.items()
+        if branch.parent and parts <= most
     ]
 
 
-def duplicable(
-    sizes: dict[MutableGenome, SizeCounts], space: Space
-) -> list[MutableGenome]:
+def duplicable(sizes: dict[MutableGenome, Counts], space: Space) -> list[MutableGenome]:
     """Return the subtrees of which a second copy stays within all limits."""
     total = next(iter(sizes.values()))
     return fitting_subtrees(sizes, size_limits(space).minus(total))
@@ -105,40 +101,51 @@ def vary_parts(
             )
 
 
-def expected_parts(root: MutableGenome, experiment: Experiment) -> float:
+def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) -> float:
     """Return the mean number of parts to add; 0 or less means none.
 
     It is the mean number that deletion removes less the mean number that duplication
     adds, limited by the room that is left.
+
+    Args:
+        branches: those of the tree, depth first.
+        experiment: restrictions and probabilities.
     """
     variation, space = experiment.variation, experiment.space
-    sizes = subtree_sizes(preorder(root))
-    deleted = [sizes[branch].parts for branch in deletable(sizes, space)]
-    duplicated = [sizes[branch].parts for branch in duplicable(sizes, space)]
+    sizes = subtree_sizes(branches)
+    deleted = [sizes[branch][0] for branch in deletable(sizes, space)]
+    duplicated = [sizes[branch][0] for branch in duplicable(sizes, space)]
     more = float(sum(duplicated))
     if duplicated and variation.duplicable_size == "mean":
         more /= len(duplicated)
     less = sum(deleted) / len(deleted) if deleted else 0.0
     return min(
         variation.p_delete_subtree * less - variation.p_duplicate_subtree * more,
-        space.max_parts - sizes[root].parts,
+        space.max_parts - len(branches),
     )
 
 
 def add_parts(
     draws: BufferedRng,
-    root: MutableGenome,
+    branches: Sequence[MutableGenome],
     genes: Iterator[int],
     experiment: Experiment,
 ) -> None:
-    """Add random parts, `expected_parts` on average, with neurons and connections."""
-    expected = expected_parts(root, experiment)
+    """Add random parts, `expected_parts` on average, with neurons and connections.
+
+    Args:
+        draws: source of all choices.
+        branches: those of the tree, depth first.
+        genes: identities of the parts.
+        experiment: restrictions and probabilities.
+    """
+    expected = expected_parts(branches, experiment)
     if expected <= 0.0:
         return
     trials = ceil(2.0 * expected) if experiment.variation.add_parts == "loop" else 1
     for _ in range(trials):
         if draws.chance(expected / trials):
-            _add_part(draws, root, genes, experiment)
+            _add_part(draws, branches[0], genes, experiment)
 
 
 def _add_part(

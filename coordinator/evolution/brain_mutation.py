@@ -26,7 +26,7 @@ def delete_hidden_neurons(
     Connections of the remaining neurons keep their source and target.
     """
     new_offsets: dict[Branch, list[int | None]] = {}
-    for branch in branches:
+    for branch in [one for one in branches if one.hidden]:
         stays = [not draws.chance(probability) for _ in branch.hidden]
         if not all(stays):
             offsets = iter(range(len(stays)))
@@ -91,8 +91,11 @@ def vary_neurons(
 ) -> None:
     """Move the parameters of every neuron towards random values."""
     for branch in branches:
-        branch.outputs = _varied(draws, branch.outputs, epsilon, kinds)
-        branch.hidden = _varied(draws, branch.hidden, epsilon, kinds)
+        # Most parts have no neurons.
+        if branch.outputs:
+            branch.outputs = _varied(draws, branch.outputs, epsilon, kinds)
+        if branch.hidden:
+            branch.hidden = _varied(draws, branch.hidden, epsilon, kinds)
 
 
 def _varied(

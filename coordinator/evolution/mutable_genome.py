@@ -5,12 +5,12 @@ function call, and convert it into a new genome.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from itertools import count
 from operator import add, le, sub
 from typing import NamedTuple
 
-from msgspec.structs import astuple
+from msgspec import Struct, field
+from msgspec.structs import astuple, replace
 
 from schema.experiment.document import Space
 from schema.parts import BodySpace, PartType
@@ -19,8 +19,7 @@ from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
 from schema.robot.ids import BirthId
 
 
-@dataclass(slots=True, eq=False)
-class MutableGenome:
+class MutableGenome(Struct, eq=False):
     """Mutable node of a genome; its first fields are those of `Node`.
 
     Attributes:
@@ -201,6 +200,10 @@ def level(branches: Iterable[MutableGenome]) -> None:
         turns[branch] = (before + branch.orientation) % 360
 
 
+Counts = tuple[int, int, int, int]
+"""Plain ``SizeCounts``; a tree has too many subtrees for the names to be free."""
+
+
 class SizeCounts(NamedTuple):
     """Numbers of parts, inputs, outputs and hidden neurons of some branches."""
 
@@ -209,11 +212,11 @@ class SizeCounts(NamedTuple):
     outputs: int
     hidden: int
 
-    def plus(self, other: "SizeCounts") -> "SizeCounts":
+    def plus(self, other: Counts) -> "SizeCounts":
         """Return the sum with other counts."""
         return SizeCounts(*map(add, self, other))
 
-    def minus(self, other: "SizeCounts") -> "SizeCounts":
+    def minus(self, other: Counts) -> "SizeCounts":
         """Return what is left without other counts."""
         return SizeCounts(*map(sub, self, other))
 
@@ -231,32 +234,32 @@ def size_limits(space: Space) -> SizeCounts:
 
 def size_of(branches: Iterable[MutableGenome]) -> SizeCounts:
     """Return the counts of some branches, without their children."""
-    sizes = [(1, b.kind.inputs, len(b.outputs), len(b.hidden)) for b in branches]
-    return SizeCounts(*map(sum, zip(*sizes, strict=True)))
+    parts = inputs = outputs = hidden = 0
+    for branch in branches:
+        parts += 1
+        inputs += branch.kind.inputs
+        outputs += len(branch.outputs)
+        hidden += len(branch.hidden)
+    return SizeCounts(parts, inputs, outputs, hidden)
 
 
-def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, SizeCounts]:
+def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Counts]:
     """Return the counts of every subtree, in the order of the branches.
 
     Args:
-        branches: those of a tree, depth first.
+        branches: those of a whole tree, depth first.
     """
-    sums: dict[MutableGenome, SizeCounts] = {}
+    sums = {b: (1, b.kind.inputs, len(b.outputs), len(b.hidden)) for b in branches}
     for branch in reversed(branches):
-        parts, inputs = 1, branch.kind.inputs
-        outputs, hidden = len(branch.outputs), len(branch.hidden)
-        for child in branch.children.values():
-            p, i, o, h = sums[child]
-            parts += p
-            inputs += i
-            outputs += o
-            hidden += h
-        sums[branch] = SizeCounts(parts, inputs, outputs, hidden)
-    return dict(reversed(sums.items()))
+        if branch.parent is not None:
+            p, i, o, h = sums[branch]
+            parts, inputs, outputs, hidden = sums[branch.parent]
+            sums[branch.parent] = parts + p, inputs + i, outputs + o, hidden + h
+    return sums
 
 
 def fitting_subtrees(
-    sizes: dict[MutableGenome, SizeCounts], room: SizeCounts
+    sizes: dict[MutableGenome, Counts], room: SizeCounts
 ) -> list[MutableGenome]:
     """Return the subtrees, except the whole tree, that exceed no count of ``room``."""
     parts, inputs, outputs, hidden = room

@@ -112,7 +112,7 @@ def crossover(
     if not candidates:
         return False
     donated = draws.pick(candidates)
-    parts = rest.parts + donated_sizes[donated].parts
+    parts = rest.parts + donated_sizes[donated][0]
     if experiment.variation.check_min_parts and parts < space.min_parts:
         return False
     assert replaced.parent is not None
@@ -143,4 +143,4 @@ def mutate(
     pruned = brain.prune(draws, branches, rules)
     vary_parts(draws, branches, experiment.variation.body_epsilon)
     brain.vary(draws, branches, rules, pruned)
-    add_parts(draws, root, genes, experiment)
+    add_parts(draws, branches, genes, experiment)

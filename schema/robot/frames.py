@@ -8,14 +8,18 @@ parent's tangent. Source: the code of the original.
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 
-from schema.parts import BodySpace, Shape, Slot, Vector
+from schema.parts import BodySpace, Shape, Slot
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
 _UPRIGHT = np.eye(3)
+_TURNS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
+"""Cosine and sine of each orientation, without rounding errors."""
+_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def shapes_of(robot: Robot, space: BodySpace) -> list[Shape]:
@@ -44,19 +48,26 @@ def place_parts(robot: Robot, shapes: Sequence[Shape]) -> tuple[Floats, Floats]:
         Rotations (P, 3, 3) part frame to core frame, and positions (P, 3) of the
         part origins [m].
     """
+    turns, offsets = _attached(
+        [
+            (
+                shapes[part.parent].slots[part.parent_slot],
+                shape.slots[part.slot],
+                part.orientation,
+            )
+            for part, shape in zip(robot.parts[1:], shapes[1:], strict=True)
+        ]
+    )
     rotations = np.empty((len(shapes), 3, 3))
     positions = np.zeros((len(shapes), 3))
     rotations[0] = _UPRIGHT
     # Methods and rows taken once are twice as fast for such small arrays.
-    turns, places = list(rotations), list(positions)
-    for index, part in enumerate(robot.parts[1:], start=1):
-        rotation, offset = attach(
-            shapes[part.parent].slots[part.parent_slot],
-            shapes[index].slots[part.slot],
-            part.orientation,
-        )
-        parent = turns[part.parent]
-        parent.dot(rotation, out=turns[index])
+    frames, places = list(rotations), list(positions)
+    for index, (part, turn, offset) in enumerate(
+        zip(robot.parts[1:], turns, offsets, strict=True), start=1
+    ):
+        parent = frames[part.parent]
+        parent.dot(turn, out=frames[index])
         np.add(places[part.parent], parent.dot(offset), out=places[index])
     return rotations, positions
 
@@ -74,34 +85,37 @@ def attach(parent: Slot, child: Slot, orientation: int) -> tuple[Floats, Floats]
         Rotation (3, 3) child frame to parent frame; position (3,) of the child's
         origin [m]. Both arrays are shared and read-only.
     """
-    nx, ny, nz = parent.normal
-    against = (-nx, -ny, -nz)
-    parent_rows = (against, parent.tangent, _cross(against, parent.tangent))
-    rows, origin = _turned(child, orientation)
-    rotation = np.array(parent_rows).T.dot(rows)
-    position = parent.position - rotation.dot(origin)
+    (rotation,), (position,) = _attached([(parent, child, orientation)])
     rotation.flags.writeable = False
     position.flags.writeable = False
     return rotation, position
 
 
-@lru_cache(maxsize=1024)
-def _turned(child: Slot, orientation: int) -> tuple[Floats, Floats]:
-    """Return normal, rotated tangent and cross product as rows; and the position."""
-    angle = math.radians(orientation)
-    cosine, sine = _exact(math.cos(angle)), _exact(math.sin(angle))
-    across = _cross(child.normal, child.tangent)
-    turned = [t * cosine + a * sine for t, a in zip(child.tangent, across, strict=True)]
-    rows = (child.normal, turned, _cross(child.normal, turned))
-    return np.array(rows), np.array(child.position)
+def _attached(
+    ends: Sequence[tuple[Slot, Slot, int]],
+) -> tuple[Floats, Floats]:
+    """Return rotations (K, 3, 3) and positions (K, 3) as ``attach`` for each pair."""
+    rows = [
+        (parent.normal + parent.tangent + parent.position)
+        + (child.normal + child.tangent + child.position)
+        + _TURNS[orientation]
+        for parent, child, orientation in ends
+    ]
+    table = np.fromiter(chain.from_iterable(rows), float).reshape(-1, 20)
+    cosine, sine = table[:, 18:19], table[:, 19:]
+    # Rows of each slot: normal, tangent, and their cross product in place of position.
+    slots = table[:, :18].reshape(-1, 2, 3, 3)
+    positions = slots[:, :, 2].copy()
+    slots[:, 0, 0] *= -1.0
+    normal, tangent = slots[:, 1, 0], slots[:, 1, 1]
+    slots[:, 1, 1] = tangent * cosine + _cross(normal, tangent) * sine
+    slots[:, :, 2] = _cross(slots[:, :, 0], slots[:, :, 1])
+    rotations = slots[:, 0].transpose(0, 2, 1) @ slots[:, 1]
+    return rotations, positions[:, 0] - (rotations @ positions[:, 1, :, None])[:, :, 0]
 
 
-def _cross(first: Sequence[float], second: Sequence[float]) -> Vector:
-    """Return the cross product of two vectors."""
-    (ax, ay, az), (bx, by, bz) = first, second
-    return (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
-
-
-def _exact(value: float) -> float:
-    """Return the sine or cosine of a quarter turn without rounding error."""
-    return float(round(value))
+def _cross(first: Floats, second: Floats) -> Floats:
+    """Return the cross products of vectors along the last axis."""
+    one, other = first.take(_NEXT, -1), first.take(_AFTER, -1)
+    product: Floats = one * second.take(_AFTER, -1) - other * second.take(_NEXT, -1)
+    return product

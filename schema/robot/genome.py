@@ -152,12 +152,10 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
         starts.append((len(inputs), len(outputs), len(hidden)))
         if count := space[node.kind].inputs:
             inputs += [Neuron("input", INPUT, index)] * count
-        outputs += [
-            Neuron("output", gene.kind, index, gene.parameters) for gene in node.outputs
-        ]
-        hidden += [
-            Neuron("hidden", gene.kind, index, gene.parameters) for gene in node.hidden
-        ]
+        if genes := node.outputs:
+            outputs += [Neuron("output", g.kind, index, g.parameters) for g in genes]
+        if genes := node.hidden:
+            hidden += [Neuron("hidden", g.kind, index, g.parameters) for g in genes]
     starts.append((len(inputs), len(outputs), len(hidden)))
     edges = _edges(entries, starts)
     return Robot(tuple(parts), Brain((*inputs, *outputs, *hidden), edges))

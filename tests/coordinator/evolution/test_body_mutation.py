@@ -21,6 +21,7 @@ from coordinator.evolution.mutable_genome import (
     preorder,
     size_limits,
     size_of,
+    to_branches,
     to_genome,
     to_mutable,
 )
@@ -206,20 +207,24 @@ def test_expected_parts_by_hand() -> None:
     setting: dict[str, Any] = {"p_delete_subtree": 0.6, "p_duplicate_subtree": 0.3}
     root = to_mutable(CHAIN, TYPES)
     tight = {"max_parts": 7}
-    mean = expected_parts(root, experiment(tight, **setting))
+    mean = expected_parts(preorder(root), experiment(tight, **setting))
     assert mean == pytest.approx(0.6 * 4 / 3 - 0.3 * 4 / 3)
-    total = expected_parts(root, experiment(tight, **setting, duplicable_size="sum"))
+    total = expected_parts(
+        preorder(root), experiment(tight, **setting, duplicable_size="sum")
+    )
     assert total == pytest.approx(0.6 * 4 / 3 - 0.3 * 4)
     room = {"max_parts": 6, "min_parts": 2}
     greedy = experiment(room, p_delete_subtree=1.0, p_duplicate_subtree=0.0)
-    assert expected_parts(root, greedy) == 1.0, "one part more is all there is room for"
+    assert expected_parts(preorder(root), greedy) == 1.0, (
+        "one part more is all there is room for"
+    )
     shut = experiment({"max_parts": 5}, **setting)
-    assert expected_parts(root, shut) == 0.0
+    assert expected_parts(preorder(root), shut) == 0.0
 
 
 def added(seed: int, setting: Experiment, genome: Genome = CHAIN) -> Genome:
     root = to_mutable(genome, TYPES)
-    add_parts(draws(seed), root, gene_ids(BirthId(0, 7)), setting)
+    add_parts(draws(seed), preorder(root), gene_ids(BirthId(0, 7)), setting)
     return to_genome(preorder(root))
 
 
@@ -299,7 +304,7 @@ def test_with_the_thesis_s_numbers_parts_are_rarely_added() -> None:
         setting = experiment({"max_hidden": max_hidden}, duplicable_size=option)
         positive = [
             expected_parts(
-                to_mutable(generate(np.random.default_rng(seed), setting), TYPES),
+                to_branches(generate(np.random.default_rng(seed), setting), TYPES),
                 setting,
             )
             > 0.0

@@ -13,8 +13,9 @@ from schema.parts import BUILT_IN, Slot
 from schema.robot.frames import attach, place_parts, shapes_of
 from schema.robot.genome import Genome, Node, develop
 from schema.robot.results import Floats
-from schema.robot.robot import ORIENTATIONS, Robot
+from schema.robot.robot import ORIENTATIONS, Part, Robot
 
+GREY = (0.5, 0.5, 0.5)
 NodeMaker = Callable[..., Node]
 
 
@@ -73,6 +74,30 @@ def test_core_is_at_the_origin(node: NodeMaker) -> None:
     rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     assert (rotations[0] == np.eye(3)).all()
     assert (positions[0] == 0.0).all()
+
+
+def test_a_brick_at_the_end_of_a_tilted_bar() -> None:
+    """By hand: on the core's right face the bar's x is x, its z is -y.
+
+    The brick's centre is 20.5 + 0.75 mm along the bar's end, which points 30 degrees
+    from x to y and begins 45 + 0.75 + 50 + 1.5 mm from the core's centre.
+    """
+    bar = Part("ParametricBarJoint", 0, 2, 0, 0, (50.0, math.pi / 6, 0.0, *GREY))
+    parts = (
+        Part("Core", -1, -1, -1, 0, GREY),
+        bar,
+        Part("FixedBrick", 1, 1, 1, 0, GREY),
+    )
+    robot = Robot(parts)
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
+    cosine, sine = math.sqrt(0.75), 0.5
+    assert rotations[1] == pytest.approx(
+        np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), abs=1e-12
+    )
+    along = np.array([cosine, sine, 0.0])
+    assert rotations[2] @ (0.0, -1.0, 0.0) == pytest.approx(along, abs=1e-12)
+    centre = np.array([0.09725, 0.0, 0.0]) + 0.02125 * along
+    assert positions[2] == pytest.approx(centre, abs=1e-12)
 
 
 def test_quarter_turn_on_the_right_face() -> None:
