@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
     is_campaign,
+    joined_name,
     read_experiments,
     shipped_campaigns,
 )
@@ -46,9 +47,6 @@ from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow, is_own
 from schema.tables.arrow import skip_pandas
-
-_LONGEST_NAME = 100
-"""Characters of the experiments' names in the name of a campaign's folder."""
 
 
 def main(arguments: list[str]) -> int:
@@ -82,8 +80,8 @@ def main(arguments: list[str]) -> int:
     experiments = _experiments(options)
     is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
     is_shipped = is_campaign_wanted and options.experiments[0] in shipped_campaigns()
-    names = options.experiments if is_shipped else _names(experiments)
-    folder = Path(options.out or Path("runs") / f"{_joined(names)}-seed{options.seed}")
+    name = "+".join(options.experiments) if is_shipped else joined_name(experiments)
+    folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
     deployment = _deployment(options, experiments, folder)
     if not is_campaign_wanted:
         return _stoppable(
@@ -162,24 +160,6 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     for experiment in experiments:
         _check_built_in(experiment)
     return experiments
-
-
-def _names(experiments: Sequence[Experiment]) -> list[str]:
-    """Return the names of the documents of experiments; a sweep is one document."""
-    names = (
-        each.name.rpartition("-")[0] if each.sweep is not None else each.name
-        for each in experiments
-    )
-    return list(dict.fromkeys(names))
-
-
-def _joined(names: Sequence[str]) -> str:
-    """Return names joined by "+"; beyond the longest the number of the others."""
-    most = len(names)
-    while most > 1 and len("+".join(names[:most])) > _LONGEST_NAME:
-        most -= 1
-    rest = len(names) - most
-    return "+".join([*names[:most], *([f"{rest}-more"] if rest else [])])
 
 
 def _check_built_in(experiment: Experiment) -> None:

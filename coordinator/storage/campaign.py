@@ -39,6 +39,8 @@ from schema.plugins.kept import KeptPlugin
 from schema.tables.description import read_small
 
 CAMPAIGN = "campaign.toml"
+_LONGEST_NAME = 100
+"""Characters that the joined names of experiments have at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +104,25 @@ def read_experiments(
     experiments = tuple(each for word in words for each in experiments_of(word, births))
     _check_names(experiments)
     return experiments
+
+
+def joined_name(experiments: Sequence[Experiment]) -> str:
+    """Return the names of experiments, joined by "+", for that of their folder.
+
+    A sweep counts once, with the name of its document. Of names that are too long
+    together the last ones are only counted.
+    """
+    names = list(
+        dict.fromkeys(
+            each.name.rpartition("-")[0] if each.sweep is not None else each.name
+            for each in experiments
+        )
+    )
+    most = len(names)
+    while most > 1 and len("+".join(names[:most])) > _LONGEST_NAME:
+        most -= 1
+    rest = [f"{len(names) - most}-more"] if most < len(names) else []
+    return "+".join([*names[:most], *rest])
 
 
 def _check_names(experiments: Sequence[Experiment]) -> None:

@@ -169,9 +169,7 @@ def _loaded(module_name: str, attribute: str, where: str) -> object:
         names = [
             name
             for name, value in vars(module).items()
-            # What the module imports is not its own.
-            if not (name.startswith("_") or isinstance(value, ModuleType))
-            and getattr(value, "__module__", module_name) == module_name
+            if not (name.startswith("_") or _is_imported(value, module_name))
         ]
         near = get_close_matches(attribute, names, n=1)
         hint = f"; did you mean '{module_name}:{near[0]}'?" if near else ""
@@ -180,6 +178,13 @@ def _loaded(module_name: str, attribute: str, where: str) -> object:
             f"{where}: {place}: {module_name} has no {attribute!r}{hint}"
         )
     return getattr(module, attribute)
+
+
+def _is_imported(value: object, module_name: str) -> bool:
+    """Return whether a module, class or function is not of this module."""
+    if inspect.isclass(value) or inspect.isroutine(value):
+        return bool(value.__module__ != module_name)
+    return isinstance(value, ModuleType)
 
 
 def load_module(name: str, where: str) -> ModuleType:

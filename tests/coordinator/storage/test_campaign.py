@@ -13,6 +13,7 @@ from coordinator.storage.campaign import (
     Campaign,
     check_adopted,
     is_campaign,
+    joined_name,
     read_campaign,
     read_experiments,
     refuse_used,
@@ -24,10 +25,21 @@ from coordinator.storage.hints import command
 from coordinator.storage.lock import FolderLock
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
+from schema.experiment.sweep import Sweep
 from schema.wire.status import IslandStatus, RunStatus
 
 FIRST, SECOND = read_experiment("scenario1"), read_experiment("no-selection")
 CAMPAIGN = Campaign((FIRST, SECOND), 3, 5)
+
+
+def test_the_name_of_a_sweep_counts_once_and_a_long_name_is_cut() -> None:
+    sweep = Sweep(settings={"births": (20, 30)}, chosen={"births": 20})
+    points = [replace(FIRST, name=f"lhs-{i:02}", sweep=sweep) for i in range(20)]
+    assert joined_name([*points, SECOND]) == "lhs+no-selection"
+    assert joined_name([FIRST, SECOND]) == "scenario1+no-selection"
+    long = [replace(FIRST, name=letter * 45) for letter in "abcd"]
+    assert joined_name(long) == f"{'a' * 45}+{'b' * 45}+2-more"
+    assert joined_name([replace(FIRST, name="x" * 200)]) == "x" * 200
 
 
 def test_runs_are_ordered_repeat_by_repeat(tmp_path: Path) -> None:

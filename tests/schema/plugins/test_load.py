@@ -73,6 +73,9 @@ def test_error_names_the_nearest_attribute() -> None:
 def test_error_without_a_near_attribute() -> None:
     with pytest.raises(UnknownPlugin, match=r"has no 'zzzzzz'$"):
         load("schema.parts:zzzzzz")
+    # A name that the module imports is no hint.
+    with pytest.raises(UnknownPlugin, match=r"has no 'dataclas'$"):
+        load("schema.parts:dataclas")
 
 
 @pytest.mark.parametrize("text", ["1 +", "1 / 0"])
