@@ -107,7 +107,11 @@ class Probe:
     def monotonic(self) -> float:
         """Return the time [s], slowed down for the project after the first mating."""
         since_s, now_s = self._slow_since_s, _monotonic_s()
-        if since_s is None or not self._number(sys._getframe(1).f_code.co_filename):
+        caller: FrameType | None = sys._getframe(1)
+        while caller is not None and caller.f_code.co_filename == "<string>":
+            caller = caller.f_back  # generated methods of dataclasses
+        is_own = caller is not None and self._number(caller.f_code.co_filename)
+        if since_s is None or not is_own:
             return now_s
         return since_s + (now_s - since_s) / SLOWER
 
