@@ -138,9 +138,10 @@ def _fitness(row: Row) -> str:
 def _of_last(robots: Sequence[Sequence[Row]]) -> str:
     """Return what the medians over robots of the last population are."""
     texts = []
+    one = len(robots) == 1
     for text, group, scope, least in (
         ("without sensors", HELD, ALL, False),
-        ("without its most important motor", DEAD, ONE, True),
+        (f"without {'its' if one else 'their'} most important motor", DEAD, ONE, True),
         ("with a random brain", RANDOM, ONE, False),
     ):
         found = [shares(rows, group, scope) for rows in robots]
@@ -148,4 +149,6 @@ def _of_last(robots: Sequence[Sequence[Row]]) -> str:
         texts += [f"{percent(median(known))} {text}"] if known else []
     if not texts:
         return ""
-    return f"{len(robots)} of the last population keep {', '.join(texts)} in the median"
+    keep = "keeps" if one else "keep"
+    text = f"{len(robots)} of the last population {keep} {', '.join(texts)}"
+    return text if one else f"{text} in the median"

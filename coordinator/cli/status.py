@@ -41,7 +41,7 @@ from schema.wire.operator import (
 )
 from schema.wire.status import RunStatus, Status
 
-_COLUMNS = ("run", "state", "births", "births/s", "best alive, arenas")
+_COLUMNS = ("run", "state", "births", "births/s", "best, arenas")
 _WIDEST = 1000
 """Characters of the widest line that is not wrapped."""
 

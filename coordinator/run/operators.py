@@ -127,8 +127,10 @@ def _list(arena: Arena) -> str:
     now_s, wanted = arena.clock.seconds(arena.step), arena.experiment.births
     about = f"{arena.births} of {wanted} born, {len(arena.population)} alive"
     lines = [f"{state} at {now_s:g} s, {about}", "birth  rank  fitness"]
+    mature = {one.birth for one in arena.judged}
     lines += [
         f"{one.birth.number:5}  {one.rank:4}  {one.fitness:7.4f}"
+        f"{'' if one.birth in mature else '  immature'}"
         for one in arena.population
     ]
     return "\n".join(lines)

@@ -28,7 +28,7 @@ from schema.agent.request_handler import FairQueue, ReplyCounts, Server
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
-from schema.errors import NetworkError
+from schema.errors import NetworkError, counted
 from schema.limits import MOST_SHOWN
 from schema.plugins.permission import allow
 
@@ -281,7 +281,7 @@ def serve_as_process(
         sys.exit(GAVE_UP)  # the pool's command says why
     if counts.refused:
         warn_user(
-            f"{own.name} refused {counts.refused} requests, "
+            f"{own.name} refused {counted(counts.refused, 'request')}, "
             f"{counts.malformed} of them malformed"
         )
     if counts.crowd or counts.cancels:

@@ -131,9 +131,15 @@ class Status(Message, frozen=True):
 
 
 def _left_s(runs: Iterable[RunStatus], births_per_s: float) -> float | None:
-    """Return the time to the end of runs at a rate [s]; None if the rate is 0."""
+    """Return the time to the end of runs at a rate [s]; None if the rate is 0.
+
+    It is no less than that of any single run at its own rate.
+    """
     open_runs = [run for run in runs if run.state in ("waiting", "running")]
-    left = sum(run.wanted - run.births for run in open_runs)
-    if not left:
+    lefts = [run.wanted - run.births for run in open_runs]
+    if not sum(lefts):
         return 0.0
-    return left / births_per_s if births_per_s else None
+    if not births_per_s:
+        return None
+    own = zip(lefts, (run.births_per_s for run in open_runs), strict=True)
+    return max(sum(lefts) / births_per_s, *(n / rate for n, rate in own if rate), 0.0)

@@ -78,7 +78,7 @@ def test_agent_reports_and_retries_a_missing_coordinator(role: str) -> None:
         assert process.wait(PATIENCE_S) == 0
         rest = process.stderr.read()
     assert f"connected to {address}\n" in rest
-    assert "refused 1 requests, 1 of them malformed" in rest
+    assert "refused 1 request, 1 of them malformed" in rest
     assert "Traceback" not in rest
 
 

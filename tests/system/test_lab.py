@@ -31,7 +31,7 @@ HUB = (
 )
 RUN = ("scenario1", "--seed", "5", "--births", "60", "--quiet", "--out", "run")
 
-LONG_RUN = ("scenario1", "--seed", "5", "--births", "300", "--quiet", "--out", "run")
+LONG_RUN = ("scenario1", "--seed", "5", "--births", "450", "--quiet", "--out", "run")
 
 
 @pytest.fixture

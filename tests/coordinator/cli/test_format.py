@@ -52,8 +52,8 @@ def test_status_leaves_out_empty_columns(capsys: pytest.CaptureFixture[str]) -> 
     fast = RunStatus("/r/fast", "a", 1, "running", 2.5, islands)
     damaged = RunStatus("/r/bad", "a", 2, "damaged")
     for runs, columns in (
-        ((slow, damaged), ["run", "state", "births", "best", "alive,", "arenas"]),
-        ((fast,), ["run", "state", "births", "births/s", "best", "alive,", "arenas"]),
+        ((slow, damaged), ["run", "state", "births", "best,", "arenas"]),
+        ((fast,), ["run", "state", "births", "births/s", "best,", "arenas"]),
         ((damaged,), ["run", "state"]),
     ):
         _show(Source(Status(runs, 0, 0, 0.0), None, "/r"))

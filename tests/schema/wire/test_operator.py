@@ -80,6 +80,9 @@ def test_time_left_counts_what_is_still_to_be_born() -> None:
     half = RunStatus("d", "d", 0, "running", 2.0, (IslandStatus(30, 50, 0.1, 3),))
     assert Status((done, half), 1, 1, 2.0).left_s == 10.0
     assert Status((done, half), 0, 1, 0.0).left_s is None
+    # A slow run beside a fast one: 20 births at 0.5/s.
+    slow = RunStatus("e", "e", 0, "running", 0.5, half.islands)
+    assert Status((half, slow), 1, 1, 2.5).left_s == 40.0
     assert Status((done,), 0, 1, 0.0).left_s == 0.0
 
 
