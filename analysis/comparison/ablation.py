@@ -113,11 +113,9 @@ def _of_best(rows: Sequence[Row]) -> str:
         ("with a random brain", shares(rows, RANDOM, ONE)),
     ):
         kept += [f"{percent(median(found))} {text}"] if found else []
-    dead = [
-        row
-        for row in rows
-        if row["group"] == DEAD and row["scope"] == ONE and row["share"] is not None
-    ]
+    single = (row for row in rows if (row["group"], row["scope"]) == (DEAD, ONE))
+    # Without some motors a robot gains: these carry nothing.
+    dead = [row for row in single if row["share"] is not None and row["share"] <= 1.0]
     first = sorted(dead, key=lambda row: (row["share"], row["channel"]))[:_SHOWN]
     carried = [
         f"the {row['change']} carries {percent(1 - row['share'])}" for row in first

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from schema.errors import ExperimentError, expectation, nearest, shown
+from schema.errors import ExperimentError, cut, expectation, nearest
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -29,7 +29,7 @@ def read_parameters(table: Mapping[str, Any], kind: type[T], where: str) -> T:
         if name not in names:
             allowed = ", ".join(names) or "none"
             raise ExperimentError(
-                f"{where}.{shown(name)}: no such key{nearest(name, names)}; "
+                f"{where}.{cut(name)}: no such key{nearest(name, names)}; "
                 f"allowed: {allowed}"
             )
     if path := _not_finite(table):

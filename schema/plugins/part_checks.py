@@ -140,7 +140,7 @@ def _problems(kind: PartType) -> Iterator[str]:
                 f"{parameter.name} = {value:g}"
                 for parameter, value in zip(kind.own_parameters, values, strict=False)
             )
-            yield f"{problem}{f' (with {own})' if own else ''}"
+            yield f"{problem}{f' (with {own}, then three colours)' if own else ''}"
 
 
 def _parameter_problems(parameter: Parameter, at: str) -> Iterator[str]:

@@ -91,7 +91,7 @@ def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
         ('[brain]\ntype = "my_brains:Wav"', "did you mean 'my_brains:Wave"),
         ('[brain]\ntype = "my_brains:np"', "expected a class, got an object of type"),
         ('[brain]\ntype = "my_brains:Adapting"', "expected a class of 2 arguments"),
-        ("[brain]\nparameters = {a = 1}", r"brain\.parameters\.'a': no such key"),
+        ("[brain]\nparameters = {a = 1}", r"brain\.parameters\.a: no such key"),
         (
             WAVES.replace("2", '"fast"'),
             r"brain\.parameters\.frequency_hz: must be a number",

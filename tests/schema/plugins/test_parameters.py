@@ -22,7 +22,7 @@ def test_defaults_complete_the_table() -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"radius": 1.0, "spoke": 3}, "w.'spoke': no such key; did you mean 'spokes'?"),
+        ({"radius": 1.0, "spoke": 3}, "w.spoke: no such key; did you mean 'spokes'?"),
         ({}, "w: must have a key 'radius'"),
         ({"radius": -1.0}, "w.radius: must be a number > 0.0"),
         ({"radius": "x"}, "w.radius: must be a number, got a text"),
