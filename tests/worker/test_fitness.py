@@ -124,7 +124,7 @@ def test_own_parameters_are_read_as_the_struct_of_the_second_argument() -> None:
     message = "fitness.parameters: must have a key 'reach_m'"
     with pytest.raises(ExperimentError, match=message):
         check_fitness(_seeks, Fitness())
-    with pytest.raises(ExperimentError, match=r"fitness.parameters.'reach': no such"):
+    with pytest.raises(ExperimentError, match=r"fitness.parameters.reach: no such"):
         check_fitness(_seeks, Fitness(parameters={"reach": 3.0}))
 
 

@@ -80,7 +80,7 @@ def test_an_unknown_name_is_refused_with_the_nearest(name: str, nearest: str) ->
 @pytest.mark.parametrize(
     ("name", "parameters", "problem"),
     [
-        ("revolve-angle", {"step": 1}, "encoding.parameters.'step': no such key; al"),
+        ("revolve-angle", {"step": 1}, "encoding.parameters.step: no such key; al"),
         ("cppn", {"p_weigth": 1}, "no such key; did you mean 'p_weight'"),
         (
             "cppn",

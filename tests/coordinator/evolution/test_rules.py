@@ -145,7 +145,7 @@ def test_survivors_of_wrong_number_are_refused(lab: Callable[[str], str]) -> Non
         ('survivors = "NAME:ends"', "must take 4 arguments"),
         (
             'parents = "NAME:ends"\nparents_parameters = {frist = 1}',
-            r"parents_parameters\.'frist': no such key; did you mean 'first'",
+            r"parents_parameters\.frist: no such key; did you mean 'first'",
         ),
         (
             'parents = "NAME:text"\nparents_parameters = {a = 1}',

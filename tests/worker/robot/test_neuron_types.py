@@ -169,7 +169,7 @@ def test_off_line_a_state_that_is_not_finite_is_a_failed_result() -> None:
 @own
 def test_controls_of_a_broken_section_name_the_key() -> None:
     with pytest.raises(
-        Exception, match=r"brain\.parameters\.'frequenzy_hz': no such key"
+        Exception, match=r"brain\.parameters\.frequenzy_hz: no such key"
     ):
         Controls(
             BrainSection(type="my_brains:Wave", parameters={"frequenzy_hz": 1.0}),

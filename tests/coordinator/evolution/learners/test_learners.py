@@ -184,9 +184,7 @@ def test_own_learners_are_checked(
 def test_unknown_learners_and_parameters_are_refused() -> None:
     with pytest.raises(UnknownPlugin, match="did you mean 'random'"):
         NewbornLearner(Learning(learner="rendom"), (0.5,))
-    with pytest.raises(
-        ExperimentError, match=r"learning.parameters.'size': no such key"
-    ):
+    with pytest.raises(ExperimentError, match=r"learning.parameters.size: no such key"):
         NewbornLearner(Learning(parameters={"size": 3}), (0.5,))
     with pytest.raises(ExperimentError, match="allowed: none"):
         NewbornLearner(Learning(learner="random", parameters={"a": 1}), (0.5,))
