@@ -30,8 +30,7 @@ from schema.experiment.identity import Origin
 from schema.plugins.source import modules_named
 from schema.robot.ids import BirthId
 from schema.tables.description import allow_plugins_of
-from schema.tables.files import read_table
-from schema.tables.learnt import with_learnt
+from schema.tables.learnt import learnt_births
 
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
 _BASELINES = ("no-reproduction", "no-selection")
@@ -216,9 +215,7 @@ def _robot_pictures(
                 allow_plugins_of(run.folder)
             pictures[name] = robot_picture(
                 best[name],
-                with_learnt(
-                    read_table(run.folder, "births"), read_table(run.folder, "learning")
-                ),
+                learnt_births(run.folder),
                 own_experiment(document),
                 simulation,
                 origin=Origin(seed=run.seed, run=run.number),

@@ -20,7 +20,7 @@ from schema.experiment.document import Simulation, body_space
 from schema.formats.files import write_robot
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
-from schema.tables.learnt import with_learnt
+from schema.tables.learnt import learnt_births
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual
 
@@ -135,7 +135,7 @@ def _counted_as_zero(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list
 def _best_robot(run: RunSession, birth: BirthId, fitness: float) -> list[str]:
     """Describe a robot; write it to a file."""
     folder, space = run.held.path, body_space(run.experiment.space)
-    births = with_learnt(read_table(folder, "births"), read_table(folder, "learning"))
+    births = learnt_births(folder)
     is_it = pc.and_(
         pc.equal(births["island"], birth.island),
         pc.equal(births["birth"], birth.number),

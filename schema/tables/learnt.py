@@ -1,7 +1,20 @@
 """Robots of the births table with the brains that they learnt in arenas."""
 
+from pathlib import Path
+
 import pyarrow as pa
 import pyarrow.compute as pc
+
+from schema.tables.files import read_table
+
+
+def learnt_births(folder: Path) -> pa.Table:
+    """Return the births of a run, as ``with_learnt``.
+
+    Raises:
+        RunFolderError: a table is damaged.
+    """
+    return with_learnt(read_table(folder, "births"), read_table(folder, "learning"))
 
 
 def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:

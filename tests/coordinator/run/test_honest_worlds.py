@@ -46,7 +46,7 @@ def advances(
 ) -> Iterator[tuple[Advance, bytes, ExpectedAdvance]]:
     """Advance a crowd from stop to stop; robots come and go at each.
 
-    One of those that stay gets its brain anew, and its window restarts.
+    The brain of one of those that stay is replaced by itself, and its window restarts.
     """
     settings = read_arena_settings(arena_settings(rules, Origin()))
     world, space = World(settings), body_space(rules.space)
