@@ -108,14 +108,14 @@ def parser(command: str) -> Flags:
 def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
-    from worker.robot.brains import controls_of
+    from worker.robot.brains import load_controls
 
     def check_brain(experiment: Experiment) -> None:
         check_brain_genes(experiment)
         clock = experiment.simulation
         tick_s = clock.brain_steps * clock.timestep_s
         # Its check runs when it is made.
-        controls_of(experiment.brain, experiment.space, tick_s)
+        load_controls(experiment.brain, experiment.space, tick_s)
 
     return (
         *schema.experiment.kinds.KINDS,

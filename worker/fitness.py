@@ -9,6 +9,7 @@ annotation it gets the experiment's fitness section.
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -24,30 +25,51 @@ FitnessFunction = Callable[[Trace, Any], float]
 """Function that ``fitness.function`` names: fitness of a trace; finite, maximised."""
 
 
-def fitness_of(trace: Trace, fitness: Fitness) -> float:
-    """Return the fitness of a trace, by the experiment's function.
+@dataclass(frozen=True, slots=True)
+class LoadedFitness:
+    """Fitness function of an experiment with its parameters.
 
-    Args:
-        trace: of T samples with all channels that the function declares; T >= 2.
-        fitness: names the function and its parameters.
+    Attributes:
+        name: as in ``fitness.function``.
+        function: that computes it.
+        argument: its second argument.
+    """
+
+    name: str
+    function: FitnessFunction
+    argument: Any
+
+    def value(self, trace: Trace) -> float:
+        """Return the fitness of a trace.
+
+        Args:
+            trace: of T samples with all channels that the function declares; T >= 2.
+
+        Raises:
+            FitnessUndefined: the function raised or gave no finite number.
+        """
+        try:
+            value = float(self.function(trace, self.argument))
+        except Exception as error:
+            raise FitnessUndefined(
+                f"{self.name} raised {type(error).__name__}: {error}"
+            ) from error
+        if not math.isfinite(value):
+            raise FitnessUndefined(
+                f"{self.name} must return a finite number, got {value}"
+            )
+        return value
+
+
+def load_fitness(fitness: Fitness) -> LoadedFitness:
+    """Return the fitness function that an experiment names.
 
     Raises:
-        FitnessUndefined: the function raised or gave no finite number.
         ExperimentError: an unknown function, or parameters that it refuses.
     """
     function = fitness_function(fitness)
     argument = fitness_argument(function, fitness)
-    try:
-        value = float(function(trace, argument))
-    except Exception as error:
-        raise FitnessUndefined(
-            f"{fitness.function} raised {type(error).__name__}: {error}"
-        ) from error
-    if not math.isfinite(value):
-        raise FitnessUndefined(
-            f"{fitness.function} must return a finite number, got {value}"
-        )
-    return value
+    return LoadedFitness(fitness.function, function, argument)
 
 
 @lru_cache(maxsize=1)  # both the fitness and the record of a robot need it

@@ -7,7 +7,7 @@ folders, addresses) are flags of the commands, not keys.
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import pi
 from typing import Annotated, ClassVar, Literal
 
@@ -337,7 +337,7 @@ class Fitness(PluginSection, frozen=True):
     parameters: Parameters = field(default_factory=dict)
 
 
-class Measures(PluginSection, frozen=True):
+class Measures(PluginSection, frozen=True, dict=True):
     """Numbers of a robot's life that are recorded beside its fitness.
 
     Attributes:
@@ -349,7 +349,7 @@ class Measures(PluginSection, frozen=True):
     names: Annotated[tuple[str, ...], Meta(max_length=MOST_MEASURES)] = ()
     parameters: dict[str, Parameters] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def labels(self) -> tuple[str, ...]:
         """Names of the measures in tables: short names and attributes."""
         return tuple(name.rpartition(":")[2] for name in self.names)
@@ -449,7 +449,7 @@ class Islands(Section, frozen=True):
     learning: Learning | None = None
 
 
-class Experiment(Section, frozen=True):
+class Experiment(Section, frozen=True, dict=True):
     """An experiment.
 
     Attributes:
@@ -503,7 +503,7 @@ class Experiment(Section, frozen=True):
     sweep: Sweep | None = None
     learning: Learning | None = None
 
-    @property
+    @cached_property
     def window(self) -> int:
         """Births in flight at once: a whole generation by default."""
         return self.selection.window or self.selection.children

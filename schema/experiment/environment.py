@@ -73,14 +73,16 @@ class Environment(Section, frozen=True, dict=True):
         # 0.0 minus: avoids -0.0, which would change sensor readings.
         return 0.0 - sin(slope), 0.0, -cos(slope)
 
-    def gravity_vector(self, gravity: float) -> Vector:
-        """Return the gravity vector in the ground's frame, x uphill [m/s2]."""
-        x, y, z = self.down
-        return 0.0 + gravity * x, gravity * y, gravity * z
-
 
 FLAT = Environment()
 """The default: an infinite plane."""
+
+
+@lru_cache(maxsize=64)
+def gravity_vector(environment: Environment, gravity: float) -> Vector:
+    """Return the gravity vector in the ground's frame, x uphill [m/s2]."""
+    x, y, z = environment.down
+    return 0.0 + gravity * x, gravity * y, gravity * z
 
 
 def is_mjcf(scenery: str) -> bool:

@@ -1,7 +1,7 @@
 """Settings in requests: the sections of an experiment that an answer depends on."""
 
 from collections.abc import Callable, Iterator
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar, TypeVar
 
 import msgspec
@@ -79,8 +79,11 @@ class Ablation(Section, frozen=True):
         return any(value is None for _, value in self.inputs)
 
 
-class EvaluationSettings(Section, frozen=True):
-    """Settings of an evaluation request; an experiment has all but ``ablation``."""
+class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
+    """Settings of an evaluation request; an experiment has all but ``ablation``.
+
+    The hash is computed once, so that workers can look up what they made of settings.
+    """
 
     later: ClassVar = ("measures", "brain", "robust", "calibration", "ablation")
 
@@ -94,14 +97,14 @@ class EvaluationSettings(Section, frozen=True):
     calibration: tuple[Calibration, ...] = ()
     ablation: Ablation | None = None
 
-    @property
+    @cached_property
     def light(self) -> Vector | None:
         """Position of the light [m]; None is no light."""
         return self.environment.light
 
 
-class ArenaSettings(Section, frozen=True):
-    """Settings of a request to advance an arena."""
+class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
+    """Settings of a request to advance an arena; hashed once, as those above."""
 
     later: ClassVar = ("measures", "brain")
 
@@ -114,7 +117,7 @@ class ArenaSettings(Section, frozen=True):
     measures: Measures = Measures()
     brain: BrainSection = NETWORK
 
-    @property
+    @cached_property
     def light(self) -> Vector | None:
         """Position of the light [m]; None is no light."""
         return light_of(self.environment, self.arena)

@@ -111,7 +111,7 @@ def solo_spec(
     add_ground(spec, simulation, environment)
     if furnish is not None:
         furnish(spec)
-    objects = object_count(environment, simulation)
+    objects = object_count(environment, simulation) if environment.scenery else 0
     spec.memory = MEMORY_BYTES + OBJECT_BYTES * objects
     root = spec.body("root")
     root.pos = (0.0, 0.0, height + simulation.drop_m)

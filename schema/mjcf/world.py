@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from schema.experiment.document import Arena, Simulation
-from schema.experiment.environment import Environment, relief
+from schema.experiment.environment import Environment, gravity_vector, relief
 from schema.experiment.scenery import add_scenery
 from schema.robot.results import Floats
 
@@ -34,7 +34,7 @@ def set_options(
     """
     option = spec.option
     option.timestep = simulation.timestep_s
-    option.gravity = environment.gravity_vector(simulation.gravity)
+    option.gravity = gravity_vector(environment, simulation.gravity)
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON

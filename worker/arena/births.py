@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 
 from schema.errors import UnexpectedEvent, one_line
-from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
@@ -57,10 +56,10 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
             raise UnexpectedEvent(f"apply: {birth} does not live here")
         body = robots[birth] if birth in new else population.find(birth).body.robot
         robots[birth] = Robot(body.parts, change.brain)
-    kinds = neuron_kinds(settings.brain, settings.space)
+    controls = population.model_cache.controls
     for robot in robots.values():
-        check_robot(robot, body_space(settings.space), kinds)
-        population.model_cache.controls.pack(robot.brain)
+        check_robot(robot, body_space(settings.space), controls.neurons)
+        controls.pack(robot.brain)
 
 
 def _distinct(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:

@@ -9,7 +9,7 @@ from schema.robot.results import Floats
 from schema.robot.trace import NEIGHBOUR_M
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
-from worker.measures.functions import channels_needed
+from worker.measures.functions import functions_of
 
 
 class Samples:
@@ -22,7 +22,7 @@ class Samples:
             settings: of the arena.
             population: its living robots.
         """
-        wanted = channels_needed(settings.fitness, settings.measures)
+        wanted = functions_of(settings).channels
         self._population = population
         self._is_recorded = bool(wanted)
         self._counts_neighbours = "neighbours" in wanted

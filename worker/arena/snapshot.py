@@ -27,7 +27,7 @@ from schema.wire.arena import Casualty
 from schema.wire.codec import decode_robot
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, Window
-from worker.measures.functions import channels_needed
+from worker.measures.functions import functions_of
 
 FORMAT = 2
 """Increases when the meaning of a field changes."""
@@ -109,7 +109,7 @@ def write_snapshot(
         clusters=[[rows[b] for b in c.members] for c in population.clusters],
         casualties=[(c.birth, c.step, c.reason, c.place) for c in casualties],
     )
-    if channels_needed(settings.fitness, settings.measures):
+    if functions_of(settings).channels:
         recordings = [_recording(robot) for robot in population.robots]
         state = _RecordingState(**asdict(state), recordings=recordings)
     return msgspec.msgpack.encode(state)
@@ -132,7 +132,7 @@ def read_snapshot(
         MalformedMessage: not a snapshot's bytes, another format, of an arena with
             other settings, or a robot that breaks their rules.
     """
-    is_recorded = bool(channels_needed(settings.fitness, settings.measures))
+    is_recorded = bool(functions_of(settings).channels)
     try:
         state: _ArenaState = msgspec.msgpack.decode(
             data, type=_RecordingState if is_recorded else _ArenaState

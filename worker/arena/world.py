@@ -15,6 +15,7 @@ from typing import Self
 
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import body_space
+from schema.experiment.environment import gravity_vector
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -64,7 +65,7 @@ class World:
         controls = self.population.model_cache.controls
         noise = NoiseSource(clock, controls.width, settings.origin)
         self._controllers = BatchedControllers(noise, controls)
-        gravity = settings.environment.gravity_vector(clock.gravity)
+        gravity = gravity_vector(settings.environment, clock.gravity)
         self._io = BatchedIO(controls.width, clock, gravity)
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None

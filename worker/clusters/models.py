@@ -59,8 +59,7 @@ class ModelCache:
         refuse_objects(settings.environment, settings.simulation)
         self.settings = settings
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
-        tick_s = settings.simulation.brain_steps * settings.simulation.timestep_s
-        self.controls = controls_of(settings.brain, settings.space, tick_s)
+        self.controls = controls_of(settings)
         self._types = body_space(settings.space)
         self._furnish = partial(add_ring_wall, arena=settings.arena)
         self._clusters: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()

@@ -16,8 +16,8 @@ from schema.robot.trace import Trace
 from schema.wire.arena import Casualty, Judgement
 from schema.wire.codec import encode_robot
 from worker.clusters.models import Body
-from worker.fitness import fitness_of, path_velocity, straight_velocity
-from worker.measures.functions import measures_of
+from worker.fitness import path_velocity, straight_velocity
+from worker.measures.functions import functions_of
 from worker.robot.brains import Controls
 
 LEAST_SHARE = 0.25
@@ -157,9 +157,9 @@ class ArenaRobot:
                 track.interval_s, track.core_position, self.window.rows
             )
             try:
-                fitness = fitness_of(trace, settings.fitness)
-                own = measures_of(settings.measures)
-                measures = tuple(each.value(trace) for each in own)
+                functions = functions_of(settings)
+                fitness = functions.fitness.value(trace)
+                measures = tuple(each.value(trace) for each in functions.measures)
             except FitnessUndefined as error:
                 reason = f"fitness undefined: {error}"
                 return Casualty(self.birth, step, reason, place)

@@ -1,4 +1,4 @@
-"""Measures that an experiment names: their functions, values and channels."""
+"""Fitness and measures that an experiment names: functions, values, channels."""
 
 import math
 from collections.abc import Callable
@@ -9,17 +9,19 @@ from typing import Any
 import msgspec
 
 from schema.errors import ExperimentError, FitnessUndefined
-from schema.experiment.document import (
-    Fitness,
-    Measures,
-)
-from schema.experiment.settings import fitness_function
+from schema.experiment.document import Measures
+from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.plugins.load import load_function, load_object
 from schema.plugins.needs import channels_of
 from schema.plugins.parameters import parameters_type, read_parameters
 from schema.plugins.simple_traces import check_function
 from schema.robot.trace import Trace
-from worker.fitness import path_velocity, straight_velocity
+from worker.fitness import (
+    LoadedFitness,
+    load_fitness,
+    path_velocity,
+    straight_velocity,
+)
 from worker.measures.built_in import (
     body_symmetry,
     contact_share,
@@ -126,12 +128,28 @@ def check_measure(measure: Measure) -> None:
     check_function(measure.function, measure.arguments, "measures.names")
 
 
+@dataclass(frozen=True, slots=True)
+class Functions:
+    """Functions of an experiment that compute numbers from traces.
+
+    Attributes:
+        fitness: its fitness function.
+        measures: its measures, in its order.
+        channels: that these functions declare.
+    """
+
+    fitness: LoadedFitness
+    measures: tuple[Measure, ...]
+    channels: tuple[str, ...]
+
+
 @lru_cache(maxsize=64)
-def channels_needed(fitness: Fitness, measures: Measures) -> tuple[str, ...]:
-    """Return the channels that an experiment's functions declare.
+def functions_of(settings: EvaluationSettings | ArenaSettings) -> Functions:
+    """Return the functions that the settings of a request name.
 
     Raises:
         ExperimentError: an unknown function, or parameters that it refuses.
     """
-    functions = [each.function for each in measures_of(measures)]
-    return channels_of([fitness_function(fitness), *functions])
+    fitness, measures = load_fitness(settings.fitness), measures_of(settings.measures)
+    functions = [fitness.function, *(each.function for each in measures)]
+    return Functions(fitness, measures, channels_of(functions))

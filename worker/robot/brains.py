@@ -9,6 +9,7 @@ import numpy as np
 from schema.errors import SimulationDiverged
 from schema.experiment.brains import NoParameters, brain_half, kinds_of, widths
 from schema.experiment.document import BrainSection, Space
+from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.plugins.origin import where_defined
 from schema.plugins.protocols import Bank as BankProtocol
 from schema.plugins.protocols import BrainControl, NeuronType
@@ -152,6 +153,14 @@ class Controls:
 
 
 @lru_cache(maxsize=64)
-def controls_of(brain: BrainSection, space: Space, tick_s: float) -> Controls:
+def controls_of(settings: EvaluationSettings | ArenaSettings) -> Controls:
+    """Return the brains of a request's experiment; see ``Controls``."""
+    clock = settings.simulation
+    tick_s = clock.brain_steps * clock.timestep_s
+    return load_controls(settings.brain, settings.space, tick_s)
+
+
+@lru_cache(maxsize=64)
+def load_controls(brain: BrainSection, space: Space, tick_s: float) -> Controls:
     """Return the brains of an experiment; see ``Controls``."""
     return Controls(brain, space, tick_s)

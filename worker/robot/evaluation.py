@@ -25,8 +25,8 @@ from schema.mjcf.model import solo_spec
 from schema.robot.results import Evaluation, Floats
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
-from worker.fitness import fitness_of, path_velocity, straight_velocity
-from worker.measures.functions import measures_of
+from worker.fitness import path_velocity, straight_velocity
+from worker.measures.functions import functions_of
 from worker.robot.ablation import Ablated
 from worker.robot.brains import controls_of
 from worker.robot.calibration import Calibrated
@@ -87,13 +87,13 @@ def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:
             number.
         ExperimentError: an unknown fitness function or measure.
     """
-    clock = settings.simulation
+    clock, functions = settings.simulation, functions_of(settings)
     return Evaluation(
-        fitness_of(trace, settings.fitness),
+        functions.fitness.value(trace),
         path_velocity(trace),
         straight_velocity(trace),
         (clock.warmup_steps + clock.window_steps) * clock.timestep_s,
-        tuple(each.value(trace) for each in measures_of(settings.measures)),
+        tuple(each.value(trace) for each in functions.measures),
     )
 
 
@@ -209,7 +209,7 @@ class _ControlLoop:
         self._velocities = self.data.qvel.data
         self._simulation = simulation
         self._tick_s = simulation.brain_steps * simulation.timestep_s
-        controls = controls_of(settings.brain, settings.space, self._tick_s)
+        controls = controls_of(settings)
         width = controls.width
         self._light = settings.environment.light
         self._sensors = Sensors(

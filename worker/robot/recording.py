@@ -17,7 +17,7 @@ from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.robot.trace import RECORDED, Trace
-from worker.measures.functions import channels_needed
+from worker.measures.functions import functions_of
 
 Indices = npt.NDArray[np.intp]
 _FREE, _FREE_DOFS = 7, 6
@@ -30,7 +30,7 @@ PROBED = ("joint_torque", "energy", "contact")
 
 def probed_channels(settings: EvaluationSettings | ArenaSettings) -> tuple[str, ...]:
     """Return the channels of an experiment that need a probe."""
-    wanted = channels_needed(settings.fitness, settings.measures)
+    wanted = functions_of(settings).channels
     return tuple(name for name in PROBED if name in wanted)
 
 
@@ -58,7 +58,7 @@ class Channels:
             model: in which it is alone.
             settings: fitness and measures.
         """
-        wanted = channels_needed(settings.fitness, settings.measures)
+        wanted = functions_of(settings).channels
         free = model.joint("free").id
         # Without the free joints of the robot and of objects in scenery.
         joints = int((model.jnt_type != mujoco.mjtJoint.mjJNT_FREE).sum())

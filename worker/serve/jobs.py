@@ -74,9 +74,11 @@ def answer(request: bytes) -> bytes:
     job = decode_request(request, prepare=checked_evaluation)
     settings = checked_evaluation(job.settings)
     check_types(job.robot, body_space(settings.space))
+    if job.steps:
+        settings = lasting(settings, job.steps)
     result: Evaluation | str
     try:
-        result = evaluate(job.robot, lasting(settings, job.steps), job.identity)
+        result = evaluate(job.robot, settings, job.identity)
     except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
         result = str(error)
     wall_s = time.perf_counter() - start

@@ -10,12 +10,14 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol, Self
 
 from schema.errors import StateDiffers
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings, read_arena_settings
+from schema.robot.brain import NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
 from schema.wire.arena import Advance, Changes
@@ -196,9 +198,14 @@ def _closed_on_error(world: World) -> Iterator[World]:
 
 def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
     space = body_space(settings.space)
-    kinds = neuron_kinds(settings.brain, settings.space)
+    kinds = _neuron_kinds(settings)
     for insertion in changes.insertions:
         check_robot(insertion.robot, space, kinds)
+
+
+@lru_cache(maxsize=64)
+def _neuron_kinds(settings: ArenaSettings) -> NeuronKinds:
+    return neuron_kinds(settings.brain, settings.space)
 
 
 def _repeat(world: World, history: Sequence[PastAdvance]) -> None:

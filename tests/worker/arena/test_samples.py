@@ -34,7 +34,7 @@ NAMES = tuple(BUILT_IN)
 def forget() -> None:
     """Forget the functions of earlier tests."""
     functions.measures_of.cache_clear()
-    functions.channels_needed.cache_clear()
+    functions.functions_of.cache_clear()
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 from schema.experiment.document import Simulation
 from tests.worker.arena_cases import SETTINGS
 from worker.clusters.robot import Window
-from worker.fitness import fitness_of, path_velocity, straight_velocity
+from worker.fitness import load_fitness, path_velocity, straight_velocity
 
 CLOCK = Simulation(
     timestep_s=0.01, pose_steps=10, brain_steps=10, window_steps=80, warmup_steps=20
@@ -59,4 +59,4 @@ def test_fitness_of_the_window_uses_the_experiment_s_weights() -> None:
     for number in range(9):
         window.add(20 + 10 * number, (0.01 * number, 0.0, 0.0))
     fitness = replace(SETTINGS.fitness, path_weight=1.0, straight_weight=5.0)
-    assert fitness_of(window.track(), fitness) == pytest.approx(0.6)
+    assert load_fitness(fitness).value(window.track()) == pytest.approx(0.6)

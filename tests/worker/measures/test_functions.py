@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from schema.errors import ExperimentError, FitnessUndefined, UnknownPlugin
-from schema.experiment.document import Fitness, Measures
+from schema.experiment.document import Fitness, Measures, Simulation, Space
+from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
 from schema.plugins.simple_traces import simple_traces
 from schema.robot.trace import Trace
 from worker.measures.functions import (
     BUILT_IN,
     Measure,
-    channels_needed,
     check_measure,
+    functions_of,
     measures_of,
 )
 
@@ -60,7 +61,10 @@ def test_own_measures_have_parameters(own: str) -> None:
     trace = Trace(1.0, np.array([(0, 0, 0.4), (0, 0, 0.6)]), {"contact": np.eye(2)})
     assert measures.labels == ("high", "height", "limp")
     assert [each.value(trace) for each in measures_of(measures)] == [0.5, 0.5, 0.5]
-    assert channels_needed(Fitness(), measures) == ("contact",)
+    settings = EvaluationSettings(
+        space=Space(), simulation=Simulation(), fitness=Fitness(), measures=measures
+    )
+    assert functions_of(settings).channels == ("contact",)
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,14 @@ from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.results import Track
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode_answer, encode_request, encode_robot
-from worker import fitness
-from worker.fitness import FitnessFunction, path_velocity, straight_velocity
+from worker.fitness import (
+    FitnessFunction,
+    LoadedFitness,
+    path_velocity,
+    straight_velocity,
+)
+from worker.measures.functions import Functions
+from worker.robot import evaluation
 from worker.robot.evaluation import evaluate, simulate
 from worker.serve.jobs import answer
 
@@ -228,7 +234,8 @@ def test_undefined_fitness_is_a_result(
     function: FitnessFunction,
     message: str,
 ) -> None:
-    monkeypatch.setattr(fitness, "fitness_function", lambda _fitness: function)
+    named = Functions(LoadedFitness("own:function", function, None), (), ())
+    monkeypatch.setattr(evaluation, "functions_of", lambda _settings: named)
     with pytest.raises(FitnessUndefined, match=message):
         evaluate(turtle, SETTINGS)
     request = encode_request(

@@ -33,7 +33,7 @@ def everything(monkeypatch: pytest.MonkeyPatch) -> EvaluationSettings:
 
     monkeypatch.setitem(functions.BUILT_IN, "everything", all_channels)
     functions.measures_of.cache_clear()
-    functions.channels_needed.cache_clear()
+    functions.functions_of.cache_clear()
     return replace(PLAIN, simulation=CLOCK, measures=Measures(names=("everything",)))
 
 
