@@ -13,7 +13,7 @@ from schema.experiment.document import (
     light_of,
 )
 from schema.experiment.document import island_experiment as of_island
-from schema.mjcf.world import ring_wall
+from schema.mjcf.model import ring_wall
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats

@@ -1,9 +1,10 @@
-"""Translation of a robot into a MuJoCo model.
+"""Translation of robots and their worlds into MuJoCo models.
 
 There is one body per rigid segment, so a robot with k joints has k + 1 bodies. At
 neutral pose all body frames are parallel to the core's. The origin of the root body
 is the centre of the core; that of every other body is the anchor of its joint. The
-position of the free joint is therefore the position that the thesis tracks.
+position of the free joint is therefore the position that the thesis tracks. The world
+frame lies in the ground: z is its normal, and x points uphill.
 
 The spec of a robot has no ground and can be attached to any number of worlds, each
 time with another prefix. Names of its elements, where p is the index of the part:
@@ -14,15 +15,15 @@ parameters that MuJoCo needs beyond those of the original, with their measured e
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import pi, tan
 
 import mujoco
 import numpy as np
 
-from schema.experiment.document import Simulation
-from schema.experiment.environment import Environment
-from schema.experiment.scenery import object_count
+from schema.experiment.document import Arena, Simulation
+from schema.experiment.environment import Environment, gravity_vector, relief
+from schema.experiment.scenery import add_scenery, object_count
 from schema.mjcf.footing import footprint, standing_height
-from schema.mjcf.world import add_ground, set_contacts, set_options
 from schema.parts import IDENTITY, BodySpace, Joint, PartType, Sensor
 from schema.robot.frames import place_parts, round_reach, shapes_of
 from schema.robot.results import Floats
@@ -42,6 +43,9 @@ LEVER_M = 0.1
 It turns rotor inertia [kg m2], damping and stiffness [N m s/rad] of the settings into
 mass [kg] and [N s/m].
 """
+
+_BELOW_M = 0.1
+"""Thickness of rough ground below z = 0 [m]."""
 
 _Segment = tuple[mujoco.MjsBody, list[float]]
 """Body, and its origin in the frame of the core [m]."""
@@ -156,6 +160,118 @@ def shared_model(
     for prefix, child in robots:
         spec.attach(child, frame=spec.worldbody.add_frame(), prefix=prefix)
     return spec.compile()
+
+
+def set_options(
+    spec: mujoco.MjSpec,
+    simulation: Simulation,
+    environment: Environment,
+    *,
+    is_single: bool,
+) -> None:
+    """Set the integrator, solver, gravity and time step of a world.
+
+    Args:
+        spec: of the world.
+        simulation: time step, strength of gravity and contacts.
+        environment: its slope.
+        is_single: the world has one robot, so contact islands are not needed.
+    """
+    option = spec.option
+    option.timestep = simulation.timestep_s
+    option.gravity = gravity_vector(environment, simulation.gravity)
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.tolerance = 1e-6
+    option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+    # Without warm start, a step is a pure function of (qpos, qvel, ctrl). Without
+    # automatic reset, divergence can be detected.
+    disabled = mujoco.mjtDisableBit.mjDSBL_WARMSTART
+    disabled |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if is_single:
+        disabled |= mujoco.mjtDisableBit.mjDSBL_ISLAND
+    else:
+        # One spec of a robot can be attached to many worlds.
+        spec.copy_during_attach = True
+    option.disableflags |= int(disabled)
+    set_contacts(spec, simulation)
+
+
+def set_contacts(spec: mujoco.MjSpec, simulation: Simulation) -> None:
+    """Set the default contacts of a spec's geoms."""
+    geom = spec.default.geom
+    geom.condim = 3
+    geom.friction = (simulation.friction, 0.0, 0.0)
+    geom.solref = (simulation.contact_time_s, 1.0)
+
+
+def add_ground(
+    spec: mujoco.MjSpec, simulation: Simulation, environment: Environment
+) -> None:
+    """Add the infinite plane z = 0, named ``ground``, rough ground and scenery.
+
+    Args:
+        spec: of the world.
+        simulation: default contacts of scenery.
+        environment: rough ground becomes the geom ``rough``, scenery ``scenery/{k}``.
+
+    Raises:
+        ExperimentError: invalid scenery.
+    """
+    spec.worldbody.add_geom(
+        name="ground",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=(0.0, 0.0, 1.0),
+    )
+    if environment.roughness_m:
+        _add_relief(spec, environment)
+    if environment.scenery:
+        add_scenery(spec, environment.scenery, simulation)
+
+
+def _add_relief(spec: mujoco.MjSpec, environment: Environment) -> None:
+    shares, extent = relief(environment), environment.extent_m
+    field = spec.add_hfield()
+    field.name, (field.nrow, field.ncol) = "rough", shares.shape
+    field.size = (extent, extent, environment.roughness_m, _BELOW_M)
+    field.userdata = shares.ravel()
+    spec.worldbody.add_geom(
+        name="rough",
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname="rough",
+    )
+
+
+def ring_wall(arena: Arena) -> Floats:
+    """Return the boxes of a ring of straight walls about the origin, if there is one.
+
+    The inner faces touch the circle of ``wall_diameter_m`` from outside. Source: the
+    original's ring of 12 segments, 0.05 m thick, 1 m high.
+
+    Returns:
+        (W, 10) centre [m], attitude w, x, y, z, and half sizes [m] of each wall.
+    """
+    if not arena.wall_diameter_m:
+        return np.zeros((0, 10))
+    count, half = arena.wall_segments, 0.5 * arena.wall_thickness_m
+    centre, height = 0.5 * arena.wall_diameter_m + half, 0.5 * arena.wall_height_m
+    length = (centre + half) * tan(pi / count)
+    walls = []
+    for index in range(count):
+        angle = 2.0 * pi * index / count
+        place = (centre * np.cos(angle), centre * np.sin(angle), height)
+        attitude = (np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle))
+        walls.append((*place, *attitude, half, length, height))
+    return np.array(walls)
+
+
+def add_ring_wall(spec: mujoco.MjSpec, arena: Arena) -> None:
+    """Add the walls of ``ring_wall`` as geoms ``wall{k}``."""
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    for index, wall in enumerate(ring_wall(arena)):
+        geom = spec.worldbody.add_geom(name=f"wall{index}", type=box)
+        geom.pos, geom.quat, geom.size = wall[:3], wall[3:7], wall[7:]
 
 
 class _Builder:

@@ -27,7 +27,7 @@ from analysis.viewer.show import Show
 from schema.errors import RunFolderError
 from schema.experiment.document import Arena, Experiment
 from schema.experiment.file import read_experiment
-from schema.mjcf.world import add_ring_wall
+from schema.mjcf.model import add_ring_wall
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot

@@ -10,8 +10,7 @@ from msgspec.structs import replace
 
 from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT
-from schema.mjcf.model import robot_spec, solo_spec
-from schema.mjcf.world import add_ground, set_options
+from schema.mjcf.model import add_ground, robot_spec, set_options, solo_spec
 from schema.parts import BUILT_IN, CORE, BodySpace, PartType, Sensor
 from schema.robot.robot import Part, Robot
 from worker.robot.motors import Servos
