@@ -45,7 +45,7 @@ from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pending import PairedJobs, Pending
 from coordinator.dispatch.pool import REPLY_S, AgentState, Pool
 from schema.errors import MalformedMessage, UnexpectedEvent
-from schema.wire.packing import fingerprint
+from schema.wire.decoding import fingerprint
 
 AGENT_OF: dict[JobKind, AgentKind] = {
     "vet": "analyzer",

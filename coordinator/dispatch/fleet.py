@@ -45,7 +45,7 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage
-from schema.wire.packing import fingerprint
+from schema.wire.decoding import fingerprint
 
 
 class Agents(Protocol):

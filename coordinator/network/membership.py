@@ -21,7 +21,7 @@ from schema.limits import (
     printable,
 )
 from schema.wire import revolve_pb2 as pb
-from schema.wire.parsing import parsed
+from schema.wire.decoding import parsed
 
 _CAUSE_LENGTH = 100
 

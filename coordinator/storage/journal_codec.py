@@ -37,12 +37,12 @@ from schema.wire.codec import (
     report_from_message,
     write_report,
 )
+from schema.wire.decoding import parsed
 from schema.wire.messages import (
     birth_from_message,
     birth_to_message,
     finite,
 )
-from schema.wire.parsing import parsed
 
 
 def encode_entry(event: JournalledEvent) -> bytes:

@@ -30,8 +30,7 @@ from schema.limits import (
 )
 from schema.plugins.source import check_plugins
 from schema.wire import revolve_pb2 as pb
-from schema.wire.packing import fingerprint
-from schema.wire.parsing import parsed, require_most
+from schema.wire.decoding import fingerprint, parsed, require_most
 
 _MOST_REMEMBERED = 1000
 _CANCELLED_S = 10.0

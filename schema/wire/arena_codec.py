@@ -22,8 +22,8 @@ from schema.wire.arena_messages import (
     checked_digest,
 )
 from schema.wire.codec import read_wall_s
+from schema.wire.decoding import parsed
 from schema.wire.messages import birth_from_message, birth_to_message
-from schema.wire.parsing import parsed
 
 
 @dataclass(frozen=True, slots=True)

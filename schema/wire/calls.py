@@ -19,7 +19,7 @@ from schema.limits import (
     printable,
 )
 from schema.wire import revolve_pb2 as pb
-from schema.wire.parsing import parsed
+from schema.wire.decoding import parsed
 
 _PLAIN = "None, bool, int, float, str, bytes, list or dict"
 
@@ -104,15 +104,6 @@ def encode_call_request(
     )
     message.call.argument = argument
     return message.SerializeToString(deterministic=True)
-
-
-def is_call_request(data: bytes) -> bool:
-    """Return whether a job is a call, and not about a robot.
-
-    Raises:
-        MalformedMessage: not the bytes of a request.
-    """
-    return parsed(data, pb.Request(), REQUEST_BYTES).HasField("call")
 
 
 def decode_call_request(data: bytes) -> Call:

@@ -7,6 +7,7 @@ part types or neuron types are checked by ``schema.robot.robot.check_robot``.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from schema.errors import MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity
@@ -25,6 +26,7 @@ from schema.robot.genome import Genome
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb
+from schema.wire.decoding import parsed, require_most
 from schema.wire.messages import (
     body_from_message,
     body_to_message,
@@ -37,7 +39,6 @@ from schema.wire.messages import (
     vector_from_message,
     write_brain,
 )
-from schema.wire.parsing import parsed, require_most
 
 _MOST_PAIRS = MOST_PARTS * (MOST_PARTS - 1) // 2
 
@@ -201,15 +202,18 @@ def decode_request(
     )
 
 
-def is_advance_request(data: bytes) -> bool:
-    """Return whether a job is about an arena, and not about a single robot.
+def request_kind(data: bytes) -> Literal["advance", "call", "evaluation"]:
+    """Return what a worker is asked for: to advance an arena, a call, an evaluation.
 
     Raises:
-        MalformedMessage: bytes that are no request of either kind.
+        MalformedMessage: bytes that are no request of any kind.
     """
     # Only a request about an arena has changes, even if they are empty.
-    message = parsed(data, pb.AdvanceRequest(), ADVANCE_REQUEST_BYTES)
-    return message.HasField("changes")
+    arena = parsed(data, pb.AdvanceRequest(), ADVANCE_REQUEST_BYTES)
+    if arena.HasField("changes"):
+        return "advance"
+    request = parsed(data, pb.Request(), REQUEST_BYTES)
+    return "call" if request.HasField("call") else "evaluation"
 
 
 def encode_answer(answer: Answer) -> bytes:

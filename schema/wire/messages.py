@@ -23,7 +23,7 @@ from schema.robot.genome import (
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
-from schema.wire.parsing import require_most
+from schema.wire.decoding import require_most
 
 _LAYER_CODES: dict[Layer, pb.Layer] = {
     "input": pb.LAYER_INPUT,

@@ -14,7 +14,7 @@ from schema.limits import (
 )
 from schema.robot.ids import BirthId, IslandNumber
 from schema.wire.codec import decode_robot
-from schema.wire.packing import Finite, Message, unpack
+from schema.wire.decoding import Finite, Message, unpack
 from schema.wire.status import Status
 
 

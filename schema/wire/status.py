@@ -7,7 +7,7 @@ from msgspec import Meta
 
 from schema.experiment.section import Count
 from schema.limits import MOST_SHOWN
-from schema.wire.packing import Finite, Message
+from schema.wire.decoding import Finite, Message
 
 
 class IslandStatus(Message, frozen=True):

@@ -17,7 +17,7 @@ from schema.limits import UPDATE_BYTES
 from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode_body, encode_body
-from schema.wire.packing import Finite, Message, unpack
+from schema.wire.decoding import Finite, Message, unpack
 
 
 class Birth(Message, frozen=True):

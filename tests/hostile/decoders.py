@@ -104,7 +104,7 @@ from schema.wire.codec import (
     encode_genome,
     encode_request,
     encode_robot,
-    is_advance_request,
+    request_kind,
 )
 from schema.wire.operator import (
     GetStatus,
@@ -213,7 +213,7 @@ def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     yield Target("decode_request", decode_request, (single,))
     body = partial(decode_request, read=decode_body)
     yield Target("decode_request, body", body, (vetting,))
-    yield Target("is_advance_request", is_advance_request, both)
+    yield Target("request_kind", request_kind, both)
     yield Target("decode_advance_request", decode_advance_request, (advance,))
     yield Target(
         "analyzer's answer", analyzer.report.answer, (vetting,), (RevolveError,)

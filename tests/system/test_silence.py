@@ -23,7 +23,7 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import Journal
 from schema.experiment.file import experiment_text, read_experiment
 from schema.wire.arena_codec import decode_advance_request
-from schema.wire.codec import is_advance_request
+from schema.wire.codec import request_kind
 
 pytestmark = [
     pytest.mark.system,
@@ -98,7 +98,7 @@ class Counting:
         fleet._agents = self
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
-        if is_advance_request(payload):
+        if request_kind(payload) == "advance":
             request = decode_advance_request(payload)
             self.rebuilt += request.rebuild is not None and request.from_step > 0
         self._agents.send(number, agent, payload)

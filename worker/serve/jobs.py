@@ -9,12 +9,11 @@ from schema.experiment.settings import lasting
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_types
 from schema.wire.arena_codec import Live
-from schema.wire.calls import is_call_request
 from schema.wire.codec import (
     Answer,
     decode_request,
     encode_answer,
-    is_advance_request,
+    request_kind,
 )
 from worker.arena.world import World
 from worker.robot.evaluation import evaluate
@@ -50,11 +49,13 @@ class Jobs:
         Raises:
             RevolveError: see ``answer``, ``answer_call`` and ``Shards.answer``.
         """
-        if is_advance_request(request):
-            return self._shards.answer(request)
-        if is_call_request(request):
-            return answer_call(request)
-        return answer(request)
+        match request_kind(request):
+            case "advance":
+                return self._shards.answer(request)
+            case "call":
+                return answer_call(request)
+            case "evaluation":
+                return answer(request)
 
 
 def answer(request: bytes) -> bytes:

@@ -46,7 +46,7 @@ from coordinator.dispatch.pool import (
     REST_S,
 )
 from schema.errors import UnexpectedEvent
-from schema.wire.packing import fingerprint
+from schema.wire.decoding import fingerprint
 
 
 def job(number: int, kind: JobKind = "evaluate") -> Job:

@@ -23,7 +23,7 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.fleet import Fleet
 from coordinator.dispatch.pool import REPLY_S
 from schema.errors import MalformedMessage
-from schema.wire.packing import fingerprint
+from schema.wire.decoding import fingerprint
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
 EMPTY = fingerprint(b"")

@@ -36,7 +36,7 @@ from schema.wire.codec import (
     encode_body,
     encode_robot,
 )
-from schema.wire.packing import fingerprint
+from schema.wire.decoding import fingerprint
 from tests.coordinator.sent_requests import (
     BIRTH,
     EPOCH,

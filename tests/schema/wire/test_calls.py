@@ -12,12 +12,11 @@ from schema.wire.calls import (
     decode_call_request,
     encode_call_answer,
     encode_call_request,
-    is_call_request,
     pack_value,
     read_call_answer,
     unpack_value,
 )
-from schema.wire.codec import encode_request
+from schema.wire.codec import encode_request, request_kind
 
 CALL = Call(3, 17, "lab:score", {"a": [1, 2.5, None, True, "é", b"\x00"]})
 
@@ -43,8 +42,8 @@ def test_call_survives_the_way() -> None:
 
 def test_only_a_call_is_a_call() -> None:
     other = encode_request(run="r", epoch=1, number=1, settings=b"{}", robot=b"")
-    assert is_call_request(request(None))
-    assert not is_call_request(other)
+    assert request_kind(request(None)) == "call"
+    assert request_kind(other) == "evaluation"
     with pytest.raises(MalformedMessage, match="is no call"):
         decode_call_request(other)
     with pytest.raises(MalformedMessage):

@@ -1,22 +1,69 @@
-"""Parsing of Protobuf bytes within limits of length and number of submessages."""
+"""Decoding of bytes within limits: Protobuf, and MessagePack of Structs.
 
-from typing import Any, TypeVar
+Structs travel between processes of one version: coordinators, operators and viewers
+exchange them; nothing stores them. Their decoding is typed: unknown or missing fields,
+numbers out of range and numbers that are not finite are refused. Protobuf messages are
+bounded by their length and number of submessages.
+"""
 
-from google.protobuf.message import DecodeError, Message
+import sys
+from hashlib import blake2b
+from typing import Annotated, Any, TypeVar
+
+from google.protobuf.message import DecodeError
+from google.protobuf.message import Message as ProtobufMessage
+from msgspec import Meta, Struct
+from msgspec.msgpack import Decoder
 
 from schema.errors import MalformedMessage
 from schema.limits import MOST_FIELDS, MOST_SUBMESSAGES, UNCOUNTED_BYTES
 
-M = TypeVar("M", bound=Message)
-
+T = TypeVar("T")
+M = TypeVar("M", bound=ProtobufMessage)
 Descriptor = Any
-"""Type of a message; the libraries of Protobuf have several classes for it."""
+"""Type of a Protobuf message; its libraries have several classes for it."""
+
+_GREATEST = sys.float_info.max
+Finite = Annotated[float, Meta(ge=-_GREATEST, le=_GREATEST)]
+"""Float that is neither infinite nor NaN: NaN satisfies no bound."""
 
 _VARINT, _BYTES = 0, 2
 _SIZES = {1: 8, 5: 4}
 """Bytes of the other wire types."""
 _WIRE_TYPES = 7
 _MOST_VARINT = 10
+
+
+class Message(Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of the messages: immutable, without unknown fields."""
+
+
+def fingerprint(data: bytes) -> bytes:
+    """Return 8 bytes that identify a request: no other content has them by chance."""
+    return blake2b(data, digest_size=8).digest()
+
+
+def unpack(decoder: Decoder[T], data: bytes, most: int) -> T:
+    """Return the message of some bytes.
+
+    Args:
+        decoder: of the type of message.
+        data: the bytes.
+        most: number of bytes that such a message may have.
+
+    Raises:
+        MalformedMessage: not the bytes of such a message, or too many.
+    """
+    if len(data) > most:
+        raise MalformedMessage(
+            f"message: must be <= {most} bytes, got {len(data)}", "too large"
+        )
+    try:
+        return decoder.decode(data)
+    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
+        raise MalformedMessage(
+            f"damaged, or of another version of Revolve Islands: {error}"
+        ) from None
 
 
 def parsed(data: bytes, message: M, most: int) -> M:
