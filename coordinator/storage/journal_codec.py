@@ -25,7 +25,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import BrainChange
-from schema.wire.arena_messages import (
+from schema.wire.arena_codec import (
     advance_from_message,
     advance_to_message,
     read_brain_change,
