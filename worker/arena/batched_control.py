@@ -19,9 +19,8 @@ from worker.clusters.cluster import EngineView
 from worker.clusters.columns import Layout
 from worker.clusters.robot import ArenaRobot
 from worker.robot.brains import Controls
-from worker.robot.motors import HIGHEST_OUTPUT, LOWEST_OUTPUT
+from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
 from worker.robot.noise import Noise, NoiseSource
-from worker.robot.sensors import into_frame
 
 
 class BatchedControllers:

@@ -18,9 +18,8 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.robot.motors import Servos
+from worker.robot.devices import Sensors, Servos
 from worker.robot.recording import Probe, probed_channels, step_with
-from worker.robot.sensors import Sensors
 
 NEVER = 1 << 62
 """A moment later than all others."""

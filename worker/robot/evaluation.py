@@ -30,14 +30,13 @@ from worker.measures.functions import functions_of
 from worker.robot.ablation import Ablated
 from worker.robot.brains import controls_of
 from worker.robot.calibration import Calibrated
+from worker.robot.devices import Sensors, Servos
 from worker.robot.disturbances import combined, disturbances
 from worker.robot.light import read_light
-from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
 from worker.robot.own_sensors import Surroundings
 from worker.robot.pushes import Pushes
 from worker.robot.recording import Channels, Recorder
-from worker.robot.sensors import Sensors
 
 Watch = Callable[[mujoco.MjData], None]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from schema.parts import Vector
 from schema.robot.results import Floats
-from worker.robot.sensors import Sensors
+from worker.robot.devices import Sensors
 
 World = tuple[mujoco.MjModel, mujoco.MjData]
 """Model and state of some robots; the kinematics are those of the present pose."""

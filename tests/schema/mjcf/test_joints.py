@@ -24,7 +24,7 @@ from schema.parts import (
 )
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
 from schema.robot.robot import Part, Robot
-from worker.robot.motors import Servos
+from worker.robot.devices import Servos
 
 GREY = (0.5, 0.5, 0.5)
 CORE = Part("Core", -1, -1, -1, 0, GREY)

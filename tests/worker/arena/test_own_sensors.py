@@ -21,9 +21,9 @@ from schema.robot.robot import Part, Robot
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import populated, seconds, settings_of, state_of
 from worker.arena.world import World
+from worker.robot.devices import Sensors
 from worker.robot.evaluation import evaluate, simulate
 from worker.robot.own_sensors import Surroundings
-from worker.robot.sensors import Sensors
 
 GREY = (0.5, 0.5, 0.5)
 A, B, C = BirthId(0, 1), BirthId(0, 2), BirthId(0, 3)

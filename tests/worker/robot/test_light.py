@@ -16,9 +16,9 @@ from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Insertion
 from tests.worker.arena_cases import populated, settings_of
+from worker.robot.devices import Sensors
 from worker.robot.evaluation import simulate
 from worker.robot.light import read_light
-from worker.robot.sensors import Sensors
 
 GREY = (0.5, 0.5, 0.5)
 SPACE = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))

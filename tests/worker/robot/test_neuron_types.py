@@ -12,8 +12,7 @@ from schema.parts import Parameter
 from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
 from schema.robot.neurons import BUILT_IN_NEURONS, Tick
 from schema.robot.results import Floats
-from worker.robot.brains import Controls, NetworkControl, SoloBank
-from worker.robot.controller import Bank, pack
+from worker.robot.brains import Bank, Controls, NetworkControl, SoloBank, pack
 from worker.robot.own_neurons import STATE_LIMIT
 
 WIDTH = widths(Space())

@@ -27,8 +27,8 @@ from tests.worker.arena_cases import (
 )
 from worker.arena.replay import alone
 from worker.arena.world import World
+from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT
 from worker.robot.evaluation import evaluate, simulate
-from worker.robot.motors import HIGHEST_OUTPUT, LOWEST_OUTPUT
 from worker.robot.noise import BLOCK_TICKS, Noise, NoiseSource
 
 Robots = Callable[[int], Robot]

@@ -9,7 +9,7 @@ from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.robot import Robot
-from worker.robot.controller import Bank, SoloNetwork, pack
+from worker.robot.brains import Bank, SoloNetwork, pack
 from worker.robot.own_neurons import STATE_LIMIT
 
 WIDTH = widths(Space())

@@ -13,8 +13,7 @@ from schema.experiment.environment import FLAT
 from schema.mjcf.model import add_ground, robot_spec, set_options, solo_spec
 from schema.parts import BUILT_IN, CORE, BodySpace, PartType, Sensor
 from schema.robot.robot import Part, Robot
-from worker.robot.motors import Servos
-from worker.robot.sensors import Sensors
+from worker.robot.devices import Sensors, Servos
 
 GREY = (0.5, 0.5, 0.5)
 WORLD = Simulation()

@@ -11,7 +11,7 @@ from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
 from schema.robot.robot import Robot
-from worker.robot.controller import Bank, Network, pack
+from worker.robot.brains import Bank, Network, pack
 from worker.robot.own_neurons import STATE_LIMIT
 
 WIDTH = widths(Space())
