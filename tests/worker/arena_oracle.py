@@ -8,7 +8,7 @@ from schema.mjcf.model import robot_spec, shared_model
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.arena.world import World
-from worker.clusters.rollout import Rollout
+from worker.clusters.states import Rollout
 
 
 class Oracle:

@@ -14,10 +14,10 @@ from schema.parts import Vector
 from schema.plugins.protocols import Bank
 from schema.robot.brain import Widths
 from schema.robot.results import Floats
-from worker.clusters.bounds import Indices
 from worker.clusters.cluster import EngineView
-from worker.clusters.columns import Layout
+from worker.clusters.models import Indices
 from worker.clusters.robot import ArenaRobot
+from worker.clusters.states import Layout
 from worker.robot.brains import Controls
 from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
 from worker.robot.noise import Noise, NoiseSource

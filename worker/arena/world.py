@@ -21,17 +21,15 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
 from worker.arena.batched_control import BatchedControllers, BatchedIO
-from worker.arena.births import check_changes, newborn
-from worker.arena.divergence import diverged
+from worker.arena.changes import check_changes, diverged, newborn
 from worker.arena.light import read_lights
 from worker.arena.own_sensors import has_own_sensors, read_own_sensors
-from worker.arena.records import Contacts, Poses
-from worker.arena.samples import Samples
+from worker.arena.records import Contacts, Poses, Samples
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
-from worker.clusters.rollout import Rollout, Schedule
+from worker.clusters.states import Rollout, Schedule
 from worker.robot.evaluation import silence_engine
 from worker.robot.noise import NoiseSource
 

@@ -14,11 +14,10 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
-from worker.clusters.columns import Layout, RobotRows
 from worker.clusters.models import ModelCache
-from worker.clusters.proximity import Pairs, Proximity, Scene
+from worker.clusters.proximity import Proximity, Scene
 from worker.clusters.robot import ArenaRobot
-from worker.clusters.rollout import Rollout
+from worker.clusters.states import Layout, Pairs, RobotRows, Rollout
 
 Group = tuple[BirthId, ...]
 """Members of one cluster, ascending."""

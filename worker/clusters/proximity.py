@@ -15,15 +15,12 @@ import numpy.typing as npt
 
 from schema.experiment.settings import ArenaSettings
 from schema.robot.results import Floats
-from worker.clusters.columns import Layout, runs
+from worker.clusters.states import Layout, Pairs, runs
 
 FASTEST = 10.0
 """Speed above which the physics is broken; bounds the margin of a robot [m/s]."""
 _ROUNDING_M = 1e-9
 """Upper bound on the rounding error of sums of distances."""
-
-Pairs = list[tuple[int, int]]
-"""Pairs of rows of robots, the lesser row first."""
 
 Mask = npt.NDArray[np.bool_]
 

@@ -30,7 +30,7 @@ from schema.wire.arena_codec import (
     decode_advance_request,
     encode_advance_answer,
 )
-from worker.arena.births import possible
+from worker.arena.changes import possible
 from worker.serve.checks import checked_arena
 
 Key = tuple[str, int]

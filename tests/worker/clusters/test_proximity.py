@@ -9,7 +9,8 @@ import pytest
 from schema.robot.robot import Robot
 from tests.worker.arena_cases import crowd, populated, seconds, settings_of
 from worker.arena.world import World
-from worker.clusters.proximity import FASTEST, Pairs, Proximity, Scene
+from worker.clusters.proximity import FASTEST, Proximity, Scene
+from worker.clusters.states import Pairs
 
 Robots = Callable[[int], Robot]
 

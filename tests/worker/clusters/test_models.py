@@ -11,7 +11,7 @@ from schema.robogen_parts import ACTIVE_WHEEL
 from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
 from tests.plugins.crawlers import PISTON
-from worker.clusters.bounds import bounding_spheres
+from worker.clusters.models import bounding_spheres
 
 GREY = (0.5, 0.5, 0.5)
 ROBOT = Robot(

@@ -40,8 +40,8 @@ SPACE = replace(
     SETTINGS.space,
     part_types=(
         *SETTINGS.space.part_types,
-        "tests.worker.arena.test_divergence:HEAVY",
-        "tests.worker.arena.test_divergence:NOTHING",
+        "tests.worker.arena.test_changes:HEAVY",
+        "tests.worker.arena.test_changes:NOTHING",
     ),
 )
 ABSURD = replace(SETTINGS, space=SPACE)
@@ -49,7 +49,7 @@ ABSURD = replace(SETTINGS, space=SPACE)
 
 @pytest.fixture(autouse=True)
 def _plugins() -> None:
-    allow(["tests.worker.arena.test_divergence"])
+    allow(["tests.worker.arena.test_changes"])
 
 
 def with_brick(turtle: Robot, kind: str) -> Robot:
@@ -167,7 +167,7 @@ def test_undefined_fitness_removes_the_robot_with_the_reason(
     turtle: Robot,
 ) -> None:
     fitness = replace(
-        SETTINGS.fitness, function="tests.worker.arena.test_divergence:raises"
+        SETTINGS.fitness, function="tests.worker.arena.test_changes:raises"
     )
     settings = replace(SETTINGS, fitness=fitness)
     world = populated(settings, [Insertion(BAD, turtle, (0.0, 0.0))])
