@@ -1,27 +1,34 @@
-"""Intersecting parts of a body, by the separating axes of their oriented boxes.
+"""Intersecting parts of a body, by the separating axes of their boxes and cylinders.
 
 Two boxes are apart exactly if they are apart along one of 15 directions: the three
 axes of each box and the nine cross products of an axis of either. The least overlap
 along these directions is the depth of the intersection.
 
-Pairs with a cylinder are examined in ``analyzer.cylinders``.
+Two convex bodies are apart exactly if they are apart along some direction. Where one
+or both are cylinders, the search starts from the axes of both bodies, their cross
+products and the directions between the bodies, and refines the best of them. It is
+conservative: bodies that it finds apart are apart, but it may take a small gap for an
+intersection. In 400 random pairs about 0.5 m long it never did so for gaps above
+0.1 mm (tests/analyzer/test_cylinders.py).
 
 Source: Gottschalk, Lin, Manocha, *OBBTree*, 1996, section 5.
 """
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
-from analyzer.boxes import Boxes, Indices
-from analyzer.cylinders import round_separation
 from schema.experiment.document import Vetting
+from schema.parts import IDENTITY, BodySpace, Vector
+from schema.robot.frames import place_parts, round_reach, shapes_of
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
+Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
-
 PARALLEL = 1e-12
 """Squared sine below which two edges count as parallel and have no cross product.
 
@@ -29,9 +36,82 @@ At 0.1 m this hides less than 1e-7 m of separation, a tenth of the tolerance.
 """
 ALIGNED = 1e-12
 """Greatest deviation of a box from the axes that counts as axis-aligned."""
-
 _NEXT = np.array([1, 2, 0])
 _AFTER = np.array([2, 0, 1])
+_STARTS = 2
+"""Directions that are refined."""
+_FIRST_STEP, _LAST_STEP, _SHRINK = 0.5, 1e-7, 0.6
+"""Tangents of the angles of the search, and the ratio of two of them."""
+_MOST_LEVELS = 150
+"""Steps of the search, those that find a better direction included."""
+_AROUND = 8
+"""Neighbours of a direction that are tried at each step."""
+_TURN = 2.4
+"""Rotation of these neighbours from step to step, so that none is missed [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Boxes:
+    """All boxes of a body, in the core's frame.
+
+    Attributes:
+        count: (P,) number of boxes of each part; boxes are ordered by part.
+        rotation: (N, 3, 3) box frame to core frame.
+        centre: (N, 3) [m].
+        half: (N, 3) half of the lengths along the box's own axes [m].
+        lower, upper: (N, 3) corners of each box's axis-aligned hull [m].
+        mass: total mass [kg].
+        round: indices of those that are cylinders, ascending.
+    """
+
+    count: Indices
+    rotation: Floats
+    centre: Floats
+    half: Floats
+    lower: Floats
+    upper: Floats
+    mass: float
+    round: tuple[int, ...] = ()
+
+
+def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
+    """Return the boxes of a checked robot.
+
+    Args:
+        robot: a checked robot.
+        space: its part types.
+
+    Returns:
+        Its boxes by part, in the order of each part's shape.
+    """
+    shapes = shapes_of(robot, space)
+    rotations, positions = place_parts(robot, shapes)
+    boxes = [box for shape in shapes for box in shape.boxes]
+    count = np.array([len(shape.boxes) for shape in shapes])
+    rows = chain.from_iterable([box.size + box.position for box in boxes])
+    lengths = np.fromiter(rows, float).reshape(-1, 6)
+    half, local = lengths[:, :3] / 2, lengths[:, 3:]
+    rotation = rotations.repeat(count, axis=0)
+    centre = (rotation @ local[:, :, None])[:, :, 0]
+    centre += positions.repeat(count, axis=0)
+    for index, box in enumerate(boxes):
+        if box.rotation is not IDENTITY:
+            rotation[index] = rotation[index].dot(box.rotation)
+    reach = (np.abs(rotation) @ half[:, :, None])[:, :, 0]
+    cylinders = tuple([index for index, box in enumerate(boxes) if box.is_round])
+    for index in cylinders:
+        own = half[index].tolist()
+        reach[index] = [round_reach(row, own) for row in rotation[index].tolist()]
+    mass = math.fsum([box.mass for box in boxes])
+    lower, upper = centre - reach, centre + reach
+    return Boxes(count, rotation, centre, half, lower, upper, mass, cylinders)
+
+
+def bounding_box(boxes: Boxes) -> tuple[Vector, Vector]:
+    """Return the lower and upper corner of the axis-aligned hull [m], core frame."""
+    lower_x, lower_y, lower_z = np.minimum.reduce(boxes.lower).tolist()
+    upper_x, upper_y, upper_z = np.maximum.reduce(boxes.upper).tolist()
+    return (lower_x, lower_y, lower_z), (upper_x, upper_y, upper_z)
 
 
 def intersecting_parts(
@@ -117,6 +197,58 @@ def separation(boxes: Boxes, first: Indices, second: Indices) -> Floats:
     return separations
 
 
+def round_separation(
+    boxes: Boxes, first: int, second: int, enough: float = math.inf
+) -> float:
+    """Return a lower bound on the separation of two bodies of a robot.
+
+    Args:
+        boxes: all boxes and cylinders.
+        first: index of the first body.
+        second: index of the second body.
+        enough: a bound from which on no better one is sought [m].
+
+    Returns:
+        [m]: a positive value is a gap, a negative one minus the depth.
+    """
+    pair = (first, second)
+    turns = [boxes.rotation[index] for index in pair]
+    halves = [boxes.half[index] for index in pair]
+    are_round = [index in boxes.round for index in pair]
+    offset = boxes.centre[second] - boxes.centre[first]
+
+    def apart(ways: Floats) -> Floats:
+        """Return the separation along unit vectors, (K, 3)."""
+        found = ways @ offset
+        for turn, half, is_round in zip(turns, halves, are_round, strict=True):
+            local = np.abs(ways @ turn)
+            if is_round:
+                across = np.hypot(local[:, 0], local[:, 1])
+                found = found - half[0] * across - half[2] * local[:, 2]
+            else:
+                found = found - local @ half
+        return np.asarray(found)
+
+    ways = _candidates(turns, offset)
+    ways = ways[np.argsort(-apart(ways), kind="stable")[:_STARTS]]
+    best, step = apart(ways), _FIRST_STEP
+    for level in range(_MOST_LEVELS):
+        if best.max() > enough:
+            break
+        angles = level * _TURN + np.arange(_AROUND) * (2.0 * math.pi / _AROUND)
+        tries = _neighbours(ways, step * np.cos(angles), step * np.sin(angles))
+        found = apart(tries.reshape(-1, 3)).reshape(len(ways), _AROUND)
+        chosen, rows = found.argmax(axis=1), np.arange(len(ways))
+        is_better = found[rows, chosen] > best
+        ways = np.where(is_better[:, None], tries[rows, chosen], ways)
+        best = np.where(is_better, found[rows, chosen], best)
+        if not is_better.any():
+            step *= _SHRINK
+            if step < _LAST_STEP:
+                break
+    return float(best.max())
+
+
 def _round_separations(
     boxes: Boxes, first: Indices, second: Indices, vetting: Vetting
 ) -> Floats:
@@ -159,3 +291,26 @@ def _near_parts(boxes: Boxes, robot: Robot, vetting: Vetting) -> Mask:
     index = np.arange(len(parent))
     near: Mask = meet & (index[:, None] < index) & (index[:, None] != parent)
     return near
+
+
+def _candidates(turns: list[Floats], offset: Floats) -> Floats:
+    """Return unit vectors to start from, (K, 3), in both senses."""
+    own, other = turns[0].T, turns[1].T
+    crossed = np.cross(own[:, None], other[None]).reshape(-1, 3)
+    across = [offset - (offset @ axis) * axis for axis in (*own, *other)]
+    ways = np.concatenate([own, other, crossed, [offset], across])
+    lengths = np.linalg.norm(ways, axis=1)
+    ways = ways[lengths > 1e-9] / lengths[lengths > 1e-9, None]  # noqa: PLR2004
+    return np.concatenate([ways, -ways])
+
+
+def _neighbours(ways: Floats, along: Floats, across: Floats) -> Floats:
+    """Return unit vectors around each of some unit vectors, (K, A, 3)."""
+    # The axis that is least parallel to a vector gives two tangents.
+    helper = np.eye(3)[np.abs(ways).argmin(axis=1)]
+    one = np.cross(ways, helper)
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    two = np.cross(ways, one)
+    aside = along[:, None] * one[:, None] + across[:, None] * two[:, None]
+    moved = ways[:, None] + aside
+    return np.asarray(moved / np.linalg.norm(moved, axis=2, keepdims=True))

@@ -1,9 +1,9 @@
 """Report on a body (size, mass, motors, intersections), also as an encoded answer."""
 
 import time
+from functools import lru_cache
 
-from analyzer.boxes import bounding_box, place_boxes
-from analyzer.overlap import intersecting_parts
+from analyzer.overlap import bounding_box, intersecting_parts, place_boxes
 from schema.experiment.document import Vetting, body_space
 from schema.experiment.settings import read_vetting_settings
 from schema.parts import BodySpace
@@ -38,6 +38,7 @@ def answer(request: bytes) -> bytes:
     return encode_answer(Answer(decoded.epoch, decoded.number, wall_s, report))
 
 
+@lru_cache(maxsize=64)
 def _body_space(settings: bytes) -> BodySpace:
     return body_space(read_vetting_settings(settings).space)
 

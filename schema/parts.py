@@ -10,6 +10,7 @@ these types follow the code, which produced the results.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, Protocol
 
 from msgspec import Struct
@@ -122,7 +123,7 @@ class Motor:
     control: Literal["position", "velocity"] = "position"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Sensor:
     """Built-in sensor: ``imu`` gives 6 inputs, ``touch`` and ``light`` one each.
 
@@ -134,7 +135,7 @@ class Sensor:
     kind: Literal["imu", "touch", "light"]
     box: str
 
-    @property
+    @cached_property
     def inputs(self) -> int:
         """Number of network inputs."""
         return 6 if self.kind == "imu" else 1

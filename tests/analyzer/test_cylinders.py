@@ -7,9 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from analyzer.boxes import Boxes, bounding_box, place_boxes
-from analyzer.cylinders import round_separation
-from analyzer.overlap import intersecting_parts
+from analyzer.overlap import (
+    Boxes,
+    bounding_box,
+    intersecting_parts,
+    place_boxes,
+    round_separation,
+)
 from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, IDENTITY, Matrix, PartType, Shape, Slot, cylinder
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL

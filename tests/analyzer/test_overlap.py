@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from analyzer.boxes import Boxes, place_boxes
-from analyzer.overlap import intersecting_parts, separation
+from analyzer.overlap import Boxes, intersecting_parts, place_boxes, separation
 from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, Box, Shape
 from schema.robot.results import Floats

@@ -154,7 +154,9 @@ def diverged(
             problem = cluster.failure
         if reads_warnings or not is_plausible:
             reasons = {} if is_plausible else _reasons(cluster, moment)
-            problem = problem or warning_names(cluster.history.warnings[moment])
+            warnings = cluster.history.warnings[moment]
+            if not problem and warnings.any():
+                problem = warning_names(warnings)
         if problem and not reasons:
             reasons = dict.fromkeys(cluster.members, f"physics diverged: {problem}")
         found += [

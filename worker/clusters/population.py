@@ -29,7 +29,8 @@ class ArenaPopulation:
 
     Attributes:
         model_cache: engine models.
-        robot_rows: the living robots.
+        robot_rows: the living robots and their indices.
+        robots: the living robots, by birth.
         clusters: of all of them.
         by_cost: the same clusters, most expensive first.
         cluster_of: the cluster of each birth.
@@ -41,7 +42,7 @@ class ArenaPopulation:
     def __init__(self, settings: ArenaSettings) -> None:
         """Initialise without robots."""
         self.model_cache = ModelCache(settings)
-        self.robot_rows = RobotRows(())
+        self._number(())
         self.clusters: tuple[Cluster, ...] = ()
         self.by_cost: list[Cluster] = []
         self.cluster_of: dict[BirthId, Cluster] = {}
@@ -50,11 +51,6 @@ class ArenaPopulation:
         self.merges = self.splits = 0
         self._proximity = Proximity(settings)
         self._new: list[Cluster] = []
-
-    @property
-    def robots(self) -> tuple[ArenaRobot, ...]:
-        """All robots, by birth."""
-        return self.robot_rows.robots
 
     def __contains__(self, birth: BirthId) -> bool:
         return birth in self.robot_rows.rows
@@ -67,7 +63,7 @@ class ArenaPopulation:
         """Add robots, each in its own cluster."""
         added = sorted(newborn, key=lambda robot: robot.birth)
         robots = sorted((*self.robots, *added), key=lambda robot: robot.birth)
-        self.robot_rows = RobotRows(robots)
+        self._number(robots)
         self._settle([*self.clusters, *(robot.body.solo for robot in added)])
 
     def remove(self, births: Iterable[BirthId]) -> None:
@@ -76,7 +72,7 @@ class ArenaPopulation:
         if not gone:
             return
         left = [robot for robot in self.robots if robot.birth not in gone]
-        self.robot_rows = RobotRows(left)
+        self._number(left)
         kept: list[Cluster] = []
         for cluster in self.clusters:
             rest = tuple(birth for birth in cluster.members if birth not in gone)
@@ -173,6 +169,11 @@ class ArenaPopulation:
         """Compute the frames of all bodies from the present state."""
         for cluster in self.clusters:
             mujoco.mj_kinematics(cluster.model, cluster.data)
+
+    def _number(self, robots: Sequence[ArenaRobot]) -> None:
+        """Replace the robots, ordered by birth."""
+        self.robot_rows = RobotRows(robots)
+        self.robots = self.robot_rows.robots
 
     def _move(self, births: Group) -> Cluster:
         """Return a cluster into which robots have moved with their states."""
