@@ -7,7 +7,7 @@ from typing import Any
 from coordinator.evolution.cpg import CpgGenes
 from coordinator.evolution.network import NetworkGenes
 from schema.experiment.brains import brain_half
-from schema.experiment.document import BrainSection, Experiment
+from schema.experiment.document import Experiment
 from schema.plugins.protocols import BrainGenes, BrainRules, NeuronType
 
 BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainGenes]] = {
@@ -16,6 +16,7 @@ BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainGenes]] = {
 }
 
 
+@lru_cache(maxsize=64)
 def brain_genes(experiment: Experiment) -> BrainGenes:
     """Return the brain type of an experiment.
 
@@ -23,14 +24,10 @@ def brain_genes(experiment: Experiment) -> BrainGenes:
         UnknownPlugin: no such brain type or neuron type.
         ExperimentError: one that breaks its contract, or wrong parameters.
     """
-    return _brain_genes(experiment.brain, experiment.space.neuron_types)
+    return brain_half(experiment.brain, experiment.space.neuron_types, BUILT_IN)
 
 
 @lru_cache(maxsize=64)
-def _brain_genes(brain: BrainSection, names: tuple[str, ...]) -> BrainGenes:
-    return brain_half(brain, names, BUILT_IN)
-
-
 def brain_rules(experiment: Experiment) -> BrainRules:
     """Return the settings of an experiment that brains keep."""
     variation = experiment.variation

@@ -449,7 +449,7 @@ class Islands(Section, frozen=True):
     learning: Learning | None = None
 
 
-class Experiment(Section, frozen=True, dict=True):
+class Experiment(Section, frozen=True, dict=True, cache_hash=True):
     """An experiment.
 
     Attributes:

@@ -22,13 +22,13 @@ from schema.wire.arena import (
     Judgement,
     Touch,
 )
-from schema.wire.codec import read_wall_s
 from schema.wire.decoding import parsed
 from schema.wire.messages import (
     birth_from_message,
     birth_to_message,
     finite,
     read_brain,
+    read_wall_s,
     robot_from_message,
     robot_to_message,
     vector_from_message,

@@ -15,7 +15,6 @@ from schema.limits import (
     ADVANCE_REQUEST_BYTES,
     ANSWER_BYTES,
     LONGEST_REASON,
-    LONGEST_WALL_S,
     MOST_PARTS,
     PAIR_BYTES,
     REQUEST_BYTES,
@@ -35,6 +34,7 @@ from schema.wire.messages import (
     genome_to_message,
     identity_from_message,
     identity_to_message,
+    read_wall_s,
     robot_from_message,
     vector_from_message,
     write_brain,
@@ -255,20 +255,6 @@ def decode_answer(data: bytes, pairs: int = _MOST_PAIRS) -> Answer:
         case _:
             raise MalformedMessage("answer: has no result")
     return Answer(message.epoch, message.number, read_wall_s(message), result)
-
-
-def read_wall_s(message: pb.Answer | pb.AdvanceAnswer) -> float:
-    """Return the duration of an answer [s].
-
-    Raises:
-        MalformedMessage: it is negative, too long or not a number.
-    """
-    wall_s = message.wall_s
-    if not 0.0 <= wall_s <= LONGEST_WALL_S:
-        raise MalformedMessage(
-            f"answer.wall_s: must be in [0, {LONGEST_WALL_S:g}], got {wall_s}"
-        )
-    return wall_s
 
 
 def write_report(report: Report, message: pb.Report) -> None:

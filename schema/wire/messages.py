@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.identity import Identity, Origin
-from schema.limits import MOST_CONNECTIONS, MOST_NEURONS, MOST_PARTS
+from schema.limits import LONGEST_WALL_S, MOST_CONNECTIONS, MOST_NEURONS, MOST_PARTS
 from schema.parts import Vector
 from schema.robot.brain import Brain, Connection, Layer, Neuron, check_brain
 from schema.robot.genome import (
@@ -287,3 +287,17 @@ def vector_from_message(message: pb.Vector, where: str) -> Vector:
     """
     x, y, z = message.x, message.y, message.z
     return finite(x, where), finite(y, where), finite(z, where)
+
+
+def read_wall_s(message: pb.Answer | pb.AdvanceAnswer) -> float:
+    """Return the duration of an answer [s].
+
+    Raises:
+        MalformedMessage: it is negative, too long or not a number.
+    """
+    wall_s = message.wall_s
+    if not 0.0 <= wall_s <= LONGEST_WALL_S:
+        raise MalformedMessage(
+            f"answer.wall_s: must be in [0, {LONGEST_WALL_S:g}], got {wall_s}"
+        )
+    return wall_s

@@ -8,7 +8,6 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import lasting
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_types
-from schema.wire.arena_codec import Live
 from schema.wire.codec import (
     Answer,
     decode_request,
@@ -19,7 +18,7 @@ from worker.arena.world import World
 from worker.robot.evaluation import evaluate
 from worker.serve.calls import answer_call
 from worker.serve.checks import checked_evaluation
-from worker.serve.shards import Shards
+from worker.serve.shards import Outlet, Shards
 
 
 class Jobs:
@@ -30,17 +29,23 @@ class Jobs:
         *,
         most_shards: int = 16,
         threads: int = 1,
-        publish: Callable[[Live], None] = lambda _: None,
+        outlet: Outlet | None = None,
+        key_of: Callable[[int], str] = str,
     ) -> None:
         """Initialise without shards.
 
         Args:
             most_shards: arena shards to keep.
             threads: that step clusters of an arena; results do not depend on it.
-            publish: called with each advance, for live viewers.
+            outlet: publishes each advance for live viewers.
+            key_of: returns the key of a shard's advances.
         """
         self._shards = Shards(
-            World, most_held=most_shards, threads=threads, publish=publish
+            World,
+            most_held=most_shards,
+            threads=threads,
+            outlet=outlet,
+            key_of=key_of,
         )
 
     def answer(self, request: bytes) -> bytes:

@@ -7,7 +7,6 @@ from schema.agent.service import Outlet, own_agent, serve_as_process
 from schema.agent.supervision import ProcessSlot
 from schema.agent.topics import Member
 from schema.tables.arrow import skip_pandas
-from schema.wire.arena_codec import Live, encode_live
 from worker.serve.jobs import Jobs
 
 
@@ -15,14 +14,12 @@ def process(agent: Agent, slot: ProcessSlot) -> None:
     """Run one process of a worker; returns when asked to stop."""
     own = own_agent(agent, slot.index)
     member = Member(own.fleet, own.role, own.name)
-    key_of = lru_cache(member.poses)
     outlet = Outlet()
-
-    def publish(live: Live) -> None:
-        key = key_of(live.shard)
-        if outlet.has_listeners(key):
-            outlet.put(key, encode_live(live))
-
     skip_pandas()
-    jobs = Jobs(most_shards=own.shards, threads=own.threads, publish=publish)
+    jobs = Jobs(
+        most_shards=own.shards,
+        threads=own.threads,
+        outlet=outlet,
+        key_of=lru_cache(member.poses),
+    )
     serve_as_process(jobs.answer, own, slot, outlet)

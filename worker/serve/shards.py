@@ -29,6 +29,7 @@ from schema.wire.arena_codec import (
     Rebuild,
     decode_advance_request,
     encode_advance_answer,
+    encode_live,
 )
 from worker.arena.changes import possible
 from worker.serve.checks import checked_arena
@@ -71,6 +72,16 @@ class World(Protocol):
         """Stop its threads."""
 
 
+class Outlet(Protocol):
+    """Interface of ``schema.agent.service.Outlet``."""
+
+    def has_listeners(self, key: str) -> bool:
+        """Return whether any viewer subscribes to a key."""
+
+    def put(self, key: str, data: bytes) -> None:
+        """Publish bytes."""
+
+
 @dataclass(slots=True)
 class _Held:
     """A shard after its latest advance; ``digest`` is empty before the first."""
@@ -89,7 +100,8 @@ class Shards:
         *,
         most_held: int = 16,
         threads: int = 1,
-        publish: Callable[[Live], None] = lambda _: None,
+        outlet: Outlet | None = None,
+        key_of: Callable[[int], str] = str,
     ) -> None:
         """Initialise without shards.
 
@@ -97,12 +109,13 @@ class Shards:
             world: class of the arenas.
             most_held: shards to keep; the least recently used is dropped first.
             threads: that step clusters of an arena; results do not depend on it.
-            publish: called with each advance, for live viewers.
+            outlet: publishes each advance for live viewers.
+            key_of: returns the key of a shard's advances.
         """
         self._world = world
         self._most_held = most_held
         self._threads = threads
-        self._publish = publish
+        self._outlet, self._key_of = outlet, key_of
         self._held: OrderedDict[Key, _Held] = OrderedDict()
 
     def answer(self, request: bytes) -> bytes:
@@ -142,6 +155,14 @@ class Shards:
         return encode_advance_answer(
             AdvanceAnswer(job.epoch, job.number, wall_s, advance, snapshot)
         )
+
+    def _publish(self, live: Live) -> None:
+        """Publish an advance; it is encoded only for viewers."""
+        if self._outlet is None:
+            return
+        key = self._key_of(live.shard)
+        if self._outlet.has_listeners(key):
+            self._outlet.put(key, encode_live(live))
 
     def _taken(self, job: AdvanceRequest) -> _Held | None:
         """Remove and return the state that a request starts from, if it is kept."""

@@ -17,13 +17,11 @@ from schema.wire.arena import Advance, Changes, Insertion
 from schema.wire.arena_codec import (
     AdvanceAnswer,
     AdvanceRequest,
-    Live,
     PastAdvance,
     Rebuild,
     decode_advance_answer,
     decode_live,
     encode_advance_request,
-    encode_live,
 )
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.serve.shards import Shards as AnyShards
@@ -210,15 +208,36 @@ def test_least_recently_used_shard_is_dropped_first() -> None:
     assert clients[2].ask(shards).advance is not None
 
 
-def test_each_advance_is_published() -> None:
-    seen: list[Live] = []
-    requester = lived(Shards(FakeWorld, publish=seen.append))
+KEYS = {0: "fleet/poses/0"}
+
+
+class Viewers:
+    """An outlet that keeps what is published while viewers are there."""
+
+    def __init__(self) -> None:
+        self.are_there = False
+        self.put_at: list[tuple[str, bytes]] = []
+
+    def has_listeners(self, key: str) -> bool:
+        return self.are_there and key in KEYS.values()
+
+    def put(self, key: str, data: bytes) -> None:
+        self.put_at.append((key, data))
+
+
+def test_each_advance_is_published_to_viewers() -> None:
+    outlet = Viewers()
+    lived(Shards(FakeWorld, outlet=outlet, key_of=KEYS.__getitem__))
+    assert outlet.put_at == []
+    outlet.are_there = True
+    requester = lived(Shards(FakeWorld, outlet=outlet, key_of=KEYS.__getitem__))
+    assert [key for key, _ in outlet.put_at] == [KEYS[0], KEYS[0]]
+    seen = [decode_live(data) for _, data in outlet.put_at]
     assert [(live.run, live.shard, live.advance.step) for live in seen] == [
         ("r", 0, 100),
         ("r", 0, 200),
     ]
     assert seen[1].advance.digest == requester.digest
-    assert decode_live(encode_live(seen[1])) == seen[1]
 
 
 def test_malformed_request_is_rejected() -> None:
