@@ -6,6 +6,7 @@ python -m docs.python_reference
 import inspect
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from types import FunctionType
 
@@ -51,7 +52,7 @@ def _entry(name: str) -> Iterator[str]:
         if key.startswith("_") or not inspect.getdoc(member):
             continue
         own = getattr(found, key)
-        if isinstance(member, property):
+        if isinstance(member, property | cached_property):
             yield from (f"### `{name}.{key}`", inspect.getdoc(member) or "", "")
         elif isinstance(member, FunctionType | classmethod):
             yield f"### `{name}.{key}`"

@@ -1,5 +1,6 @@
 """Measures by name, their parameters, and their contract."""
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -65,6 +66,7 @@ def test_own_measures_have_parameters(own: str) -> None:
         space=Space(), simulation=Simulation(), fitness=Fitness(), measures=measures
     )
     assert functions_of(settings).channels == ("contact",)
+    assert functions_of(msgspec.structs.replace(settings)) is functions_of(settings)
 
 
 @pytest.mark.parametrize(
