@@ -11,13 +11,15 @@ from math import inf
 
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.rules import (
+from coordinator.evolution.selection import (
+    Couple,
+    Individual,
+    cull_population,
     parents_rule,
     select_parents,
     select_survivors,
     survivors_rule,
 )
-from coordinator.evolution.selection import Couple, Individual, cull_population
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId

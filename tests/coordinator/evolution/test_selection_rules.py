@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from coordinator.evolution.kinds import check_parents, check_survivors
-from coordinator.evolution.rules import (
+from coordinator.evolution.selection import (
     PARENTS,
     SURVIVORS,
+    Individual,
     Tournament,
     parents_rule,
     select_parents,
     select_survivors,
     survivors_rule,
 )
-from coordinator.evolution.selection import Individual
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import Selection
 from schema.experiment.file import parse_experiment
