@@ -10,7 +10,7 @@ from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.encodings import IslandEncoding, encoding_of, outside_limits
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.variation import mate
+from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, UnknownPlugin
 from schema.experiment.document import Encoding, Experiment, Space
 from schema.parts import BUILT_IN
@@ -36,10 +36,10 @@ def thesis_genomes() -> tuple[Genome, Genome]:
 
 
 def test_the_thesis_encoding_draws_what_its_functions_draw() -> None:
-    encoding = encoding_of(THESIS)
+    encoding, thesis = encoding_of(THESIS), RevolveAngle(THESIS, BUILT_IN, None)
     first, second = thesis_genomes()
     assert encoding.random(rng(1), BirthId(0, 1)) == first
-    children = [mate(first, second, rng(k), THESIS, BIRTH) for k in range(9)]
+    children = [thesis.mate(first, second, rng(k), BIRTH) for k in range(9)]
     assert [encoding.mate(first, second, rng(k), BIRTH) for k in range(9)] == children
     child = next(filter(None, children))
     assert encoding.develop(child) == develop(child, encoding.types)
