@@ -77,7 +77,7 @@ class VettingQueue:
         if candidate is None or event.attempt < candidate.attempt:
             return []
         del self._in_vetting[number]
-        if event.is_viable:
+        if event.report and event.report.is_viable:
             self._viable[number] = candidate
             if number == self._next:
                 self.take_number()

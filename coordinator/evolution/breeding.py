@@ -4,7 +4,7 @@ Every candidate is a pure function of seed, run, birth, attempt and population.
 Attempts are numbered through all couples of a birth, so that each has its own stream.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import inf
@@ -49,15 +49,10 @@ class Candidate:
     robot: Robot
     learnt: Robot | None = None
 
-    def individual(
-        self,
-        generation: int | None,
-        fitness: float | None = 0.0,
-        measures: Mapping[str, float] | None = None,
-    ) -> Individual:
-        """Return the individual; its fitness is None if its evaluation failed."""
+    def individual(self, generation: int | None) -> Individual:
+        """Return the individual, before any evaluation."""
         parents = self.couple or ()
-        individual = Individual(
+        return Individual(
             self.birth,
             self.genome,
             fitness=0.0,
@@ -67,7 +62,6 @@ class Candidate:
             size=len(self.robot.parts),
             learnt=self.learnt,
         )
-        return individual.evaluated(fitness, measures)
 
 
 class Breeder:

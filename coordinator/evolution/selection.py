@@ -21,6 +21,7 @@ from schema.experiment.selection_rules import own_rule
 from schema.plugins.origin import raised_by, where_defined
 from schema.plugins.protocols import ParentSelection, Selectable, SurvivorSelection
 from schema.robot.ids import BirthId
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 
 Couple = tuple["Individual", "Individual"]
@@ -56,20 +57,21 @@ class Individual:
     learnt: Robot | None = None
 
     def evaluated(
-        self, fitness: float | None, measures: Mapping[str, float] | None = None
+        self, evaluation: Evaluation | None, labels: Sequence[str]
     ) -> "Individual":
         """Return the individual with the results of an evaluation.
 
         Args:
-            fitness: None where its evaluation failed.
-            measures: of the evaluation; None keeps those of an earlier one.
+            evaluation: None if it failed.
+            labels: names of its measures.
         """
-        value = 0.0 if fitness is None else fitness
+        if evaluation is None:
+            return replace(self, fitness=0.0, has_failed=True, measures={})
         return replace(
             self,
-            fitness=value,
-            has_failed=fitness is None,
-            measures=self.measures if measures is None else measures,
+            fitness=evaluation.fitness,
+            has_failed=False,
+            measures=dict(zip(labels, evaluation.measures, strict=True)),
         )
 
     @property
