@@ -2,8 +2,7 @@
 
 from dataclasses import replace
 
-from coordinator.arena.living import LivingRobots
-from coordinator.arena.rows import Moment, death_record
+from coordinator.arena.living import LivingRobots, Moment, death_record
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose
 from coordinator.evolution.selection import Individual
