@@ -18,10 +18,10 @@ from coordinator.arena.living import (
     touch_records,
 )
 from coordinator.arena.orders import Orders, inserted
-from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose
-from coordinator.evolution.selection import Individual, select_culled
+from coordinator.evolution.selection import select_culled
 from coordinator.islands.events import (
     Advanced,
     AdvanceShard,

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from math import inf
 
-from coordinator.evolution.breeding import Breeder, Candidate
-from coordinator.evolution.selection import Couple, Individual
+from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.islands.events import Verdict, Vet
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment

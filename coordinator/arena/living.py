@@ -9,8 +9,8 @@ from functools import partial
 from math import cos, dist, isfinite, sin, tau
 from typing import NamedTuple
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Record
 from coordinator.islands.rows import named, named_measures
 from schema.experiment.document import Arena

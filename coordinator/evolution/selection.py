@@ -1,4 +1,4 @@
-"""Selection: individuals, the choice of parents and of survivors, and culling.
+"""Selection: the choice of parents and of survivors, and culling.
 
 A rule of selection, built-in or of a user, gets a population and returns places in it;
 ``schema.plugins.protocols`` says what. The answer of a rule is checked before it is
@@ -6,10 +6,10 @@ used.
 Source: Hupkes 2016, sections 5.3 and 8.2; the code of the original.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import fsum
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from msgspec import Struct
@@ -20,67 +20,11 @@ from schema.experiment.document import Arena, Culling, Selection
 from schema.experiment.selection_rules import own_rule
 from schema.plugins.origin import raised_by, where_defined
 from schema.plugins.protocols import ParentSelection, Selectable, SurvivorSelection
-from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation
-from schema.robot.robot import Robot
 
-Couple = tuple["Individual", "Individual"]
+S = TypeVar("S", bound=Selectable)
 
 
-@dataclass(frozen=True, slots=True)
-class Individual:
-    """Member of a population.
-
-    Attributes:
-        birth: its id.
-        genome: what its children inherit, of the type that the encoding uses.
-        fitness: always maximised; 0 where its evaluation failed.
-        rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
-        generation: number of its brood; founders are 0; None on-line.
-        has_failed: its evaluation ended without a fitness.
-        parents: birth ids of its parents; empty for a random robot.
-        size: number of parts of its body.
-        measures: of its evaluation, by name.
-        learnt: the robot with the brain that it learnt, if it did and its genome has
-            another one.
-    """
-
-    birth: BirthId
-    genome: object
-    fitness: float
-    rank: int
-    generation: int | None
-    has_failed: bool = False
-    parents: tuple[BirthId, ...] = ()
-    size: int = 0
-    measures: Mapping[str, float] = field(default_factory=dict, hash=False)
-    learnt: Robot | None = None
-
-    def evaluated(
-        self, evaluation: Evaluation | None, labels: Sequence[str]
-    ) -> "Individual":
-        """Return the individual with the results of an evaluation.
-
-        Args:
-            evaluation: None if it failed.
-            labels: names of its measures.
-        """
-        if evaluation is None:
-            return replace(self, fitness=0.0, has_failed=True, measures={})
-        return replace(
-            self,
-            fitness=evaluation.fitness,
-            has_failed=False,
-            measures=dict(zip(labels, evaluation.measures, strict=True)),
-        )
-
-    @property
-    def known_fitness(self) -> float | None:
-        """Its fitness; None where its evaluation failed."""
-        return None if self.has_failed else self.fitness
-
-
-def fittest_first(individuals: Sequence[Individual]) -> list[Individual]:
+def fittest_first(individuals: Sequence[S]) -> list[S]:
     """Return individuals by descending fitness; of equals the elder comes first."""
     return sorted(individuals, key=_order)
 
@@ -177,8 +121,8 @@ def survivors_rule(selection: Selection) -> Rule:
 
 
 def select_parents(
-    population: Sequence[Individual], rng: np.random.Generator, rule: Rule
-) -> Couple:
+    population: Sequence[S], rng: np.random.Generator, rule: Rule
+) -> tuple[S, S]:
     """Return two different parents, the one that gives its root first.
 
     Args:
@@ -194,12 +138,12 @@ def select_parents(
 
 
 def select_survivors(
-    parents: Sequence[Individual],
-    children: Sequence[Individual],
+    parents: Sequence[S],
+    children: Sequence[S],
     rng: np.random.Generator,
     selection: Selection,
     rule: Rule,
-) -> tuple[Individual, ...]:
+) -> tuple[S, ...]:
     """Return the next population of constant size, in birth order.
 
     Args:
@@ -288,11 +232,11 @@ SURVIVORS: dict[str, SurvivorSelection] = {"best": best, "random": random_surviv
 
 
 def cull_population(
-    parents: Sequence[Individual],
-    children: Sequence[Individual],
+    parents: Sequence[S],
+    children: Sequence[S],
     founders: int,
     rules: Culling,
-) -> tuple[Individual, ...]:
+) -> tuple[S, ...]:
     """Return the next population of varying size, in birth order.
 
     The rule is that of an arena, with births as its clock. A full arena waits for its
@@ -314,9 +258,7 @@ def cull_population(
     return tuple(one for one in living if one not in culled)
 
 
-def select_culled(
-    mature: Sequence[Individual], rules: Arena | Culling
-) -> tuple[str, list[Individual]]:
+def select_culled(mature: Sequence[S], rules: Arena | Culling) -> tuple[str, list[S]]:
     """Return the robots to cull and the reason, the least fit first.
 
     Robots below a share of the mean fitness are culled ("selection"). If there are

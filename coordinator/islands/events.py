@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from msgspec import Struct
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.learners.learner import Batch, Points
-from coordinator.evolution.selection import Individual
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report

@@ -9,9 +9,8 @@ Source: Hupkes 2016, section 5.3; the code of the original.
 from dataclasses import dataclass
 from math import isfinite
 
-from coordinator.evolution.breeding import Breeder, Candidate
+from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
     Answered,
     Asked,

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Emigrate,
     Evaluate,

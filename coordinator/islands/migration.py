@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import Individual, fittest_first
+from coordinator.evolution.selection import fittest_first
 from coordinator.islands.events import (
     Emigrate,
     Immigrated,

@@ -12,9 +12,9 @@ from math import fsum
 
 from msgspec import structs
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Evaluate,
     IslandCommand,

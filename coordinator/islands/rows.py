@@ -4,9 +4,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import IslandEncoding
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.parts import BodySpace
 from schema.robot.genome import Node, walk

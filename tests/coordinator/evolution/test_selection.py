@@ -7,8 +7,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.selection import (
-    Individual,
     cull_population,
     fittest_first,
     parents_rule,

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.kinds import check_parents, check_survivors
 from coordinator.evolution.selection import (
     PARENTS,
     SURVIVORS,
-    Individual,
     Tournament,
     parents_rule,
     select_parents,
