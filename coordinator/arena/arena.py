@@ -20,7 +20,6 @@ from coordinator.arena.living import (
 from coordinator.arena.orders import Orders, inserted
 from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.random_streams import Purpose
 from coordinator.evolution.selection import select_culled
 from coordinator.islands.events import (
     Advanced,
@@ -38,7 +37,6 @@ from coordinator.islands.events import (
     Verdict,
 )
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.rows import birth_record, population_records
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, steps_of
 
@@ -309,20 +307,11 @@ class Arena:
         Returns:
             The rows of its birth; the first request to its learner if it learns.
         """
-        birth = candidate.birth
-        individual = candidate.individual(generation=None)
-        place = place or self._living.random_place(birth, Purpose.PLACE)
-        self._living.insert(individual, candidate.robot, place)
         self.births += 1
-        now_s = self.clock.seconds(self.step)
-        born = birth_record(
-            candidate, individual, self.encoding, sim_time_s=now_s, place=place
-        )
-        fitness = [(one.birth, one.known_fitness) for one in self._living]
-        population = population_records(self._number, self.births, fitness)
+        rows = self._living.add_newborn(candidate, self.encoding, self._moment, place)
         if self._infancy is None:
-            return [born, *population]
-        return [born, *population, *self._infancy.begin(candidate, self.step)]
+            return [*rows]
+        return [*rows, *self._infancy.begin(candidate, self.step)]
 
     @property
     def _moment(self) -> Moment:

@@ -1,6 +1,6 @@
 """Living robots of an arena, their places, and the changes that await an advance.
 
-Their table rows are made here, too, besides those of births and migrations.
+Their table rows are made here, too, besides those of migrations.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -9,10 +9,16 @@ from functools import partial
 from math import cos, dist, isfinite, sin, tau
 from typing import NamedTuple
 
-from coordinator.evolution.breeding import Individual
+from coordinator.evolution.breeding import Candidate, Individual
+from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.islands.events import Record
-from coordinator.islands.rows import named, named_measures
+from coordinator.islands.rows import (
+    birth_record,
+    named,
+    named_measures,
+    population_records,
+)
 from schema.experiment.document import Arena
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -125,6 +131,31 @@ class LivingRobots:
         """Return a random place away from the living; the name is that of a stream."""
         draws = BufferedRng(self._stream(name, 0, purpose))
         return draw_place(draws, [one.position[:2] for one in self], self._rules)
+
+    def add_newborn(
+        self,
+        candidate: Candidate,
+        encoding: IslandEncoding,
+        moment: Moment,
+        place: Place | None = None,
+    ) -> list[Record]:
+        """Insert a newborn; return the rows of its birth and of the population.
+
+        Args:
+            candidate: the newborn.
+            encoding: of the arena.
+            moment: of its birth, which counts.
+            place: where; random if None.
+        """
+        individual = candidate.individual(generation=None)
+        place = place or self.random_place(candidate.birth, Purpose.PLACE)
+        self.insert(individual, candidate.robot, place)
+        now_s = moment.sim_time_s
+        born = birth_record(
+            candidate, individual, encoding, sim_time_s=now_s, place=place
+        )
+        fitness = [(one.birth, one.known_fitness) for one in self]
+        return [born, *population_records(moment.island, moment.births, fitness)]
 
     def insert(self, individual: Individual, robot: Robot, place: Place) -> None:
         """Insert a robot."""
