@@ -17,8 +17,7 @@ import zenoh
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
 from coordinator.dispatch.faults import FaultKind, PeerFaults
-from coordinator.network.info_queue import InfoQueue
-from coordinator.network.membership import Membership
+from coordinator.network.membership import InfoQueue, Membership
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
 from schema.agent.log import tell_user, warn_user
@@ -276,7 +275,7 @@ class Network:
             agent: that has joined; if it has left since, the job is lost.
             payload: an encoded request.
         """
-        if member := self._membership.member(agent):
+        if member := self._membership.joined.get(agent):
             asked = _Asked(member, number, self._inbox)
             self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
         else:
@@ -290,12 +289,12 @@ class Network:
             agent: that was given the job, and may have left.
             payload: the encoded request.
         """
-        if member := self._membership.member(agent):
+        if member := self._membership.joined.get(agent):
             self._session.put(member.cancelled, payload)
 
     def ask(self, agent: str, /) -> None:
         """Ask an agent for its progress; ``receive`` returns a report, if any."""
-        if member := self._membership.member(agent):
+        if member := self._membership.joined.get(agent):
             self._ask_info(member)
 
     def _ask(
@@ -326,8 +325,8 @@ class Network:
         if not self._is_hub and now_s >= self._look_s:
             self._look_s = now_s + _LOOK_S
             self._hub.seen(is_there=bool(self._session.info.routers_zid()))
-        while member := self._info_queue.take(began_s := time.monotonic()):
-            self._ask_info(member)
+        while (began_s := time.monotonic()) >= self._info_queue.due_s:
+            self._ask_info(self._info_queue.take())
             self._info_queue.spent(began_s, time.monotonic())
         events: list[DispatchEvent] = []
         time.sleep(pause_s)
@@ -455,7 +454,7 @@ class Network:
     def _returned(self, asked: _Asked) -> list[DispatchEvent]:
         number, agent, reply = asked.number, asked.member.name, asked.reply
         if reply is None:
-            if self._membership.member(agent):
+            if agent in self._membership.joined:
                 # It may be gone although its token is not: another process can
                 # declare the same one.
                 self._info_queue.add(asked.member)
