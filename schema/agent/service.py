@@ -20,12 +20,11 @@ from typing import Any
 import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
-from schema.agent.job_watch import LOOK_S
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import FairQueue, ReplyCounts, Server
-from schema.agent.supervision import ProcessSlot
+from schema.agent.supervision import LOOK_S, ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.errors import NetworkError, counted
