@@ -30,8 +30,7 @@ from coordinator.run.advance_checks import (
     read_poses,
 )
 from coordinator.run.requests import read_evaluation, read_vetting
-from coordinator.storage.journal import decode_record
-from coordinator.storage.journal_codec import decode_entry, encode_entry
+from coordinator.storage.journal import decode_entry, decode_record, encode_entry
 from schema.agent.network import Agent
 from schema.agent.request_handler import Server
 from schema.agent.topics import Member, member_of
