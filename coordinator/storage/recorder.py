@@ -9,21 +9,23 @@ import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import pyarrow as pa
 import pyarrow.parquet
 
 from coordinator.islands.events import Append, Record
 from coordinator.storage.disk import (
+    AppendedFile,
     install_durably,
     new_path,
     storage_errors,
     write_durably,
 )
 from coordinator.storage.folder import RunDetails
-from coordinator.storage.segment import Segment, cut_segment, remove_segment
+from coordinator.storage.removal import cut_segment, remove_rows, remove_segment
 from schema.errors import MalformedMessage, RunFolderError
-from schema.tables.checksums import digest_of
+from schema.tables.checksums import CHECK, FIELDS, MAGIC, digest_of, sums_path
 from schema.tables.columns import ROWS, TABLES
 from schema.tables.description import run_columns
 from schema.tables.files import (
@@ -34,7 +36,7 @@ from schema.tables.files import (
     stored_rows,
 )
 from schema.tables.received import read_columns
-from schema.tables.segments import SEGMENTS, read_segment, segment_path, segments_of
+from schema.tables.segments import SEGMENTS, segment_path, segments_of
 
 _LOG = logging.getLogger(__name__)
 
@@ -259,7 +261,7 @@ class TableFile:
     def keep(self, rows: int) -> None:
         """Remove all rows on disk from a number on, which must start a batch."""
         if self._stored > rows:
-            _remove_rows(self._folder, self._name, rows)
+            remove_rows(self._folder, self._name, rows)
             self._stored = rows
 
     def flush(self) -> None:
@@ -335,7 +337,7 @@ class TableFile:
             {name: table[name].combine_chunks() for name in table.column_names}, rows
         )
 
-    def _opened(self) -> Segment:
+    def _opened(self) -> "Segment":
         """Return a new segment that contains the schema."""
         numbers = [number for number, _ in segments_of(self._folder, self._name)]
         path = segment_path(self._folder, self._name, max(numbers, default=-1) + 1)
@@ -373,20 +375,54 @@ def _aside(parquet: Path) -> Path:
     return parquet.with_name(f"{parquet.name}.damaged")
 
 
-def _remove_rows(folder: Path, table: str, rows: int) -> None:
-    """Remove all rows of a table from a number on, which must start a batch.
+class Segment:
+    """A new segment of a table, open for appending."""
 
-    Raises:
-        RunFolderError: it does not start a batch, or the disk fails.
-    """
-    seen = 0
-    for _, path in segments_of(folder, table):
-        kept = None
-        for batch in read_segment(folder, table, path):
-            if batch.numbers.start < rows:
-                kept, seen = batch, max(seen, batch.numbers.stop)
-        cut_segment(path, kept)
-    if seen != rows:
-        raise RunFolderError(
-            f"{folder / SEGMENTS}: {table}: row {rows} must start a batch, got {seen}"
-        )
+    def __init__(self, path: Path, schema: pa.Schema, *, fsync: bool = False) -> None:
+        """Create the files of a segment, with its schema.
+
+        Args:
+            path: of the segment; neither it nor its checksums exist.
+            schema: of its rows.
+            fsync: survive power loss, too.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
+        # In this order, a segment without checksums is always damage.
+        self._sums = AppendedFile(sums_path(path), fsync=fsync)
+        self._file = AppendedFile(path, fsync=fsync)
+        try:
+            self._sums.append(MAGIC)
+            self._append(schema.serialize())
+        except RunFolderError:
+            self.close()
+            raise
+
+    def append(self, batch: pa.RecordBatch) -> None:
+        """Append a batch, all or nothing.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
+        self._append(batch.serialize())
+
+    def _append(self, message: pa.Buffer) -> None:
+        data = memoryview(message)
+        self._file.append(data)
+        try:
+            self._sums.append(_record(self._file.size, data))
+        except RunFolderError:
+            self._file.cut(self._file.size - len(data))
+            raise
+
+    def close(self) -> None:
+        """Close both files."""
+        self._file.close()
+        self._sums.close()
+
+
+def _record(end: int, message: memoryview) -> bytes:
+    """Return the checksum record of a message that ends at a byte of its segment."""
+    fields = FIELDS.pack(end, crc32(message))
+    return fields + CHECK.pack(crc32(fields))
