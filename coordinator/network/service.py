@@ -4,8 +4,10 @@ The network's threads only enqueue. One thread calls ``send`` and ``receive`` an
 events in the order of their arrival.
 """
 
+import ctypes
 import json
 import math
+import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -18,6 +20,7 @@ import zenoh
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
 from coordinator.dispatch.faults import FaultKind, PeerFaults
 from coordinator.network.membership import InfoQueue, Membership
+from coordinator.network.operator_service import Queries
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
 from schema.agent.log import tell_user, warn_user
@@ -37,7 +40,6 @@ from schema.agent.platform_tag import wire_version
 from schema.agent.service import (
     HubWatch,
     Outlet,
-    keep_thread_state,
     log_engine,
     session_config,
 )
@@ -46,9 +48,6 @@ from schema.errors import MalformedMessage, NetworkError
 from schema.limits import (
     LONGEST_REASON,
     MOST_ASKED_INFOS,
-    MOST_QUERIES,
-    MOST_QUERY_BYTES,
-    OPERATOR_REQUEST_BYTES,
     printable,
 )
 
@@ -59,6 +58,7 @@ _MOST_NEWS = 10_000
 _LOOK_S = 1.0
 # Properties that are malformed are hardly better after a second.
 _MALFORMED_SILENCES = 5
+_THREAD = threading.local()
 
 
 @dataclass(slots=True)
@@ -81,7 +81,7 @@ class _Asked:
 
     def take(self, reply: zenoh.Reply) -> None:
         """Pass the first reply on at once: another process may never end its own."""
-        keep_thread_state()
+        _keep_thread_state()
         replier = reply.replier_id
         if replier is None:
             return  # of the engine itself, after the timeout
@@ -128,20 +128,6 @@ _News = _Told | None
 """What ``receive`` waits for; None only ends its wait."""
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
-    """A query of an operator or a viewer; call ``reply`` once."""
-
-    data: bytes
-    query: zenoh.Query
-    key: str
-
-    def reply(self, data: bytes) -> None:
-        """Reply, whether the other process still waits or not."""
-        with self.query as query:
-            query.reply(self.key, data)
-
-
 class Network:
     """A coordinator's end of the network; use it in a ``with``.
 
@@ -149,6 +135,7 @@ class Network:
         address: where agents connect to.
         own_address: where this user's processes on this machine connect to.
         faults: counts of what agents sent and nothing used.
+        queries: of operators and viewers; ``receive`` takes them.
     """
 
     def __init__(
@@ -197,9 +184,7 @@ class Network:
         self._membership = Membership(wire_version(), self.faults)
         self._info_queue = InfoQueue()
         self._asked_infos: set[Member] = set()
-        self._orders: list[Order] = []
-        self._order_bytes = 0
-        self._onlookers: list[Order] = []
+        self.queries = Queries(self._me.state, self.faults)
         self._outlet = Outlet()
 
     @property
@@ -342,17 +327,6 @@ class Network:
             pass
         return events
 
-    def orders(self) -> list[Order]:
-        """Return the operators' queries since the last call; ``receive`` takes them."""
-        orders, self._orders = self._orders, []
-        self._order_bytes = 0
-        return orders
-
-    def onlookers(self) -> list[Order]:
-        """Return the viewers' queries for the whole run since the last call."""
-        onlookers, self._onlookers = self._onlookers, []
-        return onlookers
-
     @property
     def has_viewers(self) -> bool:
         """A viewer subscribes to the news."""
@@ -369,7 +343,7 @@ class Network:
     def _understand(self, news: _Told) -> Sequence[DispatchEvent]:
         """Return the dispatch events of a message, if any."""
         if isinstance(news, _Queried):
-            self._queried(news.query, news.key)
+            self.queries.add(news.query, news.key)
             return []
         if isinstance(news, _Stray):
             about = "properties" if news.number < 0 else f"job {news.number}"
@@ -385,25 +359,6 @@ class Network:
             peer = news.member.name if isinstance(news, _Asked) else "a token"
             self.faults.note("malformed", peer, str(error))
             return []
-
-    def _queried(self, query: zenoh.Query, key: str) -> None:
-        """Keep a query of an operator or a viewer until it is asked for."""
-        is_onlooker = key == self._me.state
-        asked = self._onlookers if is_onlooker else self._orders
-        peers = "viewers" if is_onlooker else "operators"
-        payload = query.payload
-        size = 0 if payload is None else len(payload)
-        if size > OPERATOR_REQUEST_BYTES:
-            self.faults.note("malformed", peers, f"{size} bytes")
-        elif len(asked) >= MOST_QUERIES or self._order_bytes + size > MOST_QUERY_BYTES:
-            self.faults.note("crowd", peers, f"{len(asked)} queries wait")
-        else:
-            # Viewers say nothing.
-            data = b"" if payload is None or is_onlooker else payload.to_bytes()
-            self._order_bytes += len(data)
-            asked.append(Order(data, query, key))
-            return
-        query.drop()  # type: ignore[no-untyped-call]
 
     def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
         key = str(sample.key_expr)
@@ -469,6 +424,17 @@ class Network:
         outcome, text = _outcome(told)
         reason = printable(text, LONGEST_REASON) or "no reason given"
         return [Returned(number, agent, outcome, reason=reason)]
+
+
+def _keep_thread_state() -> None:
+    """Keep the Python state of the calling thread, one of Zenoh's, until it ends.
+
+    Python otherwise maps and unmaps memory for the state at each callback, which takes
+    longer than a short callback.
+    """
+    if not hasattr(_THREAD, "has_state"):
+        _THREAD.has_state = True
+        ctypes.pythonapi.PyGILState_Ensure()
 
 
 def _outcome(
