@@ -190,7 +190,7 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
     for fallen in advance.casualties:
         if not last <= fallen.step <= expected.until:
             raise impossible(
-                f"casualty {names([fallen.birth])}: step must be in "
+                f"casualty {_names([fallen.birth])}: step must be in "
                 f"{last}..{expected.until}, got {fallen.step}"
             )
         last = fallen.step
@@ -206,9 +206,9 @@ def _check_robots(advance: Advance, born: Mapping[BirthId, Inserted]) -> None:
     reported = {*judged, *(one.birth for one in advance.casualties)}
     problems = []
     if unknown := reported - born.keys():
-        problems.append(f"unknown {names(unknown)}")
+        problems.append(f"unknown {_names(unknown)}")
     if missing := born.keys() - reported:
-        problems.append(f"missing {names(missing)}")
+        problems.append(f"missing {_names(missing)}")
     if len(reported) < len(advance.judgements) + len(advance.casualties):
         problems.append("a robot is reported twice")
     if problems:
@@ -218,7 +218,7 @@ def _check_robots(advance: Advance, born: Mapping[BirthId, Inserted]) -> None:
 
 
 def _check_judgement(one: Judgement, expected: ExpectedAdvance) -> None:
-    name, robot = names([one.birth]), expected.born[one.birth]
+    name, robot = _names([one.birth]), expected.born[one.birth]
     simulation = expected.experiment.simulation
     age_s = (expected.until - robot.step) * simulation.timestep_s
     if one.age_s != age_s:
@@ -252,7 +252,7 @@ def _check_place(one: Judgement | Casualty) -> None:
     place: Vector = one.place
     if max(map(abs, place)) > GREATEST_COORDINATE:
         raise impossible(
-            f"robot {names([one.birth])}: coordinates must be within "
+            f"robot {_names([one.birth])}: coordinates must be within "
             f"{GREATEST_COORDINATE:g} m, got {place}"
         )
 
@@ -268,11 +268,11 @@ def _check_touches(touches: Sequence[Touch], expected: ExpectedAdvance) -> None:
         pair = (touch.first, touch.second)
         if touch.first == touch.second or not expected.born.keys() >= set(pair):
             raise impossible(
-                f"touch: must be of two robots that live here, got {names(pair)}"
+                f"touch: must be of two robots that live here, got {_names(pair)}"
             )
         if not 0.0 < touch.duration_s <= longest_s:
             raise impossible(
-                f"touch of {names(pair)}: must take up to {longest_s:g} s, "
+                f"touch of {_names(pair)}: must take up to {longest_s:g} s, "
                 f"got {touch.duration_s} s"
             )
     pairs = [(touch.first, touch.second) for touch in touches]
@@ -302,21 +302,21 @@ def read_poses(columns: bytes, advance: Advance, expected: ExpectedAdvance) -> p
             continue
         if (least, most) != (robot.joints, robot.joints):
             raise impossible(
-                f"poses: robot {names([birth])} must have {robot.joints} angles"
+                f"poses: robot {_names([birth])} must have {robot.joints} angles"
             )
     for one in advance.judgements:
         if found.pop(one.birth, _NO_POSES)[0] != len(expected.samples):
             raise impossible(
-                f"poses: robot {names([one.birth])} must have {len(expected.samples)}"
+                f"poses: robot {_names([one.birth])} must have {len(expected.samples)}"
             )
     for fallen in advance.casualties:
         before = sum(step <= fallen.step for step in expected.samples)
         if found.pop(fallen.birth, _NO_POSES)[0] > before:
             raise impossible(
-                f"poses: robot {names([fallen.birth])} must have <= {before}"
+                f"poses: robot {_names([fallen.birth])} must have <= {before}"
             )
     if found:
-        raise impossible(f"poses: robots {names(found)} do not live here")
+        raise impossible(f"poses: robots {_names(found)} do not live here")
     return rows
 
 
@@ -412,7 +412,7 @@ def place_poses(columns: bytes, poses: pa.Table, island: int) -> bytes:
     return bytes(sink.getvalue().to_pybytes())
 
 
-def names(births: Iterable[BirthId]) -> str:
+def _names(births: Iterable[BirthId]) -> str:
     """Return the first of some births as text, and how many more there are."""
     ordered = sorted(births)
     shown = ", ".join(f"{one.island}/{one.number}" for one in ordered[:_SHOWN])

@@ -197,36 +197,6 @@ def is_quarantined(event: EvaluationFailed) -> bool:
     return event.reason.startswith(QUARANTINED)
 
 
-def _event(end: Deliver) -> Answered:
-    """Return the island's event for the end of a job.
-
-    Raises:
-        JobRefused: several agents cannot do it.
-    """
-    job, request, reason = end.job, end.job.subject, end.reason
-    assert isinstance(request, Vet | Evaluate)
-    birth = request.birth
-    if reason and not end.is_deadly:
-        raise JobRefused(
-            f"birth {birth.number}: several agents cannot {job.kind} it, the last "
-            f"of them {end.agent}: {reason}; fix that and resume"
-        )
-    wall_s, result = 0.0, None
-    if isinstance(end.answer, Answer):
-        wall_s, result = end.answer.wall_s, end.answer.result
-    if isinstance(request, Vet):
-        if isinstance(result, Report):
-            return Vetted(birth, request.attempt, result)
-        why = f"the analyzer {reason}" if reason else str(result)
-        return VettingFailed(birth, request.attempt, why)
-    provenance = Provenance(end.agent, end.platform, wall_s)
-    trial, requester = request.trial, request.requester
-    if isinstance(result, Evaluation):
-        return Evaluated(birth, result, provenance, trial, requester)
-    why = f"{QUARANTINED}{reason}" if reason else str(result)
-    return EvaluationFailed(birth, why, provenance, trial, requester)
-
-
 def read_vetting(
     data: bytes, *, expected: Expected, robot: Robot, space: BodySpace
 ) -> Answer:
@@ -322,6 +292,41 @@ def check_count(measures: Sequence[float], wanted: int) -> None:
         raise impossible(f"measures: must be {wanted} numbers, got {len(measures)}")
 
 
+def impossible(why: str) -> MalformedMessage:
+    """Return the error of an answer that contradicts its request."""
+    return MalformedMessage(why, "impossible")
+
+
+def _event(end: Deliver) -> Answered:
+    """Return the island's event for the end of a job.
+
+    Raises:
+        JobRefused: several agents cannot do it.
+    """
+    job, request, reason = end.job, end.job.subject, end.reason
+    assert isinstance(request, Vet | Evaluate)
+    birth = request.birth
+    if reason and not end.is_deadly:
+        raise JobRefused(
+            f"birth {birth.number}: several agents cannot {job.kind} it, the last "
+            f"of them {end.agent}: {reason}; fix that and resume"
+        )
+    wall_s, result = 0.0, None
+    if isinstance(end.answer, Answer):
+        wall_s, result = end.answer.wall_s, end.answer.result
+    if isinstance(request, Vet):
+        if isinstance(result, Report):
+            return Vetted(birth, request.attempt, result)
+        why = f"the analyzer {reason}" if reason else str(result)
+        return VettingFailed(birth, request.attempt, why)
+    provenance = Provenance(end.agent, end.platform, wall_s)
+    trial, requester = request.trial, request.requester
+    if isinstance(result, Evaluation):
+        return Evaluated(birth, result, provenance, trial, requester)
+    why = f"{QUARANTINED}{reason}" if reason else str(result)
+    return EvaluationFailed(birth, why, provenance, trial, requester)
+
+
 def _check_report(report: Report, robot: Robot, space: BodySpace) -> None:
     count = len(robot.parts)
     pairs = report.intersections
@@ -350,8 +355,3 @@ def _check_report(report: Report, robot: Robot, space: BodySpace) -> None:
         raise impossible(
             f"report: mass must be in (0, {GREATEST_MASS:g}] kg, got {report.mass}"
         )
-
-
-def impossible(why: str) -> MalformedMessage:
-    """Return the error of an answer that contradicts its request."""
-    return MalformedMessage(why, "impossible")
