@@ -16,8 +16,7 @@ import msgspec
 
 from coordinator.dispatch.events import Deliver
 from coordinator.network.service import Network
-from coordinator.run.answer_checks import read_evaluation
-from coordinator.run.requests import QUARANTINED
+from coordinator.run.requests import QUARANTINED, read_evaluation
 from revolve.children import plugins as allowed_plugins
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for

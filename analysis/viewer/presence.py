@@ -38,7 +38,8 @@ class Presence:
             now_s: time of a monotonic clock [s].
         """
         was_there, self.is_hub_there = self.is_hub_there, bool(hubs)
-        if not was_there and hubs:
+        # A hub that is started again soon has another id.
+        if hubs and not (was_there and hubs & self._hubs):
             self._gone_s, self._patience_s = None, PATIENCE_S
         if self._watched is None:
             pass

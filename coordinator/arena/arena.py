@@ -9,15 +9,18 @@ of the original.
 
 from coordinator.arena.arena_migration import ArenaMigration
 from coordinator.arena.candidates import VettingQueue
-from coordinator.arena.clock import ArenaClock
 from coordinator.arena.infancy import Infancy
-from coordinator.arena.living import LivingRobots, Place
+from coordinator.arena.living import (
+    LivingRobots,
+    Moment,
+    Place,
+    death_record,
+    touch_records,
+)
 from coordinator.arena.orders import Orders, inserted
-from coordinator.arena.rows import Moment, death_record, sample_records, touch_records
-from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.random_streams import Purpose
-from coordinator.evolution.selection import Individual, select_culled
+from coordinator.evolution.selection import select_culled
 from coordinator.islands.events import (
     Advanced,
     AdvanceShard,
@@ -34,9 +37,8 @@ from coordinator.islands.events import (
     Verdict,
 )
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.rows import birth_record, population_records
 from schema.errors import ExperimentError, UnexpectedEvent
-from schema.experiment.document import Experiment
+from schema.experiment.document import Experiment, steps_of
 
 
 class Arena:
@@ -74,7 +76,7 @@ class Arena:
         self.is_finished = self.is_extinct = False
         self.experiment = experiment
         self._rules = rules
-        self.clock = ArenaClock(rules, experiment.simulation)
+        self.clock = ArenaClock(experiment)
         self.encoding = encoding_of(experiment)
         self._parents_needed = experiment.selection.parents_needed
         self._number = number
@@ -82,7 +84,12 @@ class Arena:
         self._living = LivingRobots(
             rules, experiment.measures.labels, seed=seed, run=run
         )
-        self._infancy = Infancy(experiment, self.encoding, self.clock, self._living)
+        learning = experiment.learning
+        self._infancy = (
+            Infancy(experiment, self.encoding, self._living)
+            if learning and learning.budget > 1
+            else None
+        )
         self._orders = Orders(experiment, self._living, self._infancy)
         self._migration = (
             None if epochs is None else ArenaMigration(experiment, epochs, self._living)
@@ -152,7 +159,7 @@ class Arena:
     def _asked(self, event: Asked) -> list[ArenaCommand]:
         """Take what a learner wants to try; duplicates are ignored."""
         birth = event.birth
-        if not self._infancy.is_on:
+        if self._infancy is None:
             raise self._unexpected(event, "it has no learners")
         if birth.island != self._number or not self._vetting_queue.has_taken(birth):
             raise self._unexpected(event, "no such robot has been born")
@@ -196,7 +203,8 @@ class Arena:
             moment = self._moment._replace(sim_time_s=died_s)
             commands.append(death_record(casualty, "diverged", moment))
         self._living.update(advance)
-        commands += self._infancy.end_trials(event, self._moment)
+        if self._infancy is not None:
+            commands += self._infancy.end_trials(event, self._moment)
         return commands + self._decide()
 
     def _decide(self) -> list[ArenaCommand]:
@@ -207,9 +215,7 @@ class Arena:
                 commands += self._insert(self._founders.pop())
             return commands + self._conclude()
         if self.step % self.clock.sample == 0:
-            commands += sample_records(
-                self._living, self._moment, self.experiment.measures.labels
-            )
+            commands += self._living.sample(self._moment)
         if self.step % self.clock.birth == 0:
             self.is_extinct = not self._orders.insertions and (
                 len(self._living) < self._parents_needed
@@ -243,7 +249,7 @@ class Arena:
             order = orders.insertions.pop(0)
             birth = self._vetting_queue.take_number()
             commands += self._insert(inserted(order, birth, self.encoding), order.place)
-        if self._infancy.is_waiting:
+        if self._infancy is not None and self._infancy.is_waiting:
             return commands
         if self._migration is not None and not self._founders:
             commands += self._migration.exchange(self._moment)
@@ -260,7 +266,8 @@ class Arena:
     def _finish(self) -> list[Record | Finish]:
         self.is_finished = True
         links = self._migration.epochs.links.neighbours if self._migration else ()
-        return [*self._infancy.close(), Finish(self._number, links)]
+        trials = self._infancy.close() if self._infancy is not None else []
+        return [*trials, Finish(self._number, links)]
 
     def _migrated(self, event: MigrationEvent) -> list[ArenaCommand]:
         """Handle an event of a neighbour; a finished arena ignores it."""
@@ -283,7 +290,8 @@ class Arena:
     def _advance(self) -> AdvanceShard:
         clock, step = self.clock, self.step
         until = clock.next_decision(step, is_founding=bool(self._founders))
-        until = self._infancy.next_end(until)
+        if self._infancy is not None:
+            until = self._infancy.next_end(until)
         changes = self._living.take_changes()
         is_saved = clock.is_snapshot_due(step, until)
         self._awaited = AdvanceShard(
@@ -299,19 +307,11 @@ class Arena:
         Returns:
             The rows of its birth; the first request to its learner if it learns.
         """
-        birth = candidate.birth
-        individual = candidate.individual(generation=None)
-        place = place or self._living.random_place(birth, Purpose.PLACE)
-        self._living.insert(individual, candidate.robot, place)
         self.births += 1
-        now_s = self.clock.seconds(self.step)
-        born = birth_record(
-            candidate, individual, self.encoding, sim_time_s=now_s, place=place
-        )
-        fitness = [(one.birth, one.known_fitness) for one in self._living]
-        population = population_records(self._number, self.births, fitness)
-        asks = self._infancy.begin(candidate, self.step)
-        return [born, *population, *asks]
+        rows = self._living.add_newborn(candidate, self.encoding, self._moment, place)
+        if self._infancy is None:
+            return [*rows]
+        return [*rows, *self._infancy.begin(candidate, self.step)]
 
     @property
     def _moment(self) -> Moment:
@@ -323,3 +323,35 @@ class Arena:
             f"{self.experiment.births} born, {len(self._living)} alive, "
             f"{self._advances} advances done: {why}, got {event}"
         )
+
+
+class ArenaClock:
+    """Intervals of an arena; every decision falls on a multiple of one of them.
+
+    Attributes:
+        founder, birth, cull, sample, snapshot: intervals [steps].
+    """
+
+    def __init__(self, experiment: Experiment) -> None:
+        rules, simulation = experiment.arena, experiment.simulation
+        assert rules is not None
+        self._timestep_s = simulation.timestep_s
+        self.founder = steps_of(rules.founder_interval_s, simulation)
+        self.birth = steps_of(rules.birth_interval_s, simulation)
+        self.cull = steps_of(rules.cull_interval_s, simulation)
+        self.sample = steps_of(rules.sample_interval_s, simulation)
+        self.snapshot = steps_of(rules.snapshot_interval_s, simulation)
+
+    def seconds(self, step: int) -> float:
+        """Return the simulated time of a step [s]."""
+        return step * self._timestep_s
+
+    def next_decision(self, step: int, *, is_founding: bool) -> int:
+        """Return the step of the next decision; while founding, of the next founder."""
+        later = (self.birth, self.cull, self.sample)
+        intervals = (self.founder,) if is_founding else later
+        return min((step // each + 1) * each for each in intervals)
+
+    def is_snapshot_due(self, step: int, until: int) -> bool:
+        """Return whether a snapshot is due between two steps."""
+        return until // self.snapshot > step // self.snapshot

@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
-from coordinator.arena.living import LivingRobots
-from coordinator.arena.rows import Moment, death_record
+from coordinator.arena.living import LivingRobots, Moment, death_record
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Record
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import migration_records

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from math import inf
 
-from coordinator.evolution.breeding import Breeder, Candidate
-from coordinator.evolution.selection import Couple, Individual
+from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.islands.events import Verdict, Vet
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
@@ -77,7 +76,7 @@ class VettingQueue:
         if candidate is None or event.attempt < candidate.attempt:
             return []
         del self._in_vetting[number]
-        if event.is_viable:
+        if event.report and event.report.is_viable:
             self._viable[number] = candidate
             if number == self._next:
                 self.take_number()

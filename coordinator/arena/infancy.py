@@ -11,9 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from msgspec import structs
 
-from coordinator.arena.clock import ArenaClock
-from coordinator.arena.living import LivingRobot, LivingRobots
-from coordinator.arena.rows import Moment
+from coordinator.arena.living import LivingRobot, LivingRobots, Moment
 from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.encodings import IslandEncoding
 from coordinator.islands.events import (
@@ -53,7 +51,7 @@ class _Infant:
 
 
 class Infancy:
-    """The infants of an arena; none without learning, or with a budget of one trial.
+    """The infants of an arena whose robots learn, with a budget of several trials.
 
     An infant occupies a place of the population. It cannot be selected as a parent,
     culled, sent as a migrant or replaced by one.
@@ -63,7 +61,6 @@ class Infancy:
         self,
         experiment: Experiment,
         encoding: IslandEncoding,
-        clock: ArenaClock,
         living: LivingRobots,
     ) -> None:
         """Initialise without infants.
@@ -71,18 +68,12 @@ class Infancy:
         Raises:
             ExperimentError: as of ``IslandLearning``.
         """
-        rules = experiment.learning
-        self._island = (
-            IslandLearning(experiment, encoding) if rules and rules.budget > 1 else None
-        )
-        self._clock = clock
+        simulation = experiment.simulation
+        self._island = IslandLearning(experiment, encoding)
+        self._timestep_s = simulation.timestep_s
+        self._warmup, self._window = simulation.warmup_steps, simulation.window_steps
         self._living = living
         self._infants: dict[BirthId, _Infant] = {}
-
-    @property
-    def is_on(self) -> bool:
-        """Newborns learn here."""
-        return self._island is not None
 
     @property
     def is_waiting(self) -> bool:
@@ -99,13 +90,11 @@ class Infancy:
         Returns:
             The first request to its learner.
         """
-        if self._island is None:
-            return []
         learning = NewbornLearning(candidate, self._island)
         if not learning.learns:
             return []
         self._found(candidate.birth).is_infant = True
-        end = step + self._clock.first_window
+        end = step + self._warmup + self._window
         self._infants[candidate.birth] = _Infant(learning, end)
         return _asks(learning.start())
 
@@ -138,7 +127,7 @@ class Infancy:
         """
         commands: list[Ask | Record] = []
         for fallen in event.advance.casualties:
-            died_s = self._clock.seconds(fallen.step)
+            died_s = fallen.step * self._timestep_s
             commands += self.end(fallen.birth, fallen.reason, died_s, event.provenance)
         for birth in sorted(self._infants):
             if self._infants[birth].end == event.advance.step:
@@ -190,7 +179,7 @@ class Infancy:
             judgement.fitness,
             judgement.path_velocity,
             judgement.straight_velocity,
-            self._clock.seconds(self._clock.window),
+            self._window * self._timestep_s,
             judgement.measures,
         )
         outcome = Evaluated(birth, evaluation, event.provenance, infant.trial)
@@ -206,7 +195,7 @@ class Infancy:
     def _try_next(self, birth: BirthId, infant: _Infant, step: int) -> None:
         """Exchange the brain for that of the next trial."""
         wanted = infant.queue.popleft()
-        infant.trial, infant.end = wanted.trial, step + self._clock.window
+        infant.trial, infant.end = wanted.trial, step + self._window
         self._exchange(self._found(birth), wanted.robot)
 
     def _grow(self, birth: BirthId) -> list[Record]:

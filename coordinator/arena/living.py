@@ -1,19 +1,53 @@
-"""Living robots of an arena, their places, and the changes that await an advance."""
+"""Living robots of an arena, their places, and the changes that await an advance.
 
-from collections.abc import Iterator, Sequence
+Their table rows are made here, too, besides those of migrations.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, dist, isfinite, sin, tau
+from typing import NamedTuple
 
+from coordinator.evolution.breeding import Candidate, Individual
+from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import Individual
+from coordinator.islands.events import Record
+from coordinator.islands.rows import (
+    birth_record,
+    named,
+    named_measures,
+    population_records,
+)
 from schema.experiment.document import Arena
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.arena import Advance, BrainChange, Changes, Insertion, Judgement
+from schema.wire.arena import (
+    Advance,
+    BrainChange,
+    Casualty,
+    Changes,
+    Insertion,
+    Judgement,
+    Touch,
+)
 
 Place = tuple[float, float]
 """A point of the ground plane [m]."""
+
+
+class Moment(NamedTuple):
+    """State of an arena that its rows refer to.
+
+    Attributes:
+        island: number of the arena.
+        births: number of births.
+        sim_time_s: simulated time [s].
+    """
+
+    island: int
+    births: int
+    sim_time_s: float
 
 
 @dataclass(slots=True)
@@ -98,6 +132,31 @@ class LivingRobots:
         draws = BufferedRng(self._stream(name, 0, purpose))
         return draw_place(draws, [one.position[:2] for one in self], self._rules)
 
+    def add_newborn(
+        self,
+        candidate: Candidate,
+        encoding: IslandEncoding,
+        moment: Moment,
+        place: Place | None = None,
+    ) -> list[Record]:
+        """Insert a newborn; return the rows of its birth and of the population.
+
+        Args:
+            candidate: the newborn.
+            encoding: of the arena.
+            moment: of its birth, which counts.
+            place: where; random if None.
+        """
+        individual = candidate.individual(generation=None)
+        place = place or self.random_place(candidate.birth, Purpose.PLACE)
+        self.insert(individual, candidate.robot, place)
+        now_s = moment.sim_time_s
+        born = birth_record(
+            candidate, individual, encoding, sim_time_s=now_s, place=place
+        )
+        fitness = [(one.birth, one.known_fitness) for one in self]
+        return [born, *population_records(moment.island, moment.births, fitness)]
+
     def insert(self, individual: Individual, robot: Robot, place: Place) -> None:
         """Insert a robot."""
         self._living[individual.birth] = LivingRobot(individual, robot, place)
@@ -156,6 +215,27 @@ class LivingRobots:
                 measures=dict(zip(self._labels, judgement.measures, strict=False)),
             )
 
+    def sample(self, moment: Moment) -> list[Record]:
+        """Return the fitness rows of all living robots with a report."""
+        return [
+            Record(
+                "fitness",
+                {
+                    **named(one.birth, moment.island),
+                    "sim_time_s": moment.sim_time_s,
+                    "births": moment.births,
+                    "age_s": one.judgement.age_s,
+                    "path_velocity": one.judgement.path_velocity,
+                    "straight_velocity": one.judgement.straight_velocity,
+                    "fitness": one.judgement.fitness,
+                    "is_mature": one.is_mature,
+                    "measures": named_measures(self._labels, one.judgement.measures),
+                },
+            )
+            for one in self
+            if one.judgement is not None
+        ]
+
     def take_changes(self) -> Changes:
         """Return all changes since the last call."""
         changes = Changes(
@@ -186,3 +266,39 @@ def draw_place(draws: BufferedRng, others: Sequence[Place], arena: Arena) -> Pla
         if all(dist(place, other) >= arena.birth_distance_m for other in others):
             break
     return place
+
+
+def death_record(dead: LivingRobot | Casualty, reason: str, moment: Moment) -> Record:
+    """Return the deaths row of a robot that is removed or has diverged."""
+    x, y, z = dead.place if isinstance(dead, Casualty) else dead.position
+    row = {
+        **named(dead.birth, moment.island),
+        "sim_time_s": moment.sim_time_s,
+        "births": moment.births,
+        "reason": reason,
+        "detail": dead.reason if isinstance(dead, Casualty) else "",
+        "x": x,
+        "y": y,
+        "z": z,
+    }
+    return Record("deaths", row)
+
+
+def touch_records(
+    touches: Iterable[Touch], moment: Moment, over_s: float
+) -> list[Record]:
+    """Return the touches rows of an advance that lasted ``over_s``."""
+    return [
+        Record(
+            "touches",
+            {
+                **named(touch.first, moment.island),
+                "other_island": touch.second.island,
+                "other_birth": touch.second.number,
+                "sim_time_s": moment.sim_time_s,
+                "over_s": over_s,
+                "duration_s": touch.duration_s,
+            },
+        )
+        for touch in touches
+    ]

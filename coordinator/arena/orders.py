@@ -4,8 +4,7 @@ from dataclasses import replace
 from math import isfinite
 
 from coordinator.arena.infancy import Infancy
-from coordinator.arena.living import LivingRobots
-from coordinator.arena.rows import Moment, death_record
+from coordinator.arena.living import LivingRobots, Moment, death_record
 from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from coordinator.islands.events import (
@@ -36,7 +35,7 @@ class Orders:
     """
 
     def __init__(
-        self, experiment: Experiment, living: LivingRobots, infancy: Infancy
+        self, experiment: Experiment, living: LivingRobots, infancy: Infancy | None
     ) -> None:
         self.is_paused = False
         self.pending: list[Order] = []
@@ -73,8 +72,7 @@ class Orders:
                 case Insert():
                     self.insertions.append(order)
                 case Remove(birth=birth) if self._living.get(birth):
-                    now_s = moment.sim_time_s
-                    records += self._infancy.end(birth, "removed", now_s)
+                    records += self._end_infancy(birth, "removed", moment)
                     removed = self._living.remove(birth)
                     records.append(death_record(removed, "removed", moment))
                 case ReplaceBrain(birth=birth, brain=brain):
@@ -91,9 +89,15 @@ class Orders:
         if not (living and robot):
             return []
         was_infant = living.is_infant
-        rows = self._infancy.end(birth, "brain replaced", moment.sim_time_s)
+        rows = self._end_infancy(birth, "brain replaced", moment)
         self._living.replace_brain(living, robot, restarts_window=was_infant)
         return rows
+
+    def _end_infancy(self, birth: BirthId, why: str, moment: Moment) -> list[Record]:
+        """End the infancy of a robot, if it is an infant; return its rows."""
+        if self._infancy is None:
+            return []
+        return self._infancy.end(birth, why, moment.sim_time_s)
 
     def _with_brain(self, robot: Robot, brain: Brain) -> Robot | None:
         """Return a robot with another brain; None if the brain does not fit it."""

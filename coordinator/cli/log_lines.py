@@ -14,7 +14,6 @@ from coordinator.islands.events import (
     JournalledEvent,
     Order,
     Verdict,
-    Vetted,
 )
 from coordinator.run.requests import requester_of
 from schema.robot.ids import BirthId
@@ -119,10 +118,13 @@ def _answer(event: Answered) -> Fields:
         outcome = asdict(found) if found else {"reason": event.reason}
         return {"trial": event.trial, **outcome, **_worker(event.provenance)}
     fields: Fields = {"attempt": event.attempt}
-    if isinstance(event, Vetted):
-        fields["verdict"] = "viable" if event.is_viable else "not viable"
-        fields |= {"motors": event.report.motors, "mass": event.report.mass}
-    return fields if event.is_viable else {**fields, "reason": event.reason}
+    report = event.report
+    if report is not None:
+        fields["verdict"] = "viable" if report.is_viable else "not viable"
+        fields |= {"motors": report.motors, "mass": report.mass}
+        if report.is_viable:
+            return fields
+    return {**fields, "reason": event.reason}
 
 
 def _audit(event: Audited) -> Fields:

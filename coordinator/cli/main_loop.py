@@ -165,7 +165,7 @@ class _Server:
         Args:
             now_s: the time, of any clock that only goes forward [s].
         """
-        for order in self._network.orders():
+        for order in self._network.queries.orders():
             order.reply(answer_operator(self._scheduler, order.data, now_s))
         run = self._scheduler.watched
         if run is not self._watched:

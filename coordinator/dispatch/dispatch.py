@@ -19,7 +19,6 @@ that crashed several processes is given up.
 from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 
-from coordinator.dispatch.deadlines import FIRST_S, LOOK_S, Deadlines
 from coordinator.dispatch.events import (
     AgentKind,
     Ask,
@@ -42,8 +41,16 @@ from coordinator.dispatch.events import (
     Withdrawn,
 )
 from coordinator.dispatch.faults import PeerFaults
-from coordinator.dispatch.pending import PairedJobs, Pending
-from coordinator.dispatch.pool import REPLY_S, AgentState, Pool
+from coordinator.dispatch.pool import (
+    FIRST_S,
+    LOOK_S,
+    REPLY_S,
+    AgentState,
+    Deadlines,
+    PairedJobs,
+    Pending,
+    Pool,
+)
 from schema.errors import MalformedMessage, UnexpectedEvent
 from schema.wire.decoding import fingerprint
 

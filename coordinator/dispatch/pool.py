@@ -1,19 +1,17 @@
-"""Agents of one kind, their load, and the jobs that wait for them.
+"""Agents of one kind, their load, the jobs that wait for them, and how long jobs take.
 
-Jobs and advances of arenas share one account of load, one backoff, and one judgement of
-which agents are silent.
+Jobs and advances of arenas share one account of load, one backoff, one judgement of
+which agents are silent, and one rule for deadlines.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from itertools import count
 from math import inf
 from typing import Literal
 
-from coordinator.dispatch.deadlines import NEWEST_WEIGHT
-from coordinator.dispatch.events import Client, Joined, Overdue
-from coordinator.dispatch.pending import Pending
+from coordinator.dispatch.events import Client, Job, Joined, Overdue
 
 MOST_AHEAD = 16
 """Most jobs that an agent holds beyond the one that is always ready."""
@@ -25,10 +23,46 @@ REST_S = 0.05
 LONGEST_REST_S = 3.2
 REPLY_S = 5.0
 """Time that an agent has to report progress when it is asked [s]."""
+_NEWEST_WEIGHT = 0.1
+"""Weight of the newest value in a moving average."""
+PATIENCE = 4.0
+"""A job is late after this multiple of the typical duration of its kind."""
+FIRST_S = 60.0
+"""Deadline of a job without history [s]."""
+LOOK_S = 0.25
+"""Interval between checks for late jobs [s]."""
+_MOST_DOUBLINGS = 16
 _PROVIDED = 1e6
 """Above the load of any agent that needs jobs."""
 
 Verdict = Literal["in time", "ask", "silent"]
+
+
+@dataclass(slots=True)
+class Pending:
+    """A job that is not delivered yet.
+
+    Attributes:
+        job: the job.
+        holders: agents that have it, several if the first is late, in order: time of
+            assignment [s], and its place in the queue of a slot (1.0 is first).
+        errors: number of agents that could not do it.
+        avoid: agents that failed at it.
+        lost: agents that had it and gave no reply.
+        killed: processes that it crashed, with the causes.
+    """
+
+    job: Job
+    holders: dict[str, tuple[float, float]] = field(default_factory=dict)
+    errors: int = 0
+    avoid: tuple[str, ...] = ()
+    lost: dict[str, None] = field(default_factory=dict)
+    killed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def since_s(self) -> float:
+        """Time of the first assignment that still holds [s]."""
+        return next(iter(self.holders.values()))[0]
 
 
 @dataclass(slots=True)
@@ -76,7 +110,7 @@ class AgentState:
     def learn(self, duration_s: float) -> None:
         """Note the time that a slot took for a job [s]."""
         known = self.job_s or duration_s
-        self.job_s = known + NEWEST_WEIGHT * (duration_s - known)
+        self.job_s = known + _NEWEST_WEIGHT * (duration_s - known)
 
     @property
     def most_ahead(self) -> int:
@@ -282,3 +316,53 @@ class Pool:
         """Remove a waiting job."""
         self.waiting.remove(number)
         heapify(self.waiting)
+
+
+class PairedJobs:
+    """Agents that were given a job whose twin another agent is to do."""
+
+    def __init__(self) -> None:
+        self._agents: dict[int, dict[str, None]] = {}
+
+    def note(self, job: Job, agent: str) -> None:
+        """Note that a job is assigned to an agent."""
+        if job.twin >= 0:
+            self._agents.setdefault(job.number, {})[agent] = None
+
+    def avoided(self, pending: Pending) -> tuple[str, ...]:
+        """Return the agents that a job avoids if there are others."""
+        others = self._agents.get(pending.job.twin)
+        if not others:
+            return pending.avoid
+        return (*pending.avoid, *(each for each in others if each not in pending.avoid))
+
+    def forget(self, job: Job) -> None:
+        """Remove a pair, both jobs of which have ended."""
+        self._agents.pop(job.number, None)
+        self._agents.pop(job.twin, None)
+
+
+class Deadlines:
+    """Typical duration of the jobs of each kind, from their assignment [s]."""
+
+    def __init__(self, least_s: float) -> None:
+        """Initialise without history; no deadline is shorter than ``least_s`` [s]."""
+        self._least_s = least_s
+        self._typical_s: dict[Hashable, float] = {}
+
+    def learn(self, kind: Hashable, duration_s: float) -> None:
+        """Note the duration of a job."""
+        known = self._typical_s.get(kind, duration_s)
+        self._typical_s[kind] = known + _NEWEST_WEIGHT * (duration_s - known)
+
+    def forget(self, kind: Hashable) -> None:
+        """Drop the history of a kind of jobs that has ended."""
+        self._typical_s.pop(kind, None)
+
+    def limit_s(self, kind: Hashable, misses: int = 0) -> float:
+        """Return how long a job may take; twice as long after each miss [s]."""
+        typical_s = self._typical_s.get(kind)
+        first_s = FIRST_S
+        if typical_s is not None:
+            first_s = max(self._least_s, PATIENCE * typical_s)
+        return first_s * float(2 ** min(misses, _MOST_DOUBLINGS))

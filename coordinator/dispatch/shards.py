@@ -16,7 +16,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from coordinator.dispatch.deadlines import FIRST_S, LOOK_S, Deadlines
 from coordinator.dispatch.events import (
     NO_CLIENT,
     Ask,
@@ -37,7 +36,7 @@ from coordinator.dispatch.events import (
     ShardSeen,
     Ticked,
 )
-from coordinator.dispatch.pool import Pool
+from coordinator.dispatch.pool import FIRST_S, LOOK_S, Deadlines, Pool
 from schema.errors import UnexpectedEvent
 
 MAX_ERRORS = 3

@@ -1,30 +1,88 @@
-"""Candidates of a birth, random or from two parents, and the survivors of a brood.
+"""Individuals, the candidates that become individuals, and the source of candidates.
 
 Every candidate is a pure function of seed, run, birth, attempt and population.
 Attempts are numbered through all couples of a birth, so that each has its own stream.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.rules import (
+from coordinator.evolution.selection import (
+    cull_population,
     parents_rule,
     select_parents,
     select_survivors,
     survivors_rule,
 )
-from coordinator.evolution.selection import Couple, Individual, cull_population
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 
 _COUPLES = 100
 """Number of couples that may fail at one birth before `Breeder` gives up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Individual:
+    """Member of a population.
+
+    Attributes:
+        birth: its id.
+        genome: what its children inherit, of the type that the encoding uses.
+        fitness: always maximised; 0 where its evaluation failed.
+        rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
+        generation: number of its brood; founders are 0; None on-line.
+        has_failed: its evaluation ended without a fitness.
+        parents: birth ids of its parents; empty for a random robot.
+        size: number of parts of its body.
+        measures: of its evaluation, by name.
+        learnt: the robot with the brain that it learnt, if it did and its genome has
+            another one.
+    """
+
+    birth: BirthId
+    genome: object
+    fitness: float
+    rank: int
+    generation: int | None
+    has_failed: bool = False
+    parents: tuple[BirthId, ...] = ()
+    size: int = 0
+    measures: Mapping[str, float] = field(default_factory=dict, hash=False)
+    learnt: Robot | None = None
+
+    def evaluated(
+        self, evaluation: Evaluation | None, labels: Sequence[str]
+    ) -> "Individual":
+        """Return the individual with the results of an evaluation.
+
+        Args:
+            evaluation: None if it failed.
+            labels: names of its measures.
+        """
+        if evaluation is None:
+            return replace(self, fitness=0.0, has_failed=True, measures={})
+        return replace(
+            self,
+            fitness=evaluation.fitness,
+            has_failed=False,
+            measures=dict(zip(labels, evaluation.measures, strict=True)),
+        )
+
+    @property
+    def known_fitness(self) -> float | None:
+        """Its fitness; None where its evaluation failed."""
+        return None if self.has_failed else self.fitness
+
+
+Couple = tuple[Individual, Individual]
+"""Two parents; the first gives the root of the child."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +105,10 @@ class Candidate:
     robot: Robot
     learnt: Robot | None = None
 
-    def individual(
-        self,
-        generation: int | None,
-        fitness: float | None = 0.0,
-        measures: Mapping[str, float] | None = None,
-    ) -> Individual:
-        """Return the individual; its fitness is None if its evaluation failed."""
+    def individual(self, generation: int | None) -> Individual:
+        """Return the individual, before any evaluation."""
         parents = self.couple or ()
-        individual = Individual(
+        return Individual(
             self.birth,
             self.genome,
             fitness=0.0,
@@ -65,7 +118,6 @@ class Candidate:
             size=len(self.robot.parts),
             learnt=self.learnt,
         )
-        return individual.evaluated(fitness, measures)
 
 
 class Breeder:

@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from coordinator.evolution.brains import brain_genes
-from coordinator.evolution.generation import generate
-from coordinator.evolution.variation import mate
+from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line
 from schema.experiment.brains import widths
 from schema.experiment.document import Experiment, body_space
@@ -61,16 +60,17 @@ def check_brain_genes(experiment: Experiment) -> None:
 
 def _genomes(experiment: Experiment) -> Iterator[Genome]:
     """Yield random genomes and children of them."""
+    encoding = RevolveAngle(experiment, body_space(experiment.space), None)
     found = []
     for seed in range(_FOUNDERS):
         rng = np.random.default_rng(seed)
-        found.append(generate(rng, experiment, BirthId(0, seed)))
+        found.append(encoding.random(rng, BirthId(0, seed)))
         yield found[-1]
     for seed in range(_CHILDREN):
         for first, second in pairwise(found[-_FOUNDERS:]):
             rng = np.random.default_rng((seed, len(found)))
             birth = BirthId(0, len(found))
-            if child := mate(first, second, rng, experiment, birth):
+            if child := encoding.mate(first, second, rng, birth):
                 found.append(child)
                 yield child
                 break

@@ -17,7 +17,7 @@ from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
-from coordinator.evolution.rules import PARENTS, SURVIVORS, Rule
+from coordinator.evolution.selection import PARENTS, SURVIVORS, Rule
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (

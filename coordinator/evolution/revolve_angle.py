@@ -1,24 +1,44 @@
 """Revolve Angle, the encoding of the thesis: the genome is the tree of parts itself.
 
-Source: Hupkes 2016, section 4.4.
+Each step of mutation changes a mutable tree in place and keeps every restriction; those
+of the brain belong to its type. The analyzer checks the body of a child later.
+Source: Hupkes 2016, sections 4.4.3 to 4.4.6; the code of the original. Two of its
+errors are avoided: a new part may connect to every neuron, and the mean size of the
+subtrees that can be duplicated is a mean.
 """
+
+from collections.abc import Iterable, Iterator, Sequence
+from math import ceil
 
 import numpy as np
 
-from coordinator.evolution.generation import generate
+from coordinator.evolution.brains import brain_genes, brain_rules
+from coordinator.evolution.generation import (
+    generate,
+    pick_growth,
+    random_part,
+    usable_types,
+)
 from coordinator.evolution.mutable_genome import (
+    Counts,
     MutableGenome,
+    copied,
+    fitting_subtrees,
+    free_places,
     gene_ids,
     level,
+    lineage,
     preorder,
+    size_limits,
+    size_of,
+    subtree_sizes,
     to_branches,
     to_genome,
     to_mutable,
 )
 from coordinator.evolution.random_streams import BufferedRng
-from coordinator.evolution.variation import crossover, mate, mutate
 from schema.errors import InvalidRobot
-from schema.experiment.document import Experiment
+from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import BodySpace
 from schema.robot.genome import Genome, develop, walk
 from schema.robot.ids import BirthId
@@ -38,6 +58,7 @@ class RevolveAngle:
     ) -> None:
         self._experiment = experiment
         self._types = types
+        self._brain, self._rules = brain_genes(experiment), brain_rules(experiment)
 
     def random(self, rng: np.random.Generator, birth: BirthId) -> Genome:
         """Return the genome of a random robot with at least one motor.
@@ -54,8 +75,26 @@ class RevolveAngle:
     def mate(
         self, first: Genome, second: Genome, rng: np.random.Generator, birth: BirthId
     ) -> Genome | None:
-        """Return the genome of a child: crossover and mutation of one mutable tree."""
-        return mate(first, second, rng, self._experiment, birth)
+        """Return the genome of a child: crossover and mutation of one mutable tree.
+
+        Args:
+            first: parent that gives the root.
+            second: parent that gives a subtree.
+            rng: the stream of this attempt.
+            birth: id of the child; the identities of its new parts derive from it.
+
+        Returns:
+            A genome within all restrictions, planar where the experiment says so, with
+            at least one motor; None if crossover finds no fitting subtree or no motor
+            is left.
+        """
+        draws, types = BufferedRng(rng), self._types
+        branches, donors = to_branches(first, types), to_branches(second, types)
+        child: Genome | None = None
+        if crossover(draws, branches, donors, self._experiment):
+            child = self._mutated(draws, branches[0], birth)
+        _unlink([*branches, *donors])
+        return child
 
     def crossover(
         self, first: Genome, second: Genome, rng: np.random.Generator
@@ -63,16 +102,14 @@ class RevolveAngle:
         """Return the first genome with a subtree of the second, or None."""
         branches, donors = (to_branches(each, self._types) for each in (first, second))
         is_done = crossover(BufferedRng(rng), branches, donors, self._experiment)
-        return self._genome(branches[0]) if is_done else None
+        return self._genome(preorder(branches[0])) if is_done else None
 
     def mutate(
         self, genome: Genome, rng: np.random.Generator, birth: BirthId
     ) -> Genome | None:
         """Return a mutated genome, or None if no motor is left."""
         root = to_mutable(genome, self._types)
-        mutate(BufferedRng(rng), root, gene_ids(birth), self._experiment)
-        has_motor = any(branch.outputs for branch in preorder(root))
-        return self._genome(root) if has_motor else None
+        return self._mutated(BufferedRng(rng), root, birth)
 
     def to_bytes(self, genome: Genome) -> bytes:
         """Return the Protobuf bytes of a genome."""
@@ -98,8 +135,226 @@ class RevolveAngle:
         """Return the genome that develops into a robot."""
         return genome_of(robot)
 
-    def _genome(self, root: MutableGenome) -> Genome:
+    def _mutated(
+        self, draws: BufferedRng, root: MutableGenome, birth: BirthId
+    ) -> Genome | None:
+        """Mutate a tree, step by step in the order of the thesis.
+
+        Args:
+            draws: source of all choices.
+            root: root of the tree, which is of no use afterwards.
+            birth: as of ``mate``.
+
+        Returns:
+            The genome of the tree; None if no motor is left.
+        """
+        experiment = self._experiment
+        delete_subtree(draws, root, experiment)
+        duplicate_subtree(draws, root, experiment)
+        swap_subtrees(draws, root, experiment)
         branches = preorder(root)
+        pruned = self._brain.prune(draws, branches, self._rules)
+        vary_parts(draws, branches, experiment.variation.body_epsilon)
+        self._brain.vary(draws, branches, self._rules, pruned)
+        add_parts(draws, branches, gene_ids(birth), experiment)
+        branches = preorder(root)
+        has_motor = any(branch.outputs for branch in branches)
+        genome = self._genome(branches) if has_motor else None
+        _unlink(branches)
+        return genome
+
+    def _genome(self, branches: Sequence[MutableGenome]) -> Genome:
+        """Return the genome of a tree, planar where the experiment says so."""
         if self._experiment.space.planar:
             level(branches)
         return to_genome(branches)
+
+
+def _unlink(branches: Iterable[MutableGenome]) -> None:
+    """Break the reference cycles of branches, so that they are freed at once.
+
+    Collecting them as garbage took a twentieth of the coordinator's time.
+    """
+    for branch in branches:
+        branch.parent = None
+
+
+def crossover(
+    draws: BufferedRng,
+    branches: Sequence[MutableGenome],
+    donors: Sequence[MutableGenome],
+    experiment: Experiment,
+) -> bool:
+    """Replace a subtree by one of a donor; neither is a root.
+
+    The replaced subtree is uniform. The donated one is uniform among those with which
+    the tree stays within its limits; it keeps its own slot and orientation.
+
+    Args:
+        draws: source of all choices.
+        branches: those of the tree that changes, depth first.
+        donors: those of the other tree, which loses the donated subtree.
+        experiment: restrictions.
+
+    Returns:
+        Whether a subtree was replaced; if not, the trees are unchanged.
+    """
+    space = experiment.space
+    if len(branches) == 1:
+        return False
+    donated_sizes = subtree_sizes(donors)
+    replaced = draws.pick(branches[1:])
+    rest = size_of(branches).minus(size_of(preorder(replaced)))
+    room = size_limits(space).minus(rest)
+    candidates = fitting_subtrees(donated_sizes, room)
+    if not candidates:
+        return False
+    donated = draws.pick(candidates)
+    parts = rest.parts + donated_sizes[donated][0]
+    if experiment.variation.check_min_parts and parts < space.min_parts:
+        return False
+    assert replaced.parent is not None
+    donated.cut()
+    replaced.parent.graft(donated, replaced.parent_slot)
+    return True
+
+
+def delete_subtree(
+    draws: BufferedRng, root: MutableGenome, experiment: Experiment
+) -> None:
+    """Delete a random subtree, with the probability of the experiment."""
+    if not draws.chance(experiment.variation.p_delete_subtree):
+        return
+    if candidates := deletable(subtree_sizes(preorder(root)), experiment.space):
+        draws.pick(candidates).cut()
+
+
+def duplicate_subtree(
+    draws: BufferedRng, root: MutableGenome, experiment: Experiment
+) -> None:
+    """Attach a copy of a random subtree to a free slot, with a probability."""
+    if not draws.chance(experiment.variation.p_duplicate_subtree):
+        return
+    branches = preorder(root)
+    candidates = duplicable(subtree_sizes(branches), experiment.space)
+    places = free_places(branches)
+    if candidates and places:
+        copy = copied(draws.pick(candidates))
+        parent, slot = draws.pick(places)
+        parent.graft(copy, slot)
+
+
+def swap_subtrees(
+    draws: BufferedRng, root: MutableGenome, experiment: Experiment
+) -> None:
+    """Exchange two subtrees, neither within the other, with a probability."""
+    if not draws.chance(experiment.variation.p_swap_subtree):
+        return
+    others = preorder(root)[1:]
+    if not others:
+        return
+    first = draws.pick(others)
+    ancestors = lineage(first)
+    candidates = [b for b in others if b not in ancestors and first not in lineage(b)]
+    if candidates:
+        second = draws.pick(candidates)
+        one, slot = first.parent, first.parent_slot
+        other, other_slot = second.parent, second.parent_slot
+        assert one is not None
+        assert other is not None
+        one.graft(second, slot)
+        other.graft(first, other_slot)
+
+
+def vary_parts(
+    draws: BufferedRng, branches: Iterable[MutableGenome], epsilon: float
+) -> None:
+    """Move the parameters of every part, except its colour, towards random values."""
+    for branch in branches:
+        if branch.kind.own_parameters:
+            branch.parameters = draws.nearby(
+                branch.kind.parameters, branch.parameters, epsilon
+            )
+
+
+def add_parts(
+    draws: BufferedRng,
+    branches: Sequence[MutableGenome],
+    genes: Iterator[int],
+    experiment: Experiment,
+) -> None:
+    """Add random parts, `expected_parts` on average, with neurons and connections.
+
+    Args:
+        draws: source of all choices.
+        branches: those of the tree, depth first.
+        genes: identities of the parts.
+        experiment: restrictions and probabilities.
+    """
+    expected = expected_parts(branches, experiment)
+    if expected <= 0.0:
+        return
+    trials = ceil(2.0 * expected) if experiment.variation.add_parts == "loop" else 1
+    for _ in range(trials):
+        if draws.chance(expected / trials):
+            _add_part(draws, branches[0], genes, experiment)
+
+
+def _add_part(
+    draws: BufferedRng,
+    root: MutableGenome,
+    genes: Iterator[int],
+    experiment: Experiment,
+) -> None:
+    space = experiment.space
+    branches = preorder(root)
+    size = size_of(branches)
+    usable = usable_types(body_space(space), size, space)
+    growth = pick_growth(draws, free_places(branches), usable)
+    if growth is None:
+        return
+    (parent, slot), kind = growth
+    brain = brain_genes(experiment)
+    part = random_part(draws, kind, genes, brain)
+    parent.graft(part, slot)
+    brain.grow(draws, [part], preorder(root), brain_rules(experiment))
+
+
+def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) -> float:
+    """Return the mean number of parts to add; 0 or less means none.
+
+    It is the mean number that deletion removes less the mean number that duplication
+    adds, limited by the room that is left.
+
+    Args:
+        branches: those of the tree, depth first.
+        experiment: restrictions and probabilities.
+    """
+    variation, space = experiment.variation, experiment.space
+    sizes = subtree_sizes(branches)
+    deleted = [sizes[branch][0] for branch in deletable(sizes, space)]
+    duplicated = [sizes[branch][0] for branch in duplicable(sizes, space)]
+    more = float(sum(duplicated))
+    if duplicated and variation.duplicable_size == "mean":
+        more /= len(duplicated)
+    less = sum(deleted) / len(deleted) if deleted else 0.0
+    return min(
+        variation.p_delete_subtree * less - variation.p_duplicate_subtree * more,
+        space.max_parts - len(branches),
+    )
+
+
+def deletable(sizes: dict[MutableGenome, Counts], space: Space) -> list[MutableGenome]:
+    """Return the subtrees that can be deleted without falling below the least size."""
+    most = next(iter(sizes.values()))[0] - space.min_parts
+    return [
+        branch
+        for branch, (parts, *_) in sizes.items()
+        if branch.parent and parts <= most
+    ]
+
+
+def duplicable(sizes: dict[MutableGenome, Counts], space: Space) -> list[MutableGenome]:
+    """Return the subtrees of which a second copy stays within all limits."""
+    total = next(iter(sizes.values()))
+    return fitting_subtrees(sizes, size_limits(space).minus(total))

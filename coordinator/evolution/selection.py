@@ -1,90 +1,242 @@
-"""Individuals, their order by fitness, tournaments, and culling.
+"""Selection: the choice of parents and of survivors, and culling.
 
+A rule of selection, built-in or of a user, gets a population and returns places in it;
+``schema.plugins.protocols`` says what. The answer of a rule is checked before it is
+used.
 Source: Hupkes 2016, sections 5.3 and 8.2; the code of the original.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import fsum
+from typing import Any, TypeVar
+
+import numpy as np
+from msgspec import Struct
 
 from coordinator.evolution.random_streams import BufferedRng
-from schema.experiment.document import Arena, Culling
-from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
+from schema.errors import ExperimentError, shown
+from schema.experiment.document import Arena, Culling, Selection
+from schema.experiment.selection_rules import own_rule
+from schema.plugins.origin import raised_by, where_defined
+from schema.plugins.protocols import ParentSelection, Selectable, SurvivorSelection
 
-Couple = tuple["Individual", "Individual"]
+S = TypeVar("S", bound=Selectable)
+
+
+def fittest_first(individuals: Sequence[S]) -> list[S]:
+    """Return individuals by descending fitness; of equals the elder comes first."""
+    return sorted(individuals, key=_order)
+
+
+def _order(one: Selectable) -> tuple[float, object]:
+    return -one.fitness, one.birth
 
 
 @dataclass(frozen=True, slots=True)
-class Individual:
-    """Member of a population.
+class Rule:
+    """A rule of selection with its parameters.
 
     Attributes:
-        birth: its id.
-        genome: what its children inherit, of the type that the encoding uses.
-        fitness: always maximised; 0 where its evaluation failed.
-        rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
-        generation: number of its brood; founders are 0; None on-line.
-        has_failed: its evaluation ended without a fitness.
-        parents: birth ids of its parents; empty for a random robot.
-        size: number of parts of its body.
-        measures: of its evaluation, by name.
-        learnt: the robot with the brain that it learnt, if it did and its genome has
-            another one.
+        key: of the experiment, for messages.
+        function: the rule.
+        parameters: its last argument.
     """
 
-    birth: BirthId
-    genome: object
-    fitness: float
-    rank: int
-    generation: int | None
-    has_failed: bool = False
-    parents: tuple[BirthId, ...] = ()
-    size: int = 0
-    measures: Mapping[str, float] = field(default_factory=dict, hash=False)
-    learnt: Robot | None = None
+    key: str
+    function: Callable[..., Any]
+    parameters: object
 
-    def evaluated(
-        self, fitness: float | None, measures: Mapping[str, float] | None = None
-    ) -> "Individual":
-        """Return the individual with the results of an evaluation.
+    def places(
+        self,
+        count: int,
+        population: Sequence[Selectable],
+        *rest: Any,  # noqa: ANN401 - as the rule needs
+    ) -> list[int]:
+        """Return the answer of the rule, checked: different places in the population.
 
         Args:
-            fitness: None where its evaluation failed.
-            measures: of the evaluation; None keeps those of an earlier one.
+            count: number of places that it must return.
+            population: the candidates.
+            rest: further arguments, without the parameters.
+
+        Raises:
+            ExperimentError: it raises, or returns anything else.
         """
-        value = 0.0 if fitness is None else fitness
-        return replace(
-            self,
-            fitness=value,
-            has_failed=fitness is None,
-            measures=self.measures if measures is None else measures,
+        try:
+            answer = self.function(population, *rest, self.parameters)
+        except Exception as error:
+            what = raised_by(self.function, error)
+            raise ExperimentError(f"{self.key}: {what}") from error
+        places = _whole_numbers(answer)
+        if len(places) == len(set(places)) == count and (
+            min(places) >= 0 and max(places) < len(population)
+        ):
+            return places
+        raise ExperimentError(
+            f"{self.key}: {where_defined(self.function)}: must return {count} "
+            f"different whole numbers from 0 to {len(population) - 1}, got "
+            f"{shown(answer)}"
         )
 
-    @property
-    def known_fitness(self) -> float | None:
-        """Its fitness; None where its evaluation failed."""
-        return None if self.has_failed else self.fitness
+
+def _whole_numbers(answer: object) -> list[int]:
+    """Return the answer of a rule as plain integers; empty if it is none."""
+    if not isinstance(answer, (list, tuple, np.ndarray)):
+        return []
+    kinds = set(map(type, answer))
+    if kinds <= {int}:
+        return list(answer)
+    is_whole = all(issubclass(kind, (int, np.integer)) for kind in kinds)
+    return [int(at) for at in answer] if is_whole else []
 
 
-def fittest_first(individuals: Sequence[Individual]) -> list[Individual]:
-    """Return individuals by descending fitness; of equals the elder comes first."""
-    return sorted(individuals, key=lambda one: (-one.fitness, one.birth))
+def parents_rule(selection: Selection) -> Rule:
+    """Return the rule that selects parents; that of ``none`` is never called.
+
+    Raises:
+        ExperimentError: as of ``own_rule``.
+    """
+    found = own_rule(selection, "parents")
+    if found is None:
+        name = selection.parents
+        size = Tournament(selection.tournament_size)
+        found = (
+            PARENTS.get(name, random_parents),
+            size if name == "tournament" else None,
+        )
+    return Rule("selection.parents", *found)
+
+
+def survivors_rule(selection: Selection) -> Rule:
+    """Return the rule that selects survivors.
+
+    Raises:
+        ExperimentError: as of ``own_rule``.
+    """
+    found = own_rule(selection, "survivors")
+    return Rule(
+        "selection.survivors", *(found or (SURVIVORS[selection.survivors], None))
+    )
+
+
+def select_parents(
+    population: Sequence[S], rng: np.random.Generator, rule: Rule
+) -> tuple[S, S]:
+    """Return two different parents, the one that gives its root first.
+
+    Args:
+        population: the candidates, in a reproducible order.
+        rng: source of all choices.
+        rule: of ``parents_rule``.
+
+    Raises:
+        ExperimentError: the rule raises, or returns no two places.
+    """
+    first, second = rule.places(2, population, rng)
+    return population[first], population[second]
+
+
+def select_survivors(
+    parents: Sequence[S],
+    children: Sequence[S],
+    rng: np.random.Generator,
+    selection: Selection,
+    rule: Rule,
+) -> tuple[S, ...]:
+    """Return the next population of constant size, in birth order.
+
+    Args:
+        parents: the population before.
+        children: the brood.
+        rng: source of all choices.
+        selection: size of the population; whether parents compete with their children.
+            A brood cut short by the end of the run always competes with its parents,
+            or the population would shrink.
+        rule: of ``survivors_rule``.
+
+    Raises:
+        ExperimentError: the rule raises, or returns other than that many places.
+    """
+    size = selection.population
+    pool = list(children)
+    if selection.keep_parents or len(pool) < size:
+        pool = [*parents, *pool]
+    if len(pool) > size:
+        pool = [pool[at] for at in rule.places(size, pool, size, rng)]
+    return tuple(sorted(pool, key=lambda one: one.birth))
+
+
+class Tournament(Struct, frozen=True):
+    """Parameters of ``tournament``.
+
+    Attributes:
+        size: number of candidates of each tournament.
+    """
+
+    size: int = 4
 
 
 def tournament(
-    candidates: Sequence[Individual], draws: BufferedRng, size: int
-) -> Individual:
-    """Return the fittest of ``size`` candidates drawn without replacement."""
-    return fittest_first(draws.sample(candidates, size))[0]
+    population: Sequence[Selectable], rng: np.random.Generator, parameters: Tournament
+) -> tuple[int, int]:
+    """Return the winners of two tournaments.
+
+    Each parent is the fittest of a few drawn without replacement, the second from the
+    rest of the population. Of equals the elder wins.
+    """
+    draws = BufferedRng(rng)
+    order = list(map(_order, population))
+    places = list(range(len(population)))
+    first = min(draws.sample(places, parameters.size), key=order.__getitem__)
+    places.remove(first)
+    return first, min(draws.sample(places, parameters.size), key=order.__getitem__)
+
+
+def random_parents(
+    population: Sequence[Selectable], rng: np.random.Generator, _parameters: None
+) -> tuple[int, int]:
+    """Return two uniformly drawn parents."""
+    first, second = BufferedRng(rng).sample(range(len(population)), 2)
+    return first, second
+
+
+def best(
+    population: Sequence[Selectable],
+    count: int,
+    _rng: np.random.Generator,
+    _parameters: None,
+) -> Sequence[int]:
+    """Return the fittest; of equals the elder survives."""
+    places = range(len(population))
+    return sorted(places, key=lambda at: _order(population[at]))[:count]
+
+
+def random_survivors(
+    population: Sequence[Selectable],
+    count: int,
+    rng: np.random.Generator,
+    _parameters: None,
+) -> Sequence[int]:
+    """Return uniformly drawn survivors."""
+    return BufferedRng(rng).sample(range(len(population)), count)
+
+
+PARENTS: dict[str, ParentSelection] = {
+    "tournament": tournament,
+    "random": random_parents,
+}
+"""Built-in selections of parents; ``none`` selects no parents."""
+SURVIVORS: dict[str, SurvivorSelection] = {"best": best, "random": random_survivors}
+"""Built-in selections of survivors."""
 
 
 def cull_population(
-    parents: Sequence[Individual],
-    children: Sequence[Individual],
+    parents: Sequence[S],
+    children: Sequence[S],
     founders: int,
     rules: Culling,
-) -> tuple[Individual, ...]:
+) -> tuple[S, ...]:
     """Return the next population of varying size, in birth order.
 
     The rule is that of an arena, with births as its clock. A full arena waits for its
@@ -106,9 +258,7 @@ def cull_population(
     return tuple(one for one in living if one not in culled)
 
 
-def select_culled(
-    mature: Sequence[Individual], rules: Arena | Culling
-) -> tuple[str, list[Individual]]:
+def select_culled(mature: Sequence[S], rules: Arena | Culling) -> tuple[str, list[S]]:
     """Return the robots to cull and the reason, the least fit first.
 
     Robots below a share of the mean fitness are culled ("selection"). If there are

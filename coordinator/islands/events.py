@@ -3,13 +3,13 @@
 Events are past participles, commands imperatives; all are immutable.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from msgspec import Struct
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.learners.learner import Batch, Points
-from coordinator.evolution.selection import Individual
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
@@ -36,13 +36,8 @@ class Vetted(Message, frozen=True):
     report: Report
 
     @property
-    def is_viable(self) -> bool:
-        """The body can be built and simulated."""
-        return self.report.is_viable
-
-    @property
     def reason(self) -> str:
-        """Reason why it cannot; empty if viable."""
+        """Reason why it cannot be built or simulated; empty if it can."""
         return self.report.reason
 
 
@@ -52,7 +47,7 @@ class VettingFailed(Message, frozen=True):
     birth: BirthId
     attempt: int
     reason: str
-    is_viable: ClassVar[bool] = False
+    report: ClassVar[None] = None
 
 
 Verdict = Vetted | VettingFailed
@@ -357,14 +352,3 @@ class Finish(Message, frozen=True):
 IslandCommand = Vet | Evaluate | Ask | Record | Emigrate | Finish
 
 ArenaCommand = Vet | Ask | AdvanceShard | Record | Append | Emigrate | Finish
-
-
-def fitness_of(outcome: Outcome) -> float | None:
-    """Return the fitness of an outcome; None if the evaluation failed."""
-    return outcome.evaluation.fitness if outcome.evaluation else None
-
-
-def measures_of(outcome: Outcome, labels: Sequence[str]) -> dict[str, float]:
-    """Return the measures of an outcome by name; none if the evaluation failed."""
-    found = outcome.evaluation
-    return dict(zip(labels, found.measures, strict=True)) if found else {}

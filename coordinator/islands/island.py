@@ -9,9 +9,8 @@ Source: Hupkes 2016, section 5.3; the code of the original.
 from dataclasses import dataclass
 from math import isfinite
 
-from coordinator.evolution.breeding import Breeder, Candidate
+from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
     Answered,
     Asked,
@@ -26,8 +25,6 @@ from coordinator.islands.events import (
     Started,
     Verdict,
     Vet,
-    fitness_of,
-    measures_of,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.learning import IslandLearning, NewbornLearning
@@ -106,6 +103,7 @@ class Island:
         self._begun = 0
         # Founders have no parents: all of them are in flight together.
         self._window = self._brood_end = selection.population
+        self._brood_window = experiment.window
         self._in_flight: dict[int, _Birth] = {}
         self._brood: list[Individual] = []
 
@@ -161,7 +159,7 @@ class Island:
         candidate = found.candidate
         if not isinstance(event, Verdict):
             return self._judged_newborn(found, event)
-        if not event.is_viable:
+        if not (event.report and event.report.is_viable):
             attempt = candidate.attempt + 1
             return [self._begin(event.birth, attempt, candidate.couple, event.reason)]
         found.is_viable = True
@@ -249,8 +247,8 @@ class Island:
         """Add an evaluated candidate to the brood; return its rows."""
         del self._in_flight[self.births]
         candidate = found.candidate
-        individual = candidate.individual(
-            self._generation, fitness_of(outcome), measures_of(outcome, self._labels)
+        individual = candidate.individual(self._generation).evaluated(
+            outcome.evaluation, self._labels
         )
         self._brood.append(individual)
         self.births += 1
@@ -311,6 +309,6 @@ class Island:
             room = selection.culling.population_limit - len(self.population)
             children = min(children, max(1, room))
         self._generation += 1
-        self._window = self.experiment.window
+        self._window = self._brood_window
         self._brood_end = min(self.births + children, self.experiment.births)
         return commands

@@ -2,16 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Emigrate,
     Evaluate,
     MigrationEvent,
     Outcome,
     Record,
-    fitness_of,
-    measures_of,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
@@ -90,7 +88,7 @@ class IslandMigration:
             assert outcome is not None
             immigrant = self._immigrants[birth]
             self._immigrants[birth] = immigrant.evaluated(
-                fitness_of(outcome), measures_of(outcome, self._labels)
+                outcome.evaluation, self._labels
             )
             commands.append(evaluation_record(outcome, self._labels))
         settled = self._settle(population, self._immigrants.values())

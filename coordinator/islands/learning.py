@@ -21,7 +21,6 @@ from coordinator.islands.events import (
     Evaluate,
     Outcome,
     Record,
-    fitness_of,
 )
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.brains import neuron_kinds
@@ -207,7 +206,7 @@ class NewbornLearning:
             "birth": outcome.birth.number,
             "trial": trial,
             "request": self._requests[trial],
-            "fitness": fitness_of(outcome),
+            "fitness": outcome.evaluation and outcome.evaluation.fitness,
             "reason": outcome.reason,
             "distance": sqrt(sum(squares) / len(squares)) if squares else 0.0,
             "parameters": point,
@@ -228,5 +227,5 @@ class NewbornLearning:
 
 def _told_fitness(outcome: Outcome | None) -> float:
     """Return the fitness of a trial; -inf if it failed."""
-    fitness = fitness_of(outcome) if outcome else None
-    return -inf if fitness is None else fitness
+    found = outcome and outcome.evaluation
+    return found.fitness if found else -inf

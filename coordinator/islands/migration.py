@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import Individual, fittest_first, tournament
+from coordinator.evolution.selection import fittest_first
 from coordinator.islands.events import (
     Emigrate,
     Immigrated,
@@ -223,6 +224,6 @@ class MigrationEpochs:
         rest = list(candidates)
         for _ in range(count):
             size = min(self._tournament_size, len(rest))
-            chosen.append(tournament(rest, draws, size))
+            chosen.append(fittest_first(draws.sample(rest, size))[0])
             rest.remove(chosen[-1])
         return chosen

@@ -7,20 +7,19 @@ Source: Hupkes 2016, section 8.2, on scenarios between his 2 and 3.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from math import fsum
 
-from msgspec.structs import replace
+from msgspec import structs
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Evaluate,
     IslandCommand,
     Outcome,
     Record,
-    fitness_of,
-    measures_of,
 )
 from coordinator.islands.rows import evaluation_record
 from schema.errors import UnexpectedEvent
@@ -39,7 +38,7 @@ def with_durations(
         if isinstance(each, Evaluate):
             rng = stream(seed, run, each.birth, each.trial, Purpose.DURATION)
             steps = shortest + BufferedRng(rng).below(longest - shortest + 1)
-            timed.append(replace(each, steps=steps))
+            timed.append(structs.replace(each, steps=steps))
         else:
             timed.append(each)
     return timed
@@ -117,7 +116,8 @@ class Reevaluations:
         records = []
         for birth, outcome in sorted(outcomes.items()):
             assert outcome is not None
-            self._trials[birth].append(fitness_of(outcome))
+            found = outcome.evaluation
+            self._trials[birth].append(found.fitness if found else None)
             records.append(evaluation_record(outcome, self._labels))
         evaluated = (
             self._evaluated(one, outcome)
@@ -127,16 +127,16 @@ class Reevaluations:
         )
         return tuple(evaluated), records
 
-    def _evaluated(self, individual: Individual, outcome: Outcome | None) -> Individual:
+    def _evaluated(self, individual: Individual, outcome: Outcome) -> Individual:
         """Return an individual with the fitness that follows from its trials."""
-        measures = measures_of(outcome, self._labels) if outcome else None
+        evaluated = individual.evaluated(outcome.evaluation, self._labels)
         trials = self._trials[individual.birth]
         if self._rules.fitness == "replace":
             trials = trials[-1:]
         if all(each is None for each in trials):
-            return individual.evaluated(None, measures)
+            return evaluated
         fitness = fsum(each or 0.0 for each in trials) / len(trials)
-        return individual.evaluated(fitness, measures)
+        return replace(evaluated, fitness=fitness, has_failed=False)
 
     def _last_evaluation(self, individual: Individual) -> tuple[int, BirthId]:
         """Return the number of births at the last evaluation, and the id for ties."""

@@ -1,14 +1,17 @@
 """Table rows of off-line islands, and those that arenas share with them."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import IslandEncoding
-from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Outcome, Record
+from schema.parts import BodySpace
+from schema.robot.genome import Node, walk
 from schema.robot.ids import BirthId
-from schema.tables.births import body_rows, sizes
+from schema.robot.robot import Robot
+from schema.tables.columns import Row
 
 
 def named(birth: BirthId, island: int) -> dict[str, int | None]:
@@ -56,6 +59,61 @@ def birth_record(
         "robot": encoding.stored_robot(candidate.robot, candidate.learnt),
     }
     return Record("births", row)
+
+
+def body_rows(robot: Robot) -> list[Row]:
+    """Return the ``body`` of a births row: one dictionary per part, core first."""
+    return [
+        {
+            "idx": index,
+            "parent": part.parent,
+            "parent_slot": part.parent_slot,
+            "child_slot": part.slot,
+            "kind": part.kind,
+            "rot": part.orientation,
+            "params": part.parameters,
+            "gene": part.gene,
+        }
+        for index, part in enumerate(robot.parts)
+    ]
+
+
+def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
+    """Return the counts of a births row.
+
+    Args:
+        robot: the phenotype.
+        genome: of the phenotype.
+        space: its part types.
+
+    Returns:
+        ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
+        (parts without children; a lone core counts 1), ``inputs``, ``outputs``,
+        ``hidden``, and ``connections`` of a genome of ``revolve-angle``, including
+        unresolved ones; of another genome's robot.
+
+    Source: thesis section 6.3; the code of the original.
+    """
+    kinds = [space[part.kind] for part in robot.parts]
+    neurons = Counter(neuron.layer for neuron in robot.brain.neurons)
+    connections = len(robot.brain.connections)
+    if isinstance(genome, Node):
+        connections = sum(len(node.connections) for node, _, _ in walk(genome))
+    # Includes -1, the parent of the core.
+    parents = {part.parent for part in robot.parts}
+    return {
+        "parts": len(robot.parts),
+        "joints": sum(
+            kind.shape(part.parameters).joint is not None
+            for kind, part in zip(kinds, robot.parts, strict=True)
+        ),
+        "motors": sum(kind.outputs for kind in kinds),
+        "extremities": len(robot.parts) + 1 - len(parents),
+        "inputs": neurons["input"],
+        "outputs": neurons["output"],
+        "hidden": neurons["hidden"],
+        "connections": connections,
+    }
 
 
 def outcome_columns(outcome: Outcome) -> dict[str, Any]:

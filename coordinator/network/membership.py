@@ -1,9 +1,14 @@
-"""Agents of a fleet: which ones are alive, their properties, and which may join.
+"""Agents of a fleet: which are alive, when to ask for their properties, which may join.
 
 State only: liveliness tokens and agent infos in, dispatch events out. Any process that
 reaches the hub can declare tokens, so their number is limited, and a token says only
 that the agent of its own key, role included, is to be asked.
 """
+
+from collections import deque
+from heapq import heappop, heappush
+from itertools import count
+from math import inf
 
 from coordinator.dispatch.events import AgentKind, Died, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
@@ -23,6 +28,10 @@ from schema.limits import (
 from schema.wire import revolve_pb2 as pb
 from schema.wire.decoding import parsed
 
+SHARE = 0.1
+"""Greatest share of the coordinator's time that asking takes."""
+ASK_AGAIN_S = 1.0
+LONGEST_PAUSE_S = 32.0
 _CAUSE_LENGTH = 100
 
 
@@ -30,6 +39,7 @@ class Membership:
     """All agents of a fleet whose token exists.
 
     Attributes:
+        joined: agents that have joined, by name.
         refused: agents that may not join, with the reasons.
     """
 
@@ -40,13 +50,13 @@ class Membership:
             version: that agents must have.
             faults: counts what is dropped; None: counts of its own.
         """
+        self.joined: dict[str, Member] = {}
         self.refused: dict[str, str] = {}
         self._faults = faults or PeerFaults()
         self._version = version
         self._alive: set[Member] = set()
         # How often they were asked without an answer.
         self._silent: dict[Member, int] = {}
-        self._joined: dict[str, Member] = {}
         self._refused_members: dict[str, Member] = {}
         # Agents that left and may have died of their job, oldest first.
         self._gone: dict[str, None] = {}
@@ -58,10 +68,6 @@ class Membership:
     def __contains__(self, member: Member) -> bool:
         """Return whether the token of an agent exists."""
         return member in self._alive
-
-    def member(self, agent: str) -> Member | None:
-        """Return an agent that has joined; None if none of that name has."""
-        return self._joined.get(agent)
 
     def appear(self, key: str) -> Member | None:
         """Note a token; return its agent if that is to be asked for its properties.
@@ -101,7 +107,7 @@ class Membership:
 
     def is_stranger(self, member: Member) -> bool:
         """Return whether an agent is alive but its properties are not known yet."""
-        known = (self._joined.get(member.name), self._refused_members.get(member.name))
+        known = (self.joined.get(member.name), self._refused_members.get(member.name))
         return member in self._alive and member not in known
 
     def note_silence(self, member: Member) -> Left | None:
@@ -131,7 +137,7 @@ class Membership:
         """
         info = _parsed(member, data)
         agent = member.name
-        if agent in self._joined or agent in self._refused_members:
+        if agent in self.joined or agent in self._refused_members:
             raise MalformedMessage(f"{member.role} {agent!r} has another agent's name")
         self._silent.pop(member, None)
         if info.version != self._version:
@@ -145,7 +151,7 @@ class Membership:
         if kind == "worker":
             _check("shards", info.shards, MOST_SHARDS)
             _check("cores", info.cores, MOST_CORES)
-        self._joined[agent] = member
+        self.joined[agent] = member
         joined = Joined(agent, kind, info.slots, info.platform, info.shards, info.cores)
         return [*self._new_deaths(member, info), joined]
 
@@ -159,7 +165,7 @@ class Membership:
         Raises:
             MalformedMessage: as for ``introduce``.
         """
-        if self._joined.get(member.name) != member:
+        if self.joined.get(member.name) != member:
             return None
         info = _parsed(member, data)
         works = info.HasField("quiet_s") and 0.0 <= info.quiet_s <= LONGEST_QUIET_S
@@ -170,9 +176,9 @@ class Membership:
         self._silent.pop(member, None)
 
     def _leave(self, member: Member) -> Left | None:
-        if self._joined.get(member.name) != member:
+        if self.joined.get(member.name) != member:
             return None
-        del self._joined[member.name]
+        del self.joined[member.name]
         self._gone[member.name] = None
         if len(self._gone) > MOST_MEMBERS:
             del self._gone[next(iter(self._gone))]
@@ -186,7 +192,7 @@ class Membership:
         died: list[Died] = []
         for death in info.deaths:
             is_same_slot = slot_of(death.agent) == slot_of(member.name) != ""
-            if death.agent in self._joined or (
+            if death.agent in self.joined or (
                 death.agent in self._gone and not is_same_slot
             ):
                 self._faults.note("death", member.name, f"of {death.agent}")
@@ -196,6 +202,65 @@ class Membership:
                 job = (death.run, death.epoch, death.number)
                 died.append(Died(*job, death.agent, cause, death.request))
         return died
+
+
+class InfoQueue:
+    """Order in which agents are asked: newest and oldest in turn, then silent ones.
+
+    A query takes the hub longer the more tokens there are, milliseconds with thousands.
+    Thousands of tokens without an agent must not delay the runs, nor an agent that came
+    just before or comes just after them.
+
+    Attributes:
+        due_s: when the next agent is to be asked, by a monotonic clock [s]; infinite
+            if none waits.
+    """
+
+    def __init__(self) -> None:
+        self.due_s = inf
+        self._new: deque[Member] = deque(maxlen=MOST_MEMBERS)
+        self._again: list[tuple[float, int, Member]] = []
+        self._order = count()
+        self._pause_until_s = 0.0
+        self._is_oldest_next = False
+
+    def add(self, member: Member) -> None:
+        """Add an agent that is to be asked as soon as possible."""
+        self._new.append(member)
+        self._schedule()
+
+    def add_again(self, member: Member, silences: int, now_s: float) -> None:
+        """Add an agent that is to be asked after a pause.
+
+        Args:
+            member: the agent.
+            silences: how often it was asked without an answer.
+            now_s: the time, of a monotonic clock [s].
+        """
+        pause_s = min(ASK_AGAIN_S * 2.0 ** min(silences - 1, 9), LONGEST_PAUSE_S)
+        heappush(self._again, (now_s + pause_s, next(self._order), member))
+        self._schedule()
+
+    def take(self) -> Member:
+        """Remove and return the next agent to ask; call it when it is due."""
+        if self._new:
+            is_oldest = self._is_oldest_next
+            self._is_oldest_next = not is_oldest
+            member = self._new.popleft() if is_oldest else self._new.pop()
+        else:
+            member = heappop(self._again)[2]
+        self._schedule()
+        return member
+
+    def spent(self, began_s: float, now_s: float) -> None:
+        """Note how long asking one agent took; the next one has to wait accordingly."""
+        self._pause_until_s = now_s + (now_s - began_s) * (1.0 / SHARE - 1.0)
+        self._schedule()
+
+    def _schedule(self) -> None:
+        """Set when the next agent is to be asked."""
+        waits_s = 0.0 if self._new else self._again[0][0] if self._again else inf
+        self.due_s = max(self._pause_until_s, waits_s)
 
 
 def _parsed(member: Member, data: bytes) -> pb.AgentInfo:

@@ -4,8 +4,10 @@ The network's threads only enqueue. One thread calls ``send`` and ``receive`` an
 events in the order of their arrival.
 """
 
+import ctypes
 import json
 import math
+import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -17,8 +19,8 @@ import zenoh
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
 from coordinator.dispatch.faults import FaultKind, PeerFaults
-from coordinator.network.info_queue import InfoQueue
-from coordinator.network.membership import Membership
+from coordinator.network.membership import InfoQueue, Membership
+from coordinator.network.operator_service import Queries
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
 from schema.agent.log import tell_user, warn_user
@@ -38,7 +40,6 @@ from schema.agent.platform_tag import wire_version
 from schema.agent.service import (
     HubWatch,
     Outlet,
-    keep_thread_state,
     log_engine,
     session_config,
 )
@@ -47,9 +48,6 @@ from schema.errors import MalformedMessage, NetworkError
 from schema.limits import (
     LONGEST_REASON,
     MOST_ASKED_INFOS,
-    MOST_QUERIES,
-    MOST_QUERY_BYTES,
-    OPERATOR_REQUEST_BYTES,
     printable,
 )
 
@@ -60,6 +58,7 @@ _MOST_NEWS = 10_000
 _LOOK_S = 1.0
 # Properties that are malformed are hardly better after a second.
 _MALFORMED_SILENCES = 5
+_THREAD = threading.local()
 
 
 @dataclass(slots=True)
@@ -82,7 +81,7 @@ class _Asked:
 
     def take(self, reply: zenoh.Reply) -> None:
         """Pass the first reply on at once: another process may never end its own."""
-        keep_thread_state()
+        _keep_thread_state()
         replier = reply.replier_id
         if replier is None:
             return  # of the engine itself, after the timeout
@@ -129,20 +128,6 @@ _News = _Told | None
 """What ``receive`` waits for; None only ends its wait."""
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
-    """A query of an operator or a viewer; call ``reply`` once."""
-
-    data: bytes
-    query: zenoh.Query
-    key: str
-
-    def reply(self, data: bytes) -> None:
-        """Reply, whether the other process still waits or not."""
-        with self.query as query:
-            query.reply(self.key, data)
-
-
 class Network:
     """A coordinator's end of the network; use it in a ``with``.
 
@@ -150,6 +135,7 @@ class Network:
         address: where agents connect to.
         own_address: where this user's processes on this machine connect to.
         faults: counts of what agents sent and nothing used.
+        queries: of operators and viewers; ``receive`` takes them.
     """
 
     def __init__(
@@ -198,9 +184,7 @@ class Network:
         self._membership = Membership(wire_version(), self.faults)
         self._info_queue = InfoQueue()
         self._asked_infos: set[Member] = set()
-        self._orders: list[Order] = []
-        self._order_bytes = 0
-        self._onlookers: list[Order] = []
+        self.queries = Queries(self._me.state, self.faults)
         self._outlet = Outlet()
 
     @property
@@ -276,7 +260,7 @@ class Network:
             agent: that has joined; if it has left since, the job is lost.
             payload: an encoded request.
         """
-        if member := self._membership.member(agent):
+        if member := self._membership.joined.get(agent):
             asked = _Asked(member, number, self._inbox)
             self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
         else:
@@ -290,12 +274,12 @@ class Network:
             agent: that was given the job, and may have left.
             payload: the encoded request.
         """
-        if member := self._membership.member(agent):
+        if member := self._membership.joined.get(agent):
             self._session.put(member.cancelled, payload)
 
     def ask(self, agent: str, /) -> None:
         """Ask an agent for its progress; ``receive`` returns a report, if any."""
-        if member := self._membership.member(agent):
+        if member := self._membership.joined.get(agent):
             self._ask_info(member)
 
     def _ask(
@@ -326,8 +310,8 @@ class Network:
         if not self._is_hub and now_s >= self._look_s:
             self._look_s = now_s + _LOOK_S
             self._hub.seen(is_there=bool(self._session.info.routers_zid()))
-        while member := self._info_queue.take(began_s := time.monotonic()):
-            self._ask_info(member)
+        while (began_s := time.monotonic()) >= self._info_queue.due_s:
+            self._ask_info(self._info_queue.take())
             self._info_queue.spent(began_s, time.monotonic())
         events: list[DispatchEvent] = []
         time.sleep(pause_s)
@@ -342,17 +326,6 @@ class Network:
         except Empty:
             pass
         return events
-
-    def orders(self) -> list[Order]:
-        """Return the operators' queries since the last call; ``receive`` takes them."""
-        orders, self._orders = self._orders, []
-        self._order_bytes = 0
-        return orders
-
-    def onlookers(self) -> list[Order]:
-        """Return the viewers' queries for the whole run since the last call."""
-        onlookers, self._onlookers = self._onlookers, []
-        return onlookers
 
     @property
     def has_viewers(self) -> bool:
@@ -370,7 +343,7 @@ class Network:
     def _understand(self, news: _Told) -> Sequence[DispatchEvent]:
         """Return the dispatch events of a message, if any."""
         if isinstance(news, _Queried):
-            self._queried(news.query, news.key)
+            self.queries.add(news.query, news.key)
             return []
         if isinstance(news, _Stray):
             about = "properties" if news.number < 0 else f"job {news.number}"
@@ -386,25 +359,6 @@ class Network:
             peer = news.member.name if isinstance(news, _Asked) else "a token"
             self.faults.note("malformed", peer, str(error))
             return []
-
-    def _queried(self, query: zenoh.Query, key: str) -> None:
-        """Keep a query of an operator or a viewer until it is asked for."""
-        is_onlooker = key == self._me.state
-        asked = self._onlookers if is_onlooker else self._orders
-        peers = "viewers" if is_onlooker else "operators"
-        payload = query.payload
-        size = 0 if payload is None else len(payload)
-        if size > OPERATOR_REQUEST_BYTES:
-            self.faults.note("malformed", peers, f"{size} bytes")
-        elif len(asked) >= MOST_QUERIES or self._order_bytes + size > MOST_QUERY_BYTES:
-            self.faults.note("crowd", peers, f"{len(asked)} queries wait")
-        else:
-            # Viewers say nothing.
-            data = b"" if payload is None or is_onlooker else payload.to_bytes()
-            self._order_bytes += len(data)
-            asked.append(Order(data, query, key))
-            return
-        query.drop()  # type: ignore[no-untyped-call]
 
     def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
         key = str(sample.key_expr)
@@ -455,7 +409,7 @@ class Network:
     def _returned(self, asked: _Asked) -> list[DispatchEvent]:
         number, agent, reply = asked.number, asked.member.name, asked.reply
         if reply is None:
-            if self._membership.member(agent):
+            if agent in self._membership.joined:
                 # It may be gone although its token is not: another process can
                 # declare the same one.
                 self._info_queue.add(asked.member)
@@ -470,6 +424,17 @@ class Network:
         outcome, text = _outcome(told)
         reason = printable(text, LONGEST_REASON) or "no reason given"
         return [Returned(number, agent, outcome, reason=reason)]
+
+
+def _keep_thread_state() -> None:
+    """Keep the Python state of the calling thread, one of Zenoh's, until it ends.
+
+    Python otherwise maps and unmaps memory for the state at each callback, which takes
+    longer than a short callback.
+    """
+    if not hasattr(_THREAD, "has_state"):
+        _THREAD.has_state = True
+        ctypes.pythonapi.PyGILState_Ensure()
 
 
 def _outcome(

@@ -1,4 +1,4 @@
-"""Checks of advances against their requests and the state of their arenas.
+"""Checks of advances and poses against their requests and the state of their arenas.
 
 An advance that passes names exactly the robots that live, and its times, ages and
 counts are those that follow from the request; so no state machine raises for it.
@@ -9,7 +9,18 @@ from dataclasses import dataclass
 from hashlib import sha256
 from itertools import pairwise
 
-from coordinator.run.answer_checks import check_count, check_velocities, impossible
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.compute
+
+from coordinator.run.requests import (
+    Expected,
+    check_count,
+    check_job,
+    check_velocities,
+    impossible,
+)
 from schema.experiment.document import Experiment
 from schema.limits import (
     ANGLE_BYTES,
@@ -26,12 +37,16 @@ from schema.limits import (
 from schema.parts import BodySpace, Vector
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
+from schema.tables.received import received_columns
 from schema.wire.arena import Advance, Casualty, Changes, Judgement, Touch
 from schema.wire.arena_codec import AdvanceAnswer
 
 _SHOWN = 3
 """Robots that a message names."""
 _ROUNDING_S = 1e-6
+_NO_POSES = (0, 0, 0)
+_UNIT = 0.01
+"""Greatest difference of a quaternion's length from 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +81,21 @@ class ExpectedAdvance:
     """What a correct answer to a request to advance an arena has.
 
     Attributes:
+        job: epoch and number of the request.
         from_step, until: of the request.
         born: robots that live after the requested changes.
         experiment: of the island.
         wants_snapshot: the answer must hold the state at the end.
+        is_whole: the request has what is needed to rebuild the state.
     """
 
+    job: Expected
     from_step: int
     until: int
     born: Mapping[BirthId, Inserted]
     experiment: Experiment
     wants_snapshot: bool
+    is_whole: bool
 
     @property
     def samples(self) -> range:
@@ -127,20 +146,28 @@ class ExpectedAdvance:
         )
 
 
-def check_snapshot(answer: AdvanceAnswer, expected: ExpectedAdvance) -> None:
-    """Raise unless an answer has a snapshot of its state, if one was wanted.
+def check_answer(answer: AdvanceAnswer, expected: ExpectedAdvance) -> None:
+    """Raise unless an answer is to its request and has the snapshot that was wanted.
+
+    The advance itself is not checked. It is missing if the worker lacks the state.
 
     Raises:
-        MalformedMessage: none, one that was not wanted, or one of another state.
+        MalformedMessage: the answer to another request; no advance although the state
+            came with the request; no snapshot, one that was not wanted, or one of
+            another state.
     """
+    check_job(answer.epoch, answer.number, expected.job)
+    advance = answer.advance
+    if advance is None:
+        if expected.is_whole:
+            raise impossible("answer: lacks the state that came with the request")
+        return
     if bool(answer.snapshot) != expected.wants_snapshot:
         raise impossible(
             "advance: a snapshot was wanted, got none"
             if expected.wants_snapshot
             else "advance: no snapshot was wanted, got one"
         )
-    advance = answer.advance
-    assert advance is not None
     if answer.snapshot and sha256(answer.snapshot).digest() != advance.digest:
         raise impossible("advance: the snapshot must have the digest of the state")
 
@@ -163,7 +190,7 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
     for fallen in advance.casualties:
         if not last <= fallen.step <= expected.until:
             raise impossible(
-                f"casualty {names([fallen.birth])}: step must be in "
+                f"casualty {_names([fallen.birth])}: step must be in "
                 f"{last}..{expected.until}, got {fallen.step}"
             )
         last = fallen.step
@@ -179,9 +206,9 @@ def _check_robots(advance: Advance, born: Mapping[BirthId, Inserted]) -> None:
     reported = {*judged, *(one.birth for one in advance.casualties)}
     problems = []
     if unknown := reported - born.keys():
-        problems.append(f"unknown {names(unknown)}")
+        problems.append(f"unknown {_names(unknown)}")
     if missing := born.keys() - reported:
-        problems.append(f"missing {names(missing)}")
+        problems.append(f"missing {_names(missing)}")
     if len(reported) < len(advance.judgements) + len(advance.casualties):
         problems.append("a robot is reported twice")
     if problems:
@@ -191,7 +218,7 @@ def _check_robots(advance: Advance, born: Mapping[BirthId, Inserted]) -> None:
 
 
 def _check_judgement(one: Judgement, expected: ExpectedAdvance) -> None:
-    name, robot = names([one.birth]), expected.born[one.birth]
+    name, robot = _names([one.birth]), expected.born[one.birth]
     simulation = expected.experiment.simulation
     age_s = (expected.until - robot.step) * simulation.timestep_s
     if one.age_s != age_s:
@@ -225,7 +252,7 @@ def _check_place(one: Judgement | Casualty) -> None:
     place: Vector = one.place
     if max(map(abs, place)) > GREATEST_COORDINATE:
         raise impossible(
-            f"robot {names([one.birth])}: coordinates must be within "
+            f"robot {_names([one.birth])}: coordinates must be within "
             f"{GREATEST_COORDINATE:g} m, got {place}"
         )
 
@@ -241,11 +268,11 @@ def _check_touches(touches: Sequence[Touch], expected: ExpectedAdvance) -> None:
         pair = (touch.first, touch.second)
         if touch.first == touch.second or not expected.born.keys() >= set(pair):
             raise impossible(
-                f"touch: must be of two robots that live here, got {names(pair)}"
+                f"touch: must be of two robots that live here, got {_names(pair)}"
             )
         if not 0.0 < touch.duration_s <= longest_s:
             raise impossible(
-                f"touch of {names(pair)}: must take up to {longest_s:g} s, "
+                f"touch of {_names(pair)}: must take up to {longest_s:g} s, "
                 f"got {touch.duration_s} s"
             )
     pairs = [(touch.first, touch.second) for touch in touches]
@@ -253,7 +280,139 @@ def _check_touches(touches: Sequence[Touch], expected: ExpectedAdvance) -> None:
         raise impossible("advance: touches must ascend by pair")
 
 
-def names(births: Iterable[BirthId]) -> str:
+def read_poses(columns: bytes, advance: Advance, expected: ExpectedAdvance) -> pa.Table:
+    """Return the poses of an advance that passes ``check_advance``.
+
+    Raises:
+        MalformedMessage: not the columns of poses; poses at other times, of other
+            robots, repeated, missing or not finite.
+    """
+    rows = received_columns(
+        "poses",
+        columns,
+        most_bytes=expected.most_pose_bytes,
+        most_rows=expected.most_rows,
+    )
+    _check_numbers(rows)
+    samples = _sample_of_row(rows, expected)
+    found = _poses_of_robots(rows, samples)
+    for birth, (_, least, most) in found.items():
+        robot = expected.born.get(birth)
+        if robot is None or robot.joints is None:
+            continue
+        if (least, most) != (robot.joints, robot.joints):
+            raise impossible(
+                f"poses: robot {_names([birth])} must have {robot.joints} angles"
+            )
+    for one in advance.judgements:
+        if found.pop(one.birth, _NO_POSES)[0] != len(expected.samples):
+            raise impossible(
+                f"poses: robot {_names([one.birth])} must have {len(expected.samples)}"
+            )
+    for fallen in advance.casualties:
+        before = sum(step <= fallen.step for step in expected.samples)
+        if found.pop(fallen.birth, _NO_POSES)[0] > before:
+            raise impossible(
+                f"poses: robot {_names([fallen.birth])} must have <= {before}"
+            )
+    if found:
+        raise impossible(f"poses: robots {_names(found)} do not live here")
+    return rows
+
+
+def _poses_of_robots(
+    rows: pa.Table, samples: npt.NDArray[np.int64]
+) -> dict[BirthId, tuple[int, int, int]]:
+    """Return each robot's number of poses, and the least and most angles of one.
+
+    Raises:
+        MalformedMessage: two poses of one robot in one sample.
+    """
+    islands, numbers = rows["island"].to_numpy(), rows["birth"].to_numpy()
+    order = np.lexsort((samples, numbers, islands))
+    keys = [column[order] for column in (islands, numbers, samples)]
+    is_other = [column[1:] != column[:-1] for column in keys]
+    is_new = is_other[0] | is_other[1]
+    if not (is_new | is_other[2]).all():
+        raise impossible("poses: must have one row per robot and time")
+    if not len(order):
+        return {}
+    starts = np.concatenate([[0], np.flatnonzero(is_new) + 1])
+    counts = np.diff(starts, append=len(order))
+    angles = pyarrow.compute.list_value_length(rows["angles"]).to_numpy()[order]
+    births = zip(keys[0][starts].tolist(), keys[1][starts].tolist(), strict=True)
+    facts = zip(
+        counts.tolist(),
+        np.minimum.reduceat(angles, starts).tolist(),
+        np.maximum.reduceat(angles, starts).tolist(),
+        strict=True,
+    )
+    return {BirthId(*birth): fact for birth, fact in zip(births, facts, strict=True)}
+
+
+def _sample_of_row(rows: pa.Table, expected: ExpectedAdvance) -> npt.NDArray[np.int64]:
+    """Return the number of the sample of each row.
+
+    Raises:
+        MalformedMessage: times that are not those of samples, or descend.
+    """
+    timestep_s = expected.experiment.simulation.timestep_s
+    times = np.array([step * timestep_s for step in expected.samples])
+    found = rows["sim_time_s"].to_numpy()
+    samples: npt.NDArray[np.int64] = np.searchsorted(times, found).astype(np.int64)
+    is_known = samples < len(times)
+    if not is_known.all() or (times[samples] != found).any():
+        raise impossible(
+            "poses: must be at multiples of simulation.pose_steps after step "
+            f"{expected.from_step} up to {expected.until}"
+        )
+    if (np.diff(samples) < 0).any():
+        raise impossible("poses: times must ascend")
+    return samples
+
+
+def _check_numbers(rows: pa.Table) -> None:
+    if rows["birth_island"].null_count < rows.num_rows:
+        raise impossible("poses: birth_island must be null")
+    columns = [rows[name].to_numpy() for name in ("x", "y", "z")]
+    attitude = np.stack([rows[f"q{axis}"].to_numpy() for axis in "wxyz"])
+    # A signalling NaN warns when it is converted.
+    with np.errstate(invalid="ignore"):
+        lengths = np.sqrt((attitude.astype(np.float64) ** 2).sum(axis=0))
+    angles = pyarrow.compute.list_flatten(rows["angles"]).to_numpy()
+    if not all(np.isfinite(each).all() for each in (*columns, lengths, angles)):
+        raise impossible("poses: must be finite")
+    if (np.abs(lengths - 1.0) > _UNIT).any():
+        raise impossible("poses: quaternions must have the length 1")
+
+
+def place_poses(columns: bytes, poses: pa.Table, island: int) -> bytes:
+    """Return the poses of an arena as the table has them.
+
+    Args:
+        columns: Arrow IPC stream; ``island`` is where each robot was born.
+        poses: the rows of the columns.
+        island: where the robots live; ``birth_island`` is set for immigrants only.
+    """
+    born = poses["island"]
+    if pa.compute.all(pa.compute.equal(born, island), min_count=0).as_py():
+        return columns
+    is_immigrant = pa.compute.not_equal(born, island)
+    absent = pa.scalar(None, pa.int32())
+    schema = poses.schema
+    here = pa.repeat(pa.scalar(island, pa.int32()), poses.num_rows)
+    poses = poses.set_column(
+        schema.get_field_index("birth_island"),
+        schema.field("birth_island"),
+        pa.compute.if_else(is_immigrant, born, absent),
+    ).set_column(schema.get_field_index("island"), schema.field("island"), here)
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, schema) as writer:
+        writer.write_table(poses)
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def _names(births: Iterable[BirthId]) -> str:
     """Return the first of some births as text, and how many more there are."""
     ordered = sorted(births)
     shown = ", ".join(f"{one.island}/{one.number}" for one in ordered[:_SHOWN])

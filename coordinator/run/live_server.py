@@ -11,7 +11,8 @@ from queue import SimpleQueue
 
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.fleet import Fleet
-from coordinator.network.service import Network, Order
+from coordinator.network.operator_service import Order
+from coordinator.network.service import Network
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from schema.agent.import_path import environment, python_command
@@ -52,7 +53,7 @@ class LiveServer:
         Args:
             now_s: the time, of any clock that only goes forward [s].
         """
-        self._waiting += self._network.onlookers()
+        self._waiting += self._network.queries.onlookers()
         is_whole_due = self._waiting and now_s - self._whole_s >= _WHOLE_S
         if now_s - self._update_s < _UPDATE_S and not is_whole_due:
             return

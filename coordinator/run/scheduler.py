@@ -112,7 +112,10 @@ class RunScheduler:
         now_s = clock()
         for run, ends in acting.items():
             if run in self._places:
-                self.guard(run, partial(run.act, now_s, ends))
+                # A run that has lost poses computes them before its loop starts.
+                is_ready = run.recovery is None
+                act = partial(run.loop.act, now_s) if is_ready else run.recover
+                self.guard(run, partial(act, ends))
 
     def _check_fenced(self) -> None:
         """Stop the runs that another coordinator took over, as agents say.

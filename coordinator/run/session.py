@@ -76,7 +76,8 @@ class RunSession:
         experiment: the document.
         loop: its islands and their connections.
         feed: collects its rows for viewers; None without a network.
-        recovery: computes lost poses before the run continues; None: nothing is lost.
+        recovery: computes lost poses before the run continues; None: nothing is lost,
+            so that the loop acts on the ends of jobs and advances.
     """
 
     def __init__(
@@ -173,16 +174,17 @@ class RunSession:
         )
         self.recovery.start()
 
-    def act(self, now_s: float, ends: Iterable[End]) -> None:
-        """Act on the ends of jobs and advances; see ``Loop.act``.
+    def recover(self, ends: Iterable[End]) -> None:
+        """Continue the recovery of lost poses; when it is done, start the loop.
 
         Args:
-            now_s: the time, of a monotonic clock [s].
             ends: what the fleet returned for this run.
+
+        Raises:
+            RevolveError: the run cannot continue; see ``PoseRecovery.act`` and
+                ``Loop.start``.
         """
-        if self.recovery is None:
-            self.loop.act(now_s, ends)
-            return
+        assert self.recovery is not None
         self.held.confirm()
         self.recovery.act(ends)
         if self.recovery.is_done:

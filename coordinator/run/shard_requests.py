@@ -18,13 +18,13 @@ from coordinator.run.advance_checks import (
     ExpectedAdvance,
     Inserted,
     check_advance,
-    check_snapshot,
+    check_answer,
     inserted,
+    place_poses,
+    read_poses,
     restarted,
 )
-from coordinator.run.answer_checks import check_job
 from coordinator.run.drift import Drift, with_losses
-from coordinator.run.pose_checks import place_poses, read_poses
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.experiment.document import body_space
@@ -314,15 +314,17 @@ class ShardRequests:
             )
         read = partial(
             _read_answer,
-            request=request,
+            shard=shard,
             advance_number=requested.number,
             repeats=past.repeats,
             expected=ExpectedAdvance(
+                (request.epoch, request.number),
                 past.step,
                 requested.until,
                 past.born_after(requested.changes, self._space(shard)),
                 self._context.experiments[shard],
                 wants_snapshot,
+                command.is_whole,
             ),
             provenance=Provenance(command.agent, command.platform),
             complete=complete,
@@ -333,7 +335,7 @@ class ShardRequests:
 def _read_answer(
     data: bytes,
     *,
-    request: AdvanceRequest,
+    shard: int,
     advance_number: int,
     repeats: Advanced | None,
     expected: ExpectedAdvance,
@@ -344,7 +346,7 @@ def _read_answer(
 
     Args:
         data: bytes of the answer.
-        request: that it answers.
+        shard: number of the island.
         advance_number: number of the arena's command.
         repeats: past result that the answer must have; None for a new advance.
         expected: what a correct answer has.
@@ -356,25 +358,20 @@ def _read_answer(
             contradicts the request or the state of the arena.
     """
     answer = decode_advance_answer(data, expected.most_bytes)
-    check_job(answer.epoch, answer.number, (request.epoch, request.number))
+    check_answer(answer, expected)
     advance = answer.advance
     if advance is None:
-        if request.rebuild is not None:
-            raise MalformedMessage(
-                "answer: lacks the state that came with the request", "impossible"
-            )
         return None
-    check_snapshot(answer, expected)
     if complete is not None:
         advance = complete(advance)
     check_advance(advance, expected)
     rows = read_poses(advance.poses, advance, expected)
     if repeats is not None:
         _check_repeated(advance, rows.num_rows, repeats)
-    poses = place_poses(advance.poses, rows, request.shard)
+    poses = place_poses(advance.poses, rows, shard)
     signed = replace(provenance, wall_s=answer.wall_s)
     event = Advanced(
-        request.shard,
+        shard,
         advance_number,
         replace(advance, poses=poses),
         rows.num_rows,

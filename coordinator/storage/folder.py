@@ -24,7 +24,12 @@ from coordinator.storage.disk import (
     storage_errors,
 )
 from coordinator.storage.hints import FLAGS, command
-from coordinator.storage.journal import MOST_RECORDED_EPOCH, newest_epoch
+from coordinator.storage.journal import (
+    MOST_RECORDED_EPOCH,
+    Position,
+    read_journal,
+    read_records,
+)
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, FolderLock
 from schema.errors import RunFolderError, unreadable
@@ -286,12 +291,16 @@ def _next_epoch(path: Path) -> int:
     """Return the epoch of a coordinator that opens a folder now.
 
     The journal's epoch counts, too: with a lower one, as a lost or older file gives,
-    all new records would be void.
+    all new records would be void. Records behind damage do not count: ``Journal``
+    refuses such a file.
 
     Raises:
         RunFolderError: the journal cannot be read, or the run has no more epochs.
     """
-    recorded = newest_epoch(path)
+    position = Position()
+    for _ in read_records(read_journal(path / JOURNAL), position):
+        pass
+    recorded = position.epoch
     try:
         epoch = max(_read_epoch(path), recorded) + 1
     except RunFolderError as error:

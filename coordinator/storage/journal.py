@@ -19,10 +19,46 @@ from pathlib import Path
 from typing import Self
 from zlib import crc32
 
-from coordinator.islands.events import JournalledEvent
+from coordinator.islands.events import (
+    Advanced,
+    Asked,
+    Audited,
+    Commanded,
+    Evaluated,
+    EvaluationFailed,
+    ExternalEvent,
+    Insert,
+    JournalledEvent,
+    Order,
+    Outcome,
+    Pause,
+    Remove,
+    ReplaceBrain,
+    Resume,
+    Vetted,
+    VettingFailed,
+)
 from coordinator.storage.disk import AppendedFile
-from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.errors import MalformedMessage, RunFolderError
+from schema.limits import ADVANCE_BYTES
+from schema.robot.ids import BirthId
+from schema.robot.results import Provenance
+from schema.wire import revolve_pb2 as pb
+from schema.wire.arena import BrainChange
+from schema.wire.arena_codec import (
+    advance_from_message,
+    advance_to_message,
+    read_brain_change,
+    write_brain_change,
+)
+from schema.wire.codec import (
+    evaluation_from_message,
+    evaluation_to_message,
+    report_from_message,
+    write_report,
+)
+from schema.wire.decoding import parsed
+from schema.wire.messages import birth_from_message, birth_to_message, finite
 
 NAME = "journal.bin"
 MAGIC = b"revolve journal 1\n"
@@ -55,7 +91,7 @@ class Journal:
             RunFolderError: the file is no journal, is damaged before intact records,
                 or the disk fails.
         """
-        data = _read(path)
+        data = read_journal(path)
         end = 0
         payloads: list[bytes] = []
         if not is_empty(path, data):
@@ -92,10 +128,11 @@ class Journal:
             RunFolderError: the disk is full or failed.
         """
         first = self._epoch * _RECORDS + self._sequence
-        frames = [
-            _frame(number, encode_entry(event))
-            for number, event in enumerate(events, start=first)
-        ]
+        frames: list[bytes] = []
+        for number, event in enumerate(events, start=first):
+            payload = encode_entry(event)
+            head = _HEAD.pack(number, len(payload))
+            frames.append(head + _CHECK.pack(crc32(payload, crc32(head))) + payload)
         self._file.append(b"".join(frames))
         self._sequence += len(frames)
 
@@ -157,20 +194,6 @@ def is_begun(folder: Path) -> bool:
     return path.exists() and path.stat().st_size > 0
 
 
-def newest_epoch(folder: Path) -> int:
-    """Return the newest epoch in a run's journal, 0 if it has no records.
-
-    Records behind damage do not count; ``Journal`` refuses such a file.
-
-    Raises:
-        RunFolderError: the file cannot be read.
-    """
-    position = Position()
-    for _ in read_records(_read(folder / NAME), position):
-        pass
-    return position.epoch
-
-
 def is_empty(path: Path, data: bytes) -> bool:
     """Return whether a journal has no complete header yet.
 
@@ -201,8 +224,7 @@ def check_gap(path: Path, data: bytes, position: Position, start: int = 0) -> No
         RunFolderError: the bytes at the position are damaged.
     """
     for offset in range(position.end - start, len(data) - _FRAME + 1):
-        found = _record_at(data, offset)
-        if found is not None:
+        if found := _record_at(data, offset):
             raise RunFolderError(
                 f"{path}: damaged at byte {position.end} (record {position.records}), "
                 f"but record {found[0] % _RECORDS} is intact at byte {start + offset}: "
@@ -230,16 +252,16 @@ def decode_record(path: Path, payload: bytes) -> JournalledEvent:
         ) from None
 
 
-def _read(path: Path) -> bytes:
+def read_journal(path: Path) -> bytes:
+    """Return the bytes of a journal, empty if it is missing.
+
+    Raises:
+        RunFolderError: it cannot be read.
+    """
     try:
         return path.read_bytes() if path.exists() else b""
     except OSError as error:
         raise RunFolderError(f"{path}: cannot be read: {error}") from None
-
-
-def _frame(number: int, payload: bytes) -> bytes:
-    head = _HEAD.pack(number, len(payload))
-    return head + _CHECK.pack(crc32(payload, crc32(head))) + payload
 
 
 def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
@@ -256,3 +278,153 @@ def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
     if crc32(data[begin:end], crc32(head)) != check:
         return None
     return number, end
+
+
+def encode_entry(event: JournalledEvent) -> bytes:
+    """Return an event as bytes; the poses of an advance are left out."""
+    return _entry(event).SerializeToString(deterministic=True)
+
+
+def decode_entry(data: bytes) -> JournalledEvent:
+    """Return the event of an entry's bytes.
+
+    Raises:
+        MalformedMessage: the bytes are no entry, or it holds no event.
+    """
+    entry = parsed(data, pb.Entry(), ADVANCE_BYTES)
+    match entry.WhichOneof("event"):
+        case "audited":
+            return _audited(entry.audited)
+        case "asked":
+            return _asked(entry)
+    return _event(entry)
+
+
+def _entry(event: JournalledEvent) -> pb.Entry:
+    match event:
+        case Audited(first, second):
+            audit = pb.AuditEntry(first=_entry(first), second=_entry(second))
+            return pb.Entry(audited=audit)
+        case Commanded():
+            return pb.Entry(island=event.island, commanded=_command(event))
+        case Advanced():
+            advance = advance_to_message(event.advance)
+            advance.ClearField("poses")
+            advanced = pb.AdvanceEntry(
+                number=event.number, advance=advance, pose_rows=event.pose_rows
+            )
+            entry = pb.Entry(island=event.island, advanced=advanced)
+        case Asked(birth, number, points):
+            values = [value for point in points for value in point]
+            asked = pb.LearnerEntry(number=number, points=len(points), values=values)
+            return pb.Entry(island=birth.island, birth=birth.number, asked=asked)
+        case Vetted() | VettingFailed():
+            entry = pb.Entry(attempt=event.attempt)
+            entry.island, entry.birth = event.birth
+            if isinstance(event, Vetted):
+                write_report(event.report, entry.vetted)
+            else:
+                entry.vetting_failed = event.reason
+            return entry
+        case Evaluated() | EvaluationFailed():
+            entry = pb.Entry(trial=event.trial, requester=event.requester)
+            entry.island, entry.birth = event.birth
+            if isinstance(event, Evaluated):
+                entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
+            else:
+                entry.evaluation_failed = event.reason
+    provenance = event.provenance
+    entry.provenance.agent = provenance.agent
+    entry.provenance.platform = provenance.platform
+    entry.provenance.wall_s = provenance.wall_s
+    # Present also if all three have their defaults.
+    entry.provenance.SetInParent()
+    return entry
+
+
+def _command(event: Commanded) -> pb.Command:
+    command = pb.Command(command_id=event.command_id, step=event.step)
+    match order := event.order:
+        case Pause():
+            command.pause.SetInParent()
+        case Resume():
+            command.resume.SetInParent()
+        case Insert():
+            command.insert.genome = order.genome
+            if order.place is not None:
+                command.insert.has_place = True
+                command.insert.x, command.insert.y = order.place
+        case Remove():
+            command.remove.CopyFrom(birth_to_message(order.birth))
+        case ReplaceBrain():
+            change = BrainChange(order.birth, order.brain)
+            write_brain_change(change, command.replace_brain)
+    return command
+
+
+def _event(entry: pb.Entry) -> ExternalEvent:
+    birth = BirthId(entry.island, entry.birth)
+    signed = Provenance(
+        entry.provenance.agent, entry.provenance.platform, entry.provenance.wall_s
+    )
+    requester = entry.requester if entry.HasField("requester") else None
+    match entry.WhichOneof("event"):
+        case "vetted":
+            return Vetted(birth, entry.attempt, report_from_message(entry.vetted))
+        case "vetting_failed":
+            return VettingFailed(birth, entry.attempt, entry.vetting_failed)
+        case "evaluated":
+            evaluation = evaluation_from_message(entry.evaluated)
+            return Evaluated(birth, evaluation, signed, entry.trial, requester)
+        case "evaluation_failed":
+            reason = entry.evaluation_failed
+            return EvaluationFailed(birth, reason, signed, entry.trial, requester)
+        case "advanced":
+            message = entry.advanced
+            advance, rows = advance_from_message(message.advance), message.pose_rows
+            return Advanced(entry.island, message.number, advance, rows, signed)
+        case "commanded":
+            command = entry.commanded
+            order = _order(command)
+            return Commanded(entry.island, command.command_id, command.step, order)
+    raise MalformedMessage("entry: holds no event")
+
+
+def _asked(entry: pb.Entry) -> Asked:
+    message = entry.asked
+    count, left = divmod(len(message.values), max(1, message.points))
+    if left or not count or not message.points:
+        raise MalformedMessage(
+            f"entry: {message.points} points must have equally many values, got "
+            f"{len(message.values)} values"
+        )
+    values = [finite(value, "asked.values") for value in message.values]
+    rows = zip(*[iter(values)] * count, strict=True)
+    return Asked(BirthId(entry.island, entry.birth), message.number, tuple(rows))
+
+
+def _audited(message: pb.AuditEntry) -> Audited:
+    first, second = _event(message.first), _event(message.second)
+    if not (isinstance(first, Outcome) and isinstance(second, Outcome)):
+        raise MalformedMessage("entry: an audit must hold two evaluations")
+    return Audited(first, second)
+
+
+def _order(command: pb.Command) -> Order:
+    match command.WhichOneof("order"):
+        case "pause":
+            return Pause()
+        case "resume":
+            return Resume()
+        case "insert":
+            insert = command.insert
+            if not insert.has_place:
+                return Insert(insert.genome)
+            place = finite(insert.x, "insert.x"), finite(insert.y, "insert.y")
+            return Insert(insert.genome, place)
+        case "remove":
+            return Remove(birth_from_message(command.remove))
+        case "replace_brain":
+            change = read_brain_change(command.replace_brain)
+            return ReplaceBrain(change.birth, change.brain)
+    raise MalformedMessage("command: holds no order")

@@ -5,20 +5,44 @@ those that are already on disk are skipped by their number.
 """
 
 import contextlib
+import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import pyarrow as pa
+import pyarrow.parquet
 
 from coordinator.islands.events import Append, Record
-from coordinator.storage.disk import storage_errors
+from coordinator.storage.disk import (
+    AppendedFile,
+    install_durably,
+    new_path,
+    storage_errors,
+    write_durably,
+)
 from coordinator.storage.folder import RunDetails
-from coordinator.storage.segment import remove_segment
-from coordinator.storage.table_file import TableFile
-from schema.tables.columns import TABLES
-from schema.tables.files import parquet_path
-from schema.tables.segments import SEGMENTS, segments_of
+from coordinator.storage.removal import cut_segment, remove_rows, remove_segment
+from schema.errors import MalformedMessage, RunFolderError
+from schema.tables.checksums import CHECK, FIELDS, MAGIC, digest_of, sums_path
+from schema.tables.columns import ROWS, TABLES
+from schema.tables.description import run_columns
+from schema.tables.files import (
+    batches_by_island,
+    damage_of,
+    parquet_path,
+    read_table,
+    stored_rows,
+)
+from schema.tables.received import read_columns
+from schema.tables.segments import SEGMENTS, segment_path, segments_of
+
+_LOG = logging.getLogger(__name__)
 
 BUFFERED = 64
 """Rows of a table that are buffered before they are written together."""
+ROW_GROUP = 50_000
 
 
 class Recorder:
@@ -153,3 +177,252 @@ class Recorder:
         """Close all files; buffered rows are dropped, a replay adds them again."""
         for table in self._tables.values():
             table.close()
+
+
+class TableFile:
+    """Writer of one table.
+
+    A table gets either single rows, which are buffered, or bulk rows as columns.
+
+    Attributes:
+        buffered: rows that are not on disk yet.
+    """
+
+    def __init__(self, folder: Path, name: str, parquet: Path, *, fsync: bool) -> None:
+        self._folder = folder
+        self._name = name
+        self._parquet = parquet
+        self._fsync = fsync
+        self._schema = TABLES[name]
+        self._of_run = run_columns(folder)
+        self._segment: Segment | None = None
+        self._seen = 0
+        self._ahead = 0
+        self.buffered: list[Mapping[str, Any]] = []
+        if parquet.exists() and not self._set_aside():
+            self._stored: int = read_table(folder, name).num_rows
+            return
+        stored = stored_rows(folder, name)
+        self._stored = stored.rows
+        for path, last in stored.used.items():
+            cut_segment(path, last)
+        for path in stored.unused:
+            remove_segment(path)
+
+    @property
+    def stored(self) -> int:
+        """Number of rows on disk."""
+        return self._stored
+
+    def _set_aside(self) -> bool:
+        """Rename the finished file if it is damaged; return whether it is.
+
+        The rows are written again.
+        """
+        if not (why := damage_of(self._folder, self._name)):
+            return False
+        aside = _aside(self._parquet)
+        with storage_errors(self._parquet):
+            self._parquet.replace(aside)
+        _LOG.warning("%s; until then it is kept as %s", why, aside.name)
+        return True
+
+    def take(self, row: Mapping[str, Any]) -> None:
+        """Add the next row, unless it is already on disk."""
+        if self._seen >= self._stored:
+            self.buffered.append(row)
+        self._seen += 1
+
+    def store(self, rows: int, columns: bytes) -> None:
+        """Write bulk rows ahead of the count; remove rows on disk that do not count."""
+        self.keep(self._seen + self._ahead)
+        if rows:
+            self._write(self._bulk(rows, columns))
+            self._ahead += rows
+
+    def take_columns(self, rows: int, columns: bytes) -> None:
+        """Count the next bulk rows; write them unless they are already on disk."""
+        end = self._seen + rows
+        if self._stored < end:
+            if not columns:
+                raise RunFolderError(
+                    f"{self._folder / SEGMENTS}: {self._name}: rows {self._stored} to "
+                    f"{end - 1} are missing, and the journal does not hold them: "
+                    "resume the run to compute them again"
+                )
+            self.store(rows, columns)
+        self._seen = end
+        self._ahead = max(0, self._ahead - rows)
+
+    def restore(self, rows: int, columns: bytes) -> None:
+        """Write the next bulk rows behind those on disk, before any is counted."""
+        self._write(self._bulk(rows, columns))
+
+    def keep(self, rows: int) -> None:
+        """Remove all rows on disk from a number on, which must start a batch."""
+        if self._stored > rows:
+            remove_rows(self._folder, self._name, rows)
+            self._stored = rows
+
+    def flush(self) -> None:
+        """Write the buffered rows as one batch, all or none."""
+        if self.buffered:
+            self._write(self._batch())
+            self.buffered = []
+
+    def prepare(self) -> str:
+        """Write all rows as Parquet under another name; return the file's SHA-256.
+
+        Returns:
+            In hexadecimal; empty if the table has its final form already.
+        """
+        if self._parquet.exists():
+            return ""
+        rows = stored_rows(self._folder, self._name).rows
+        if rows != self._stored:
+            raise RunFolderError(
+                f"{self._folder / SEGMENTS}: {self._name}: must hold {self._stored} "
+                f"rows, got {rows}: resume the run to write them again"
+            )
+        write_durably(self._parquet, self._write_parquet)
+        return digest_of(new_path(self._parquet))
+
+    def finish(self) -> None:
+        """Give the Parquet file its final name."""
+        if not self._parquet.exists():
+            install_durably(self._parquet)
+        aside = _aside(self._parquet)
+        with storage_errors(aside):
+            if aside.exists():
+                aside.unlink()
+
+    def close(self) -> None:
+        """Close the segment."""
+        if self._segment is not None:
+            self._segment.close()
+
+    def _write_parquet(self, path: Path) -> None:
+        """Write all rows, one row group in memory at a time."""
+        with pa.parquet.ParquetWriter(
+            path, self._schema, compression="zstd", write_page_checksum=True
+        ) as file:
+            rows = self._schema.empty_table()
+            for batch in batches_by_island(self._folder, self._name):
+                rows = pa.concat_tables([rows, pa.Table.from_batches([batch])])
+                while rows.num_rows >= ROW_GROUP:
+                    file.write_table(rows.slice(0, ROW_GROUP))
+                    rows = rows.slice(ROW_GROUP)
+            if rows.num_rows:
+                file.write_table(rows)
+
+    def _write(self, batch: pa.RecordBatch) -> None:
+        """Append a batch to the segment, all or nothing."""
+        if self._parquet.exists():
+            raise RunFolderError(
+                f"{self._parquet}: finished with {self._stored} rows, got more"
+            )
+        if self._segment is None:
+            self._segment = self._opened()
+        self._segment.append(batch)
+        self._stored += batch.num_rows
+
+    def _bulk(self, rows: int, columns: bytes) -> pa.RecordBatch:
+        """Return bulk rows as one batch with record numbers."""
+        table = read_columns(self._name, columns)
+        if table.num_rows != rows:
+            raise MalformedMessage(
+                f"{self._name}: must be {rows} rows, got {table.num_rows}"
+            )
+        return self._numbered(
+            {name: table[name].combine_chunks() for name in table.column_names}, rows
+        )
+
+    def _opened(self) -> "Segment":
+        """Return a new segment that contains the schema."""
+        numbers = [number for number, _ in segments_of(self._folder, self._name)]
+        path = segment_path(self._folder, self._name, max(numbers, default=-1) + 1)
+        return Segment(path, self._schema, fsync=self._fsync)
+
+    def _batch(self) -> pa.RecordBatch:
+        """Return the buffered rows as one batch with record numbers."""
+        rows = self.buffered
+        columns = {
+            each.name: pa.array([row[each.name] for row in rows], each.type)
+            for each in ROWS[self._name]
+        }
+        return self._numbered(columns, len(rows))
+
+    def _numbered(self, columns: dict[str, pa.Array], rows: int) -> pa.RecordBatch:
+        """Return a batch of the next rows, with record numbers and those of the run.
+
+        Args:
+            columns: of ``ROWS``, by name.
+            rows: their number.
+        """
+        columns["record"] = pa.array(
+            range(self._stored, self._stored + rows), pa.int64()
+        )
+        for each in self._schema:
+            if each.name not in columns:
+                value = pa.scalar(self._of_run[each.name], each.type)
+                columns[each.name] = pa.repeat(value, rows)
+        arrays = [columns[name] for name in self._schema.names]
+        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
+
+
+def _aside(parquet: Path) -> Path:
+    """Return the name of a damaged file until it is written again."""
+    return parquet.with_name(f"{parquet.name}.damaged")
+
+
+class Segment:
+    """A new segment of a table, open for appending."""
+
+    def __init__(self, path: Path, schema: pa.Schema, *, fsync: bool = False) -> None:
+        """Create the files of a segment, with its schema.
+
+        Args:
+            path: of the segment; neither it nor its checksums exist.
+            schema: of its rows.
+            fsync: survive power loss, too.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
+        # In this order, a segment without checksums is always damage.
+        self._sums = AppendedFile(sums_path(path), fsync=fsync)
+        self._file = AppendedFile(path, fsync=fsync)
+        try:
+            self._sums.append(MAGIC)
+            self._append(schema.serialize())
+        except RunFolderError:
+            self.close()
+            raise
+
+    def append(self, batch: pa.RecordBatch) -> None:
+        """Append a batch, all or nothing.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
+        self._append(batch.serialize())
+
+    def _append(self, message: pa.Buffer) -> None:
+        data = memoryview(message)
+        self._file.append(data)
+        try:
+            self._sums.append(_record(self._file.size, data))
+        except RunFolderError:
+            self._file.cut(self._file.size - len(data))
+            raise
+
+    def close(self) -> None:
+        """Close both files."""
+        self._file.close()
+        self._sums.close()
+
+
+def _record(end: int, message: memoryview) -> bytes:
+    """Return the checksum record of a message that ends at a byte of its segment."""
+    fields = FIELDS.pack(end, crc32(message))
+    return fields + CHECK.pack(crc32(fields))

@@ -15,9 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from schema.agent.job_watch import JobWatch, thread_clock
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
-from schema.agent.supervision import ProcessSlot, Task
+from schema.agent.supervision import JobWatch, ProcessSlot, Task, thread_clock
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
 from schema.limits import (
     ADVANCE_REQUEST_BYTES,

@@ -5,7 +5,6 @@ callbacks of the network only enqueue. Bad requests are refused with a reason an
 counted; they never end the loop.
 """
 
-import ctypes
 import json
 import math
 import os
@@ -20,12 +19,11 @@ from typing import Any
 import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
-from schema.agent.job_watch import LOOK_S
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import FairQueue, ReplyCounts, Server
-from schema.agent.supervision import ProcessSlot
+from schema.agent.supervision import LOOK_S, ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.errors import NetworkError, counted
@@ -38,7 +36,6 @@ _MOST_QUERIES = 1000
 _RETRY_S = 0.3
 # Different lines about refused runs that are written.
 _MOST_REFUSALS = 20
-_THREAD = threading.local()
 
 GAVE_UP = 75
 """Exit status of a process that gave up for lack of a hub (EX_TEMPFAIL)."""
@@ -64,17 +61,6 @@ def log_engine() -> None:
     finally:
         if chosen is not None:
             os.environ["RUST_LOG"] = chosen
-
-
-def keep_thread_state() -> None:
-    """Keep the Python state of the calling thread, one of Zenoh's, until it ends.
-
-    Python otherwise maps and unmaps memory for the state at each callback, which takes
-    longer than a short callback.
-    """
-    if not hasattr(_THREAD, "has_state"):
-        _THREAD.has_state = True
-        ctypes.pythonapi.PyGILState_Ensure()
 
 
 def session_config(text: str, member: Member) -> zenoh.Config:

@@ -33,26 +33,23 @@ class Member:
         name: its own, never used again.
         jobs: key that takes one ``Request`` and gives one ``Answer``, or takes one
             ``AdvanceRequest`` and gives one ``AdvanceAnswer`` (workers).
+        session: id of the process's Zenoh session, hexadecimal. A hub accepts one
+            session of an id at a time, and a reply carries the id of the session that
+            gave it. Only the process itself can thus reply in its name.
     """
 
     fleet: str
     role: Role
     name: str
-    jobs: str = field(init=False)
+    jobs: str = field(init=False, compare=False)
+    session: str = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         # Once per process and not for each job.
         object.__setattr__(self, "jobs", f"{self._prefix}/jobs")
-
-    @property
-    def session(self) -> str:
-        """Id of the process's Zenoh session, hexadecimal.
-
-        A hub accepts one session of an id at a time, and a reply carries the id of the
-        session that gave it. Only the process itself can thus reply in its name.
-        """
         # An id must not begin with 0.
-        return f"a{sha256(self._prefix.encode()).hexdigest()[:31]}"
+        session = f"a{sha256(self._prefix.encode()).hexdigest()[:31]}"
+        object.__setattr__(self, "session", session)
 
     @property
     def alive(self) -> str:

@@ -22,9 +22,11 @@ from schema.tables.description import DETAILS, read_small
 
 MAGIC = b"revolve sums 1\n\0"
 
-_FIELDS = struct.Struct("<QI")
-_CHECK = struct.Struct("<I")
-_RECORD = _FIELDS.size + _CHECK.size
+FIELDS = struct.Struct("<QI")
+"""End of a message and CRC32 of its bytes, in a record."""
+CHECK = struct.Struct("<I")
+"""CRC32 of these two, behind them."""
+_RECORD = FIELDS.size + CHECK.size
 _PIECE = 1 << 20
 
 
@@ -76,12 +78,6 @@ def sums_size(messages: int) -> int:
     return len(MAGIC) + messages * _RECORD
 
 
-def sums_record(end: int, message: bytes | memoryview) -> bytes:
-    """Return the record of a message that ends at a byte of its segment."""
-    fields = _FIELDS.pack(end, crc32(message))
-    return fields + _CHECK.pack(crc32(fields))
-
-
 def sound_messages(segment: Path, sums: bytes) -> Iterator[tuple[int, pa.Buffer]]:
     """Yield end and bytes of each message of a segment, up to the first damage.
 
@@ -131,10 +127,10 @@ def _records(segment: Path, sums: bytes) -> Iterator[tuple[int, int]]:
             return
         raise Damaged(path, 0, "no checksums of this version of Revolve")
     for at in range(len(MAGIC), len(sums) - _RECORD + 1, _RECORD):
-        fields = sums[at : at + _FIELDS.size]
-        if _CHECK.unpack_from(sums, at + _FIELDS.size) != (crc32(fields),):
+        fields = sums[at : at + FIELDS.size]
+        if CHECK.unpack_from(sums, at + FIELDS.size) != (crc32(fields),):
             raise Damaged(path, at, "wrong checksum of a record")
-        yield _FIELDS.unpack(fields)
+        yield FIELDS.unpack(fields)
 
 
 def digest_of(path: Path) -> str:

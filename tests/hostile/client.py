@@ -16,7 +16,7 @@ import threading
 import time
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import zenoh
@@ -45,6 +45,8 @@ from tests.hostile.mutation import Mutator
 _NOW = zenoh.ConsolidationMode.NONE
 _PATIENCE_S = 120.0
 """Time without a hub after which the run is over [s]."""
+_BETWEEN_LOOKS = 500
+"""Messages after which it looks for the fleet again."""
 _OPEN = 200
 """Most queries that wait for replies at a time."""
 _KEPT = 30
@@ -60,11 +62,25 @@ _FAR = 10**12
 class HostileClient:
     """Sends hostile messages through sessions at a hub."""
 
-    def __init__(self, seed: int, address: str, stack: ExitStack) -> None:
-        self.sent: Counter[str] = Counter()
-        self.came: Counter[str] = Counter()
+    def __init__(
+        self,
+        seed: int,
+        address: str,
+        stack: ExitStack,
+        sent: Counter[str],
+        came: Counter[str],
+    ) -> None:
+        """Open a session and listen.
+
+        Args:
+            seed: of all messages; the threads of the network draw from the next one.
+            address: of the hub.
+            stack: closes the sessions.
+            sent: number of sent messages by kind; increases.
+            came: number of replies by kind; increases.
+        """
+        self.sent, self.came = sent, came
         self._mutator = Mutator(seed)
-        # The threads of the network draw from a sequence of their own.
         self._replier = Mutator(seed + 1)
         self._lock = threading.Lock()
         self._stack = stack
@@ -358,24 +374,27 @@ def main() -> None:
     )
     chosen = parser.parse_args()
     stop = stop_on_signals()
-    with ExitStack() as stack:
-        client = HostileClient(chosen.seed, chosen.connect, stack)
-        client.join()
-        number = 0
-        while not stop.is_set() and sum(client.sent.values()) < chosen.messages:
-            if number % 500 == 0:
-                # A hub closes the link of a peer that floods it: wait until it is back.
-                end_s = time.monotonic() + _PATIENCE_S
-                while client.look() == 0 and time.monotonic() < end_s:
-                    stop.wait(0.5)
-                if time.monotonic() >= end_s:
-                    break  # the run is over
-            number += 1
-            client.send()
-            is_half = 2 * sum(client.sent.values()) >= chosen.messages
-            if is_half and chosen.progress is not None:
-                chosen.progress.touch()
-        sent, came = dict(client.sent), dict(client.came)
+    sent, came = Counter[str](), Counter[str]()
+    seed, seen_s = chosen.seed, time.monotonic()
+
+    def is_busy() -> bool:
+        return not stop.is_set() and sum(sent.values()) < chosen.messages
+
+    # A hub closes the links of a peer that floods it, and some of its sessions never
+    # get an answer again: begin anew.
+    while is_busy() and time.monotonic() < seen_s + _PATIENCE_S:
+        with ExitStack() as stack, suppress(zenoh.ZError):
+            client = HostileClient(seed, chosen.connect, stack, sent, came)
+            client.join()
+            while is_busy() and client.look():
+                seen_s = time.monotonic()
+                for _ in range(_BETWEEN_LOOKS):
+                    client.send()
+                is_half = 2 * sum(sent.values()) >= chosen.messages
+                if is_half and chosen.progress is not None:
+                    chosen.progress.touch()
+        seed += 2
+        stop.wait(0.5)
     json.dump({"sent": sent, "came": came}, sys.stdout, sort_keys=True)
 
 

@@ -25,12 +25,12 @@ from coordinator.network.membership import Membership
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
     check_advance,
-    check_snapshot,
+    check_answer,
+    place_poses,
+    read_poses,
 )
-from coordinator.run.answer_checks import check_job, read_evaluation, read_vetting
-from coordinator.run.pose_checks import place_poses, read_poses
-from coordinator.storage.journal import decode_record
-from coordinator.storage.journal_codec import decode_entry, encode_entry
+from coordinator.run.requests import read_evaluation, read_vetting
+from coordinator.storage.journal import decode_entry, decode_record, encode_entry
 from schema.agent.network import Agent
 from schema.agent.request_handler import Server
 from schema.agent.topics import Member, member_of
@@ -267,8 +267,8 @@ def _answers(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Tar
     evaluation = partial(read_evaluation, expected=JOB, simulated_s=_SECONDS)
     yield Target("read_evaluation", evaluation, (evaluated, failed))
     for number, (advance, snapshot, expected) in enumerate(made):
-        answer = AdvanceAnswer(*JOB, 0.5, advance, snapshot)
-        without = AdvanceAnswer(*JOB, 0.5, None)
+        answer = AdvanceAnswer(*expected.job, 0.5, advance, snapshot)
+        without = AdvanceAnswer(*expected.job, 0.5, None)
         samples = (encode_advance_answer(answer), encode_advance_answer(without))
         read = partial(_read_advance, expected=expected)
         yield Target(f"advance checks {number}", read, samples)
@@ -280,10 +280,9 @@ def _answers(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Tar
 def _read_advance(data: bytes, expected: ExpectedAdvance) -> None:
     """Check an answer as ``coordinator.run.shard_requests`` does."""
     answer = decode_advance_answer(data, expected.most_bytes)
-    check_job(answer.epoch, answer.number, JOB)
+    check_answer(answer, expected)
     if answer.advance is None:
         return
-    check_snapshot(answer, expected)
     check_advance(answer.advance, expected)
     rows = read_poses(answer.advance.poses, answer.advance, expected)
     place_poses(answer.advance.poses, rows, 0)

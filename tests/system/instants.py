@@ -16,7 +16,7 @@ from typing import Any
 
 import pyarrow.parquet
 
-from coordinator.storage import table_file
+from coordinator.storage import recorder
 from coordinator.storage.folder import RunFolder
 from coordinator.storage.recorder import Recorder
 
@@ -52,7 +52,7 @@ class Instants:
         # The name that the file gets; the folder for one that has none yet.
         self._around(os, "replace", lambda _, path: _name(path))
         self._around(os, "ftruncate", lambda descriptor, _: _name(_path(descriptor)))
-        self._around(table_file, "digest_of", lambda _: ".parquet.new")
+        self._around(recorder, "digest_of", lambda _: ".parquet.new")
         self._around(
             pyarrow.parquet.ParquetWriter, "write_table", lambda *_: ".parquet.new"
         )

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from coordinator.islands.rows import body_rows
 from coordinator.storage.compare import compare
 from schema.parts import BUILT_IN
 from schema.robot.robot import check_robot
-from schema.tables.births import body_rows
 from schema.tables.files import read_table
 from schema.wire.codec import decode_robot
 from tests.system.documents import OFF_LINE, SMALL_ARENA

@@ -120,6 +120,10 @@ def outcome(
                 "half of the messages are sent",
                 patience_s=3000.0,
             )
+            if client.done():
+                # The pool waits for all that it reads.
+                for process in processes.values():
+                    process.kill()
             assert not client.done(), client.result()
         fleet.join("judge", "analyzer")
         processes["judge"] = fleet.agents["judge"]

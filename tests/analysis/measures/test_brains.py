@@ -13,11 +13,11 @@ from analysis.measures.brains.measures import change, recurrent, sensed
 from analysis.measures.measures import brains
 from analysis.measures.outputs import run_schema
 from analysis.measures.run_tables import RunTables
+from coordinator.islands.rows import body_rows
 from schema.experiment.document import Space, body_space
 from schema.robot.brain import INPUT, Brain, Connection, Layer, Neuron
 from schema.robot.genome import ConnectionGene, NeuronGene, Node, develop
 from schema.robot.robot import Part, Robot
-from schema.tables.births import body_rows
 from schema.wire.codec import encode_genome, encode_robot
 from tests.analysis.tables import births, population, run
 

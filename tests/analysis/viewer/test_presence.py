@@ -47,6 +47,15 @@ def test_run_goes_on_without_the_hub_and_after_its_return(presence: Presence) ->
     assert not presence.has_ended
 
 
+def test_run_goes_on_after_a_hub_that_was_not_missed(presence: Presence) -> None:
+    presence.coordinators.clear()
+    presence.look(frozenset({"b1"}), 1.0)
+    presence.look(frozenset({"b1"}), 1.0 + 0.9 * PATIENCE_S)
+    assert not presence.has_ended
+    presence.look(frozenset({"b1"}), 1.0 + 1.01 * PATIENCE_S)
+    assert presence.has_ended
+
+
 def test_run_has_ended_if_only_the_hub_comes_back(presence: Presence) -> None:
     presence.coordinators.clear()
     presence.look(NONE, 1.0)

@@ -21,7 +21,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.storage.journal_codec import decode_entry, encode_entry
+from coordinator.storage.journal import decode_entry, encode_entry
 from schema.robot.ids import BirthId
 from tests.coordinator.arena_world import (
     DT,

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch.deadlines import FIRST_S, PATIENCE
 from coordinator.dispatch.dispatch import (
     LEAST_S,
     MAX_DEATHS,
@@ -39,8 +38,10 @@ from coordinator.dispatch.events import (
 )
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
+    FIRST_S,
     LONGEST_REST_S,
     MOST_AHEAD,
+    PATIENCE,
     PAUSE_S,
     REPLY_S,
     REST_S,

@@ -4,7 +4,6 @@ from typing import Literal
 
 import pytest
 
-from coordinator.dispatch.deadlines import FIRST_S
 from coordinator.dispatch.events import (
     AssignShard,
     Client,
@@ -21,7 +20,7 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.fleet import Fleet
-from coordinator.dispatch.pool import REPLY_S
+from coordinator.dispatch.pool import FIRST_S, REPLY_S
 from schema.errors import MalformedMessage
 from schema.wire.decoding import fingerprint
 

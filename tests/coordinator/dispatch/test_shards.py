@@ -5,7 +5,6 @@ from itertools import count
 
 import pytest
 
-from coordinator.dispatch.deadlines import FIRST_S, PATIENCE
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
     Ask,
@@ -28,7 +27,7 @@ from coordinator.dispatch.events import (
     ShardSeen,
     Ticked,
 )
-from coordinator.dispatch.pool import REPLY_S
+from coordinator.dispatch.pool import FIRST_S, PATIENCE, REPLY_S
 from coordinator.dispatch.shards import DRIFT_S, LEAST_S, MAX_ERRORS, ShardDispatch
 from schema.errors import UnexpectedEvent
 

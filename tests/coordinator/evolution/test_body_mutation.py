@@ -7,14 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.evolution.body_mutation import (
-    add_parts,
-    delete_subtree,
-    duplicate_subtree,
-    expected_parts,
-    swap_subtrees,
-    vary_parts,
-)
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     gene_ids,
@@ -26,6 +18,14 @@ from coordinator.evolution.mutable_genome import (
     to_mutable,
 )
 from coordinator.evolution.random_streams import BufferedRng
+from coordinator.evolution.revolve_angle import (
+    add_parts,
+    delete_subtree,
+    duplicate_subtree,
+    expected_parts,
+    swap_subtrees,
+    vary_parts,
+)
 from schema.experiment.document import (
     Experiment,
     Generation,

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from coordinator.evolution.breeding import Breeder
-from coordinator.evolution.selection import Individual
+from coordinator.evolution.breeding import Breeder, Individual
 from schema.errors import ExperimentError
 from schema.experiment.document import Culling, Experiment, Selection, Space
 from schema.robot.genome import NeuronGene, Node

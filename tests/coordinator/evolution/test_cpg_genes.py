@@ -12,7 +12,7 @@ from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
 from coordinator.evolution.random_streams import BufferedRng
-from coordinator.evolution.variation import mate
+from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import BrainSection, Experiment, Variation, body_space
 from schema.robot.brain import Brain
@@ -85,7 +85,8 @@ def test_growth_adds_only_what_is_missing() -> None:
 @given(st.integers(0, 2**32 - 1))
 def test_children_couple_exactly_their_neighbours(seed: int) -> None:
     pair = [generate(np.random.default_rng((seed, n)), CPG) for n in (0, 1)]
-    child = mate(pair[0], pair[1], np.random.default_rng(seed), CPG, BirthId(0, 9))
+    encoding = RevolveAngle(CPG, TYPES, None)
+    child = encoding.mate(pair[0], pair[1], np.random.default_rng(seed), BirthId(0, 9))
     for genome in [*pair, *([child] if child else [])]:
         robot = develop(genome, TYPES)
         check_robot(robot, TYPES, neuron_kinds(CPG.brain, CPG.space))

@@ -1,5 +1,6 @@
 """Encodings as islands use them: built-in and own ones, and what is refused."""
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +11,7 @@ from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.encodings import IslandEncoding, encoding_of, outside_limits
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.variation import mate
+from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, UnknownPlugin
 from schema.experiment.document import Encoding, Experiment, Space
 from schema.parts import BUILT_IN
@@ -36,10 +37,10 @@ def thesis_genomes() -> tuple[Genome, Genome]:
 
 
 def test_the_thesis_encoding_draws_what_its_functions_draw() -> None:
-    encoding = encoding_of(THESIS)
+    encoding, thesis = encoding_of(THESIS), RevolveAngle(THESIS, BUILT_IN, None)
     first, second = thesis_genomes()
     assert encoding.random(rng(1), BirthId(0, 1)) == first
-    children = [mate(first, second, rng(k), THESIS, BIRTH) for k in range(9)]
+    children = [thesis.mate(first, second, rng(k), BIRTH) for k in range(9)]
     assert [encoding.mate(first, second, rng(k), BIRTH) for k in range(9)] == children
     child = next(filter(None, children))
     assert encoding.develop(child) == develop(child, encoding.types)
@@ -269,7 +270,8 @@ def test_candidates_of_an_own_encoding_depend_on_their_name_alone(
     for number in range(8):
         candidate = first.candidate(BirthId(0, number), 0, ())
         assert candidate is not None
-        population.append(candidate.individual(0, number / 8))
+        one = candidate.individual(generation=0)
+        population.append(dataclasses.replace(one, fitness=number / 8))
     child = first.candidate(BIRTH, 0, population)
     again = second.candidate(BIRTH, 0, population)
     other = second.candidate(BirthId(2, 41), 0, population)

@@ -7,17 +7,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from coordinator.evolution.rules import (
+from coordinator.evolution.breeding import Individual
+from coordinator.evolution.selection import (
+    cull_population,
+    fittest_first,
     parents_rule,
+    select_culled,
     select_parents,
     select_survivors,
     survivors_rule,
-)
-from coordinator.evolution.selection import (
-    Individual,
-    cull_population,
-    fittest_first,
-    select_culled,
 )
 from schema.experiment.document import Arena, Culling, Selection
 from schema.robot.genome import Node

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import Evaluated, EvaluationFailed
 from coordinator.run.requests import requester_of
-from coordinator.storage.journal_codec import decode_entry, encode_entry
+from coordinator.storage.journal import decode_entry, encode_entry
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Arena as Rules

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.evolution.selection import Individual
+from coordinator.evolution.breeding import Individual
 from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed
 from coordinator.islands.reevaluation import Reevaluations, with_durations
 from schema.errors import UnexpectedEvent

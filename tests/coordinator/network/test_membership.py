@@ -1,4 +1,4 @@
-"""Membership of agents: tokens and introductions in, events out."""
+"""Membership of agents: tokens and introductions in, events out; order of asking."""
 
 import pytest
 from hypothesis import given, settings
@@ -6,7 +6,12 @@ from hypothesis import strategies as st
 
 from coordinator.dispatch.events import Died, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
-from coordinator.network.membership import Membership
+from coordinator.network.membership import (
+    LONGEST_PAUSE_S,
+    SHARE,
+    InfoQueue,
+    Membership,
+)
 from schema.agent.topics import Member
 from schema.errors import MalformedMessage
 from schema.limits import (
@@ -64,7 +69,7 @@ def test_agent_joins_with_its_info_and_leaves(membership: Membership) -> None:
     assert not membership.is_stranger(WORKER)
     assert membership.appear(WORKER.alive) is None
     assert membership.vanish(WORKER.alive) == Left(NAME)
-    assert membership.member(NAME) is None
+    assert NAME not in membership.joined
 
 
 def test_unknown_agent_that_vanishes_gives_no_event(membership: Membership) -> None:
@@ -136,7 +141,7 @@ def test_a_token_counts_only_under_its_own_roles_prefix(membership: Membership) 
     membership.introduce(WORKER, info())
     assert membership.appear(forged.alive) == forged
     assert membership.vanish(forged.alive) is None
-    assert membership.member(NAME) == WORKER
+    assert membership.joined[NAME] == WORKER
     membership.appear(forged.alive)
     with pytest.raises(MalformedMessage, match="another agent's name"):
         membership.introduce(forged, info(kind="analyzer"))
@@ -168,7 +173,7 @@ def test_agents_that_do_not_answer_make_room_for_others(
     assert membership.appear(late.alive) == late
     data = info(agent=late.name)
     assert membership.introduce(late, data) == [joined(late.name)]
-    assert membership.member(NAME) == WORKER
+    assert membership.joined[NAME] == WORKER
 
 
 def test_an_agent_that_stops_answering_leaves_and_may_join_again(
@@ -254,3 +259,45 @@ def test_agent_reports_progress_if_its_job_used_cpu_lately(
         membership.progress(WORKER, info(agent="x", quiet_s=0.0))
     membership.vanish(WORKER.alive)
     assert membership.progress(WORKER, data) is None
+
+
+def member(name: str) -> Member:
+    return Member("f", "worker", name)
+
+
+def due(queue: InfoQueue, now_s: float) -> Member | None:
+    """Return the agent that is to be asked at a time, if there is one."""
+    return queue.take() if now_s >= queue.due_s else None
+
+
+def test_the_newest_and_the_oldest_agent_are_asked_in_turn() -> None:
+    queue = InfoQueue()
+    queue.add_again(member("silent"), 1, 0.0)
+    for name in ("a", "b", "c"):
+        queue.add(member(name))
+    names = [taken.name for _ in range(4) if (taken := due(queue, 5.0))]
+    assert names == ["c", "a", "b", "silent"]
+    assert due(queue, 5.0) is None
+
+
+def test_pauses_grow_with_each_silence_up_to_a_limit() -> None:
+    for silences, pause_s in ((1, 1.0), (2, 2.0), (4, 8.0), (1000, LONGEST_PAUSE_S)):
+        queue = InfoQueue()
+        queue.add_again(member("a"), silences, 10.0)
+        assert due(queue, 10.0 + 0.99 * pause_s) is None
+        assert due(queue, 10.0 + pause_s) == member("a")
+
+
+def test_asking_takes_a_limited_share_of_the_time() -> None:
+    queue = InfoQueue()
+    for number in range(10_000):
+        queue.add(member(f"fake{number}"))
+    now_s = spent_s = 0.0
+    while now_s < 10.0:
+        if due(queue, now_s) is None:
+            now_s += 0.001
+            continue
+        queue.spent(now_s, now_s + 0.003)
+        now_s += 0.003
+        spent_s += 0.003
+    assert 0.5 * SHARE < spent_s / now_s <= SHARE + 0.001

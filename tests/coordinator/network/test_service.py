@@ -31,7 +31,8 @@ from coordinator.dispatch.events import (
     Returned,
     Ticked,
 )
-from coordinator.network.service import Network, Order
+from coordinator.network.operator_service import Order
+from coordinator.network.service import Network
 from schema.agent.network import client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member
@@ -154,7 +155,7 @@ def test_each_job_is_delivered_once_by_two_workers(
         ctypes.pythonapi, "PyGILState_Ensure", lambda: kept.append(keep())
     )
     # An earlier test may have kept the states of the engine's threads.
-    monkeypatch.setattr("schema.agent.service._THREAD", threading.local())
+    monkeypatch.setattr("coordinator.network.service._THREAD", threading.local())
     driver = Driver(network)
     with agent(network, "a"), agent(network, "b"):
         driver.run(lambda: driver.dispatch.agents("worker") == 2)
@@ -405,7 +406,7 @@ def test_a_query_with_a_wildcard_gets_a_reply_of_each_key(
         asked: list[Order] = []
         while len(asked) < len(keys):
             network.receive(0.1)
-            asked += network.orders() + network.onlookers()
+            asked += network.queries.orders() + network.queries.onlookers()
         for order in asked:
             order.reply(b"yes")
         found = {str(reply.ok.key_expr) for reply in replies if reply.ok}
@@ -419,4 +420,4 @@ def test_a_query_of_hostile_length_is_counted_and_dropped(network: Network) -> N
         replies = session.get(member.command, payload=bytes(OPERATOR_REQUEST_BYTES + 1))
         until(network, lambda _: network.malformed > 0)
         assert list(replies) == []
-    assert network.orders() == []
+    assert network.queries.orders() == []

@@ -14,7 +14,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.run.answer_checks import read_evaluation
+from coordinator.run.requests import read_evaluation
 from schema.errors import MalformedMessage
 from schema.limits import ANSWER_BYTES, LONGEST_REASON
 from schema.robot.results import Evaluation, Report

@@ -13,7 +13,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.run.cross_checks import CrossChecks, audit_records, describe
-from coordinator.storage.journal_codec import decode_entry, encode_entry
+from coordinator.storage.journal import decode_entry, encode_entry
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from schema.robot.robot import Part, Robot

@@ -3,11 +3,11 @@
 from msgspec.structs import replace
 
 from coordinator.islands.events import Record
+from coordinator.islands.rows import body_rows
 from coordinator.run.feed import Feed
 from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.tables.births import body_rows
 from schema.tables.columns import Row
 from schema.wire.codec import encode_body
 from schema.wire.updates import Birth, Update, WorkerInfo

@@ -14,10 +14,10 @@ from coordinator.run.advance_checks import (
     ExpectedAdvance,
     Inserted,
     check_advance,
-    check_snapshot,
+    check_answer,
     inserted,
+    read_poses,
 )
-from coordinator.run.pose_checks import read_poses
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings, read_arena_settings
@@ -34,6 +34,7 @@ from tests.coordinator.arena_world import experiment
 from worker.arena.world import World
 
 TICK = 25
+JOB = (1, 2)
 
 
 def settings_of(*, arena: dict[str, Any], simulation: dict[str, Any]) -> Experiment:
@@ -81,7 +82,8 @@ def advances(
             }
             brains |= {each.birth: each.robot.brain for each in came}
             advance, snapshot = world.advance(end), world.snapshot()
-            yield advance, snapshot, ExpectedAdvance(begin, end, born, rules, True)
+            expected = ExpectedAdvance(JOB, begin, end, born, rules, True, False)
+            yield advance, snapshot, expected
             born = {one.birth: born[one.birth] for one in advance.judgements}
     finally:
         world.close()
@@ -89,11 +91,11 @@ def advances(
 
 def check(advance: Advance, snapshot: bytes, expected: ExpectedAdvance) -> int:
     """Fail if a check refuses an advance; return the number of its poses."""
-    sent = encode_advance_answer(AdvanceAnswer(1, 2, 0.5, advance, snapshot))
+    sent = encode_advance_answer(AdvanceAnswer(*JOB, 0.5, advance, snapshot))
     assert len(sent) < expected.most_bytes / 2
     answer = decode_advance_answer(sent, expected.most_bytes)
     assert answer.advance is not None
-    check_snapshot(answer, expected)
+    check_answer(answer, expected)
     check_advance(answer.advance, expected)
     rows = read_poses(answer.advance.poses, answer.advance, expected)
     return int(rows.num_rows)

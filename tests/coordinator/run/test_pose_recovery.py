@@ -72,8 +72,11 @@ def execute(
                 run.stop()
                 return False
             watch(run)
-            ends = fleet.listen(0.0, float(turns))
-            run.act(float(turns), ends.get(run.loop.client, ()))
+            ends = fleet.listen(0.0, float(turns)).get(run.loop.client, ())
+            if run.recovery is None:
+                run.loop.act(float(turns), ends)
+            else:
+                run.recover(ends)
             turns += 1
         run.finish()
     finally:

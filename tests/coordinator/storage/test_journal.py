@@ -16,6 +16,7 @@ from msgspec import structs
 
 from coordinator.islands.events import (
     Advanced,
+    Asked,
     Commanded,
     Evaluated,
     EvaluationFailed,
@@ -29,13 +30,13 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.storage.journal import MAGIC, NAME, Journal
-from coordinator.storage.journal_codec import decode_entry, encode_entry
+from coordinator.storage.journal import MAGIC, NAME, Journal, decode_entry, encode_entry
 from schema.errors import MalformedMessage, RunFolderError
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
+from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
 from schema.wire.codec import encode_genome
 
@@ -50,6 +51,9 @@ REFUSED = Report(
     motors=2,
 )
 CORE = encode_genome(Node("Core", -1, 0, ()))
+BIRTH = BirthId(2, 17)
+EVALUATION = Evaluation(0.5, 0.1, 0.08, 27.5)
+MEASURED = Evaluation(0.5, 0.1, 0.08, 27.5, (0.25, -3.0))
 JUDGED = Judgement(
     BirthId(0, 3), 15.0, 0.1, 1 / 3, 0.1, is_mature=True, place=(0.1, -0.2, 0.02)
 )
@@ -280,3 +284,39 @@ def test_any_bytes_are_an_entry_or_malformed(data: bytes) -> None:
     except MalformedMessage:
         return
     assert decode_entry(encode_entry(event)) == event
+
+
+@pytest.mark.parametrize("trial", [0, 1, 200])
+def test_trials_are_read_as_they_were_written(trial: int) -> None:
+    for event in (
+        Evaluated(BIRTH, EVALUATION, Provenance("w", "p", 0.5), trial),
+        Evaluated(BIRTH, MEASURED, Provenance("w", "p", 0.5), trial),
+        EvaluationFailed(BIRTH, "diverged", Provenance("w", "p", 0.5), trial),
+    ):
+        assert decode_entry(encode_entry(event)) == event
+
+
+def test_a_first_trial_has_the_bytes_of_older_versions() -> None:
+    first = encode_entry(Evaluated(BIRTH, EVALUATION, Provenance("w", "p", 0.5)))
+    second = encode_entry(Evaluated(BIRTH, EVALUATION, Provenance("w", "p", 0.5), 1))
+    # Field 12, a varint: its key is 12 << 3.
+    assert second == first + bytes([12 << 3, 1])
+
+
+@pytest.mark.parametrize("points", [((0.5, 0.25),), ((0.1,), (1 / 3,), (1.0,))])
+def test_answers_of_learners_are_read_as_they_were_written(
+    points: tuple[tuple[float, ...], ...],
+) -> None:
+    event = Asked(BIRTH, 3, points)
+    assert decode_entry(encode_entry(event)) == event
+
+
+@pytest.mark.parametrize(
+    ("points", "values"), [(2, [0.5] * 3), (0, [0.5]), (2, []), (1, [float("nan")])]
+)
+def test_points_without_equally_many_values_are_refused(
+    points: int, values: list[float]
+) -> None:
+    asked = pb.LearnerEntry(points=points, values=values)
+    with pytest.raises(MalformedMessage, match=r"asked|points must have"):
+        decode_entry(pb.Entry(asked=asked).SerializeToString())

@@ -11,8 +11,8 @@ import pytest
 
 from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails, RunFolder, read_details
-from coordinator.storage.recorder import Recorder
-from coordinator.storage.segment import Segment, remove_segment
+from coordinator.storage.recorder import Recorder, Segment
+from coordinator.storage.removal import remove_segment
 from schema.errors import RunFolderError
 from schema.tables.checksums import read_seal, sums_path
 from schema.tables.columns import BIRTHS, TABLES
@@ -127,7 +127,7 @@ def test_a_batch_whose_checksum_cannot_be_written_is_removed(
         raise RunFolderError(f"disk full at {end}, {len(message)} bytes")
 
     with monkeypatch.context() as context:
-        context.setattr("coordinator.storage.segment.sums_record", fail)
+        context.setattr("coordinator.storage.recorder._record", fail)
         with pytest.raises(RunFolderError, match="disk full"):
             segment.append(batch)
     assert (path.stat().st_size, sums_path(path).stat().st_size) == before

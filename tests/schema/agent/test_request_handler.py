@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schema.agent.job_watch import JobWatch
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
-from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task
+from schema.agent.supervision import CurrentJob, Death, JobWatch, ProcessSlot, Task
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.limits import LONGEST_REASON, MOST_EPOCH, WAITING_JOB_BYTES
 from schema.plugins.permission import allow

@@ -1,15 +1,24 @@
-"""Cause of a process's death, as seen by its supervisor."""
+"""Cause of a process's death, as its supervisor finds it; use of CPU time by a job."""
 
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task, crash_cause
+from schema.agent.supervision import (
+    CurrentJob,
+    Death,
+    JobWatch,
+    ProcessSlot,
+    Task,
+    crash_cause,
+    thread_clock,
+)
 from schema.agent.supervisor import ProcessPool
 
 TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40, b"12345678")
@@ -146,3 +155,79 @@ def test_process_that_exits_by_itself_is_restarted_later_each_time(
         assert process_pool.exit_codes == []
         assert time.monotonic() - began_s > 3.0
     assert process_pool.deaths == []
+
+
+class Clocks:
+    """Wall time and CPU time, set by the test [s]."""
+
+    now_s = 100.0
+    cpu_s = 7.0
+
+
+@pytest.fixture
+def clocks() -> Clocks:
+    return Clocks()
+
+
+@pytest.fixture
+def watch(clocks: Clocks) -> JobWatch:
+    return JobWatch(lambda: clocks.cpu_s, lambda: clocks.now_s)
+
+
+def passed(clocks: Clocks, watch: JobWatch, seconds: int, used_s: float) -> None:
+    """Let time pass, with a measurement each second."""
+    for _ in range(seconds):
+        clocks.now_s += 1.0
+        clocks.cpu_s += used_s / seconds
+        watch.measure()
+
+
+def test_nothing_is_quiet_between_jobs(clocks: Clocks, watch: JobWatch) -> None:
+    passed(clocks, watch, 10, 0.0)
+    assert watch.quiet_s is None
+    watch.begin(TASK)
+    assert watch.task == TASK
+    assert watch.quiet_s == pytest.approx(0.0)
+    watch.end()
+    passed(clocks, watch, 10, 5.0)
+    assert [watch.task, watch.quiet_s] == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("used_s", "quiet_s"),
+    # A loop that polls needs some thousandth of a core; a process on a machine with
+    # a load of two hundred per core gets five.
+    [(0.0, 60.0), (60 * 0.001, 60.0), (60 * 0.005, 0.0), (60.0, 0.0)],
+)
+def test_job_is_quiet_while_it_uses_no_cpu(
+    clocks: Clocks, watch: JobWatch, used_s: float, quiet_s: float
+) -> None:
+    watch.begin(TASK)
+    passed(clocks, watch, 60, used_s)
+    assert watch.quiet_s == quiet_s
+
+
+def test_each_job_starts_anew(clocks: Clocks, watch: JobWatch) -> None:
+    watch.begin(TASK)
+    passed(clocks, watch, 60, 0.0)
+    watch.end()
+    watch.begin(TASK)
+    passed(clocks, watch, 3, 0.0)
+    assert watch.quiet_s == 3.0
+
+
+def test_clock_of_a_thread_counts_its_own_work_only() -> None:
+    clock = thread_clock(threading.get_ident())
+    begun_s = clock()
+
+    def work() -> None:
+        until_s = time.thread_time() + 0.2
+        while time.thread_time() < until_s:
+            pass
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert clock() - begun_s < 0.1
+    work()
+    assert clock() - begun_s >= 0.2

@@ -1,4 +1,4 @@
-"""Columns of the tables of a run, and counts of the births table."""
+"""Columns of the tables of a run."""
 
 import io
 from collections.abc import Callable
@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
+from coordinator.islands.rows import body_rows, sizes
 from schema.parts import BUILT_IN
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop
-from schema.tables.births import body_rows, sizes
+from schema.robot.genome import Genome, NeuronGene, Node, develop
 from schema.tables.columns import (
     BIRTHS,
     EVALUATIONS,
@@ -103,46 +103,6 @@ def test_every_table_names_its_run(name: str) -> None:
 
 def test_no_column_has_the_name_of_a_partition() -> None:
     assert all("experiment" not in schema.names for schema in TABLES.values())
-
-
-def test_sizes_of_a_small_robot(node: NodeMaker) -> None:
-    nowhere = ConnectionGene(("input", 0), (3, 3), ("output", 0), 1.0)
-    loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
-    touch = node("TouchSensor", connections=(nowhere,))
-    hinge = node(
-        "ActiveHinge", children=((1, touch),), hidden=(HIDDEN,), connections=(loop,)
-    )
-    passive = node("Hinge", children=((1, node("FixedBrick")),))
-    core = node("Core", children=((0, hinge), (3, passive)), hidden=(HIDDEN, HIDDEN))
-    assert sizes(develop(core, BUILT_IN), core, BUILT_IN) == {
-        "parts": 5,
-        "joints": 2,
-        "motors": 1,
-        "extremities": 2,
-        "inputs": 8,
-        "outputs": 1,
-        "hidden": 3,
-        "connections": 2,
-    }
-
-
-def test_connections_of_other_genomes_are_those_of_the_robot(node: NodeMaker) -> None:
-    loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
-    robot = develop(
-        node("Core", children=((0, node("ActiveHinge", connections=(loop,))),)),
-        BUILT_IN,
-    )
-    assert sizes(robot, "a genome of another type", BUILT_IN)["connections"] == 1
-
-
-@pytest.mark.parametrize("length", [0, 1, 3])
-def test_a_tree_with_one_leaf_has_one_extremity(node: NodeMaker, length: int) -> None:
-    chain: tuple[tuple[int, Node], ...] = ()
-    for _ in range(length):
-        chain = ((1, node("FixedBrick", children=chain)),)
-    core = node("Core", children=chain)
-    counts = sizes(develop(core, BUILT_IN), core, BUILT_IN)
-    assert (counts["parts"], counts["extremities"]) == (length + 1, 1)
 
 
 @given(data=st.data())

@@ -2,8 +2,10 @@
 
 import json
 import logging
+import struct
 from collections.abc import Iterator
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 import pyarrow as pa
@@ -11,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from schema.tables import segments
-from schema.tables.checksums import MAGIC, digest_of, sums_path, sums_record
+from schema.tables.checksums import MAGIC, digest_of, sums_path
 from schema.tables.columns import EVALUATIONS
 from schema.tables.files import (
     parquet_path,
@@ -47,7 +49,8 @@ def write(folder: Path, number: int = 0, first: int = 0) -> list[int]:
     for message in (EVALUATIONS, *batches):
         piece = message.serialize().to_pybytes()
         data += piece
-        sums += sums_record(len(data), piece)
+        fields = struct.pack("<QI", len(data), crc32(piece))
+        sums += fields + struct.pack("<I", crc32(fields))
         ends.append(len(data))
     path.write_bytes(data)
     sums_path(path).write_bytes(sums)

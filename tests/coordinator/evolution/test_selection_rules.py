@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coordinator.evolution.breeding import Individual
 from coordinator.evolution.kinds import check_parents, check_survivors
-from coordinator.evolution.rules import (
+from coordinator.evolution.selection import (
     PARENTS,
     SURVIVORS,
     Tournament,
@@ -17,7 +18,6 @@ from coordinator.evolution.rules import (
     select_survivors,
     survivors_rule,
 )
-from coordinator.evolution.selection import Individual
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import Selection
 from schema.experiment.file import parse_experiment

@@ -1,4 +1,4 @@
-"""The steps of mutation that change the brain, one by one."""
+"""The steps of mutation that change a network, one by one."""
 
 from collections import Counter
 from typing import Any
@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.brain_mutation import (
+from coordinator.evolution.brains import brain_rules
+from coordinator.evolution.generation import generate
+from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
+from coordinator.evolution.network import (
     add_connections,
     add_hidden_neurons,
     delete_connections,
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.brains import brain_rules
-from coordinator.evolution.generation import generate
-from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
 from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.robot.brain import NEURON_TYPES, Layer
