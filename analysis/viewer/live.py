@@ -244,7 +244,7 @@ class LiveSource:
         hubs = frozenset(map(str, self._session.info.routers_zid()))
         self._presence.look(hubs, now_s)
         if not self._presence.has_ended:
-            self._hub.seen(is_there=bool(hubs))
+            self._hub.seen(hubs)
         self._sequel.is_behind = self._sequel.is_behind or bool(hubs and not was_there)
 
     def _understood(self, message: _Message) -> LiveMessage | None:

@@ -309,7 +309,7 @@ class Network:
         now_s = time.monotonic()
         if not self._is_hub and now_s >= self._look_s:
             self._look_s = now_s + _LOOK_S
-            self._hub.seen(is_there=bool(self._session.info.routers_zid()))
+            self._hub.seen(self._session.info.routers_zid())
         while (began_s := time.monotonic()) >= self._info_queue.due_s:
             self._ask_info(self._info_queue.take())
             self._info_queue.spent(began_s, time.monotonic())

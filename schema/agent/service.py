@@ -11,7 +11,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -97,7 +97,7 @@ class HubWatch:
     give_up_after_s: float = math.inf
     tells_first: bool = False
     _lost_s: float | None = None
-    _has_been_there: bool = False
+    _hubs: frozenset[str] = frozenset()
     _refusals: set[str] = field(default_factory=set)
 
     def refused(self, line: str) -> None:
@@ -106,25 +106,36 @@ class HubWatch:
             self._refusals.add(line)
             self.warn(line)
 
-    def seen(self, *, is_there: bool) -> None:
-        """Note whether the hub is there.
+    @property
+    def is_lost(self) -> bool:
+        """Whether the last line was that there is no hub."""
+        return self._lost_s is not None
+
+    def seen(self, hubs: Iterable[object]) -> None:
+        """Note the ids of the connected hubs; another id is another hub.
 
         Raises:
-            HubLost: it has not been there for too long.
+            HubLost: none has been there for too long.
         """
-        now_s = time.monotonic()
-        if is_there:
-            if self._lost_s is not None or (
-                self.tells_first and not self._has_been_there
-            ):
-                again = "re" if self._has_been_there else ""
+        now_s, there = time.monotonic(), frozenset(map(str, hubs))
+        if self._lost_s is None and not there & self._hubs:
+            # Also if another hub is there already: it was lost between two looks.
+            if self._hubs or not there:
+                self._lost_s = now_s
+                gone = " (it ended, or the network is down)" if self._hubs else ""
+                self.warn(
+                    f"no hub at {self.address}{gone}; retrying; press Ctrl-C to stop"
+                )
+            elif self.tells_first:
+                self.say(f"connected to {self.address}")
+        if there:
+            if self._lost_s is not None:
+                again = "re" if self._hubs else ""
                 self.say(f"{again}connected to {self.address}")
-            self._lost_s, self._has_been_there = None, True
-        elif self._lost_s is None:
-            self._lost_s = now_s
-            gone = " (it ended, or the network is down)" if self._has_been_there else ""
-            self.warn(f"no hub at {self.address}{gone}; retrying; press Ctrl-C to stop")
-        elif now_s - self._lost_s >= self.give_up_after_s:
+            self._lost_s, self._hubs = None, there
+            return
+        waited_s = now_s - (self._lost_s or now_s)
+        if waited_s > 0.0 and waited_s >= self.give_up_after_s:
             raise HubLost(gave_up(self.address, self.give_up_after_s))
 
 
@@ -291,7 +302,7 @@ def _open(
         except zenoh.ZError:
             # A process that is told to stop meanwhile needs no hub.
             if not stop.is_set():
-                hub.seen(is_there=False)
+                hub.seen(())
         stop.wait(_RETRY_S)
     return None
 
@@ -329,15 +340,15 @@ def _serve_session(
         ),
         session.liveliness().declare_token(me.alive),
     ):
-        hub.seen(is_there=True)
+        hub.seen(session.info.routers_zid())
         turns: FairQueue[zenoh.Query] = FairQueue()
         while not stop.is_set():
             if not _queue_all(inbox, turns, server.counts):
                 if not stop.is_set():
-                    hub.seen(is_there=bool(session.info.routers_zid()))
+                    hub.seen(session.info.routers_zid())
                 continue
-            # A job arrived: the hub is there.
-            hub.seen(is_there=True)
+            if hub.is_lost:
+                hub.seen(session.info.routers_zid())
             began_s = time.monotonic()
             with turns.take() as query:
                 _answer(query, server, me, hub)
