@@ -383,7 +383,7 @@ def main() -> None:
     # A hub closes the links of a peer that floods it, and some of its sessions never
     # get an answer again: begin anew.
     while is_busy() and time.monotonic() < seen_s + _PATIENCE_S:
-        with ExitStack() as stack, suppress(zenoh.ZError):
+        with suppress(zenoh.ZError), ExitStack() as stack:
             client = HostileClient(seed, chosen.connect, stack, sent, came)
             client.join()
             while is_busy() and client.look():
