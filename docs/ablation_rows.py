@@ -33,6 +33,7 @@ from analysis.comparison.robustness import Row, percent
 from analysis.measures.load import read_run, read_tables
 from analysis.measures.measures import brains
 from analysis.measures.run_tables import RunTables
+from docs.page_parts import with_parts
 from schema.errors import rounded
 
 DOCS = Path(__file__).resolve().parent
@@ -116,14 +117,10 @@ def kept() -> dict[tuple[str, int], pa.Table]:
 
 def write_page(*, is_check: bool) -> int:
     """Write the page's tables and pictures, or check the tables."""
-    page = PAGE.read_text("utf-8")
-    for name, lines in parts().items():
-        begin, end = f"<!-- begin: {name} -->\n", "<!-- end -->"
-        head, _, rest = page.partition(begin)
-        _, _, tail = rest.partition(end)
-        page = "".join([head, begin, *(f"{line}\n" for line in lines), end, tail])
+    old = PAGE.read_text("utf-8")
+    page = with_parts(old, parts())
     if is_check:
-        is_old = page != PAGE.read_text("utf-8")
+        is_old = page != old
         if is_old:
             print(f"{PAGE.name}: not up to date, run python -m docs.ablation_rows page")
         return int(is_old)

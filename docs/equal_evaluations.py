@@ -22,13 +22,11 @@ import pyarrow.compute as pc
 from msgspec import structs
 
 from analysis.comparison.statistics import mean_difference, rank_sum_p
-from analysis.measures.load import read_run
+from docs.page_parts import with_parts
+from docs.tasks_campaign import best_robot, last_population
 from schema.experiment.document import Experiment
-from schema.experiment.file import own_experiment
 from schema.experiment.settings import evaluation_settings_of
 from schema.robot.robot import Robot
-from schema.tables.files import read_table
-from schema.wire.born import robot_of_birth
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import all_changes, rejudge
 
@@ -60,36 +58,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def row_of(folder: Path) -> Row:
     """Return the row of a finished run: its last population, and its winner."""
-    run = read_run(folder)
-    rules = own_experiment(run.document)
-    population = read_table(folder, "population")
-    births = pc.max(population["births"]).as_py()
+    rules, _, robot = best_robot(folder)
+    last = last_population(folder)
+    births = last["births"][0].as_py()
     if births != rules.births:
         sys.exit(f"{folder}: must have {rules.births} births, got {births}")
-    last = population.filter(pc.equal(population["births"], births))
     trials = rules.learning.budget if rules.learning else 1
     draws = rules.robust.draws if rules.robust else 1
-    winner = last["birth"][int(np.argmax(last["fitness"]))].as_py()
     found: dict[str, object] = {
-        "experiment": run.experiment,
+        "experiment": rules.name,
         "run": folder.name,
         "births": births,
         "evaluations": births * trials * draws,
         "mean": pc.mean(last["fitness"]).as_py(),
         "best": pc.max(last["fitness"]).as_py(),
-        **under_changes(robot_of(folder, winner, rules), rules),
+        **under_changes(robot, rules),
     }
     return {
         name: f"{value:.9g}" if isinstance(value, float) else str(value)
         for name, value in found.items()
     }
-
-
-def robot_of(folder: Path, birth: int, rules: Experiment) -> Robot:
-    """Return the robot of a birth of island 0."""
-    births = read_table(folder, "births")
-    (row,) = births.filter(pc.equal(births["birth"], birth)).to_pylist()
-    return robot_of_birth(row["genome"], row["robot"], rules)
 
 
 def under_changes(robot: Robot, rules: Experiment) -> dict[str, float]:
@@ -189,12 +177,8 @@ def write_pages(*, is_check: bool) -> int:
     """Write the tables into their pages, or return 1 if a table differs from them."""
     is_old = False
     for path, generated in parts().items():
-        old = page = path.read_text(encoding="utf-8")
-        for name, lines in generated.items():
-            begin, end = f"<!-- begin: {name} -->\n", "<!-- end -->"
-            head, _, rest = page.partition(begin)
-            _, _, tail = rest.partition(end)
-            page = "".join([head, begin, *(f"{line}\n" for line in lines), end, tail])
+        old = path.read_text(encoding="utf-8")
+        page = with_parts(old, generated)
         if not is_check:
             path.write_text(page, encoding="utf-8")
         elif page != old:

@@ -132,7 +132,7 @@ def _run_one(folder: Path, task: str, search: str, seed: int, workers: int) -> i
             writer.writeheader()
         writer.writerow({**row, "commit": _commit()})
     if search == "evolution" and seed == DRAWN:
-        experiment, _, robot = _best(out)
+        experiment, _, robot = best_robot(out)
         write_robot(
             robot, ROBOTS / f"{_file_name(task)}.yaml", body_space(experiment.space)
         )
@@ -155,7 +155,7 @@ def _document(task: str, search: str) -> str:
     return text
 
 
-def _last(out: Path) -> pa.Table:
+def last_population(out: Path) -> pa.Table:
     """Return the rows of the last recorded population."""
     population = read_table(out, "population")
     last = pc.max(population["births"]).as_py()
@@ -168,11 +168,11 @@ def _outcome(out: Path) -> dict[str, object]:
     Where pushes differ from trial to trial, the best fitness is the mean over new
     trials, because the greatest of many fitness values was lucky, too.
     """
-    alive = _last(out)
+    alive = last_population(out)
     fitness = np.array(alive["fitness"].to_pylist(), dtype=float)
     status = read_table(out, "evaluations")["status"].to_pylist()
     best = float(fitness.max())
-    experiment, birth, robot = _best(out)
+    experiment, birth, robot = best_robot(out)
     if experiment.environment.push_impulse:
         settings = evaluation_settings_of(experiment)
         own = [Identity(Origin(), BirthId(0, birth), trial) for trial in TRIALS]
@@ -186,11 +186,11 @@ def _outcome(out: Path) -> dict[str, object]:
     }
 
 
-def _best(out: Path) -> tuple[Experiment, int, Robot]:
+def best_robot(out: Path) -> tuple[Experiment, int, Robot]:
     """Return the experiment of a run, and birth and robot of the last best fitness."""
     (one,), _ = read_runs([out])
     experiment = own_experiment(one.document)
-    alive = _last(out)
+    alive = last_population(out)
     best = int(np.argmax(alive["fitness"].to_numpy()))
     birth = alive["birth"][best].as_py()
     births = read_table(out, "births")

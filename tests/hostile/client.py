@@ -380,8 +380,8 @@ def main() -> None:
     def is_busy() -> bool:
         return not stop.is_set() and sum(sent.values()) < chosen.messages
 
-    # A hub closes the links of a peer that floods it, and some of its sessions never
-    # get an answer again: begin anew.
+    # A hub closes the links of a peer that floods it. Some of its sessions get no
+    # answers after that: open new ones.
     while is_busy() and time.monotonic() < seen_s + _PATIENCE_S:
         with suppress(zenoh.ZError), ExitStack() as stack:
             client = HostileClient(seed, chosen.connect, stack, sent, came)
