@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -191,7 +192,8 @@ def serve(
     warn: Callable[[str], None] | None = None,
     outlet: Outlet | None = None,
     slot: ProcessSlot = UNSUPERVISED,
-) -> ReplyCounts:
+    totals: Callable[[ReplyCounts], None] | None = None,
+) -> None:
     """Do jobs until stopped; wait for the hub as long as needed.
 
     The current job is finished and the next one dropped: its coordinator gives it to
@@ -206,6 +208,8 @@ def serve(
         warn: called with a line when the hub is gone; None: ``say``.
         outlet: publishes through this agent's session while there is one.
         slot: this process's slot in a pool, if it has one.
+        totals: called at the end with counts of the replies, before the session
+            closes: that can take longer than a pool waits.
 
     Raises:
         NetworkError: an invalid name or address, or ``HubLost``.
@@ -229,9 +233,10 @@ def serve(
             if outlet is not None:
                 outlet.lead_to(session)
             _serve_session(session, server, hub, stop, me)
+            if totals is not None:
+                totals(server.counts)
             if outlet is not None:
                 outlet.lead_to(None)
-    return server.counts
 
 
 def own_agent(agent: Agent, index: int) -> Agent:
@@ -273,17 +278,29 @@ def serve_as_process(
         (tell_user, warn_user) if slot.index == 0 else (_keep_quiet, _keep_quiet)
     )
     try:
-        counts = serve(answer, own, stop, say, warn=warn, outlet=outlet, slot=slot)
+        serve(
+            answer,
+            own,
+            stop,
+            say,
+            warn=warn,
+            outlet=outlet,
+            slot=slot,
+            totals=partial(_tell_totals, own.name),
+        )
     except HubLost:
         sys.exit(GAVE_UP)  # the pool's command says why
+
+
+def _tell_totals(name: str, counts: ReplyCounts) -> None:
     if counts.refused:
         warn_user(
-            f"{own.name} refused {counted(counts.refused, 'request')}, "
+            f"{name} refused {counted(counts.refused, 'request')}, "
             f"{counts.malformed} of them malformed"
         )
     if counts.crowd or counts.cancels:
         tell_user(
-            f"{own.name} dropped {counts.crowd} requests beyond the limit and "
+            f"{name} dropped {counts.crowd} requests beyond the limit and "
             f"{counts.cancels} malformed cancellations"
         )
 
