@@ -153,7 +153,7 @@ class Dispatch:
 
     @property
     def leisure_s(self) -> float:
-        """Estimated time until some worker runs out of jobs [s]."""
+        """Time for which answers may collect before a worker runs out of jobs [s]."""
         return self.workers.leisure_s
 
     @property

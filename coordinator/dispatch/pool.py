@@ -19,6 +19,8 @@ AHEAD_S = 0.8
 """Most time that these jobs may take together [s]: other agents cannot have them."""
 PAUSE_S = 0.2
 """Longest time that the coordinator lets answers collect [s]."""
+SPARE_SHARE = 0.125
+"""Share of the time of an agent's spare jobs for which answers may collect."""
 REST_S = 0.05
 LONGEST_REST_S = 3.2
 REPLY_S = 5.0
@@ -75,6 +77,8 @@ class AgentState:
         advances: numbers of its advances of arenas.
         busy: slots that these occupy; jobs get the next one, so that they never starve.
         job_s: typical time that a slot takes for a job [s]; 0 before the first.
+        most_ahead: most jobs that it holds ahead; fewer if it is slow, as they wait
+            for it.
         failures: errors and losses since its last answer.
         rests: it gets no jobs until its backoff ends.
         stamp: of its only valid entry in the pool's heap.
@@ -90,6 +94,7 @@ class AgentState:
     advances: dict[int, None] = field(default_factory=dict)
     busy: int = 0
     job_s: float = 0.0
+    most_ahead: int = 0
     failures: int = 0
     rests: bool = False
     stamp: int = 0
@@ -111,11 +116,8 @@ class AgentState:
         """Note the time that a slot took for a job [s]."""
         known = self.job_s or duration_s
         self.job_s = known + _NEWEST_WEIGHT * (duration_s - known)
-
-    @property
-    def most_ahead(self) -> int:
-        """Most jobs that it holds ahead; fewer if it is slow, as they wait for it."""
-        return min(MOST_AHEAD, int(AHEAD_S / self.job_s)) if self.job_s else 0
+        if self.job_s:
+            self.most_ahead = min(MOST_AHEAD, int(AHEAD_S / self.job_s))
 
 
 @dataclass(slots=True)
@@ -246,10 +248,10 @@ class Pool:
 
     @property
     def leisure_s(self) -> float:
-        """Estimated time until some agent runs out of jobs [s].
+        """Time for which answers may collect before some agent runs out of jobs [s].
 
-        Half of the time that the spare jobs of the first such agent take, as jobs
-        differ.
+        A small share of the time that the spare jobs of the first such agent take:
+        jobs differ, and handling the collected answers takes time, too.
         """
         name = self._least_busy()
         if not name or self._spare(self.agents[name]) <= 0:
@@ -259,7 +261,7 @@ class Pool:
             for agent in self.agents.values()
             if not agent.rests
         )
-        return min(PAUSE_S, spare_s / 2)
+        return min(PAUSE_S, SPARE_SHARE * spare_s)
 
     def idle(self) -> list[str]:
         """Return the agents without a job that do not rest, by name."""
