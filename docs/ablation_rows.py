@@ -131,11 +131,11 @@ def write_page(*, is_check: bool) -> int:
     drawn = {f"ablation-{name}": ablation(rows) for (name, _), rows in kept().items()}
     drawn["brain-changes"] = changes_over_births({"brains": pq.read_table(CHANGES)})
     for name, figure in drawn.items():
-        _save_small(figure, name)
+        save_small(figure, name)
     return 0
 
 
-def _save_small(figure: Any, name: str) -> None:  # noqa: ANN401 - plotnine has no types
+def save_small(figure: Any, name: str) -> None:  # noqa: ANN401 - plotnine has no types
     """Write a picture of few colours into the folder of pictures."""
     from PIL import Image  # noqa: PLC0415 - of an extra
 
