@@ -159,9 +159,8 @@ def _draw_map(runs: SweepRuns, panel: Axes, measure: str) -> None:
     middle = float(np.nanmean([np.nanmin(means), np.nanmax(means)]))
     for (row, column), value in np.ndenumerate(means.to_numpy()):
         colour = "black" if value > middle else "white"
-        panel.text(
-            column, row, _text(value), ha="center", va="center", size=7, color=colour
-        )
+        text = f"{value:.2g}"
+        panel.text(column, row, text, ha="center", va="center", size=7, color=colour)
 
 
 def _draw_points(runs: SweepRuns, panel: Axes, measure: str, setting: str) -> None:

@@ -1,0 +1,216 @@
+"""Writes the tables and the picture of docs/arena_settings.md from docs/sweeps.
+
+    revolve analyze SWEEP --out REPORT
+    python -m docs.arena_settings keep REPORT ...   # keep the rows of finished sweeps
+    python -m docs.arena_settings page              # write tables and picture
+    python -m docs.arena_settings page --check      # fail if the tables differ
+
+Each sweep has one file of rows, one per run: docs/sweeps/NAME.csv.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+from scipy.interpolate import RegularGridInterpolator
+from scipy.stats import friedmanchisquare
+
+from analysis.comparison.statistics import mean_difference
+from analysis.figures.sweeps import sweep_map
+from docs.ablation_rows import save_small
+from docs.page_parts import with_parts
+
+DOCS = Path(__file__).resolve().parent
+ROWS, PAGE = DOCS / "sweeps", DOCS / "arena_settings.md"
+GRID, CHECK, LIMIT = "arena-settings", "arena-settings-check", "arena-limit"
+INTERVAL, SHARE = "arena.birth_interval_s", "arena.survive_share_of_mean"
+POPULATION_LIMIT = "arena.population_limit"
+KEPT = ("fitness", "fitness_best", "diversity", "late_gain", "size", "size_mean")
+"""Outcomes of a run that are kept, columns of ``measures/outcomes.parquet``."""
+Frame = Any  # pandas has no types
+SHOWN = {
+    "fitness": ("mean fitness [m/s]", 4),
+    "size_mean": ("living robots", 1),
+    "birth_s": ("simulated time per birth [s]", 1),
+}
+"""Outcomes of the table of the check: heading, and number of decimals."""
+TESTED = {
+    "fitness": "mean fitness",
+    "fitness_best": "best fitness",
+    "diversity": "mean tree edit distance",
+    "late_gain": "late gain",
+    "size_mean": "living robots",
+    "birth_s": "simulated time per birth",
+}
+"""Outcomes of the table of effects, and their names."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one of the commands; return 0, or 1 if a check fails."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    keeping = commands.add_parser("keep", help="keep the rows of finished sweeps")
+    keeping.add_argument("reports", type=Path, nargs="+", help="of revolve analyze")
+    writing = commands.add_parser("page", help="write tables and picture")
+    writing.add_argument("--check", action="store_true", help="write nothing; compare")
+    options = parser.parse_args(arguments)
+    if options.command == "page":
+        return write_page(is_check=options.check)
+    for report in options.reports:
+        keep(report)
+    return 0
+
+
+def keep(report: Path) -> None:
+    """Keep the rows of the sweep of a report, one per finished run."""
+    sweeps, outcomes, runs, populations = (
+        pq.read_table(report / "measures" / f"{name}.parquet").to_pandas()
+        for name in ("sweeps", "outcomes", "runs", "populations")
+    )
+    (name,) = set(sweeps["experiment"])
+    settings = sweeps.pivot_table(index="folder", columns="setting", values="number")
+    founded = populations[populations["births"] > outcomes["births"].max() // 4]
+    rows = settings.join(outcomes.set_index("folder")[["births", *KEPT]], how="inner")
+    rows["size_least"] = founded.groupby("folder")["size"].min()
+    simulated_s = runs.set_index("folder")["simulated_s"]
+    rows["birth_s"] = simulated_s / rows["births"]
+    rows.index = [Path(folder).name for folder in rows.index]
+    rows.sort_index().to_csv(
+        ROWS / f"{name}.csv", index_label="run", float_format="%.6g"
+    )
+
+
+def kept(name: str) -> Frame:
+    """Return the rows of a sweep."""
+    return pa.csv.read_csv(ROWS / f"{name}.csv").to_pandas().set_index("run")
+
+
+def settings_of(rows: Frame) -> list[str]:
+    """Return the swept settings: columns with a dotted key."""
+    return [column for column in rows.columns if "." in column]
+
+
+def drawn(name: str) -> Any:  # noqa: ANN401 - a figure
+    """Return the map of a sweep, as in its report."""
+    rows = kept(name)
+    long = rows[settings_of(rows)].melt(
+        var_name="setting", value_name="number", ignore_index=False
+    )
+    sweeps = long.assign(experiment=name, folder=long.index, value="")
+    outcomes = rows.assign(experiment=name, folder=rows.index)
+    tables = {
+        "sweeps": pa.Table.from_pandas(sweeps, preserve_index=False),
+        "outcomes": pa.Table.from_pandas(outcomes, preserve_index=False),
+    }
+    return sweep_map(tables, name)
+
+
+def write_page(*, is_check: bool) -> int:
+    """Write the page's tables and picture, or check the tables."""
+    old = PAGE.read_text(encoding="utf-8")
+    page = with_parts(old, parts())
+    if is_check:
+        is_old = page != old
+        if is_old:
+            print(
+                f"{PAGE.name}: not up to date, run python -m docs.arena_settings page"
+            )
+        return int(is_old)
+    PAGE.write_text(page, encoding="utf-8")
+    save_small(drawn(GRID), GRID)
+    return 0
+
+
+def parts() -> dict[str, list[str]]:
+    """Return the generated parts of the page, by name."""
+    grid = kept(GRID)
+    return {
+        "intervals": [*setting_lines(grid, INTERVAL)],
+        "shares": [*setting_lines(grid, SHARE)],
+        "limits": [*setting_lines(kept(LIMIT), POPULATION_LIMIT)],
+        "effects": [*effect_lines(grid)],
+        "check": [*check_lines(grid, kept(CHECK))],
+    }
+
+
+def setting_lines(rows: Frame, setting: str) -> Iterator[str]:
+    """Yield a table of means over all runs with the same value of a setting.
+
+    The interval of mean fitness is that of the mean over these runs.
+    """
+    yield (
+        f"| `{setting.removeprefix('arena.')}` | runs | mean fitness [m/s] "
+        "| best [m/s] | late gain | tree edit distance | living robots (least) "
+        "| simulated time per birth [s] |"
+    )
+    yield "|---|---|---|---|---|---|---|---|"
+    for value, own in rows.groupby(setting):
+        middle, low, high = mean_difference(own["fitness"].to_numpy(), np.zeros(1))
+        means = own.mean(numeric_only=True)
+        yield (
+            f"| {value:g} | {len(own)} | {middle:.4f} ({low:.4f} to {high:.4f}) "
+            f"| {means['fitness_best']:.4f} | {100 * own['late_gain'].median():.0f} % "
+            f"| {means['diversity']:.1f} "
+            f"| {means['size_mean']:.1f} ({means['size_least']:.1f}) "
+            f"| {means['birth_s']:.1f} |"
+        )
+
+
+def effect_lines(grid: Frame) -> Iterator[str]:
+    """Yield a table: which outcomes depend on a setting, and which on the founders.
+
+    Friedman's test compares the values of a setting between runs of the same repeat,
+    so with the same founders, and of the same other setting. The last column is the
+    share of an outcome's variance that lies between repeats.
+    """
+    yield "| outcome | interval: p | share: p | variance between repeats |"
+    yield "|---|---|---|---|"
+    repeats = grid.index.str.rpartition("-").get_level_values(2)
+    for measure, name in TESTED.items():
+        rows = grid.assign(repeat=repeats)
+        found = []
+        for setting, other in ((INTERVAL, SHARE), (SHARE, INTERVAL)):
+            blocks = rows.pivot_table(
+                index=["repeat", other], columns=setting, values=measure
+            ).dropna()
+            found.append(friedmanchisquare(*blocks.to_numpy().T).pvalue)
+        means = rows.groupby("repeat")[measure].transform("mean")
+        between = means.var(ddof=0) / rows[measure].var(ddof=0)
+        cells = " | ".join(f"{p:.2g}" for p in found)
+        yield f"| {name} | {cells} | {100 * between:.0f} % |"
+
+
+def check_lines(grid: Frame, others: Frame) -> Iterator[str]:
+    """Yield a table: points beside the grid, and what the grid's means say of them."""
+    names = [name for name, _ in SHOWN.values()]
+    yield (
+        f"| birth interval [s] | survival share | runs | "
+        f"{' | '.join(f'{name}: expected | observed' for name in names)} |"
+    )
+    yield "|---|---|---|" + "---|" * (2 * len(names))
+    for (interval, share), own in others.groupby([INTERVAL, SHARE]):
+        cells = []
+        for measure, (_, digits) in SHOWN.items():
+            expected = interpolated(grid, measure, interval, share)
+            least, most = own[measure].min(), own[measure].max()
+            observed = f"{own[measure].mean():.{digits}f}"
+            spread = f"{least:.{digits}f} to {most:.{digits}f}"
+            cells += [f"{expected:.{digits}f}", f"{observed} ({spread})"]
+        yield f"| {interval:g} | {share:g} | {len(own)} | {' | '.join(cells)} |"
+
+
+def interpolated(grid: Frame, measure: str, interval: float, share: float) -> float:
+    """Return a measure at settings between those of the grid, linear in both."""
+    means = grid.pivot_table(index=INTERVAL, columns=SHARE, values=measure)
+    at = RegularGridInterpolator((means.index, means.columns), means.to_numpy())
+    return float(at((interval, share)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
