@@ -5,7 +5,8 @@ limits is not parsed to its end. Aliases are refused: no document contains itsel
 """
 
 from collections.abc import Iterator
-from typing import cast
+from dataclasses import dataclass
+from typing import TypeAlias, cast
 
 import yaml
 
@@ -15,7 +16,35 @@ from schema.limits import MOST_DEPTH, MOST_NODES
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-def root_node(text: str) -> yaml.Node | None:
+@dataclass(slots=True)
+class ScalarNode:
+    """Text of a scalar, and its line from 1."""
+
+    value: str
+    line: int
+
+
+@dataclass(slots=True)
+class SequenceNode:
+    """Items of a list, and its line from 1."""
+
+    value: list["Node"]
+    line: int
+
+
+@dataclass(slots=True)
+class MappingNode:
+    """Keys and values of a mapping, and its line from 1."""
+
+    value: list[tuple["Node", "Node"]]
+    line: int
+
+
+# Smaller than the nodes of PyYAML, which keep a mark of two positions each.
+Node: TypeAlias = ScalarNode | SequenceNode | MappingNode
+
+
+def root_node(text: str) -> Node | None:
     """Return the root node of a document, without tags; None if it is empty.
 
     Raises:
@@ -32,9 +61,9 @@ class _Composer:
         self._events = events
         self._count = 0
 
-    def document(self) -> yaml.Node | None:
+    def document(self) -> Node | None:
         """Return the root node."""
-        root: yaml.Node | None = None
+        root: Node | None = None
         documents = 0
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
@@ -44,29 +73,29 @@ class _Composer:
                 root = self._node(next(self._events), 1)
         return root
 
-    def _node(self, event: yaml.Event, depth: int) -> yaml.Node:
+    def _node(self, event: yaml.Event, depth: int) -> Node:
         """Return the node that begins with an event."""
         self._count += 1
         if self._count > MOST_NODES:
             raise _refusal(f"must have <= {MOST_NODES} values, got more", event)
         if depth > MOST_DEPTH:
             raise _refusal(f"must have <= {MOST_DEPTH} levels, got more", event)
+        line = _mark(event).line + 1
+        if isinstance(event, yaml.ScalarEvent):
+            return ScalarNode(event.value, line)
         if isinstance(event, yaml.AliasEvent):
             raise _refusal("aliases are not allowed", event)
-        if isinstance(event, yaml.ScalarEvent):
-            return yaml.ScalarNode("", event.value, _mark(event))
         items = []
         while not isinstance(inner := next(self._events), yaml.CollectionEndEvent):
             items.append(self._node(inner, depth + 1))
         if isinstance(event, yaml.SequenceStartEvent):
-            return yaml.SequenceNode("", items, _mark(event))
-        pairs = list(zip(items[::2], items[1::2], strict=True))
-        return yaml.MappingNode("", pairs, _mark(event))
+            return SequenceNode(items, line)
+        return MappingNode(list(zip(items[::2], items[1::2], strict=True)), line)
 
 
-def _mark(event: yaml.Event) -> yaml.error.Mark | None:
-    # The types know only the marks of the parser in Python.
-    return cast("yaml.error.Mark | None", event.start_mark)
+def _mark(event: yaml.Event) -> yaml.error.Mark:
+    # The types know only the marks of the parser in Python, and None.
+    return cast("yaml.error.Mark", event.start_mark)
 
 
 def _refusal(problem: str, event: yaml.Event) -> yaml.YAMLError:

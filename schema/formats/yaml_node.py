@@ -14,7 +14,13 @@ from typing import NoReturn, TypeVar
 import yaml
 
 from schema.errors import InvalidRobot, cut, nearest, shown
-from schema.formats.yaml_compose import root_node
+from schema.formats.yaml_compose import (
+    MappingNode,
+    Node,
+    ScalarNode,
+    SequenceNode,
+    root_node,
+)
 from schema.limits import MOST_TEXT_BYTES
 
 T = TypeVar("T", int, float)
@@ -33,7 +39,7 @@ class Table:
         keys: as written, in their order.
     """
 
-    def __init__(self, node: yaml.Node | None, path: str, file: str) -> None:
+    def __init__(self, node: Node | None, path: str, file: str) -> None:
         """Read the keys of a node.
 
         Raises:
@@ -43,12 +49,12 @@ class Table:
         self._stem = f"{path}." if path else ""
         self._file = file
         self.line = _line(node)
-        self._values: dict[str, yaml.Node] = {}
+        self._values: dict[str, Node] = {}
         self._key_lines: dict[str, int] = {}
-        if not isinstance(node, yaml.MappingNode):
+        if not isinstance(node, MappingNode):
             self._fail(path, f"must be a mapping, got {_shown(node)}", self.line)
         for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
+            if not isinstance(key, ScalarNode):
                 self._fail(path, "a key must be a word or a number", _line(key))
             if key.value in self._values:
                 self._fail(self._at(key.value), "is given twice", _line(key))
@@ -75,14 +81,12 @@ class Table:
 
     def is_mapping(self, key: str) -> bool:
         """Return whether the value of a key is a mapping."""
-        return isinstance(self._values.get(key), yaml.MappingNode)
+        return isinstance(self._values.get(key), MappingNode)
 
     def is_null(self, key: str) -> bool:
         """Return whether a key is missing or its value is YAML's null."""
         node = self._values.get(key)
-        return node is None or (
-            isinstance(node, yaml.ScalarNode) and node.value in _NULL
-        )
+        return node is None or (isinstance(node, ScalarNode) and node.value in _NULL)
 
     def is_empty(self, key: str) -> bool:
         """Return whether a key is missing or has no value."""
@@ -139,7 +143,7 @@ class Table:
         if key not in self._values:
             return []
         node = self._node(key)
-        if not isinstance(node, yaml.SequenceNode):
+        if not isinstance(node, SequenceNode):
             self.refuse(key, f"must be a list, got {_shown(node)}")
         return [
             Table(item, f"{self._at(key)}[{index}]", self._file)
@@ -155,9 +159,9 @@ class Table:
         if default is not None and key not in self._values:
             return default
         node = self._node(key)
-        if not isinstance(node, yaml.ScalarNode) or not node.value:
+        if not isinstance(node, ScalarNode) or not node.value:
             self.refuse(key, f"must be a word, got {_shown(node)}")
-        return str(node.value)
+        return node.value
 
     def word(
         self,
@@ -225,7 +229,7 @@ class Table:
     def _at(self, key: str) -> str:
         return f"{self._stem}{cut(key)}"
 
-    def _node(self, key: str) -> yaml.Node:
+    def _node(self, key: str) -> Node:
         if key not in self._values:
             self._fail(self._at(key), "is missing", self.line)
         return self._values[key]
@@ -267,14 +271,14 @@ def _one_of(allowed: Collection[str]) -> str:
     return f"must be one of {first}{more}"
 
 
-def _line(node: yaml.Node | None) -> int:
-    return 1 if node is None else int(node.start_mark.line) + 1
+def _line(node: Node | None) -> int:
+    return 1 if node is None else node.line
 
 
-def _shown(node: yaml.Node | None) -> str:
+def _shown(node: Node | None) -> str:
     """Return a short description of a node for a message."""
-    if isinstance(node, yaml.ScalarNode):
-        return repr(str(node.value)[:40]) if node.value else "nothing"
+    if isinstance(node, ScalarNode):
+        return repr(node.value[:40]) if node.value else "nothing"
     if node is None:
         return "nothing"
-    return "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
+    return "a list" if isinstance(node, SequenceNode) else "a mapping"
