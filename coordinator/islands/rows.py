@@ -1,6 +1,5 @@
 """Table rows of off-line islands, and those that arenas share with them."""
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -95,7 +94,7 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     Source: thesis section 6.3; the code of the original.
     """
     kinds = [space[part.kind] for part in robot.parts]
-    neurons = Counter(neuron.layer for neuron in robot.brain.neurons)
+    layers = [neuron.layer for neuron in robot.brain.neurons]
     connections = len(robot.brain.connections)
     if isinstance(genome, Node):
         connections = sum(len(node.connections) for node, _, _ in walk(genome))
@@ -109,9 +108,9 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
         ),
         "motors": sum(kind.outputs for kind in kinds),
         "extremities": len(robot.parts) + 1 - len(parents),
-        "inputs": neurons["input"],
-        "outputs": neurons["output"],
-        "hidden": neurons["hidden"],
+        "inputs": layers.count("input"),
+        "outputs": layers.count("output"),
+        "hidden": layers.count("hidden"),
         "connections": connections,
     }
 

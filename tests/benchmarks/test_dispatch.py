@@ -39,9 +39,12 @@ from schema.agent.network import Agent
 from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
 from schema.experiment.file import read_experiment
+from schema.tables.arrow import skip_pandas
 from schema.wire.codec import decode_answer
 
-prepare_process()  # as the command does, before the first session is opened
+# As the command does, before the first session is opened.
+prepare_process()
+skip_pandas()
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 

@@ -44,8 +44,11 @@ from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
+from schema.tables.arrow import skip_pandas
 
-prepare_process()  # as the command does, before the first session is opened
+# As the command does, before the first session is opened.
+prepare_process()
+skip_pandas()
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 
