@@ -78,7 +78,7 @@ def main(arguments: list[str]) -> int:
     if command == "resume":
         return _resume(options)
     experiments = _experiments(options)
-    is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
+    is_campaign_wanted = len(experiments) > 1 or _is_repeated(options)
     is_shipped = is_campaign_wanted and options.experiments[0] in shipped_campaigns()
     name = "+".join(options.experiments) if is_shipped else joined_name(experiments)
     folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
@@ -89,10 +89,11 @@ def main(arguments: list[str]) -> int:
             deployment,
             lambda: start(folder, experiments[0], options.seed, deployment),
         )
-    repeats = options.repeats or 1
-    if repeats > MOST_REPEATS:
-        flags.error(f"--repeats: must be <= {MOST_REPEATS}, got {repeats}")
-    campaign = Campaign(experiments, repeats, options.seed)
+    repeats, first = options.repeats or 1, options.first_repeat or 0
+    if (count := first + repeats) > MOST_REPEATS:
+        also = " with those before --first-repeat" if first else ""
+        flags.error(f"--repeats: must be <= {MOST_REPEATS}{also}, got {count}")
+    campaign = Campaign(experiments, repeats, options.seed, first)
     return _stoppable(
         folder, deployment, lambda: start_campaign(folder, campaign, deployment)
     )
@@ -264,9 +265,14 @@ def _has_arena(experiment: Experiment) -> bool:
 
 
 def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
-    is_repeated = getattr(options, "repeats", None) is not None
-    is_alone = island_count(experiment) == 1 and not is_repeated
+    is_alone = island_count(experiment) == 1 and not _is_repeated(options)
     return is_alone and island_experiment(experiment, 0).arena is not None
+
+
+def _is_repeated(options: argparse.Namespace) -> bool:
+    """Return whether repeats make a campaign; ``resume`` has no such flags."""
+    counts = (getattr(options, name, None) for name in ("repeats", "first_repeat"))
+    return any(count is not None for count in counts)
 
 
 def _bench(options: argparse.Namespace) -> int:

@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if options.command == "run":
         parts = [part for part in PARTS if options.only in {None, part.option}]
-        return run(options.folder, parts, options.workers)
+        return run(options.folder, parts, options.workers, options.data)
     if options.command == "collect":
         return collect(options.folder, options.data, options.commit)
     return check(options.data)
@@ -51,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     checking = commands.add_parser("check", help="list kept, missing and damaged files")
     for command in (running, collecting):
         command.add_argument("folder", type=Path, help="folder of the campaign")
-    for command in (collecting, checking):
+    for command in (running, collecting, checking):
         command.add_argument(
             "--data",
             type=Path,
@@ -66,13 +66,18 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def run(folder: Path, parts: Sequence[Part], workers: int | None) -> int:
+def run(
+    folder: Path, parts: Sequence[Part], workers: int | None, data: Path = DATA
+) -> int:
     """Start or resume parts of the campaign with ``revolve run`` or ``resume``.
+
+    A new folder begins with the first repeat of which some experiment has no rows.
 
     Args:
         folder: folder of the campaign.
         parts: parts of the campaign, run one after the other.
         workers: number of processes; None is one per core.
+        data: folder of the rows that are kept.
 
     Returns:
         0 if all runs are finished, else the exit code of the command that failed.
@@ -83,15 +88,28 @@ def run(folder: Path, parts: Sequence[Part], workers: int | None) -> int:
         if (out / "campaign.toml").exists():
             words = ["resume", str(out)]
         else:
+            first = _first_missing(data, part)
+            if first == part.repeats:
+                continue
             words = ["run", *part.experiments, "--seed", str(part.seed)]
-            words += ["--repeats", str(part.repeats), "--births", str(part.births)]
-            words += ["--out", str(out)]
+            words += ["--first-repeat", str(first)] if first else []
+            words += ["--repeats", str(part.repeats - first)]
+            words += ["--births", str(part.births), "--out", str(out)]
         if workers is not None:
             words += ["--workers", str(workers)]
         print(f"revolve {' '.join(words)}", flush=True)
         if code := _revolve(words):
             return code
     return 0
+
+
+def _first_missing(data: Path, part: Part) -> int:
+    """Return the first repeat of which an experiment lacks rows; else their number."""
+    for number in range(part.repeats):
+        names = (stem(experiment, number) for experiment in part.names)
+        if any(list(problems_of(data, part, name)) for name in names):
+            return number
+    return part.repeats
 
 
 def _revolve(words: Sequence[str]) -> int:

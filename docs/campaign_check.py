@@ -1,5 +1,6 @@
 """Checks of the campaign's rows: missing, damaged and unexpected files."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -69,9 +70,9 @@ def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
         parts: parts of the campaign.
 
     Returns:
-        0, or 1 if a file is damaged or unexpected, if a repeat is incomplete, or if the
-        runs differ in platform or, within one experiment, in settings. Repeats without
-        any file are no error.
+        0, or 1 if a file is damaged or unexpected, if a repeat is incomplete, if a run
+        has several platforms, or if the runs of one experiment differ in settings.
+        Repeats without any file are no error.
     """
     problems = []
     details: list[dict[str, str]] = []
@@ -95,8 +96,9 @@ def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
     size = sum(path.stat().st_size for path in there)
     print(f"{len(there)} files, {size / 1e6:.1f} MB")
     for column in ("platform", "versions", "commit"):
-        for value in sorted({str(row[column]) for row in details}):
-            print(f"{column}: {value}")
+        counts = Counter(str(row[column]) for row in details)
+        for value, count in sorted(counts.items()):
+            print(f"{column}: {value} ({count} runs)")
     problems += _differences(details)
     for problem in problems:
         print(f"damaged: {problem}")
@@ -105,9 +107,10 @@ def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
 
 def _differences(details: Sequence[dict[str, str]]) -> Iterator[str]:
     """Yield differences that runs must not have."""
-    platforms = {tag for row in details for tag in row["platform"].split()}
-    if len(platforms) > 1:
-        yield f"runs: must have one platform, got {len(platforms)}"
+    for row in details:
+        if (count := len(row["platform"].split())) != 1:
+            name = stem(row["experiment"], int(row["run"]))
+            yield f"runs/{name}.parquet: must have one platform, got {count}"
     for experiment in sorted({row["experiment"] for row in details}):
         mine = [row for row in details if row["experiment"] == experiment]
         if len({row["document"] for row in mine}) > 1:

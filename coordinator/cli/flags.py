@@ -143,6 +143,14 @@ def _add_experiments(flags: argparse.ArgumentParser) -> None:
         "--seed", type=_seed, default=0, metavar="N", help="random seed (default: 0)"
     )
     add_count(flags, "--repeats", None, "repeat each experiment N times, as a campaign")
+    add_count(
+        flags,
+        "--first-repeat",
+        None,
+        "number of the campaign's first repeat (default: 0), to add repeats or to "
+        "divide them among machines",
+        least=0,
+    )
     add_count(flags, "--births", None, "number of births (default: the experiment's)")
     flags.add_argument(
         "--out",

@@ -16,7 +16,12 @@ from itertools import product
 from pathlib import Path
 from typing import IO
 
-from coordinator.storage.campaign import campaign_plugins, is_campaign, read_campaign
+from coordinator.storage.campaign import (
+    campaign_plugins,
+    is_campaign,
+    read_campaign,
+    read_experiments,
+)
 from coordinator.storage.folder import holds_run, read_details
 from schema.agent.import_path import environment, python_command
 from schema.agent.log import warn_user
@@ -29,7 +34,6 @@ from schema.experiment.document import (
 )
 from schema.experiment.file import (
     draft_experiments,
-    experiments_of,
     own_experiment,
     own_references,
 )
@@ -226,7 +230,7 @@ def _check_plugin(
 
 def _check_document(source: str, births: int | None, limit_s: float) -> None:
     """Raise what a run would refuse besides plug-ins."""
-    for experiment in experiments_of(source, births):
+    for experiment in read_experiments((source,), births):
         with _time_limit(limit_s):
             for number in range(island_count(experiment)):
                 check_fitness_keys(island_experiment(experiment, number).fitness)

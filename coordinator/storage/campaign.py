@@ -49,19 +49,21 @@ class Campaign:
 
     Attributes:
         experiments: experiments in the order of their runs; their names differ.
-        repeats: runs of each experiment, numbered from 0 to ``repeats - 1``.
+        repeats: number of runs of each experiment.
         seed: random seed of all runs; the run number selects the random streams.
+        first: number of the first repeat; the others follow it.
     """
 
     experiments: tuple[Experiment, ...]
     repeats: int
     seed: int
+    first: int = 0
 
     def runs(self, folder: Path) -> list[tuple[Path, RunDetails]]:
         """Return folder and details of each run, repeat by repeat."""
         runs = [
             RunDetails(each.name, repeat, self.seed, experiment_text(each))
-            for repeat in range(self.repeats)
+            for repeat in range(self.first, self.first + self.repeats)
             for each in self.experiments
         ]
         return [(folder / f"{each.name}-{each.run}", each) for each in runs]
@@ -140,8 +142,8 @@ def _check_names(experiments: Sequence[Experiment]) -> None:
             )
         if "/" in name or name.startswith("."):
             raise ExperimentError(
-                f"name: must have no '/' and not start with '.' in a campaign, which "
-                f"names a folder by it, got {name!r}"
+                f"name: must have no '/' and not start with '.', as a folder is named "
+                f"after it, got {name!r}"
             )
 
 
@@ -176,13 +178,16 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
     plugins: dict[str, KeptPlugin] = {}
     for document in documents:
         plugins |= keep_plugins(folder, document)
-    digest = _digest(campaign.seed, campaign.repeats, documents, plugins)
+    numbers = (campaign.seed, campaign.repeats, campaign.first)
+    digest = _digest(numbers, documents, plugins)
     lines = [
         f"# To resume it:  {printable_line(command('resume', folder))}",
         f'digest = "{digest}"',
         f"seed = {campaign.seed}",
         f"repeats = {campaign.repeats}",
     ]
+    if campaign.first:
+        lines.append(f"first = {campaign.first}")
     for name, note in plugins.items():
         lines += ["", f"[plugins.{name}]"]
         # A text of JSON without other characters is one of TOML.
@@ -206,7 +211,7 @@ def read_campaign(folder: Path) -> Campaign:
         _check_names(experiments)
     except ExperimentError as error:
         raise _damaged(folder, str(error)) from None
-    return Campaign(experiments, found.repeats, found.seed)
+    return Campaign(experiments, found.repeats, found.seed, found.first)
 
 
 def campaign_plugins(folder: Path) -> dict[str, KeptPlugin]:
@@ -236,7 +241,8 @@ def _read(folder: Path) -> "_Document":
             f"{folder / CAMPAIGN}: damaged: seed must be < 2^64, got {found.seed}"
         )
     documents = [each.document for each in found.experiments]
-    digest = _digest(found.seed, found.repeats, documents, found.plugins)
+    numbers = (found.seed, found.repeats, found.first)
+    digest = _digest(numbers, documents, found.plugins)
     if found.digest not in ("", digest):
         raise _damaged(folder, "its digest is not that of its content")
     return found
@@ -261,16 +267,24 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
     experiments: Annotated[list[_Entry], msgspec.Meta(min_length=1)]
     digest: str = ""
     plugins: dict[str, KeptPlugin] = {}
+    first: Annotated[int, msgspec.Meta(ge=0, le=MOST_REPEATS)] = 0
 
 
 def _digest(
-    seed: int,
-    repeats: int,
+    numbers: tuple[int, int, int],
     documents: Sequence[str],
     plugins: Mapping[str, KeptPlugin],
 ) -> str:
-    """Return the SHA-256 of a campaign's seed, repeats, experiments and plug-ins."""
-    parts = [str(seed), str(repeats), *documents]
+    """Return the SHA-256 of a campaign.
+
+    Args:
+        numbers: seed, repeats, and number of the first repeat, which counts only if it
+            is not 0: older campaigns have none.
+        documents: of its experiments.
+        plugins: by name.
+    """
+    seed, repeats, first = map(str, numbers)
+    parts = [seed, repeats, *([first] if first != "0" else []), *documents]
     for name, note in sorted(plugins.items()):
         parts += [name, *msgspec.structs.astuple(note)]
     return sha256("\n".join(parts).encode()).hexdigest()

@@ -79,7 +79,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text = OFF_LINE.format(name=name, children=children)
         (folder / f"{name}.toml").write_text(text)
     (folder / "scenario3.toml").write_text(ARENA)
-    assert campaign.run(folder, _parts(folder), 1) == 0
+    assert campaign.run(folder, _parts(folder), 1, folder / "none") == 0
     return folder
 
 
@@ -193,17 +193,35 @@ def test_a_lost_run_is_repeated(
     folder = tmp_path / "copy"
     shutil.copytree(place / "runs" / "some", folder / "runs" / "some")
     shutil.rmtree(folder / "runs" / "some" / "scenario1-0")
-    assert campaign.run(folder, parts[:1], 1) == 0
+    assert campaign.run(folder, parts[:1], 1, tmp_path / "none") == 0
     assert campaign.collect(folder, tmp_path / "again", COMMIT, parts[:1]) == 0
     again = _files(tmp_path / "again")
     assert again == {name: _files(data)[name] for name in again}
     assert "outcomes/scenario1-00.parquet" in again
 
 
-def _other_platform(data: Path) -> None:
+def test_kept_repeats_are_not_run_again(
+    parts: Parts, data: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "new"
+    assert campaign.run(folder, parts, 1, data) == 0
+    assert not (folder / "runs").exists()
+    before = _files(data)
+    for path in data.glob("*/scenario1-01.parquet"):
+        path.unlink()
+    assert campaign.run(folder, parts[:1], 1, data) == 0
+    names = {path.parent.name for path in folder.glob("runs/some/*/run.json")}
+    assert names == {"scenario1-1", "scenario2-1"}
+    assert campaign.collect(folder, data, COMMIT, parts) == 0
+    assert _files(data) == before
+
+
+def _two_platforms(data: Path) -> None:
     rows = read_rows(data, "runs", "scenario2-00")
     index = rows.schema.get_field_index("platform")
-    other = rows.set_column(index, "platform", pa.array(["linux-x86_64_v1"]))
+    other = rows.set_column(
+        index, "platform", pa.array(["linux-x86_64_v1 linux-x86_64_v4"])
+    )
     path_of(data, "runs", "scenario2-00").write_bytes(parquet(other))
 
 
@@ -239,7 +257,10 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
         _exchanged,
         "scenario2-00.parquet: must have rows of scenario2-00 only",
     ),
-    "platform": (_other_platform, "runs: must have one platform, got 2"),
+    "platform": (
+        _two_platforms,
+        "runs/scenario2-00.parquet: must have one platform, got 2",
+    ),
     "stray": (
         lambda data: (data / "final" / "scenario2-07.parquet").write_bytes(b""),
         "final/scenario2-07.parquet: unexpected file",

@@ -128,6 +128,22 @@ def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
     _check_equal(whole, campaign)
 
 
+def test_later_repeats_are_those_of_a_longer_campaign(
+    workspace: Workspace, whole: Path
+) -> None:
+    _write(workspace.folder)
+    sources = tuple(f"{name}.toml" for name in NAMES)
+    words = ("--seed", "7", "--first-repeat", "1", "--out", "later")
+    workspace.run("run", *sources, *words, "--in-process", "--quiet")
+    later = workspace.folder / "later"
+    names = [f"{name}-1" for name in NAMES]
+    assert sorted(path.parent.name for path in later.glob("*/run.json")) == sorted(
+        names
+    )
+    for name in names:
+        assert compare(whole / name, later / name) == []
+
+
 def test_two_coordinators_share_the_workers_of_a_hub(
     workspace: Workspace, whole: Path
 ) -> None:
@@ -188,6 +204,7 @@ def test_status_of_all_coordinators_of_a_hub(
         (("status", "nowhere"), "nowhere: no such folder"),
         (("run", "thesis", "scenario1"), "must have different names"),
         (("run", "scenario1", "--repeats", "0"), "must be a whole number >= 1"),
+        (("run", "scenario1", "--first-repeat", "100000"), "must be <= 100000"),
         (("run", "scenario1", "--connect", HUB, "--listen", HUB), "exclude each other"),
         (("run", "scenario1", "--connect", "tcp/127.0.0.1:9"), "no hub"),
     ],

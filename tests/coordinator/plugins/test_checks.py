@@ -146,6 +146,13 @@ def test_experiment_without_own_plug_ins_is_in_order(tmp_path: Path) -> None:
     ]
 
 
+def test_name_that_no_folder_can_have_is_a_fault(tmp_path: Path) -> None:
+    document = tmp_path / "odd.toml"
+    document.write_text('name = "a/b"\nbirths = 20\n')
+    (problem,) = check_apart([str(document)])
+    assert problem.startswith("name: must have no '/'")
+
+
 def test_file_without_a_name_is_asked_for_one(lab: Callable[[str], Path]) -> None:
     file = lab(GOOD)
     step, line = checked(str(file))[-1]

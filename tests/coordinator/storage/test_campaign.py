@@ -2,6 +2,7 @@
 
 import shlex
 from dataclasses import replace as changed
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,25 @@ def test_a_campaign_is_read_as_it_was_written(tmp_path: Path) -> None:
     write_campaign(tmp_path, campaign)
     assert is_campaign(tmp_path)
     assert read_campaign(tmp_path) == campaign
+
+
+def test_later_repeats_are_runs_of_a_longer_campaign(tmp_path: Path) -> None:
+    later = changed(CAMPAIGN, repeats=2, first=1)
+    assert later.runs(tmp_path) == CAMPAIGN.runs(tmp_path)[2:]
+    write_campaign(tmp_path, later)
+    assert read_campaign(tmp_path) == later
+    text = (tmp_path / "campaign.toml").read_text()
+    (tmp_path / "campaign.toml").write_text(text.replace("first = 1", "first = 2"))
+    with pytest.raises(RunFolderError, match="digest"):
+        read_campaign(tmp_path)
+
+
+def test_a_campaign_from_the_first_repeat_is_written_as_before(tmp_path: Path) -> None:
+    write_campaign(tmp_path, CAMPAIGN)
+    lines = (tmp_path / "campaign.toml").read_text().splitlines()
+    assert lines[2:5] == ["seed = 5", "repeats = 3", ""]
+    text = "\n".join(["5", "3", *map(experiment_text, CAMPAIGN.experiments)])
+    assert lines[1] == f'digest = "{sha256(text.encode()).hexdigest()}"'
 
 
 def test_a_used_folder_is_refused(tmp_path: Path) -> None:
