@@ -13,10 +13,12 @@ from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
-from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.kinds import KINDS, brain_kind
-from coordinator.islands.learning import IslandLearning
-from coordinator.plugins.checks import refuse_faulty, refuse_faulty_of
+from coordinator.plugins.checks import (
+    check_built_in,
+    refuse_faulty,
+    refuse_faulty_of,
+)
 from coordinator.plugins.command import check, check_flags, list_flags, list_plugins
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
@@ -42,10 +44,9 @@ from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import ExperimentError, NetworkError
 from schema.experiment.document import Experiment, island_count, island_experiment
-from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
-from schema.plugins.permission import allow, is_own
+from schema.plugins.permission import allow
 from schema.tables.arrow import skip_pandas
 
 
@@ -156,32 +157,13 @@ def _stoppable(
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     """Return the experiments to run, checked; imports the room of the worker."""
+    import worker.kinds
+
     refuse_faulty(options.experiments, options.births)
     experiments = read_experiments(options.experiments, options.births)
     for experiment in experiments:
-        _check_built_in(experiment)
+        check_built_in(experiment, worker.kinds.KINDS)
     return experiments
-
-
-def _check_built_in(experiment: Experiment) -> None:
-    """Raise unless built-in plug-ins take the parameters of an experiment.
-
-    A user's own were checked by ``refuse_faulty``, with a time limit.
-    """
-    import worker.kinds
-
-    for kind in worker.kinds.KINDS:
-        for use in kind.used(experiment):
-            if not is_own(use.path):
-                use.check(use.load())
-    for number in range(island_count(experiment)):
-        own = island_experiment(experiment, number)
-        if not is_own(own.fitness.function):
-            check_fitness_keys(own.fitness)
-        if own.learning is not None:
-            IslandLearning(own, encoding_of(own))
-        elif not is_own(own.encoding.type):
-            encoding_of(own)
 
 
 def _deployment(

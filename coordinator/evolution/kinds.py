@@ -152,21 +152,27 @@ def _has(methods: Iterable[str], plugin: object) -> bool:
     return isinstance(plugin, type) and all(hasattr(plugin, name) for name in methods)
 
 
-def _encoding(experiment: Experiment) -> Use:
-    path = experiment.encoding.type
+def _encoding(experiment: Experiment, own: Experiment) -> Use:
+    """Return the use of an encoding by an island whose experiment is ``own``."""
+    path = own.encoding.type
 
     def load() -> object:
         # What is wrong elsewhere is not the fault of this plug-in.
         check_experiment(experiment, experiment.name)
         return load_object(path, WHERE, ENCODINGS, METHODS)
 
-    return Use(WHERE, path, load, lambda _: check_encoding(experiment))
+    return Use(WHERE, path, load, lambda _: check_encoding(own))
+
+
+def _encoding_by_hand(path: str) -> Use:
+    experiment = Experiment("by hand", encoding=Encoding(type=path))
+    return _encoding(experiment, experiment)
 
 
 def _encodings(experiment: Experiment) -> Iterator[Use]:
     numbers = range(island_count(experiment))
     for own in dict.fromkeys(island_experiment(experiment, each) for each in numbers):
-        yield _encoding(own)
+        yield _encoding(experiment, own)
 
 
 def brain_kind(check: Callable[[Experiment], None]) -> Kind:
@@ -212,7 +218,7 @@ ENCODING = Kind(
     "encoding",
     ENCODINGS,
     partial(_has, METHODS),
-    lambda path: _encoding(Experiment("by hand", encoding=Encoding(type=path))),
+    _encoding_by_hand,
     _encodings,
 )
 KINDS = (

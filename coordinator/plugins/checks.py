@@ -16,6 +16,8 @@ from itertools import product
 from pathlib import Path
 from typing import IO
 
+from coordinator.evolution.encodings import encoding_of
+from coordinator.islands.learning import IslandLearning
 from coordinator.storage.campaign import (
     campaign_plugins,
     is_campaign,
@@ -115,6 +117,30 @@ def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
     return (own_experiment(read_details(folder).document),)
 
 
+def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
+    """Raise unless built-in plug-ins exist and take the parameters of an experiment.
+
+    Args:
+        experiment: its own plug-ins are not imported.
+        kinds: kinds of the plug-ins that are loaded.
+
+    Raises:
+        ExperimentError: a name or parameters that are not allowed.
+    """
+    for kind in kinds:
+        for use in kind.used(experiment):
+            if not is_own(use.path):
+                use.check(use.load())
+    for number in range(island_count(experiment)):
+        own = island_experiment(experiment, number)
+        if not is_own(own.fitness.function):
+            check_fitness_keys(own.fitness)
+        if own.learning is not None:
+            IslandLearning(own, encoding_of(own))
+        elif not is_own(own.encoding.type):
+            encoding_of(own)
+
+
 def check_apart(
     words: Sequence[str],
     tell: Callable[[str], None] = lambda _: None,
@@ -197,7 +223,7 @@ def check_here(
                     with _time_limit(limit_s):
                         _check_plugin(word, name, use, say)
                 if ":" not in word and not _is_folder(Path(word)):
-                    _check_document(word, births, limit_s)
+                    _check_document(word, kinds, births, limit_s)
                 if not uses:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
@@ -228,10 +254,13 @@ def _check_plugin(
         say("warn", f"{use.key}: {where}: warning: {warning}")
 
 
-def _check_document(source: str, births: int | None, limit_s: float) -> None:
-    """Raise what a run would refuse besides plug-ins."""
+def _check_document(
+    source: str, kinds: Sequence[Kind], births: int | None, limit_s: float
+) -> None:
+    """Raise what a run would refuse besides the document's own plug-ins."""
     for experiment in read_experiments((source,), births):
         with _time_limit(limit_s):
+            check_built_in(experiment, kinds)
             for number in range(island_count(experiment)):
                 check_fitness_keys(island_experiment(experiment, number).fitness)
 
@@ -289,7 +318,8 @@ def _uses(
     if place.endswith(".py"):
         allow([place])
         path = f"{Path(place).stem}:{attribute}"
-    allow_references([path], Path())
+    else:
+        allow_references([path], Path())
     plugin: object = load_object(path, "revolve check", {})
     if kind is None:
         found = kind_of(plugin, kinds)

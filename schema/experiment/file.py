@@ -1,5 +1,6 @@
 """Reading and writing of experiments: TOML of users, JSON of the runs table."""
 
+import json
 import re
 import tomllib
 from collections.abc import Collection, Iterator
@@ -18,7 +19,13 @@ from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, references
 from schema.experiment.environment import is_mjcf
-from schema.experiment.sweep import Point, sweep_points, sweep_problems, with_point
+from schema.experiment.sweep import (
+    Point,
+    Range,
+    sweep_points,
+    sweep_problems,
+    with_point,
+)
 from schema.limits import (
     MOST_BRACKETS,
     MOST_DIGITS,
@@ -27,6 +34,7 @@ from schema.limits import (
     MOST_KEY_PARTS,
     MOST_TEXT_BYTES,
 )
+from schema.plugins.parameters import read_parameters
 from schema.plugins.permission import allow_references
 
 _LISTS = ("islands", "calibration")
@@ -271,6 +279,7 @@ def own_references(source: str, births: int | None = None) -> list[str]:
 def _converted(document: dict[str, Any], where: str) -> Experiment:
     """Return the experiment of tables before the checks across its keys."""
     _read_calibration(document, where)
+    _read_sweep(document, where)
     _refuse_unknown(document, Experiment, where, "")
     _refuse_many_islands(document, where)
     _read_scenery(document, where)
@@ -279,6 +288,30 @@ def _converted(document: dict[str, Any], where: str) -> Experiment:
         return msgspec.convert(document, type=Experiment)
     except msgspec.ValidationError as error:
         raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+
+
+def _read_sweep(document: dict[str, Any], where: str) -> None:
+    """Raise for a value that no setting of a sweep can have.
+
+    ``msgspec`` does not name the setting.
+    """
+    sweep = document.get("sweep")
+    settings = sweep.get("settings") if isinstance(sweep, dict) else None
+    for key, value in settings.items() if isinstance(settings, dict) else ():
+        name = f"{where}: sweep.settings.{json.dumps(cut(key))}"
+        if isinstance(value, dict):
+            inner, each = next(iter(value.items()), ("", None))
+            if isinstance(each, dict | list):
+                raise ExperimentError(
+                    f"{name}: a key with dots must be quoted: "
+                    f'settings."{key}.{cut(inner)}" = ...'
+                )
+            read_parameters(value, Range, name)
+        elif not isinstance(value, list):
+            raise ExperimentError(
+                f"{name}: must be a list, or a range such as {{ low = 1, high = 2, "
+                f"steps = 3 }}, got {shown(value)}"
+            )
 
 
 def _text(source: str) -> str:

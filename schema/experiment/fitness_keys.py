@@ -40,7 +40,7 @@ def check_fitness_keys(fitness: Fitness) -> None:
         return
     function = fitness_function(fitness)
     name = fitness.function
-    if fitness_argument(function, fitness) is not fitness:
+    if not isinstance(fitness_argument(function, fitness), Fitness):
         raise ExperimentError(
             f"fitness.{changed[0]}: has no effect on {name}, which reads "
             f"[{_TABLE}]: move the key there, or remove it"

@@ -85,7 +85,7 @@ def _range_problems(values: Range, sweep: Sweep) -> Iterator[str]:
     elif values.log and values.low <= 0:
         yield f"low must be > 0 for log, got {values.low}"
     elif not sweep.samples and values.steps < 2:  # noqa: PLR2004 - both ends
-        yield f"steps must be >= 2, got {values.steps}"
+        yield f"steps must be >= 2, got {values.steps or 'none'}"
 
 
 def sweep_points(sweep: Sweep) -> list[Point]:

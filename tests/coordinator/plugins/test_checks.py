@@ -3,6 +3,7 @@
 import io
 import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from tests.own_brains import write_module
 
 Steps = list[tuple[str, str]]
 
+CRITTERS = Path(__file__).parents[2] / "plugins" / "critters_lab" / "critters"
 GOOD = """
 from worker.fitness import straight_velocity
 
@@ -144,6 +146,46 @@ def test_experiment_without_own_plug_ins_is_in_order(tmp_path: Path) -> None:
         "scenario1: in order, no plug-ins of its own",
         f"{document}: in order, no plug-ins of its own",
     ]
+
+
+@pytest.mark.parametrize(
+    ("tables", "fault"),
+    [
+        ('[fitness]\nfunction = "lab.walk"', "fitness.function: must be one of "),
+        ('[measures]\nnames = ["straight_speed"]', "mean 'straight_velocity'"),
+        ('[encoding]\ntype = "cppnn"', "encoding.type: .* mean 'cppn'"),
+        ('[learning]\nlearner = "cma"', "learning.learner: must be one of "),
+        ('[brain]\ntype = "rnn"', "brain.type: must be one of "),
+    ],
+)
+def test_unknown_built_in_plug_in_is_a_fault(
+    tmp_path: Path, tables: str, fault: str
+) -> None:
+    document = tmp_path / "odd.toml"
+    document.write_text(f'name = "odd"\nbirths = 20\n{tables}\n')
+    (problem,) = check_apart([str(document)])
+    assert re.search(fault, problem)
+
+
+def test_file_of_another_folder_may_have_the_name_of_one_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = tmp_path / "there"
+    there.mkdir()
+    (there / "walk.py").write_text(GOOD)
+    (tmp_path / "walk.py").write_text("raise NotImplementedError\n")
+    monkeypatch.chdir(tmp_path)
+    assert check_apart(["there/walk.py:judge"]) == []
+
+
+def test_own_encoding_of_islands_is_in_order(tmp_path: Path) -> None:
+    shutil.copy(CRITTERS / "genomes.py", tmp_path)
+    document = tmp_path / "sea.toml"
+    document.write_text(
+        'name = "sea"\nbirths = 20\n[encoding]\ntype = "genomes:Snakes"\n'
+        "[migration]\ntopology = 'ring'\nepoch = 5\n[[islands]]\ncount = 2\n"
+    )
+    assert check_apart([str(document)]) == []
 
 
 def test_name_that_no_folder_can_have_is_a_fault(tmp_path: Path) -> None:
