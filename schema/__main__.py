@@ -5,14 +5,11 @@ from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins
 from schema.errors import RevolveError, counted
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
 from schema.formats.files import read_robot, settings_of, write_robot
-from schema.formats.run_settings import experiment_of
-from schema.parts import BUILT_IN, PARAMETRIC_BAR_JOINT, BodySpace
+from schema.formats.run_settings import experiment_of, types_of
+from schema.parts import PARAMETRIC_BAR_JOINT, BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import NeuronKinds, neuron_names
-from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot
 
 _BAR_UNITS = {"connection_length": "mm", "alpha": "rad", "beta": "rad"}
@@ -34,10 +31,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
     allow(options.plugins)
     experiment = experiment_of(options.file, options.experiment)
-    space, kinds = BUILT_IN, BUILT_IN_KINDS
-    if experiment:
-        space = body_space(experiment.space)
-        kinds = neuron_kinds(experiment.brain, experiment.space)
+    space, kinds = types_of(experiment)
     robot = read_robot(options.file, space, kinds)
     if options.command == "check":
         print(f"{options.file}: well formed; {_summary(robot)}")

@@ -10,6 +10,7 @@ from schema.agent.command import add_connect, add_network_flags
 from schema.agent.flags import Flags, add_count, number, whole_number
 from schema.errors import InvalidRobot, NetworkError
 from schema.formats.files import read_robot
+from schema.formats.run_settings import experiment_of, types_of
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode_robot
 from schema.wire.operator import (
@@ -46,7 +47,7 @@ _EXAMPLES = {
     "list": _ANY,
     "pause": _ANY,
     "resume": _ANY,
-    "insert": ("best.yaml", "best.yaml --place 0.5 -1.2"),
+    "insert": ("best.yaml --place 0.5 -1.2", "wheeled.yaml --experiment mine.toml"),
     "remove": ("17", "17 --island 1 --connect runs/archipelago-arenas-seed1"),
     "brain": ("17 best.yaml", "17 best.yaml --island 1"),
     "snapshot": _ANY,
@@ -101,18 +102,25 @@ def _action(options: argparse.Namespace) -> OperatorAction:
         return PLAIN[options.action]
     if options.action == "insert":
         place = tuple(options.place) if options.place else None
-        return InsertRobot(encode_robot(read_robot(_file(options.file))), place)
+        return InsertRobot(_robot(options), place)
     birth = BirthId(options.island, options.birth)
     if options.action == "remove":
         return RemoveRobot(birth)
-    return SetBrain(birth, encode_robot(read_robot(_file(options.file))))
+    return SetBrain(birth, _robot(options))
 
 
-def _file(name: str) -> Path:
-    path = Path(name)
-    if not path.is_file():
-        raise InvalidRobot(f"{path}: no such file")
-    return path
+def _robot(options: argparse.Namespace) -> bytes:
+    """Return the encoded robot of a file.
+
+    Raises:
+        InvalidRobot: the file holds no robot.
+        ExperimentError: an invalid experiment.
+    """
+    file = Path(options.file)
+    if not file.is_file():
+        raise InvalidRobot(f"{file}: no such file")
+    types = types_of(experiment_of(file, options.experiment))
+    return encode_robot(read_robot(file, *types))
 
 
 def parser(_command: str = "arena") -> Flags:
@@ -145,6 +153,12 @@ def parser(_command: str = "arena") -> Flags:
         if name in ("insert", "brain"):
             action.add_argument(
                 "file", metavar="FILE", help="robot file: .yaml, .yml or .pb"
+            )
+            action.add_argument(
+                "--experiment",
+                metavar="NAME|FILE.toml",
+                help="experiment with the robot's own part types (default: that of the "
+                "run folder that holds the file, else all built-in types)",
             )
         if name == "insert":
             action.add_argument(

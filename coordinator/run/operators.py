@@ -5,6 +5,7 @@ that step before the operator gets a reply, so that a replay carries it out too.
 """
 
 import time
+from math import hypot
 
 from coordinator.arena.arena import Arena
 from coordinator.arena.orders import check_order
@@ -22,6 +23,7 @@ from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.brains import neuron_kinds
+from schema.experiment.document import Experiment
 from schema.limits import LONGEST_REASON, printable
 from schema.robot.brain import check_neurons
 from schema.wire.codec import decode_robot
@@ -102,6 +104,7 @@ def _order(
         case ResumeArena():
             return Resume()
         case InsertRobot():
+            _check_place(action.place, arena.experiment)
             robot = decode_robot(action.robot)
             encoding = arena.encoding
             encoding.check(robot)
@@ -119,6 +122,17 @@ def _order(
     brain = decode_robot(action.robot).brain
     check_neurons(brain, kinds)
     return ReplaceBrain(action.birth, brain)
+
+
+def _check_place(place: tuple[float, float] | None, experiment: Experiment) -> None:
+    """Raise unless a place is inside the wall of an arena, if there is one."""
+    assert experiment.arena is not None
+    radius_m = experiment.arena.wall_diameter_m / 2.0
+    if place is not None and radius_m and hypot(*place) >= radius_m:
+        raise Refused(
+            f"place: must be inside the wall, < {radius_m:g} m from the centre, got "
+            f"{place[0]:g} {place[1]:g}"
+        )
 
 
 def _list(arena: Arena) -> str:

@@ -3,9 +3,18 @@
 import sys
 from pathlib import Path
 
-from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.brains import neuron_kinds
+from schema.experiment.document import (
+    Experiment,
+    body_space,
+    island_count,
+    island_experiment,
+)
 from schema.experiment.file import own_experiment, read_experiment
 from schema.experiment.settings import evaluation_settings_of
+from schema.parts import BUILT_IN, BodySpace
+from schema.robot.brain import NeuronKinds
+from schema.robot.cpg import BUILT_IN_KINDS
 from schema.tables.description import DETAILS, allow_plugins_of, read_description
 
 
@@ -48,6 +57,18 @@ def experiment_of(
         where += ", island 0; other islands differ: --experiment names others"
     _tell(where)
     return first
+
+
+def types_of(experiment: Experiment | None) -> tuple[BodySpace, NeuronKinds]:
+    """Return the part types and neuron types of an experiment; built-in ones of None.
+
+    Raises:
+        ExperimentError: a type that cannot be loaded.
+    """
+    if experiment is None:
+        return BUILT_IN, BUILT_IN_KINDS
+    kinds = neuron_kinds(experiment.brain, experiment.space)
+    return body_space(experiment.space), kinds
 
 
 def _tell(line: str) -> None:

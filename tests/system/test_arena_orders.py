@@ -1,5 +1,6 @@
 """Tests of orders to a running arena and of its live stream."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,22 @@ from schema.tables.received import read_columns
 from schema.wire.arena_codec import Live, decode_live
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+CRITTERS = Path(__file__).parents[1] / "plugins" / "critters_lab" / "critters"
+PISTONS = """
+name = "mine"
+births = 20
+[selection]
+population = 8
+[space]
+part_types = ["schema.parts:CORE", "bodies:PISTON"]
+[simulation]
+warmup_steps = 600
+window_steps = 1200
+[arena]
+birth_interval_s = 4.0
+sample_interval_s = 2.0
+"""
 
 Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
@@ -74,6 +91,27 @@ def test_pause_list_insert_remove_snapshot_resume(
         event = known[live.advance.step]
         assert live.advance.digest == event.advance.digest
         assert read_columns("poses", live.advance.poses).num_rows == event.pose_rows
+
+
+def test_robot_with_its_own_part_types_is_inserted(
+    workspace: Workspace, until: Until
+) -> None:
+    shutil.copy(CRITTERS / "bodies.py", workspace.folder)
+    (workspace.folder / "mine.toml").write_text(PISTONS)
+    folder = workspace.folder / "run"
+    flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
+    coordinator = workspace.start("run", "mine.toml", "--quiet", "--out", "run", *flags)
+    until((folder / "address").exists, "the coordinator listens")
+    words = ("robot", "random", "guest.yaml", "--experiment", "mine.toml")
+    workspace.run(*words, "--seed", "3")
+    assert "Piston" in (workspace.folder / "guest.yaml").read_text()
+    insert = ("arena", "insert", "guest.yaml", "--connect", "run")
+    assert "--experiment FILE.toml" in workspace.run(*insert, code=2)
+    answer = workspace.run(*insert, "--experiment", "mine.toml")
+    assert "takes effect at" in answer
+    until(lambda: coordinator.poll() is not None, "the run ends")
+    assert coordinator.returncode == 0, coordinator.communicate()
+    assert [] in read_table(folder, "births")["parents"].to_pylist()[8:]
 
 
 def test_orders_without_a_coordinator_are_refused_in_one_line(

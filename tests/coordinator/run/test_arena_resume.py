@@ -50,7 +50,7 @@ from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.serve.shards import Shards
 
-EXPERIMENT = experiment(30, snapshot_interval_s=20.0)
+EXPERIMENT = experiment(30, snapshot_interval_s=20.0, wall_diameter_m=20.0)
 INFANCY = structs.replace(
     experiment(20, snapshot_interval_s=20.0),
     learning=Learning(learner="(1+1)-es", budget=2),
@@ -333,6 +333,12 @@ def test_orders_are_repeated_in_a_replay(tmp_path: Path, calm: Path) -> None:
         (
             InsertRobot(encode_robot(Robot((Part("Barrow", -1, -1, -1, 0, ()),)))),
             "Barrow",
+        ),
+        (
+            InsertRobot(
+                encode_robot(Robot((Part("Core", -1, -1, -1, 0, ()),))), (8, 6)
+            ),
+            "place: must be inside the wall, < 10 m from the centre, got 8 6",
         ),
     ],
 )
