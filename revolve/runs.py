@@ -331,6 +331,6 @@ def _description(folder: Path) -> Any:  # noqa: ANN401 - of schema.tables
     """
     below = sorted(path.parent.name for path in folder.glob(f"*/{DETAILS}"))
     if below and not (folder / DETAILS).exists():
-        names = ", ".join(below[:5])
+        names = ", ".join([*below[:5], *(["..."] if below[5:] else [])])
         raise RunFolderError(f"{folder}: holds several runs; read one of {names}")
     return read_description(folder)

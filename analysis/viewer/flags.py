@@ -45,12 +45,12 @@ def parser(_command: str = "view") -> Flags:
     )  # fmt: skip
     flags.add_argument(
         "--follow", type=_robot_name, metavar="ISLAND:BIRTH",
-        help="follow a robot with the camera, for example 0:17",
+        help="follow a robot with the camera, such as 1:17; 17 is of island 0",
     )  # fmt: skip
     flags.add_argument(
         "--robot", action="append", default=[], type=_selected, metavar="ROBOT",
         help="re-simulate a robot and show its full motion: 'best' (ever evaluated, "
-        "dead or alive) or ISLAND:BIRTH; may be repeated",
+        "dead or alive), BIRTH of island 0, or ISLAND:BIRTH; may be repeated",
     )  # fmt: skip
     flags.add_argument(
         "--ancestry", action="store_true",
@@ -70,17 +70,17 @@ def parser(_command: str = "view") -> Flags:
 
 
 def _robot_name(text: str) -> BirthId:
-    """Return the individual of a flag, such as ``0:17``.
+    """Return the individual of a flag, such as ``1:17``; ``17`` is of island 0.
 
     Raises:
         argparse.ArgumentTypeError: the text has another form.
     """
-    match = re.fullmatch(r"(\d+):(\d+)", text)
+    match = re.fullmatch(r"(?:(\d+):)?(\d+)", text)
     if match is None:
         raise argparse.ArgumentTypeError(
-            f"must be ISLAND:BIRTH such as 0:17, got {text!r}"
+            f"must be BIRTH or ISLAND:BIRTH, such as 17 or 1:17, got {text!r}"
         )
-    return BirthId(int(match[1]), int(match[2]))
+    return BirthId(int(match[1] or 0), int(match[2]))
 
 
 def _selected(text: str) -> BirthId | None:

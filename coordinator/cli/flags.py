@@ -92,7 +92,7 @@ def parser(command: str) -> Flags:
 
 
 def resume_flags(options: argparse.Namespace) -> list[str]:
-    """Return the flags with which ``revolve resume`` has the same agents again.
+    """Return the flags with which ``revolve resume`` has the same agents and speed.
 
     Args:
         options: of ``run``, ``coordinator`` or ``resume``.
@@ -106,6 +106,7 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
         "--tls-ca": options.tls_ca,
         "--tls-certificate": options.tls_certificate,
         "--tls-key": options.tls_key,
+        "--speed": None if options.speed is None else f"{options.speed:g}",
     }
     if options.command == "coordinator" and not options.connect:
         given["--listen"] = options.listen or HUB

@@ -453,7 +453,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
     """An experiment.
 
     Attributes:
-        name: names the run folder.
+        name: names the run folder: no ``/``, no ``.`` at its beginning.
         births: number of births on each island, the initial population included.
         space: part types and limits of robots, on all islands.
         generation: random robots.

@@ -17,7 +17,7 @@ from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
 from schema.plugins.load import load_instance, load_object
 from schema.plugins.origin import where_defined, where_raised
-from schema.plugins.part_checks import advise_slots
+from schema.plugins.part_checks import advise_shape
 from schema.plugins.sensor_checks import check_sensor
 from schema.robot.neurons import BUILT_IN_NEURONS
 
@@ -118,7 +118,7 @@ def _part_type(path: str) -> Use:
         body_space(Space(part_types=(*core, path)))
 
     load = partial(load_instance, path, key, PartType)
-    return Use(key, path, load, check, advise_slots)
+    return Use(key, path, load, check, advise_shape)
 
 
 def _part_types(experiment: Experiment) -> Iterator[Use]:

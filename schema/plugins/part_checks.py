@@ -77,14 +77,23 @@ def check_slot_directions(kind: PartType, where: str = "part type") -> None:
                 raise _refusal(kind, where, problem)
 
 
-def advise_slots(kind: PartType) -> str:
-    """Return a warning if a slot is not on the surface of its part, or nothing.
+def advise_shape(kind: PartType) -> str:
+    """Return a warning about the shape of a part, or nothing.
+
+    It is about a slot that is not on the part's surface, or a joint that turns further
+    than once: its limit may be in degrees.
 
     Args:
         kind: a consistent part type.
     """
     for values in _extremes(kind):
         shape = kind.shape(values)
+        joint = shape.joint
+        if joint and joint.kind == "revolute" and math.tau < joint.limit < math.inf:
+            return (
+                f"joint.limit is {joint.limit:g} rad, more than a turn: "
+                f"{joint.limit:g} degrees are {math.radians(joint.limit):.3g} rad"
+            )
         for number, slot in enumerate(shape.slots):
             away_m = _distance_from_surface(slot, shape.boxes)
             if away_m > _OFF_SURFACE_M:

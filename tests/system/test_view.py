@@ -288,7 +288,7 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
             "no coordinator at",
         ),
         (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
-        (("view", "nowhere", "--follow", "7"), "must be ISLAND:BIRTH"),
+        (("view", "nowhere", "--follow", "x"), "must be BIRTH or ISLAND:BIRTH"),
         (("view", "nowhere", "--save", "no/such/a.rrd"), "no such folder: no/such"),
         (("view", "nowhere", "--save", "a.txt"), "must end in .rrd"),
         (("view", "nowhere", "--ancestry"), "needs --robot best"),

@@ -24,7 +24,7 @@ from schema.parts import (
     Shape,
 )
 from schema.plugins.part_checks import (
-    advise_slots,
+    advise_shape,
     check_part_type,
     check_slot_directions,
 )
@@ -188,7 +188,7 @@ WRONG = {
 def test_built_in_part_types_pass(kind: PartType) -> None:
     check_part_type(kind)
     check_slot_directions(kind)
-    assert advise_slots(kind) == ""
+    assert advise_shape(kind) == ""
 
 
 def test_a_slot_into_its_own_box_is_refused_by_a_check_of_its_own() -> None:
@@ -202,8 +202,14 @@ def test_a_slot_into_its_own_box_is_refused_by_a_check_of_its_own() -> None:
 @pytest.mark.parametrize(("y", "away"), [(0.0305, "10"), (0.0105, "10")])
 def test_a_slot_off_the_surface_gets_a_warning(y: float, away: str) -> None:
     """The brick's faces are 20.5 mm from its centre."""
-    advice = advise_slots(slotted(position=(0.0, y, 0.0)))
+    advice = advise_shape(slotted(position=(0.0, y, 0.0)))
     assert advice.startswith(f"slots[1].position is {away} mm from the surface")
+
+
+def test_a_limit_in_degrees_gets_a_warning() -> None:
+    advice = advise_shape(jointed(limit=60.0))
+    assert advice.endswith("60 degrees are 1.05 rad")
+    assert advise_shape(jointed(limit=3.0)) == ""
 
 
 @pytest.mark.parametrize("name", WRONG)
