@@ -234,7 +234,7 @@ def test_viewers_receive_everything_and_do_not_change_the_run(
 def test_resimulated_robot_of_an_arena_moves_as_recorded(
     workspace: Workspace, small_arena_run: Path
 ) -> None:
-    words = ("view", str(small_arena_run), "--robot", "0:3", "--robot", "best")
+    words = ("view", str(small_arena_run), "--robot", "3", "--robot", "best")
     out = workspace.run(*words, "--save", "again.rrd")
     assert "0:3: moves as recorded, equal to the last bit" in out
     again = poses(workspace.folder / "again.rrd", "/motion/0-3")
