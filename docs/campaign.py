@@ -71,11 +71,11 @@ def run(
 ) -> int:
     """Start or resume parts of the campaign with ``revolve run`` or ``resume``.
 
-    A new folder begins with the first repeat of which some experiment has no rows.
+    A new campaign begins with the first repeat that has no rows.
 
     Args:
         folder: folder of the campaign.
-        parts: parts of the campaign, run one after the other.
+        parts: parts of the campaign; their experiments are run one after the other.
         workers: number of processes; None is one per core.
         data: folder of the rows that are kept.
 
@@ -83,15 +83,16 @@ def run(
         0 if all runs are finished, else the exit code of the command that failed.
     """
     _note_commit(folder)
-    for part in parts:
-        out = folder.resolve() / "runs" / part.folder
+    wanted = [(part, each) for part in parts for each in part.experiments]
+    for part, experiment in wanted:
+        out = folder.resolve() / "runs" / part.folder / Path(experiment).stem
         if (out / "campaign.toml").exists():
             words = ["resume", str(out)]
         else:
-            first = _first_missing(data, part)
+            first = _first_missing(data, part, Path(experiment).stem)
             if first == part.repeats:
                 continue
-            words = ["run", *part.experiments, "--seed", str(part.seed)]
+            words = ["run", experiment, "--seed", str(part.seed)]
             words += ["--first-repeat", str(first)] if first else []
             words += ["--repeats", str(part.repeats - first)]
             words += ["--births", str(part.births), "--out", str(out)]
@@ -103,11 +104,10 @@ def run(
     return 0
 
 
-def _first_missing(data: Path, part: Part) -> int:
-    """Return the first repeat of which an experiment lacks rows; else their number."""
+def _first_missing(data: Path, part: Part, experiment: str) -> int:
+    """Return the first repeat of an experiment without rows; else their number."""
     for number in range(part.repeats):
-        names = (stem(experiment, number) for experiment in part.names)
-        if any(list(problems_of(data, part, name)) for name in names):
+        if any(problems_of(data, part, stem(experiment, number))):
             return number
     return part.repeats
 

@@ -24,7 +24,7 @@ LEVEL = 19
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Part of the campaign, made by one ``revolve run``.
+    """Part of the campaign: experiments of equal repeats, births and seed.
 
     Attributes:
         option: value of ``--only``.

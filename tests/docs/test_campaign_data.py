@@ -176,8 +176,10 @@ def test_only_finished_runs_of_the_campaign_are_collected(
     place: Path, parts: Parts, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copytree(place / "runs" / "some", tmp_path / "runs" / "some")
-    (tmp_path / "runs" / "some" / "scenario2-0" / "state").write_text("running")
-    lost = tmp_path / "runs" / "some" / "scenario2-1" / "tables"
+    (tmp_path / "runs" / "some" / "scenario2" / "scenario2-0" / "state").write_text(
+        "running"
+    )
+    lost = tmp_path / "runs" / "some" / "scenario2" / "scenario2-1" / "tables"
     next(lost.rglob("evaluations.parquet")).unlink()
     fewer = Part("off-line", "some", parts[0].experiments, 1, BIRTHS, 3)
     assert campaign.collect(tmp_path, tmp_path / "data", COMMIT, (fewer,)) == 0
@@ -192,7 +194,7 @@ def test_a_lost_run_is_repeated(
 ) -> None:
     folder = tmp_path / "copy"
     shutil.copytree(place / "runs" / "some", folder / "runs" / "some")
-    shutil.rmtree(folder / "runs" / "some" / "scenario1-0")
+    shutil.rmtree(folder / "runs" / "some" / "scenario1" / "scenario1-0")
     assert campaign.run(folder, parts[:1], 1, tmp_path / "none") == 0
     assert campaign.collect(folder, tmp_path / "again", COMMIT, parts[:1]) == 0
     again = _files(tmp_path / "again")
@@ -210,8 +212,8 @@ def test_kept_repeats_are_not_run_again(
     for path in data.glob("*/scenario1-01.parquet"):
         path.unlink()
     assert campaign.run(folder, parts[:1], 1, data) == 0
-    names = {path.parent.name for path in folder.glob("runs/some/*/run.json")}
-    assert names == {"scenario1-1", "scenario2-1"}
+    names = {path.parent.name for path in folder.glob("runs/some/*/*/run.json")}
+    assert names == {"scenario1-1"}
     assert campaign.collect(folder, data, COMMIT, parts) == 0
     assert _files(data) == before
 
