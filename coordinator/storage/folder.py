@@ -11,7 +11,7 @@ import re
 import secrets
 import socket
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Self
@@ -32,7 +32,8 @@ from coordinator.storage.journal import (
 )
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, FolderLock
-from schema.errors import RunFolderError, unreadable
+from schema.errors import ExperimentError, RunFolderError, unreadable
+from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
 from schema.limits import MOST_MARK
 from schema.plugins.kept import PLUGINS, KeptPlugin, kept_file, plugins_to_keep
@@ -113,7 +114,7 @@ class RunFolder:
         self._lock = FolderLock(path)
         try:
             if details is not None:
-                _refuse_used(path)
+                _refuse_used(path, details)
                 new = Description(
                     **asdict(details),
                     nonce=secrets.token_hex(4),
@@ -265,14 +266,31 @@ def _write(data: bytes, path: Path) -> None:
     path.write_bytes(data)
 
 
-def _refuse_used(path: Path) -> None:
-    """Raise if a folder holds a run or a foreign file."""
+def _refuse_used(path: Path, wanted: RunDetails) -> None:
+    """Raise if a folder holds a run or a foreign file.
+
+    The message says whether it is another run than the wanted one: to resume it would
+    silently ignore what was changed since.
+    """
     if holds_run(path):
+        which = "a run" if _is_same(path, wanted) else "a run with other settings"
         raise RunFolderError(
-            f"{path}: already holds a run; to resume it: "
+            f"{path}: already holds {which}; to resume it: "
             f"{command('resume', path)}; or choose another folder"
         )
     _refuse_foreign(path)
+
+
+def _is_same(path: Path, wanted: RunDetails) -> bool:
+    """Return whether a folder holds the wanted run, or one that cannot be read."""
+    with contextlib.suppress(RunFolderError, ExperimentError):
+        found = read_details(path)
+        if found != replace(wanted, document=found.document):
+            return False
+        # The text of an older version lacks keys with their defaults.
+        theirs, ours = map(experiment_from_text, (found.document, wanted.document))
+        return theirs == ours
+    return True
 
 
 def _refuse_foreign(path: Path) -> None:

@@ -82,7 +82,7 @@ MISTAKES = {
     "folder of others": ("run scenario1 --out other", "notes.txt", 2),
     "used folder": (
         "run scenario1 --out run",
-        "run: already holds a run; to resume it: revolve resume run",
+        "run: already holds a run with other settings; to resume it: revolve resume",
         2,
     ),
     "resume of a finished run": ("resume run", "run: already finished", 0),

@@ -9,9 +9,11 @@ import socket
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from coordinator.islands.events import VettingFailed
 from coordinator.storage.folder import (
@@ -22,6 +24,7 @@ from coordinator.storage.folder import (
 from coordinator.storage.journal import Journal
 from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
+from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
 from schema.tables.description import read_description, read_state
 
@@ -106,7 +109,26 @@ def test_a_used_folder_is_refused(tmp_path: Path) -> None:
         RunFolderError, match="already holds a run; to resume it: revolve "
     ):
         RunFolder(tmp_path / "run", DETAILS)
+    with pytest.raises(RunFolderError, match="already holds a run with other settings"):
+        RunFolder(tmp_path / "run", replace(DETAILS, seed=7))
     assert RunFolder(tmp_path / "run").epoch == 2
+
+
+def test_a_used_folder_is_refused_with_the_hint_of_other_settings(
+    tmp_path: Path,
+) -> None:
+    first = read_experiment("scenario1")
+    details = RunDetails("scenario1", 0, 1, experiment_text(first))
+    # An older version had fewer keys.
+    document = json.loads(details.document)
+    del document["environment"]
+    older = replace(details, document=json.dumps(document))
+    RunFolder(tmp_path / "run", older).close()
+    with pytest.raises(RunFolderError, match="already holds a run; to resume it"):
+        RunFolder(tmp_path / "run", details)
+    other = replace(details, document=experiment_text(structs.replace(first, births=9)))
+    with pytest.raises(RunFolderError, match="already holds a run with other settings"):
+        RunFolder(tmp_path / "run", other)
 
 
 def test_only_a_new_run_that_has_not_started_is_forgotten(
