@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from queue import Empty, SimpleQueue
+from queue import Empty
 from typing import Literal, Self
 
 import zenoh
@@ -23,6 +23,7 @@ from coordinator.network.membership import InfoQueue, Membership
 from coordinator.network.operator_service import Queries
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
+from schema.agent.inbox import Inbox
 from schema.agent.log import tell_user, warn_user
 from schema.agent.network import (
     ASK_TIMEOUT_S,
@@ -73,7 +74,7 @@ class _Asked:
 
     member: Member
     number: int
-    inbox: "SimpleQueue[_News]"
+    inbox: "Inbox[_News]"
     reply: zenoh.Reply | None = None
     has_stray: bool = False
     asked_s: float = field(default_factory=time.monotonic)
@@ -180,7 +181,7 @@ class Network:
         self._is_hub = not connect
         self._hub = HubWatch(self.address, tell_user, warn_user, give_up_after_s)
         self._look_s = 0.0
-        self._inbox: SimpleQueue[_News] = SimpleQueue()
+        self._inbox: Inbox[_News] = Inbox()
         self._membership = Membership(wire_version(), self.faults)
         self._info_queue = InfoQueue()
         self._asked_infos: set[Member] = set()
@@ -316,7 +317,7 @@ class Network:
         events: list[DispatchEvent] = []
         time.sleep(pause_s)
         try:
-            news = self._inbox.get(timeout=timeout_s)
+            news = self._inbox.get(timeout_s)
             # Limited: the runs must act even if messages never stop coming.
             for _ in range(_MOST_NEWS):
                 events += [] if news is None else self._understand(news)

@@ -14,12 +14,13 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from queue import Empty, SimpleQueue
+from queue import Empty
 from typing import Any
 
 import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
+from schema.agent.inbox import Inbox
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
@@ -331,7 +332,7 @@ def _serve_session(
     stop: threading.Event,
     me: Member,
 ) -> None:
-    inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
+    inbox: Inbox[zenoh.Query] = Inbox()
     take = zenoh.handlers.Callback(inbox.put, indirect=False)
 
     def reply_info(query: zenoh.Query) -> None:
@@ -379,7 +380,7 @@ def _serve_session(
 
 
 def _queue_all(
-    inbox: SimpleQueue[zenoh.Query],
+    inbox: Inbox[zenoh.Query],
     turns: FairQueue[zenoh.Query],
     counts: ReplyCounts,
 ) -> bool:
@@ -388,7 +389,7 @@ def _queue_all(
         # Limited: jobs are done even if queries never stop coming.
         for _ in range(_MOST_QUERIES):
             # Wait only while there is nothing to do.
-            query = inbox.get_nowait() if turns else inbox.get(timeout=_POLL_S)
+            query = inbox.get_nowait() if turns else inbox.get(_POLL_S)
             sender, payload = query.attachment, query.payload
             source = sender.to_bytes()[:MOST_SHOWN] if sender else b""
             size = len(payload) if payload else 0

@@ -11,10 +11,11 @@ a silent worker, the number of those that it held back.
 import signal
 import sys
 import threading
-from queue import Empty, SimpleQueue
+from queue import Empty
 
 import zenoh
 
+from schema.agent.inbox import Inbox
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.service import session_config
@@ -48,7 +49,7 @@ def main(address: str, behaviour: str) -> None:
         shards=8,
         cores=1,
     ).SerializeToString()
-    inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
+    inbox: Inbox[zenoh.Query] = Inbox()
     count = held_back = 0
     is_cancelled = threading.Event()
 
@@ -68,7 +69,7 @@ def main(address: str, behaviour: str) -> None:
         token = session.liveliness().declare_token(member.alive)
         while not stop.is_set():
             try:
-                query = inbox.get(timeout=0.1)
+                query = inbox.get(0.1)
             except Empty:
                 continue
             with query:
