@@ -157,8 +157,8 @@ def parser(_command: str = "arena") -> Flags:
             action.add_argument(
                 "--experiment",
                 metavar="NAME|FILE.toml",
-                help="experiment with the robot's own part types (default: that of the "
-                "run folder that holds the file, else all built-in types)",
+                help="experiment whose settings to use (default: that of the run "
+                "folder that holds the file, else all built-in part types)",
             )
         if name == "insert":
             action.add_argument(

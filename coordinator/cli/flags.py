@@ -148,8 +148,8 @@ def _add_experiments(flags: argparse.ArgumentParser) -> None:
         flags,
         "--first-repeat",
         None,
-        "number of the campaign's first repeat (default: 0), to add repeats or to "
-        "divide them among machines",
+        "number of the campaign's first repeat, to add repeats or to divide them among "
+        "machines (default: 0)",
         least=0,
     )
     add_count(flags, "--births", None, "number of births (default: the experiment's)")
