@@ -49,17 +49,20 @@ def stream(
 ) -> np.random.Generator:
     """Return the stream of one purpose of one attempt at one birth.
 
+    Its seed sequence is that of ``SeedSequence(seed, spawn_key=(run, island, birth,
+    attempt, purpose))``.
+
     Args:
-        seed: seed of the run.
+        seed: seed of the run, < 2^64.
         run: number of the repeat, from 0.
         birth: island and birth number.
         attempt: from 0.
         purpose: what is drawn.
     """
-    key = (run, birth.island, birth.number, attempt, int(purpose))
-    return np.random.Generator(
-        np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key))
-    )
+    # NumPy makes these 32-bit words of a seed and a key, but slowly, number by number.
+    key = (run, birth.island, birth.number, attempt, purpose)
+    words = np.array((seed & 0xFFFFFFFF, seed >> 32, 0, 0, *key), np.uint32)
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words)))
 
 
 class BufferedRng:

@@ -36,6 +36,7 @@ BITS = 12
 SLOWER = 1000
 """Factor by which the project's wall clock slows down after the first mating."""
 
+_SEED_WORDS = 4
 _KEY_LENGTH = 5  # run, island, birth, attempt, purpose
 _PARENTS = 2
 _OPTIMIZED = 0x01  # flag of function code, not of module or class bodies
@@ -173,7 +174,7 @@ class _Patches:
 
 
 def _patch_streams(module: Any, probe: Probe) -> None:  # noqa: ANN401 - numpy.random
-    """Record the spawn keys of random streams."""
+    """Record the spawn keys of random streams; 32-bit words hold one after four."""
 
     class Marked(module.SeedSequence):  # type: ignore[misc]
         def __init__(
@@ -184,6 +185,8 @@ def _patch_streams(module: Any, probe: Probe) -> None:  # noqa: ANN401 - numpy.r
             **more: int,
         ) -> None:
             super().__init__(entropy, spawn_key=spawn_key, **more)
+            if entropy is not None and not isinstance(entropy, int):
+                spawn_key = entropy[_SEED_WORDS:]
             probe.mark(spawn_key)
 
     module.SeedSequence = Marked

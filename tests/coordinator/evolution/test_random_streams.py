@@ -5,8 +5,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from coordinator.evolution.random_streams import BufferedRng
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from schema.parts import Parameter
+from schema.robot.ids import BirthId
 
 N = 20_000
 
@@ -19,6 +20,20 @@ def draws() -> BufferedRng:
 def test_numbers_are_those_of_the_stream() -> None:
     mine, theirs = BufferedRng(np.random.default_rng(3)), np.random.default_rng(3)
     assert [mine.number() for _ in range(1000)] == theirs.random(1000).tolist()
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**32 - 1, 2**32, 2**40 + 5, 2**64 - 1])
+@pytest.mark.parametrize(
+    "key", [(0, 0, 0, 0, 2), (3, 1, 41, 5, 20), (*[2**32 - 1] * 4, 2)]
+)
+def test_a_stream_is_that_of_numpys_seed_and_key(
+    seed: int, key: tuple[int, ...]
+) -> None:
+    run, island, number, attempt, purpose = key
+    birth = BirthId(island, number)
+    mine = stream(seed, run, birth, attempt, Purpose(purpose))
+    words = np.random.SeedSequence(seed, spawn_key=key)
+    assert mine.random(9).tolist() == np.random.default_rng(words).random(9).tolist()
 
 
 def test_certain_and_impossible_chances(draws: BufferedRng) -> None:
