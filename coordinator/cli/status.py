@@ -20,7 +20,7 @@ from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, is_campaign, read_campaign
 from coordinator.storage.folder import EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
-from coordinator.storage.hints import resume_command
+from coordinator.storage.hints import command, resume_command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, read_holder
 from schema.agent.address import read_address
@@ -233,9 +233,10 @@ def _show(source: Source) -> None:
             f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}, "
             f"{counted(status.analyzers, 'analyzer')}, {duration(status.left_s)} left"
         )
+    elif done < len(status.runs) and root is not None and not is_live:
+        lines.append(_without_coordinator(status, root))
     elif done < len(status.runs):
-        waiting = f"waiting for {' and '.join(missing_agents(status))}"
-        lines.append(waiting if is_live else _without_coordinator(status, root))
+        lines.append(f"waiting for {' and '.join(missing_agents(status))}")
     lines += [printable(line, _WIDEST) for line in fault_lines(status.faults)]
     # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
@@ -256,13 +257,26 @@ def _table(rows: Sequence[Sequence[str]]) -> Table:
     return table
 
 
-def _without_coordinator(status: Status, root: Path | None) -> str:
+def _without_coordinator(status: Status, root: Path) -> str:
     """Return a line about unfinished runs whose coordinator does not report them."""
-    if any(run.state == "running" for run in status.runs):
-        return "the coordinator does not answer"
-    if root is not None and (is_campaign(root) or holds_run(root)):
+    running = [Path(run.folder) for run in status.runs if run.state == "running"]
+    if is_campaign(root) or holds_run(root):
+        if running:
+            return "the coordinator does not answer"
         return f"no coordinator is running; to continue: {resume_command(root)}"
-    return "no coordinator is running"
+    if not running:
+        return "no coordinator is running"
+    # Each coordinator has a folder of its own: that of its campaign or its run.
+    first, above = running[0], running[0].parent
+    where = _from(root, above if is_campaign(above) else first)
+    return f"from the files; to ask a coordinator: {command('status', where)}"
+
+
+def _from(root: Path, folder: Path) -> Path:
+    """Return an absolute path by way of a folder that may be relative."""
+    above = root.resolve()
+    is_below = folder.is_relative_to(above)
+    return root / folder.relative_to(above) if is_below else folder
 
 
 def parser(_command: str = "status") -> Flags:
