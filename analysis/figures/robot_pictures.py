@@ -235,10 +235,12 @@ def _motion(
             _cut(renderer.picture(pose, look_at=look_at, distance_m=distance_m), _FILM)
             for pose in shown
         )
-    middle = np.mean([poses[at][:3] for at in chosen], axis=0)
     with RobotRenderer(robot, settings, size=_LARGE) as renderer:
+        shown = [poses[at] for at in chosen]
+        look_at, distance_m = renderer.framing(shown, _WIDE[:2])
         gait = tuple(
-            _cut(renderer.picture(poses[at], look_at=middle), _WIDE) for at in chosen
+            _cut(renderer.picture(pose, look_at=look_at, distance_m=distance_m), _WIDE)
+            for pose in shown
         )
     return gait, times_s, film, film_step * tick_s, _way_m(poses, chosen)
 

@@ -6,8 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from analysis.progress import bars
 from analysis.render.picture import (
     NoPictures,
@@ -95,7 +93,7 @@ def _draw_motion(
     """Write an animation of an evaluation, or a strip of some of its ticks."""
     poses: list[Floats] = []
     times_s: list[float] = []
-    look_at = None
+    look_at = distance_m = None
 
     def watch(data: Any) -> None:  # noqa: ANN401 - of a library imported later
         poses.append(data.qpos.copy())
@@ -109,9 +107,12 @@ def _draw_motion(
             poses = poses[shown_from:][:gait]
             times_s = times_s[shown_from:][:gait]
             # A fixed camera, so that the robot moves in the pictures.
-            look_at = np.mean([pose[:3] for pose in poses], axis=0)
+            look_at, distance_m = renderer.framing(poses, (0.0, 0.0))
         shown = bar.track(poses, description="rendering")
-        pictures = [renderer.picture(pose, look_at=look_at) for pose in shown]
+        pictures = [
+            renderer.picture(pose, look_at=look_at, distance_m=distance_m)
+            for pose in shown
+        ]
     if gait is None:
         save_animation(pictures, out, tick_s)
     else:

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NoReturn
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 from PIL import Image
 
-from analysis.render.command import render
+from analysis.render.command import _draw_motion, render
 from analysis.render.flags import parser
 from analysis.render.picture import (
     NoPictures,
@@ -206,6 +207,21 @@ def test_a_log_names_the_picture_that_is_rendered(
     with pytest.raises(AssertionError, match="words come first"):
         main(["robot render", str(robot_file), str(out)])
     assert capsys.readouterr().err.endswith(f"\nsimulating and rendering {out}\n")
+
+
+def test_a_strip_shows_the_whole_of_a_long_robot(engine: str, tmp_path: Path) -> None:
+    assert engine
+    bricks = [Part("FixedBrick", n, 1, 0, 0, BLUE) for n in range(1, 10)]
+    parts = (*ROBOT.parts[:1], Part("FixedBrick", 0, 0, 0, 0, BLUE), *bricks)
+    robot = Robot(parts, ROBOT.brain)
+    start = SimpleNamespace(qpos=np.array([0, 0, 0.0225, 1, 0, 0, 0]), time=0.0)
+    out = tmp_path / "strip.png"
+    with RobotRenderer(robot, settings_of(None), size=(160, 120)) as made:
+        _draw_motion(made, lambda watch: watch(start), 1, out, 0.125)
+    found = mostly(np.asarray(Image.open(out))[:120], 2)
+    assert len(found) > 200
+    assert (found > 0).all()
+    assert (found < (119, 159)).all()
 
 
 def test_a_strip_as_gif_is_refused() -> None:
