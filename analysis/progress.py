@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from threading import Event, Thread
 from typing import Self
 
 from rich.console import Console
@@ -16,19 +17,44 @@ SPAN_S = 10.0
 
 @contextmanager
 def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
-    """Show progress bars on a terminal; print a title once in a log.
+    """Show progress bars on a terminal; in a log, a title, and lines every ``SPAN_S``.
 
     Args:
         title: text printed in a log.
         columns: columns of the bars; rich's default if none are given.
     """
     console = Console(stderr=True)
-    if not console.is_terminal:
+    is_log = not console.is_terminal
+    if is_log:
         print_line(console, title)
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    with (
+        Progress(*columns, console=console, transient=True, disable=is_log) as progress,
+        _lines(progress, console) if is_log else nullcontext(),
+    ):
         yield progress
+
+
+@contextmanager
+def _lines(progress: Progress, console: Console) -> Iterator[None]:
+    """Print the unfinished tasks every ``SPAN_S``."""
+    has_ended = Event()
+
+    def tell() -> None:
+        while not has_ended.wait(SPAN_S):
+            for task in progress.tasks:
+                if task.total is None:
+                    print_line(console, task.description)
+                elif not task.finished:
+                    done = f"{task.completed:g} of {task.total:g}"
+                    print_line(console, f"{task.description}: {done}")
+
+    thread = Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        has_ended.set()
+        thread.join()
 
 
 class ProgressLine:

@@ -18,6 +18,21 @@ def test_a_log_shows_the_title_once(
     assert not output.out
 
 
+def test_a_log_shows_how_far_unfinished_tasks_are(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("analysis.progress.SPAN_S", 0.01)
+    lines: set[str] = set()
+    with bars("three things") as bar:
+        bar.update(bar.add_task("done", total=2), completed=2)
+        bar.update(bar.add_task("things [bold]", total=3), completed=2)
+        bar.add_task("comparing", total=None)
+        # Ended by the test's time limit if no line comes.
+        while not lines >= {"things [bold]: 2 of 3", "comparing"}:
+            lines.update(capsys.readouterr().err.splitlines())
+    assert lines == {"three things", "things [bold]: 2 of 3", "comparing"}
+
+
 def test_a_log_shows_progress_at_intervals() -> None:
     log = io.StringIO()
     with ProgressLine(Console(file=log)) as line:
