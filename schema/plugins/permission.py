@@ -128,8 +128,10 @@ def how_to_allow(module: str) -> str:
     if not _may_be_plugin(module):
         return f"plug-ins are {', '.join(BUILT_IN)} and modules of users"
     names = ", ".join(dict.fromkeys([*_allowed, *_installed_modules()])) or "none"
-    is_file = "." not in module and _source(module) is None
-    entry = f"PATH/{module}.py" if is_file else module
+    found = [] if "." in module else _source(module)
+    file = f"{module}.py"
+    is_here = found == [Path.cwd() / file]
+    entry = file if is_here else f"PATH/{file}" if found is None else module
     return f"allowed with {FLAG} are {names}; if you trust it, add {FLAG} {entry}"
 
 

@@ -140,10 +140,17 @@ def test_module_that_is_not_allowed_is_not_imported(folder: Path) -> None:
 
 def test_advice_names_the_file_of_a_module_that_is_not_installed(
     folder: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (folder / "installed_advice.py").write_text("")
+    here = tmp_path_factory.mktemp("here")
+    (here / "here_advice.py").write_text("")
+    monkeypatch.chdir(here)
+    monkeypatch.syspath_prepend(here)
     for module, entry in (
         ("installed_advice", "installed_advice"),
+        ("here_advice", "here_advice.py"),
         ("elsewhere_advice", "PATH/elsewhere_advice.py"),
     ):
         with pytest.raises(PluginDiffers, match=rf"; if .*, add --plugins {entry}$"):
