@@ -110,8 +110,8 @@ def add_plugins(flags: argparse.ArgumentParser) -> None:
         default=[],
         metavar="MODULE|FILE",
         help="allow a module, or a .py file, with part types and fitness functions; "
-        "may be repeated (default: only built-in modules, installed entry points "
-        "'revolve.plugins', and what an experiment given as .toml names)",
+        "may be repeated (default: built-in modules, installed entry points "
+        "'revolve.plugins', and modules of a .toml file, if one is given)",
     )
 
 
