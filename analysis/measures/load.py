@@ -99,7 +99,8 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
 
     Of several folders with the same run (experiment, repeat, seed, settings, sources
     of plug-ins) one is kept: that with the most readable tables, then the finished
-    one, then the longest, then the first.
+    one, then the longest, then the first. The number of planned births may differ:
+    the shorter of two such runs is the beginning of the longer one.
 
     Raises:
         RunFolderError: a folder does not exist, or no readable run is found.
@@ -139,7 +140,8 @@ def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
     copies: dict[tuple[object, ...], list[Run]] = {}
     for run in runs:
         sources = tuple(run.plugins.items())
-        name = (run.experiment, run.number, run.seed, run.document, sources)
+        settings = _without_births(run.document)
+        name = (run.experiment, run.number, run.seed, settings, sources)
         copies.setdefault(name, []).append(run)
     kept = []
     for group in copies.values():
@@ -148,9 +150,18 @@ def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
         kept.append(best)
         for run in others:
             damaged = ", and not completely readable" if _flaws(run)[0] else ""
-            why = f"the same run as {best.folder}{damaged}"
+            same = "the same run as" if run.document == best.document else "part of"
+            why = f"{same} {best.folder}{damaged}"
             left_out.append(LeftOut(str(run.folder), "run", why))
     return sorted(kept, key=lambda run: run.folder)
+
+
+def _without_births(document: str) -> str:
+    """Return a document without numbers of planned births."""
+    entries = json.loads(document)
+    for section in (entries, *(entries.get("islands") or ())):
+        section.pop("births", None)
+    return json.dumps(entries)
 
 
 def _flaws(run: Run) -> tuple[int, bool, int]:

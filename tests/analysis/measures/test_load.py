@@ -168,6 +168,30 @@ def test_runs_with_another_source_of_a_plug_in_are_different_runs(
     assert [Path(one.folder).name for one in left_out] == ["b"]
 
 
+def test_the_beginning_of_a_longer_run_is_not_another_run(
+    made: Maker, tmp_path: Path
+) -> None:
+    islands: list[dict[str, object]] = [{"births": 3}]
+    documents: dict[str, dict[str, object]] = {
+        "a": {"births": 2, "islands": islands},
+        "b": {"births": 3, "islands": [{"births": 4}]},
+        "c": {"births": 3, "islands": islands, "seconds": 1},
+        "d": {"births": 3, "islands": islands},
+    }
+    for name, document in documents.items():
+        file = made(name) / "run.json"
+        details = {**json.loads(file.read_text()), "document": json.dumps(document)}
+        file.write_text(json.dumps(details))
+    parquet_path(tmp_path / "a", "e", 0, "population").unlink()
+    runs, left_out = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["b", "c"]
+    part = f"part of {tmp_path / 'b'}"
+    assert [(Path(one.folder).name, one.why) for one in left_out] == [
+        ("d", part),
+        ("a", f"{part}, and not completely readable"),
+    ]
+
+
 def test_a_finished_run_without_tables_is_reported(made: Maker, tmp_path: Path) -> None:
     made("whole")
     shutil.rmtree(made("gone", seed=2) / "tables")
