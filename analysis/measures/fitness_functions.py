@@ -44,6 +44,28 @@ def by_function(functions: Mapping[str, str]) -> dict[str, list[str]]:
     return found
 
 
+def measured_apart(runs: pa.Table) -> tuple[list[str], list[str]]:
+    """Return the experiments in arenas and the off-line ones, if both are compared.
+
+    Args:
+        runs: ``experiment``, ``fitness_function`` and ``simulated_s``.
+
+    Returns:
+        Sorted names of both, only of functions that both have; both empty if an
+        arena's fitness is compared only with that of other arenas.
+    """
+    rows = runs.select(["experiment", "simulated_s"]).to_pylist()
+    in_arenas = {row["experiment"] for row in rows if row["simulated_s"] is not None}
+    online: list[str] = []
+    offline: list[str] = []
+    for names in by_function(functions_of(runs)).values():
+        if in_arenas.isdisjoint(names) or in_arenas.issuperset(names):
+            continue
+        online += [name for name in names if name in in_arenas]
+        offline += [name for name in names if name not in in_arenas]
+    return sorted(online), sorted(offline)
+
+
 def fitness_unit(function: str) -> str:
     """Return the unit of a fitness function; empty if it is not known.
 

@@ -6,10 +6,13 @@ from math import comb
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from analysis.figures.style import label
-from analysis.measures.fitness_functions import by_function, functions_of
+from analysis.measures.fitness_functions import (
+    by_function,
+    functions_of,
+    measured_apart,
+)
 from analysis.measures.outputs import OUTCOME
 from analysis.report.html import cell, folded, number, plural, table
 
@@ -39,7 +42,13 @@ def differences(tables: Tables) -> str:
     """
     if len(set(tables["runs"]["experiment"].to_pylist())) <= 1:
         return ""
-    parts = [_differences_of(tables["comparison"], *one) for one in _COMPARED.items()]
+    online, offline = map(set, measured_apart(tables["runs"]))
+    every = tables["comparison"].to_pylist()
+    # A pair of an experiment in arenas and one off-line comes last.
+    for row in every:
+        pair = {row["a"], row["b"]}
+        row["apart"] = not (online.isdisjoint(pair) or offline.isdisjoint(pair))
+    parts = [_differences_of(every, *one) for one in _COMPARED.items()]
     apart = not_compared(tables)
     if not any(parts):
         why = apart or (
@@ -58,28 +67,42 @@ def differences(tables: Tables) -> str:
 
 
 def not_compared(tables: Tables) -> str:
-    """Return why some experiments are not compared by fitness; empty if all are.
+    """Return why fitness cannot be compared in some pairs; empty if it can in all.
 
     Args:
         tables: ``runs``.
     """
+    parts = []
     groups = by_function(functions_of(tables["runs"]))
-    if len(groups) <= 1:
-        return ""
-    lists = "; ".join(
-        f"<b>{escape(', '.join(map(label, names)))}</b> by {escape(function)}"
-        for function, names in groups.items()
-    )
-    return (
-        "<p>Experiments with different fitness functions are not compared by fitness, "
-        f"because their numbers have different meanings: {lists}.</p>"
-    )
+    if len(groups) > 1:
+        lists = "; ".join(
+            f"{_bold(names)} by {escape(function)}"
+            for function, names in groups.items()
+        )
+        parts.append(
+            "<p>Experiments with different fitness functions are not compared by "
+            f"fitness, because their numbers have different meanings: {lists}.</p>"
+        )
+    online, offline = measured_apart(tables["runs"])
+    if online:
+        parts.append(
+            f"<p>Fitness in arenas ({_bold(online)}) is measured in another way than "
+            f"off-line ({_bold(offline)}): among other robots, after falls, again and "
+            "again. A difference between the two does not show which robots are "
+            "better.</p>"
+        )
+    return "".join(parts)
 
 
-def _differences_of(comparison: pa.Table, measure: str, title: str) -> str:
+def _bold(names: Sequence[str]) -> str:
+    """Return the labels of experiments in bold."""
+    return f"<b>{escape(', '.join(map(label, names)))}</b>"
+
+
+def _differences_of(comparison: Sequence[Row], measure: str, title: str) -> str:
     """Return the differences of one measure; empty if nothing is compared."""
-    rows = comparison.filter(pc.field("measure") == measure).to_pylist()
-    rows.sort(key=lambda row: 1.0 if row["p"] is None else row["p"])
+    rows = [row for row in comparison if row["measure"] == measure]
+    rows.sort(key=lambda row: (row["apart"], 1.0 if row["p"] is None else row["p"]))
     shown = rows[:_MOST_PAIRS]
     if not shown:
         return ""
@@ -117,7 +140,9 @@ def _difference(row: Row, reach: float) -> str:
             f"rank-sum p = {number(row['p'])})"
         )
         verdict = "the interval includes 0: these runs do not tell which is fitter"
-        if low > 0 or high < 0:
+        if row["apart"]:
+            verdict = "in an arena and off-line: this does not show which is fitter"
+        elif low > 0 or high < 0:
             verdict = _verdict(row, label(row["a"] if low > 0 else row["b"]))
     return (
         f'<div class="difference"><p>{a} minus {b}: {text}<br>'

@@ -86,6 +86,21 @@ def test_different_fitness_functions_are_named() -> None:
     assert f"{text}: a by locomotion; b, c by x:f" in output({"runs": rows}, 200)
 
 
+def test_fitness_in_arenas_and_off_line_is_told_apart() -> None:
+    rows: list[dict[str, Any]] = [
+        {"experiment": name, "differs": "", "fitness_function": text, "simulated_s": s}
+        for name, text, s in (
+            ("a", "locomotion", 9.0),
+            ("b", "locomotion", None),
+            ("c", "x:f", 9.0),
+            ("d", "locomotion", None),
+        )
+    ]
+    text = "fitness is measured differently in arenas and off-line"
+    assert f"{text}: a in arenas; b, d off-line\n" in output({"runs": rows}, 200)
+    assert text not in output({"runs": rows[1:3]}, 200)
+
+
 def test_a_run_without_populations_is_reported() -> None:
     text = output({"left_out": ROWS["left_out"]}, 80)
     assert text == (

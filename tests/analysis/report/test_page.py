@@ -149,6 +149,23 @@ def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
     assert found.text.count("robot 0:2, hard & <b>, run 0") == 2
 
 
+@pytest.mark.parametrize("others_s", [None, 9.0])
+def test_fitness_in_arenas_and_off_line_has_no_winner(others_s: float | None) -> None:
+    given = tables()
+    runs = given["runs"].drop_columns(["deaths", "simulated_s"])
+    names = runs["experiment"].to_pylist()
+    seconds = [9.0 if name == "soft" else others_s for name in names]
+    runs = runs.append_column("deaths", pa.array([0] * len(names), pa.int64()))
+    given["runs"] = runs.append_column("simulated_s", pa.array(seconds, pa.float64()))
+    text = read_page(given).text
+    where = "in arenas ( soft ) is measured in another way than off-line ( hard & <b> )"
+    verdict = "in an arena and off-line: this does not show which is fitter"
+    is_mixed = others_s is None
+    assert (f"Fitness {where}" in text) == is_mixed
+    assert (verdict in text) == is_mixed
+    assert ("undecided: the interval excludes 0" in text) != is_mixed
+
+
 def test_an_arena_is_summed_up(tmp_path: Path) -> None:
     given = tables()
     runs = given["runs"].drop_columns(["deaths", "simulated_s"])
