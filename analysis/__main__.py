@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from analysis.viewer.flags import FILM_ENDING
 from schema.agent.extras import install_advice
 from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.errors import RevolveError
@@ -122,7 +123,7 @@ def _simulation() -> Callable[..., Any]:
         MissingExtra: a library for rendering is not installed.
     """
     with _extra("pictures need", "pictures"):
-        from analysis.render.picture import choose_engine
+        from analysis.render.stage import choose_engine
 
         # Before MuJoCo is imported.
         choose_engine()
@@ -131,7 +132,18 @@ def _simulation() -> Callable[..., Any]:
 
 
 def _view(options: argparse.Namespace) -> int:
-    """Show a run; robots are re-simulated by the worker from the run's journal."""
+    """Show a run; robots are re-simulated by the worker from the run's journal.
+
+    A film of an arena needs no viewer.
+    """
+    if options.save is not None and options.save.suffix.lower() == FILM_ENDING:
+        with _extra("pictures need", "pictures"):
+            from analysis.render.stage import choose_engine
+
+            # Before MuJoCo is imported.
+            choose_engine()
+            from analysis.viewer.arena_film import film
+        return film(options)
     with _extra("the viewer needs", "view"):
         from analysis.viewer.command import view
     from analysis.viewer.resimulate import Simulators

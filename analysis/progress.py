@@ -7,7 +7,7 @@ from threading import Event, Thread
 from typing import Self
 
 from rich.console import Console
-from rich.progress import Progress, ProgressColumn
+from rich.progress import Progress, ProgressColumn, Task
 from rich.status import Status
 from rich.text import Text
 
@@ -27,8 +27,16 @@ def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
     is_log = not console.is_terminal
     if is_log:
         print_line(console, title)
+    # A thread that refreshes is what counts otherwise, and it does not run in a log.
+    progress = Progress(
+        *columns,
+        console=console,
+        transient=True,
+        disable=is_log,
+        auto_refresh=not is_log,
+    )
     with (
-        Progress(*columns, console=console, transient=True, disable=is_log) as progress,
+        progress,
         _lines(progress, console) if is_log else nullcontext(),
     ):
         yield progress
@@ -36,17 +44,14 @@ def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
 
 @contextmanager
 def _lines(progress: Progress, console: Console) -> Iterator[None]:
-    """Print the unfinished tasks every ``SPAN_S``."""
+    """Print a line about the unfinished tasks every ``SPAN_S``."""
     has_ended = Event()
 
     def tell() -> None:
         while not has_ended.wait(SPAN_S):
-            for task in progress.tasks:
-                if task.total is None:
-                    print_line(console, task.description)
-                elif not task.finished:
-                    done = f"{task.completed:g} of {task.total:g}"
-                    print_line(console, f"{task.description}: {done}")
+            unfinished = [task for task in progress.tasks if not task.finished]
+            if unfinished:
+                print_line(console, "; ".join(map(_count, unfinished)))
 
     thread = Thread(target=tell, daemon=True)
     thread.start()
@@ -55,6 +60,13 @@ def _lines(progress: Progress, console: Console) -> Iterator[None]:
     finally:
         has_ended.set()
         thread.join()
+
+
+def _count(task: Task) -> str:
+    """Return how far a task is, for example ``measuring runs: 2 of 5``."""
+    if task.total is None:
+        return task.description
+    return f"{task.description}: {task.completed:g} of {task.total:g}"
 
 
 class ProgressLine:

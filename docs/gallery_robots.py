@@ -11,14 +11,13 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from PIL import Image
 
-from analysis.render.picture import Picture, RobotRenderer, choose_engine
+from analysis.render.picture import RobotRenderer
+from analysis.render.stage import Picture, choose_engine
 from schema.experiment.document import Experiment, body_space
-from schema.experiment.file import own_experiment, read_experiment
+from schema.experiment.file import read_experiment
 from schema.experiment.settings import evaluation_settings_of
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -36,28 +35,13 @@ FRAMES = 60
 ARENA = ("scenario3", "--seed", "7", "--births", "90")
 SHOWN = (500.0, 520.0)
 """Simulated time of the arena that is shown [s]."""
-ARENA_XML = """
-<mujoco>
-  <visual><global offwidth="300" offheight="225"/><quality shadowsize="2048"/>
-    <headlight ambient="0.6 0.6 0.6" diffuse="0.55 0.55 0.55"
-      specular="0 0 0"/></visual>
-  <statistic extent="2"/>
-  <asset>
-    <texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1"
-      width="16" height="96"/>
-    <texture name="tiles" type="2d" builtin="checker" rgb1="0.93 0.94 0.95"
-      rgb2="0.86 0.88 0.9" width="256" height="256"/>
-    <material name="floor" texture="tiles" texuniform="true" texrepeat="1 1"/>
-  </asset>
-  <worldbody><geom type="plane" size="0 0 1" material="floor"/></worldbody>
-</mujoco>
-"""
 
 
 def main(folder: Path) -> int:
     """Make all files; return 0."""
     choose_engine()
     # It imports MuJoCo, which needs to know the engine.
+    from analysis.viewer.arena_film import SPEED, draw_film  # noqa: PLC0415 - the same
     from docs.tasks_campaign import ROBOTS, TASKS  # noqa: PLC0415
     from schema.formats.files import read_robot  # noqa: PLC0415
 
@@ -70,7 +54,8 @@ def main(folder: Path) -> int:
     if not run.exists():
         words = ("-m", "revolve", "run", *ARENA, "--out", str(run))
         subprocess.run([sys.executable, *words], cwd=ROOT, check=True)
-    film_arena(run, GALLERY / "arena.gif")
+    pictures, times_s = draw_film(run, SHOWN, ARENA_SIZE)
+    save_film(pictures, GALLERY / "arena.gif", (times_s[1] - times_s[0]) / SPEED)
     span = ("--from", str(SHOWN[0]), "--until", str(SHOWN[1]))
     viewed = ("-m", "revolve", "view", str(run), *span, "--save")
     out = str(GALLERY / "arena.rrd")
@@ -132,68 +117,6 @@ def record_robot(name: str, robot: Robot, experiment: Experiment, path: Path) ->
         recording.upright("motion")
         recording.ground("motion", scene.below([birth]))
         show_motion(recording, Motion(birth, poses, verdict), model, None)
-
-
-def film_arena(run: Path, path: Path) -> None:
-    """Write a film of an arena, at twice its speed, from its recorded poses."""
-    import mujoco  # noqa: PLC0415 - after the engine is chosen
-
-    from analysis.viewer.body import box_model, place_rows  # noqa: PLC0415 - the same
-    from analysis.viewer.replay import (  # noqa: PLC0415 - the same
-        read_news,
-        read_poses,
-        rows_by_robot,
-        shown_run,
-    )
-    from schema.wire.codec import decode_body  # noqa: PLC0415 - the same
-
-    shown = shown_run(run)
-    space = body_space(own_experiment(shown.document).space)
-    bodies = {one.birth: one.body for one in read_news(shown).births}
-    boxes: dict[float, list[tuple[Any, ...]]] = {}
-    for _, poses in read_poses(run, *SHOWN):
-        for birth, rows in rows_by_robot(poses):
-            body = bodies[birth]
-            assert body is not None
-            model = box_model(decode_body(body), space, is_plain=True)
-            centres, attitudes = place_rows(model, rows)
-            times = rows["sim_time_s"].to_pylist()
-            for time, centre, attitude in zip(times, centres, attitudes, strict=True):
-                drawn = (model.half_sizes, centre, attitude, model.colours / 255.0)
-                boxes.setdefault(time, []).append(drawn)
-    world = mujoco.MjModel.from_xml_string(ARENA_XML)
-    data = mujoco.MjData(world)
-    mujoco.mj_forward(world, data)
-    camera = mujoco.MjvCamera()
-    camera.distance, camera.azimuth, camera.elevation = 3.2, 130.0, -38.0
-    pictures = []
-    with mujoco.Renderer(world, ARENA_SIZE[1], ARENA_SIZE[0]) as renderer:
-        for time in sorted(boxes):
-            renderer.update_scene(data, camera)
-            for robot in boxes[time]:
-                _draw(mujoco, renderer.scene, robot)
-            pictures.append(np.array(renderer.render()))
-    save_film(pictures, path, 0.1)
-
-
-def _draw(
-    mujoco: Any,  # noqa: ANN401 - imported late
-    scene: Any,  # noqa: ANN401 - of MuJoCo
-    robot: tuple[Any, ...],
-) -> None:
-    """Add the boxes of a robot to a scene: half sizes, centres, attitudes, colours."""
-    rotation = np.zeros(9)
-    for half, centre, attitude, colour in zip(*robot, strict=True):
-        mujoco.mju_quat2Mat(rotation, np.roll(attitude, 1).astype(np.float64))
-        mujoco.mjv_initGeom(
-            scene.geoms[scene.ngeom],
-            mujoco.mjtGeom.mjGEOM_BOX,
-            half.astype(np.float64),
-            centre.astype(np.float64),
-            rotation,
-            np.array([*colour, 1.0], dtype=np.float32),
-        )
-        scene.ngeom += 1
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from analysis.figures.bench import arena_speed
 from analysis.figures.courses import over_births
 from analysis.figures.robots import effects
 from analysis.figures.style import in_order
-from analysis.render.picture import choose_engine
+from analysis.render.stage import choose_engine
 
 Tables = Mapping[str, pa.Table]
 

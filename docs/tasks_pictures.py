@@ -10,13 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.render.picture import (
-    RobotRenderer,
-    Simulate,
-    choose_engine,
-    gait_strip,
-    save_picture,
-)
+from analysis.render.picture import RobotRenderer, Simulate, gait_strip, save_picture
+from analysis.render.stage import choose_engine
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of

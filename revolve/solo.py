@@ -36,7 +36,7 @@ def _done(task: Task) -> Outcome:
     allow(task.plugins)
     # Before MuJoCo is imported, in case that any task is a picture.
     with suppress(ImportError):
-        from analysis.render.picture import choose_engine  # noqa: PLC0415
+        from analysis.render.stage import choose_engine  # noqa: PLC0415
 
         choose_engine()
     from worker.robot.evaluation import evaluate, judge, simulate  # noqa: PLC0415

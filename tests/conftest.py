@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from analysis.render.picture import choose_engine
+from analysis.render.stage import choose_engine
 from schema.plugins import permission
 from tests.own_brains import write_module
 

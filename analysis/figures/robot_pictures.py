@@ -14,7 +14,8 @@ from msgspec.structs import replace
 
 from analysis.figures.family_tree import LINEAGE, Best, lineage, row_of
 from analysis.measures.families import Family, family
-from analysis.render.picture import Picture, RobotRenderer, Simulate
+from analysis.render.picture import RobotRenderer, Simulate
+from analysis.render.stage import Picture
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.identity import Identity, Origin

@@ -1,79 +1,37 @@
-"""Off-screen rendering of robots.
+"""Pictures of one robot, and their files."""
 
-MuJoCo renders through EGL or, where that is missing, OSMesa. It chooses between them at
-its first import, so ``choose_engine`` must be called before. Where neither works, the
-ray caster draws.
-"""
-
-import ctypes.util
-import os
-import sys
+import io
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
-from importlib.util import find_spec
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, Self
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
-from analysis.render.framing import framed
-from schema.agent.log import tell_user
-from schema.errors import RevolveError, one_line
+from analysis.render.stage import (
+    FIELD_OF_VIEW,
+    Picture,
+    Stage,
+    choose_engine,
+    furnish,
+)
+from schema.errors import RevolveError
 from schema.experiment.document import body_space
-from schema.experiment.environment import LIGHT_COLOUR, LIGHT_M
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
-from schema.parts import Vector
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
 
-Picture = npt.NDArray[np.uint8]
-"""(H, W, 3) red, green, blue."""
-
-_LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
-_SETTING = "MUJOCO_GL"
-_OFF = ("disable", "disabled", "off", "false", "0")
-"""Values of the setting for which MuJoCo loads no graphics library."""
-_AZIMUTH, _ELEVATION = 130.0, -28.0
-_FIELD_OF_VIEW = 45.0
-_FLOOR_NAME = "floor"
-_FLOOR = ((0.93, 0.94, 0.95), (0.86, 0.88, 0.90))
-_SKY = (1.0, 1.0, 1.0)
-_TILE_M = 0.2
-_GROUND = ("ground", "rough")
+_COLOURS = 256
+_SAMPLES = 6
+"""Pictures from which the colours of a film are chosen."""
+_REACH_M = 0.5
+"""Half width of what a picture of a robot shows, for light and clipping [m]."""
 
 
 class NoPictures(RevolveError):  # noqa: N818 - names what is missing
     """A picture cannot be rendered or written."""
-
-
-def choose_engine() -> str:
-    """Choose the backend of MuJoCo's renderer, and return its name.
-
-    Returns:
-        The value of ``MUJOCO_GL``; "disable" if neither EGL nor OSMesa is installed.
-    """
-    if "mujoco" not in sys.modules and not os.environ.get(_SETTING):
-        os.environ[_SETTING] = _installed() or _OFF[0]
-    return os.environ.get(_SETTING, "")
-
-
-def _installed() -> str | None:
-    """Return the first backend whose library is installed."""
-    if find_spec("OpenGL") is None:
-        return None
-    found = (
-        name for name, file in _LIBRARIES.items() if ctypes.util.find_library(file)
-    )
-    return next(found, None)
-
-
-@lru_cache(maxsize=1)
-def _tell_fallback(why: str) -> None:
-    """Say once why robots are drawn without OpenGL."""
-    tell_user(f"robots are drawn without OpenGL: {why}")
 
 
 class RobotRenderer:
@@ -100,31 +58,27 @@ class RobotRenderer:
         Raises:
             ExperimentError: invalid scenery.
         """
-        engine = choose_engine()
-        import mujoco  # noqa: PLC0415 - after its engine is chosen
+        choose_engine()
+        from schema.mjcf.model import solo_spec  # noqa: PLC0415 - imports MuJoCo
 
-        from schema.mjcf.model import solo_spec  # noqa: PLC0415 - the same
-
-        self._mujoco: Any = mujoco
         self.model = solo_spec(
             robot,
             body_space(settings.space),
             settings.simulation,
             settings.environment,
-            furnish=partial(_furnish, size, settings.environment.light),
+            furnish=partial(furnish, size, settings.environment.light, _REACH_M),
         ).compile()
-        self._data = mujoco.MjData(self.model)
-        self._renderer = _renderer(self.model, engine, size)
-        mujoco.mj_forward(self.model, self._data)
+        self._stage = Stage(self.model, size)
+        data = self._stage.data
+        self._stage.pose(data.qpos)
         own = self.model.body("root").id
-        geoms = self.model.body_rootid[self.model.geom_bodyid] == own
-        self._size, self._geoms = size, geoms
-        centres = self._data.geom_xpos[geoms]
-        reaches = self.model.geom_rbound[geoms, np.newaxis]
+        self._geoms = self.model.body_rootid[self.model.geom_bodyid] == own
+        centres = data.geom_xpos[self._geoms]
+        reaches = self.model.geom_rbound[self._geoms, np.newaxis]
         low, high = (centres - reaches).min(axis=0), (centres + reaches).max(axis=0)
         # Centre and radius of a sphere around the robot in neutral pose, in the frame
         # of the core.
-        self._middle = 0.5 * (low + high) - self._data.qpos[:3]
+        self._middle = 0.5 * (low + high) - data.qpos[:3]
         away = np.linalg.norm(centres - 0.5 * (low + high), axis=1)
         self._radius = float((away + reaches[:, 0]).max())
 
@@ -132,7 +86,7 @@ class RobotRenderer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._renderer.close()
+        self._stage.close()
 
     def picture(
         self,
@@ -149,18 +103,15 @@ class RobotRenderer:
             distance_m: of the camera from there [m]; None: just enough for the robot
                 in neutral pose.
         """
+        stage = self._stage
         if pose is not None:
-            self._data.qpos[:] = pose
-        mujoco = self._mujoco
-        mujoco.mj_forward(self.model, self._data)
-        camera = mujoco.MjvCamera()
-        middle = self._data.qpos[:3] + self._middle
-        camera.lookat[:] = middle if look_at is None else look_at
-        near_m = 1.05 * self._radius / np.sin(np.radians(_FIELD_OF_VIEW / 2))
-        camera.distance = near_m if distance_m is None else distance_m
-        camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
-        self._renderer.update_scene(self._data, camera)
-        return np.array(self._renderer.render())
+            stage.pose(pose)
+        middle = stage.data.qpos[:3] + self._middle
+        near_m = 1.05 * self._radius / np.sin(np.radians(FIELD_OF_VIEW / 2))
+        return stage.picture(
+            middle if look_at is None else look_at,
+            near_m if distance_m is None else distance_m,
+        )
 
     def framing(
         self, poses: Sequence[Floats], cut: tuple[float, float]
@@ -176,106 +127,10 @@ class RobotRenderer:
         """
         centres = []
         for pose in poses:
-            self._data.qpos[:] = pose
-            self._mujoco.mj_kinematics(self.model, self._data)
-            centres.append(self._data.geom_xpos[self._geoms])
+            self._stage.pose(pose)
+            centres.append(self._stage.data.geom_xpos[self._geoms])
         radii = np.tile(self.model.geom_rbound[self._geoms], len(poses))
-        edge, (width, height) = np.tan(np.radians(_FIELD_OF_VIEW / 2)), self._size
-        above, below = ((1 - 2 * share) * edge for share in cut)
-        view = np.radians(_AZIMUTH), np.radians(_ELEVATION)
-        tangents = above, below, width / height * edge
-        return framed(np.concatenate(centres), radii, *view, tangents)
-
-
-def _renderer(
-    model: Any,  # noqa: ANN401 - imported late
-    engine: str,
-    size: tuple[int, int],
-) -> Any:  # noqa: ANN401 - imported late
-    """Return MuJoCo's renderer, or the ray caster where that does not work."""
-    import mujoco  # noqa: PLC0415 - after its engine is chosen
-
-    from analysis.render.ray_caster import RayCaster  # noqa: PLC0415 - the same
-
-    width, height = size
-    if engine.lower() in _OFF:
-        why = f"{_SETTING} is {engine}" if _installed() else "no EGL or OSMesa here"
-    else:
-        try:
-            return mujoco.Renderer(model, height, width)
-        # The type of the exception depends on the backend.
-        except Exception as error:  # noqa: BLE001
-            why = f"{engine or 'its default backend'} does not work: {one_line(error)}"
-    _tell_fallback(why)
-    floor = (_FLOOR_NAME, np.array(_FLOOR, np.float32), _TILE_M)
-    return RayCaster(model, height, width, floor=floor)
-
-
-def _furnish(
-    size: tuple[int, int],
-    shown_light: Vector | None,
-    spec: Any,  # noqa: ANN401 - imported late
-) -> None:
-    """Add floor, light and sky to the specification of a model.
-
-    Args:
-        size: width and height of pictures [pixels].
-        shown_light: position of the light that robots read, shown as a ball [m].
-        spec: of the model.
-    """
-    import mujoco  # noqa: PLC0415 - after its engine is chosen
-
-    if shown_light is not None:
-        ball = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE)
-        ball.pos, ball.size[0], ball.rgba = shown_light, LIGHT_M, LIGHT_COLOUR
-        ball.contype = ball.conaffinity = 0
-
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = size
-    spec.visual.global_.fovy = _FIELD_OF_VIEW
-    spec.visual.headlight.ambient = (0.35, 0.35, 0.35)
-    spec.visual.headlight.diffuse = (0.35, 0.35, 0.35)
-    spec.visual.headlight.specular = (0.0, 0.0, 0.0)
-    spec.visual.quality.shadowsize = 2048
-    # Robots are small: a near clipping plane and fine shadows.
-    spec.stat.extent = 0.5
-    spec.visual.map.znear = 0.01
-    spec.visual.map.shadowclip = 1.0
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        rgb1=_SKY,
-        rgb2=_SKY,
-        width=16,
-        height=96,
-    )
-    spec.add_texture(
-        name="tiles",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=_FLOOR[0],
-        rgb2=_FLOOR[1],
-        width=256,
-        height=256,
-    )
-    floor = spec.add_material(name=_FLOOR_NAME)
-    floor.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "tiles"
-    floor.texuniform = True
-    floor.texrepeat = (1.0 / _TILE_M, 1.0 / _TILE_M)
-    for geom in spec.worldbody.geoms:
-        if geom.name in _GROUND:
-            geom.material = _FLOOR_NAME
-    spec.worldbody.add_light(
-        pos=(-0.5, -0.8, 3.0),
-        dir=(0.15, 0.25, -1.0),
-        type=mujoco.mjtLightType.mjLIGHT_SPOT,
-        castshadow=True,
-        cutoff=60.0,
-        exponent=1.0,
-        attenuation=(1.0, 0.0, 0.0),
-        diffuse=(0.5, 0.5, 0.5),
-        specular=(0.1, 0.1, 0.1),
-    )
+        return self._stage.framing(np.concatenate(centres), radii, cut)
 
 
 def gait_strip(
@@ -319,7 +174,12 @@ def save_picture(picture: Picture, path: Path) -> None:
     Raises:
         NoPictures: the ending is unknown, or the file cannot be written.
     """
-    _save(Image.fromarray(picture), path)
+    try:
+        Image.fromarray(picture).save(path)
+    except OSError as error:
+        raise NoPictures(f"{path}: cannot be written: {error.strerror}") from None
+    except ValueError as error:
+        raise NoPictures(f"{path}: {error}") from None
 
 
 def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
@@ -333,18 +193,40 @@ def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -
     Raises:
         NoPictures: the file cannot be written.
     """
-    first, *others = map(Image.fromarray, pictures)
-    pause_ms = round(1000 * interval_s)
-    _save(first, path, save_all=True, append_images=others, duration=pause_ms, loop=0)
-
-
-def _save(image: Image.Image, path: Path, **options: Any) -> None:  # noqa: ANN401 - Pillow's
     try:
-        image.save(path, **options)
+        path.write_bytes(gif(pictures, interval_s, _COLOURS))
     except OSError as error:
         raise NoPictures(f"{path}: cannot be written: {error.strerror}") from None
-    except ValueError as error:
-        raise NoPictures(f"{path}: {error}") from None
+
+
+def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:
+    """Return pictures as a GIF that repeats.
+
+    All pictures share one palette without dithering, so that what does not move is
+    stored once.
+
+    Args:
+        pictures: pictures of one size; at least one.
+        interval_s: time between two pictures [s]; a GIF stores hundredths.
+        colours: size of the palette, at most 256.
+    """
+    every = -(-len(pictures) // _SAMPLES)
+    samples = Image.fromarray(np.concatenate(pictures[::every]))
+    palette = samples.quantize(colours, Image.Quantize.MEDIANCUT)
+    first, *others = (
+        Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE)
+        for one in pictures
+    )
+    file = io.BytesIO()
+    first.save(
+        file,
+        "GIF",
+        save_all=True,
+        append_images=others,
+        duration=round(1000 * interval_s),
+        loop=0,
+    )
+    return file.getvalue()
 
 
 class Simulate(Protocol):

@@ -10,8 +10,9 @@ from schema.robot.ids import BirthId
 
 HOST, PORT = "127.0.0.1", 9876
 """Address of the server for viewers."""
-LAST_S = 600.0
-"""Simulated time at the end of a run that is replayed by default [s]."""
+LAST_S, FILM_S = 600.0, 20.0
+"""Simulated time at the end of a run that is replayed and filmed by default [s]."""
+FILM_ENDING = ".gif"
 
 
 def parser(_command: str = "view") -> Flags:
@@ -22,7 +23,7 @@ def parser(_command: str = "view") -> Flags:
         examples=(
             "revolve view runs/scenario3-seed1",
             "revolve view runs/scenario1-seed1 --robot best --save best.rrd",
-            "revolve view runs/scenario3-seed1 --serve    # for viewers elsewhere",
+            "revolve view runs/scenario3-seed1 --save arena.gif --from 100 --until 120",
             "revolve view --connect runs/scenario3-seed1    # while it runs",
         ),
         allow_abbrev=False,
@@ -37,7 +38,8 @@ def parser(_command: str = "view") -> Flags:
     add_connect(flags)
     flags.add_argument(
         "--save", type=Path, metavar="FILE",
-        help="write a recording (.rrd) instead of opening a window",
+        help="write a recording (.rrd), or a film of an arena (.gif, without a "
+        "viewer), instead of opening a window",
     )  # fmt: skip
     flags.add_argument(
         "--serve", nargs="?", const=f"{HOST}:{PORT}", metavar="HOST:PORT",
@@ -58,8 +60,8 @@ def parser(_command: str = "view") -> Flags:
     )  # fmt: skip
     flags.add_argument(
         "--from", dest="start", type=number, metavar="S",
-        help=f"replay poses from this simulated time on [s] (default: the last "
-        f"{LAST_S:g} s)",
+        help="replay poses from this simulated time on [s] (default: the last "
+        f"{LAST_S:g} s; of a film the last {FILM_S:g} s)",
     )  # fmt: skip
     flags.add_argument(
         "--until", type=number, metavar="S", help="replay poses up to this time [s]"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from analysis.viewer.flags import HOST
+from analysis.viewer.flags import FILM_ENDING, HOST
 from analysis.viewer.recording import Recording, ViewerError
 from schema.agent.import_path import python_command
 from schema.agent.log import tell_user
@@ -51,7 +51,10 @@ class Output:
                 the file does not end in .rrd, or a window needs a screen.
         """
         if save is not None and save.suffix != _ENDING:
-            raise ViewerError(f"--save {save}: must end in {_ENDING}")
+            raise ViewerError(
+                f"--save {save}: must end in {_ENDING}, or {FILM_ENDING} for "
+                "a film of an arena"
+            )
         if save is not None and not save.absolute().parent.is_dir():
             raise ViewerError(f"--save {save}: no such folder: {save.parent}")
         if serve is not None or save is not None:

@@ -21,7 +21,7 @@ _LIBRARIES = {
 # In a process of its own: a broken driver may end it.
 _RENDER = """
 import sys
-from analysis.render.picture import choose_engine
+from analysis.render.stage import choose_engine
 engine = choose_engine()
 if engine == "disable":
     print("ray casting: neither EGL nor OSMesa is installed")

@@ -94,6 +94,21 @@ MISTAKES = {
         2,
     ),
     "other ending": ("view run --save a.mp4", "--save a.mp4: must end in .rrd", 2),
+    "film of a time without robots": (
+        "view run --save a.gif --from 1e5 --until 1.1e5",
+        "run: no poses of an arena between 100000 and 110000 s; for the film of a ",
+        2,
+    ),
+    "film of one robot": (
+        "view run --robot best --save a.gif",
+        "--save a.gif: a film takes no --robot",
+        2,
+    ),
+    "film in a missing folder": (
+        "view run --save nowhere/a.gif",
+        "--save nowhere/a.gif: no such folder: nowhere",
+        2,
+    ),
     "run to view is missing": (
         "view nowhere --save a.rrd",
         "nowhere: no run found: no such folder",

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from msgspec.structs import replace
+from PIL import Image, ImageSequence
 from rerun.chunk import RrdReader
 
 from coordinator.storage.compare import compare
@@ -229,6 +230,29 @@ def test_viewers_receive_everything_and_do_not_change_the_run(
     shown = sum(len(poses(file, path)) for path in paths(file) if "/robots/" in path)
     # Delivery is best effort: a machine that is fast enough loses no poses.
     assert 0.9 * table.num_rows <= shown <= table.num_rows
+
+
+def test_a_film_of_an_arena_has_a_picture_for_each_recorded_time(
+    workspace: Workspace, small_arena_run: Path
+) -> None:
+    times = pc.unique(read_table(small_arena_run, "poses")["sim_time_s"]).to_pylist()
+    times = [time_s for time_s in sorted(times) if 3.0 <= time_s <= 6.0]
+    words = ("--save", "arena.gif", "--from", "3", "--until", "6")
+    out = workspace.run("view", str(small_arena_run), *words)
+    assert f"saved arena.gif: {times[0]:g} to {times[-1]:g} s at 2 times" in out
+    with Image.open(workspace.folder / "arena.gif") as film:
+        durations = [each.info["duration"] for each in ImageSequence.Iterator(film)]
+    # Pictures that are equal are stored once.
+    step_ms = 1000 * (times[1] - times[0]) / 2
+    assert sum(durations) == pytest.approx(step_ms * len(times))
+    assert len(durations) > len(times) // 2
+
+
+def test_an_off_line_run_has_no_film(workspace: Workspace, undisturbed: Path) -> None:
+    words = ("view", str(undisturbed), "--save", "robots.gif")
+    done = workspace.run(*words, code=2)
+    assert "no poses of an arena between 0 and" in done
+    assert "use: revolve robot render" in done
 
 
 def test_resimulated_robot_of_an_arena_moves_as_recorded(

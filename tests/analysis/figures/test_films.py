@@ -8,7 +8,7 @@ from PIL import Image, ImageSequence
 
 from analysis.figures import films
 from analysis.figures.films import film
-from analysis.render.picture import Picture
+from analysis.render.stage import Picture
 
 
 def read(stored: bytes) -> list[tuple[Picture, float]]:

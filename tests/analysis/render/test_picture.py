@@ -47,7 +47,7 @@ def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
         monkeypatch.setenv("MUJOCO_GL", "disable")
         return name
     with RobotRenderer(ROBOT, settings_of(None), size=(16, 16)) as made:
-        if isinstance(made._renderer, RayCaster):
+        if isinstance(made._stage._renderer, RayCaster):
             pytest.skip("no EGL or OSMesa that works")
     return name
 
@@ -55,7 +55,7 @@ def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
 @pytest.fixture
 def renderer(engine: str) -> Iterator[RobotRenderer]:
     with RobotRenderer(ROBOT, settings_of(None), size=(160, 120)) as made:
-        assert isinstance(made._renderer, RayCaster) == (engine == "rays")
+        assert isinstance(made._stage._renderer, RayCaster) == (engine == "rays")
         yield made
 
 
@@ -236,7 +236,8 @@ def test_a_machine_without_graphics_library_gets_pictures_and_one_line(
     script = """
 import ctypes.util
 ctypes.util.find_library = lambda name: None
-from analysis.render.picture import RobotRenderer, choose_engine
+from analysis.render.picture import RobotRenderer
+from analysis.render.stage import choose_engine
 choose_engine()
 from tests.analysis.render.test_picture import ROBOT, settings_of
 for _ in range(2):

@@ -1,0 +1,108 @@
+"""Pictures of the robots that live together in an arena."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from analysis.render.stage import HIGH, Picture, Stage, choose_engine, furnish
+from schema.experiment.document import body_space
+from schema.experiment.settings import ArenaSettings
+from schema.robot.ids import BirthId
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+
+Poses = Mapping[BirthId, Floats]
+"""Pose of each living robot, (7 + joints,): place of the core x, y, z [m], attitude w,
+x, y, z, and the angle of every joint by ascending part [rad; m of a slider]."""
+_HIDDEN_M = -100.0
+"""Height of the robots that do not live at the time of a picture [m]."""
+_LEAST_REACH_M = 0.5
+_WHOLE = (0.0, 0.0)
+"""Shares of a picture that are cut off."""
+
+
+class ArenaRenderer:
+    """Renders robots on the ground of their arena; a context manager.
+
+    The camera stands still, so that it sees all robots of some frames.
+    """
+
+    def __init__(
+        self,
+        robots: Mapping[BirthId, Robot],
+        settings: ArenaSettings,
+        frames: Sequence[Poses],
+        *,
+        size: tuple[int, int],
+    ) -> None:
+        """Build the model, and place the camera.
+
+        Args:
+            robots: all that have a pose in a frame.
+            settings: of the arena.
+            frames: what the camera must see; at least one pose.
+            size: width and height of pictures [pixels].
+
+        Raises:
+            ExperimentError: invalid scenery.
+        """
+        choose_engine()
+        from schema.mjcf import model as mjcf  # noqa: PLC0415 - imports MuJoCo
+
+        space, world = body_space(settings.space), settings.simulation
+        places = np.array([pose[:2] for poses in frames for pose in poses.values()])
+        reach_m = max(_LEAST_REACH_M, float(np.ptp(places, axis=0).max()))
+
+        def furnish_arena(spec: Any) -> None:  # noqa: ANN401 - imported late
+            mjcf.add_ring_wall(spec, settings.arena)
+            furnish(size, settings.light, reach_m, spec)
+
+        specs = [
+            (f"{birth.island}:{birth.number}/", mjcf.robot_spec(one, space, world).spec)
+            for birth, one in robots.items()
+        ]
+        model = mjcf.shared_model(
+            specs, world, settings.environment, furnish=furnish_arena
+        )
+        self._stage = Stage(model, size, HIGH)
+        self._starts = {
+            birth: int(model.joint(f"{prefix}free").qposadr[0])
+            for birth, (prefix, _) in zip(robots, specs, strict=True)
+        }
+        self._camera = self._framing(frames)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stage.close()
+
+    def picture(self, poses: Poses) -> Picture:
+        """Return a picture of robots in their poses; the others are not shown."""
+        self._pose(poses)
+        return self._stage.picture(*self._camera)
+
+    def _pose(self, poses: Poses) -> None:
+        qpos = self._stage.data.qpos.copy()
+        for birth, start in self._starts.items():
+            if birth in poses:
+                qpos[start : start + len(poses[birth])] = poses[birth]
+            else:
+                qpos[start + 2] = _HIDDEN_M
+        self._stage.pose(qpos)
+
+    def _framing(self, frames: Sequence[Poses]) -> tuple[Floats, float]:
+        """Return the point that the camera looks at, and its distance from there."""
+        model, data = self._stage.model, self._stage.data
+        # Geoms of the world have no moving root.
+        is_own = model.body_dofnum[model.body_rootid[model.geom_bodyid]] > 0
+        centres, radii = [], []
+        for poses in frames:
+            self._pose(poses)
+            is_shown = is_own & (data.geom_xpos[:, 2] > 0.5 * _HIDDEN_M)
+            centres.append(data.geom_xpos[is_shown])
+            radii.append(model.geom_rbound[is_shown])
+        return self._stage.framing(
+            np.concatenate(centres), np.concatenate(radii), _WHOLE
+        )

@@ -1,0 +1,175 @@
+"""Films of arenas, drawn from the poses of a run."""
+
+import argparse
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from analysis.progress import bars
+from analysis.render.arena_picture import ArenaRenderer, Poses
+from analysis.render.picture import NoPictures, gait_strip, save_animation
+from analysis.render.stage import Picture
+from analysis.viewer.flags import FILM_S
+from analysis.viewer.replay import (
+    last_time,
+    read_news,
+    read_poses,
+    rows_by_robot,
+    shown_run,
+)
+from schema.agent.log import tell_user
+from schema.experiment.document import Experiment, island_experiment
+from schema.experiment.file import own_experiment
+from schema.experiment.settings import arena_settings_of
+from schema.plugins.permission import allow
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from schema.tables.description import allow_plugins_of
+from schema.wire.codec import decode_body
+
+SPEED = 2.0
+"""Simulated time by time of the film."""
+_SIZE = 640, 480
+_COLUMNS = 2
+"""Arenas side by side."""
+_CORE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+
+Frames = Mapping[float, Poses]
+"""Poses of an arena's robots by simulated time [s], ascending."""
+
+
+def film(options: argparse.Namespace) -> int:
+    """Write a film of the arenas of a run.
+
+    Args:
+        options: of the command line.
+
+    Returns:
+        0.
+
+    Raises:
+        RunFolderError: the folder has no run, or the run has no robot yet.
+        NoPictures: the flags conflict, there are no poses, or the file cannot be
+            written.
+    """
+    out: Path = options.save
+    allow(options.plugins)
+    unfit = {
+        "--serve": options.serve,
+        "--follow": options.follow,
+        "--robot": options.robot,
+        "--connect": options.connect,
+    }
+    if given := [flag for flag, value in unfit.items() if value]:
+        raise NoPictures(f"--save {out}: a film takes no {', '.join(given)}")
+    if options.run is None:
+        raise NoPictures(f"--save {out}: a film needs a run folder")
+    if not out.absolute().parent.is_dir():
+        raise NoPictures(f"--save {out}: no such folder: {out.parent}")
+    end_s = last_time(options.run) if options.until is None else options.until
+    start_s = max(0.0, end_s - FILM_S) if options.start is None else options.start
+    if start_s > end_s:
+        raise NoPictures(f"--from {start_s:g}: must be before {end_s:g} s")
+    pictures, times_s = draw_film(options.run, (start_s, end_s), _SIZE)
+    interval_s = (times_s[-1] - times_s[0]) / max(1, len(times_s) - 1)
+    save_animation(pictures, out, interval_s / SPEED)
+    tell_user(
+        f"saved {out}: {times_s[0]:g} to {times_s[-1]:g} s at {SPEED:g} times real "
+        "time; --from and --until choose others"
+    )
+    return 0
+
+
+def draw_film(
+    folder: Path, span: tuple[float, float], size: tuple[int, int]
+) -> tuple[list[Picture], list[float]]:
+    """Draw the arenas of a run, side by side.
+
+    Args:
+        folder: the run folder.
+        span: simulated time of start and end [s].
+        size: width and height of an arena [pixels].
+
+    Returns:
+        A picture of each recorded time, and the times [s].
+
+    Raises:
+        RunFolderError: the folder has no run, or the run has no robot yet.
+        NoPictures: no poses are recorded.
+    """
+    run = shown_run(folder)
+    allow_plugins_of(folder)
+    experiment = own_experiment(run.document)
+    bodies = {one.birth: one.body for one in read_news(run).births}
+    found = read_frames(folder, *span)
+    if not found:
+        raise NoPictures(
+            f"{folder}: no poses of an arena between {span[0]:g} and {span[1]:g} s; "
+            "for the film of a robot use: revolve robot render"
+        )
+    times_s = sorted({time_s for frames in found.values() for time_s in frames})
+    with ExitStack() as stack, bars(f"rendering {len(times_s)} pictures") as bar:
+        renderers = {
+            island: stack.enter_context(
+                _renderer(experiment, island, frames, bodies, size)
+            )
+            for island, frames in found.items()
+        }
+        pictures = [
+            gait_strip(
+                [
+                    renderers[island].picture(frames.get(time_s, {}))
+                    for island, frames in found.items()
+                ],
+                columns=_COLUMNS,
+            )
+            for time_s in bar.track(times_s, description="rendering")
+        ]
+    return pictures, times_s
+
+
+def read_frames(folder: Path, start_s: float, end_s: float) -> dict[int, Frames]:
+    """Return the poses of a span, by island and time.
+
+    Args:
+        folder: the run folder.
+        start_s: simulated time of the span's start [s].
+        end_s: simulated time of its end [s].
+
+    Raises:
+        RunFolderError: the table cannot be read.
+    """
+    found: dict[int, dict[float, dict[BirthId, np.ndarray]]] = {}
+    for island, table in read_poses(folder, start_s, end_s):
+        frames = found.setdefault(island, {})
+        for birth, rows in rows_by_robot(table):
+            for time_s, pose in _poses(rows):
+                frames.setdefault(time_s, {})[birth] = pose
+    return {island: dict(sorted(frames.items())) for island, frames in found.items()}
+
+
+def _poses(rows: pa.Table) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield the times and poses of one robot."""
+    columns = [rows[name].to_pylist() for name in ("sim_time_s", "angles", *_CORE)]
+    for time_s, angles, *core in zip(*columns, strict=True):
+        yield time_s, np.array([*core, *angles])
+
+
+def _renderer(
+    experiment: Experiment,
+    island: int,
+    frames: Frames,
+    bodies: Mapping[BirthId, bytes | None],
+    size: tuple[int, int],
+) -> ArenaRenderer:
+    """Return the renderer of an arena."""
+    robots: dict[BirthId, Robot] = {}
+    for birth in sorted({birth for poses in frames.values() for birth in poses}):
+        body = bodies[birth]
+        assert body is not None
+        robots[birth] = decode_body(body)
+    settings = arena_settings_of(island_experiment(experiment, island))
+    return ArenaRenderer(robots, settings, list(frames.values()), size=size)

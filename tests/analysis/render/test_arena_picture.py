@@ -1,0 +1,74 @@
+"""Tests of pictures of arenas."""
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from analysis.render.arena_picture import ArenaRenderer, Poses
+from schema.experiment.document import Arena
+from schema.experiment.file import read_experiment
+from schema.experiment.settings import arena_settings_of
+from schema.robot.ids import BirthId
+from schema.robot.robot import Part, Robot
+from tests.analysis.render.test_picture import mostly
+
+SETTINGS = arena_settings_of(read_experiment("scenario3"))
+RED, BLUE = BirthId(0, 0), BirthId(1, 7)
+SIZE = 160, 120
+
+
+def brick(colour: tuple[float, float, float]) -> Robot:
+    """Return a core with an active hinge."""
+    hinge = Part("ActiveHinge", 0, 2, 0, 0, colour)
+    return Robot((Part("Core", -1, -1, -1, 0, colour), hinge))
+
+
+ROBOTS = {RED: brick((1.0, 0.0, 0.0)), BLUE: brick((0.0, 0.0, 1.0))}
+
+
+def pose(x: float, y: float, angle: float = 0.0) -> np.ndarray:
+    return np.array([x, y, 0.05, 1.0, 0.0, 0.0, 0.0, angle])
+
+
+@pytest.fixture(params=["gl", "rays"])
+def _engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if request.param == "rays":
+        monkeypatch.setenv("MUJOCO_GL", "disable")
+
+
+@pytest.mark.usefixtures("_engine")
+def test_robots_are_at_their_places_while_they_live() -> None:
+    frames: list[Poses] = [
+        {RED: pose(-0.5, 0.0), BLUE: pose(0.5, 0.0)},
+        {BLUE: pose(0.5, 0.0, 1.0)},
+        {},
+    ]
+    with ArenaRenderer(ROBOTS, SETTINGS, frames, size=SIZE) as renderer:
+        both, alone, empty = map(renderer.picture, frames)
+        again = renderer.picture(frames[0])
+    red, blue = mostly(both, 0), mostly(both, 2)
+    assert min(len(red), len(blue)) > 20
+    # The camera looks along (-0.64, 0.77), so +x is to its right.
+    assert red[:, 1].max() < blue[:, 1].min()
+    for found in (red, blue):
+        assert (found > 0).all()
+        assert (found < (119, 159)).all()
+    assert len(mostly(alone, 0)) == len(mostly(empty, 0)) == len(mostly(empty, 2)) == 0
+    assert mostly(alone, 2).mean(axis=0) == pytest.approx(blue.mean(axis=0), abs=3)
+    # The hinge has turned.
+    assert mostly(alone, 2).tolist() != blue.tolist()
+    assert mostly(again, 0).tolist() == red.tolist()
+    assert mostly(again, 2).tolist() == blue.tolist()
+
+
+def test_the_wall_is_rendered_and_does_not_move_the_camera() -> None:
+    frame = {RED: pose(0.0, 0.0)}
+    walled = replace(SETTINGS, arena=Arena(wall_diameter_m=0.6))
+    pictures = []
+    for settings in (SETTINGS, walled):
+        with ArenaRenderer({RED: ROBOTS[RED]}, settings, [frame], size=SIZE) as made:
+            pictures.append(made.picture(frame))
+    plain, shown = pictures
+    assert (plain != shown).any()
+    places = [mostly(each, 0).mean(axis=0) for each in pictures]
+    assert places[0] == pytest.approx(places[1], abs=10)
