@@ -20,7 +20,7 @@ from tests.own_brains import write_module
 from worker.fitness import check_fitness
 from worker.measures.functions import BUILT_IN, measures_of
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 TOP = Path(__file__).parents[2]
 PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
@@ -70,7 +70,6 @@ def test_code_of_pages_about_tables_runs(
         assert done.returncode == 0, f"{words[-1]}\n{done.stderr}"
 
 
-@pytest.mark.timeout(300)
 def test_selection_of_the_selection_page_runs(tmp_path: Path) -> None:
     """Two workers give the births of one process; the run needs its folder alone."""
     page = TOP / "docs" / "selection.md"
@@ -142,7 +141,6 @@ def test_measures_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_code_of_the_python_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
     blocks = _blocks(TOP / "docs" / "python.md", "python")
     assert len(blocks) >= 8
@@ -173,7 +171,6 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
             parse_experiment(document, str(tmp_path / page.name))
 
 
-@pytest.mark.timeout(300)
 def test_experiments_of_the_brains_page_run(tmp_path: Path) -> None:
     """Each runs equally in one process and with two workers."""
     write_module(tmp_path)
