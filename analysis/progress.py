@@ -63,9 +63,11 @@ def _lines(progress: Progress, console: Console) -> Iterator[None]:
 
 
 def _count(task: Task) -> str:
-    """Return how far a task is, for example ``measuring runs: 2 of 5``."""
+    """Return how far a task is, such as ``runs: 2 of 5``, or as a percentage."""
     if task.total is None:
         return task.description
+    if task.completed % 1.0:
+        return f"{task.description}: {task.percentage:.0f} %"
     return f"{task.description}: {task.completed:g} of {task.total:g}"
 
 

@@ -7,7 +7,7 @@ from analysis.measures.load import Run
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
-from analysis.viewer.entities import name_of
+from analysis.viewer.entities import name_of, recording_name
 from analysis.viewer.flags import LAST_S
 from analysis.viewer.live import LiveSource
 from analysis.viewer.motion import (
@@ -87,10 +87,7 @@ def _replay(
     motions = _motions(options, run, simulators)
     moving = [each.birth for each in motions]
     blueprint = layout(scene, follow=options.follow, motions=moving)
-    # The folder's name usually starts with that of the experiment.
-    name = folder.resolve().name
-    if not name.startswith(news.experiment):
-        name = f"{news.experiment}-{name}"
+    name = recording_name(news.experiment, folder.resolve().name)
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         recording.add_scene(scene)
         show = Show(recording, scene.space)

@@ -28,6 +28,16 @@ def name_of(birth: BirthId) -> str:
     return f"{birth.island}:{birth.number}"
 
 
+def recording_name(experiment: str, folder: str) -> str:
+    """Return the name of a run's recording.
+
+    Args:
+        experiment: name of the experiment.
+        folder: name of the run folder, which usually starts with that.
+    """
+    return folder if folder.startswith(experiment) else f"{experiment}-{folder}"
+
+
 def island_path(island: int) -> str:
     """Return the entity of an island."""
     return f"islands/{island}"

@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from analysis.progress import ProgressLine
 from analysis.viewer.blueprint import layout
+from analysis.viewer.entities import recording_name
 from analysis.viewer.live import Ended, LiveMessage, LiveSource
 from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.received import check_update, received_poses
@@ -54,7 +55,7 @@ def watch(
         return
     news = messages[0]
     assert isinstance(news, Update)
-    name = f"{news.experiment}-{news.run.rpartition('/')[2]}"
+    name = recording_name(news.experiment, news.run.rpartition("/")[2])
     blueprint = layout(scene, follow=follow)
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         window = Window(output)

@@ -26,12 +26,16 @@ def test_a_log_shows_how_far_unfinished_tasks_are(
         bar.update(bar.add_task("done", total=2), completed=2)
         bar.update(bar.add_task("things [bold]", total=3), completed=2)
         bar.add_task("comparing", total=None)
+        bar.update(bar.add_task("steps", total=1.0), completed=0.247)
         tracked = iter(bar.track(["first", "second"], description="tracked"))
         assert [next(tracked), next(tracked)] == ["first", "second"]
         lines = capsys.readouterr().err.splitlines()
         assert lines[0] == "three things"
         # Ended by the test's time limit if no line comes.
-        while "things [bold]: 2 of 3; comparing; tracked: 1 of 2" not in lines:
+        while (
+            "things [bold]: 2 of 3; comparing; steps: 25 %; tracked: 1 of 2"
+            not in lines
+        ):
             lines = capsys.readouterr().err.splitlines()
 
 

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
-from analysis.viewer.entities import TimePoint
+from analysis.viewer.entities import TimePoint, recording_name
 from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
@@ -238,3 +238,13 @@ def test_a_campaign_is_told_to_name_a_run(tmp_path: Path) -> None:
         (tmp_path / f"a-{number}" / "run.json").touch()
     with pytest.raises(RunFolderError, match=f"is a campaign; .* as {tmp_path}/a-0$"):
         shown_run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("experiment", "folder", "name"),
+    [("pond", "pond-seed1", "pond-seed1"), ("pond", "zoo", "pond-zoo")],
+)
+def test_a_recording_has_the_names_of_experiment_and_folder(
+    experiment: str, folder: str, name: str
+) -> None:
+    assert recording_name(experiment, folder) == name
