@@ -53,7 +53,7 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
         figure
         + p9.geom_line(size=0.9)
         + p9.facet_wrap("panel", scales="free_y", ncol=2)
-        + scales(in_order(sizes.index), is_filled=False)
+        + scales(tables, in_order(sizes.index), is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x=f"births (means over {width})", y="change")
         + theme_of_size(3.4)

@@ -127,7 +127,7 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
             show_legend=False,
         )
     figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
-    figure = figure + scales(shown.sizes, is_filled=sure.num_rows > 0)
+    figure = figure + scales(tables, shown.sizes, is_filled=sure.num_rows > 0)
     figure += p9.expand_limits(y=0)
     if functions:
         figure += p9.facet_wrap("function", scales="free_y", ncol=_NARROW)

@@ -1,6 +1,7 @@
 """Distributions of measures over runs: points, boxes and violins."""
 
 from collections.abc import Mapping
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ BAND_RUNS = 3
 """Runs from which on a mean's interval is drawn: that of two runs is 9 times wider."""
 _NARROW = 3
 """Panels in a row."""
+_TITLE = 28
+"""Characters of a line of a panel's title."""
 _INK = "#333333"
 
 
@@ -48,9 +51,14 @@ def fitness_panels(tables: Tables) -> dict[str, str]:
 
     Args:
         tables: ``runs``; without it, all functions are the same.
+
+    Returns:
+        Titles of panels by experiment: functions, on lines that are not too long.
     """
     functions = functions_of(tables["runs"]) if "runs" in tables else {}
-    return functions if len(set(functions.values())) > 1 else {}
+    if len(set(functions.values())) <= 1:
+        return {}
+    return {name: fill(text, _TITLE) for name, text in functions.items()}
 
 
 def fitness_text(tables: Tables, text: str) -> str:
@@ -92,7 +100,7 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     experiments = in_order(runs["experiment"])
     figure = p9.ggplot(runs, p9.aes("experiment", "value"))
     figure += [*_violins(tables, panels, functions, experiments), *_summaries(runs)]
-    figure = figure + scales(experiments) + p9.expand_limits(y=0)
+    figure = figure + scales(tables, experiments) + p9.expand_limits(y=0)
     # An invisible layer extends panels of zeros from 0 to 1.
     flat = runs[runs.groupby("panel", observed=True)["value"].transform("max") == 0]
     if not flat.empty:

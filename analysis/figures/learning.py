@@ -33,7 +33,7 @@ def learning_curves(tables: Tables) -> p9.ggplot:
         ["median", "low", "high"]
     ].mean()
     mean = _in_lines(mean, "trial", "two trials")
-    colours = scales(in_order(mean["experiment"]))
+    colours = scales(tables, in_order(mean["experiment"]))
     return (
         p9.ggplot(mean, p9.aes("trial"))
         + p9.geom_ribbon(p9.aes(ymin="low", ymax="high", fill="experiment"), alpha=0.25)

@@ -29,7 +29,7 @@ def measures_over_births(tables: Tables) -> p9.ggplot:
         p9.ggplot(frame, p9.aes("births", "mean"))
         + p9.geom_line(p9.aes(colour="experiment", group="line"), size=0.6, alpha=0.8)
         + p9.facet_wrap("measure", ncol=_NARROW, scales="free_y")
-        + scales(experiments, is_filled=False)
+        + scales(tables, experiments, is_filled=False)
         + p9.labs(x="births on the island", y="mean of the population")
         + theme_of_size(1.0 + 2.0 * lines)
     )

@@ -60,7 +60,7 @@ def variability(tables: Tables) -> p9.ggplot:
             alpha=0.8,
             position="identity",
         )
-        + scales(rows["experiment"].to_pylist())
+        + scales(tables, rows["experiment"].to_pylist())
         + p9.coord_cartesian(xlim=(0, 1))
         + p9.labs(
             x="range of a robot's fitness / range of the population's", y="density"
@@ -119,7 +119,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         + p9.geom_line(p9.aes(colour="experiment"), data=joined, size=0.6)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
         + p9.facet_wrap(in_panels, ncol=2, scales="free_y" if functions else "fixed")
-        + scales(experiments, is_filled=False)
+        + scales(tables, experiments, is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x=axis, y="mean fitness")
         + theme_of_size(0.6 + 3.0 * lines)
@@ -161,7 +161,7 @@ def lineages(tables: Tables) -> p9.ggplot:
             size=0.8,
             show_legend=len(names) > 1,
         )
-        + scales(rows["experiment"].to_pylist(), is_filled=False)
+        + scales(tables, rows["experiment"].to_pylist(), is_filled=False)
         + p9.scale_y_continuous(breaks=integer_breaks)
         + p9.labs(x="number of birth", y="rank (founders 1, children one more)")
         + theme_of_size(4.2)

@@ -2,13 +2,14 @@
 
 import re
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from colorsys import hls_to_rgb
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 import plotnine as p9
+import pyarrow as pa
 from matplotlib import pyplot as plt
 from matplotlib import rc_context
 from matplotlib.colors import to_hex
@@ -91,18 +92,27 @@ def two_line_label(experiment: str) -> str:
     return re.sub(r"(?<=[ -])", "\n", text, count=1).replace(" \n", "\n")
 
 
-def scales(experiments: Iterable[str], *, is_filled: bool = True) -> list[Any]:
+def scales(
+    tables: Mapping[str, pa.Table],
+    experiments: Iterable[str],
+    *,
+    is_filled: bool = True,
+) -> list[Any]:
     """Return the colour scales of experiments, with labels and order.
 
     Args:
+        tables: ``runs``, whose experiments determine the colours, so that they are the
+            same in all figures; without it, those of the figure do.
         experiments: experiments of the figure.
         is_filled: add a scale of fill colours.
     """
-    chosen = colours(experiments)
+    shown = in_order(experiments)
+    of_all = tables["runs"]["experiment"].to_pylist() if "runs" in tables else ()
+    paint = colours([*of_all, *shown])
     settings = {
-        "limits": list(chosen),
-        "labels": [label(name) for name in chosen],
-        "values": list(chosen.values()),
+        "limits": shown,
+        "labels": [label(name) for name in shown],
+        "values": [paint[name] for name in shown],
         "name": "",
     }
     lines = [p9.scale_colour_manual(**settings)]

@@ -67,6 +67,8 @@ def sweep_runs(tables: Tables, experiment: str) -> SweepRuns:
         raise NothingToDraw(f"no run of the sweep {experiment} is finished")
     for setting in settings:
         outcomes[setting] = [points[folder][setting] for folder in outcomes["folder"]]
+    # A sweep of fitness is divided into experiments, each with one value of those.
+    settings = [each for each in settings if outcomes[each].nunique() > 1] or settings
     known = [name for name in MEASURES if outcomes[name].notna().any()]
     # Off-line populations have a fixed size.
     shown = [name for name in known if name != "size" or outcomes[name].nunique() > 1]

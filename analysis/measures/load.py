@@ -193,8 +193,7 @@ def read_run(folder: Path) -> Run:
         raise RunFolderError(f"{DETAILS}: cannot be read: {cause}") from None
     run = Run(
         folder=folder,
-        # Its points have the sweep's name and a number.
-        experiment=str(name).rpartition("-")[0] if point else str(name),
+        experiment=_experiment(str(name), point),
         number=int(number),
         seed=int(seed),
         state=_state(folder, details),
@@ -209,6 +208,27 @@ def read_run(folder: Path) -> Run:
     if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
         raise RunFolderError("the run is finished, but its tables are missing")
     return run
+
+
+def _experiment(name: str, point: Mapping[str, Any]) -> str:
+    """Return the name of an experiment, or of the sweep that a run is a point of.
+
+    Points with different settings of fitness are different experiments, as their
+    fitness cannot be compared.
+
+    Args:
+        name: in the document; of a point, that of the sweep, a hyphen and a number.
+        point: settings that the sweep chose; empty if there is no sweep.
+    """
+    if not point:
+        return name
+    sweep = name.rpartition("-")[0]
+    chosen = [
+        f"{key.rpartition('.')[2]} = {value}"
+        for key, value in point.items()
+        if key.startswith("fitness.")
+    ]
+    return f"{sweep} ({', '.join(chosen)})" if chosen else sweep
 
 
 def _details(folder: Path) -> dict[str, Any]:

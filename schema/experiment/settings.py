@@ -129,8 +129,15 @@ def vetting_settings(experiment: Experiment) -> bytes:
 
 
 def evaluation_settings_of(experiment: Experiment) -> EvaluationSettings:
-    """Return the evaluation settings of an experiment."""
-    return _sections(experiment, EvaluationSettings)
+    """Return the evaluation settings of an experiment.
+
+    A robot of an arena that is evaluated alone has the arena's light.
+    """
+    settings = _sections(experiment, EvaluationSettings)
+    light = light_of(experiment.environment, experiment.arena)
+    if light == settings.environment.light:
+        return settings
+    return replace(settings, environment=replace(settings.environment, light=light))
 
 
 def evaluation_settings(experiment: Experiment) -> bytes:

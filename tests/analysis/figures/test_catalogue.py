@@ -9,11 +9,12 @@ from analysis.figures.courses import course as figure_course
 from analysis.figures.courses import course_caption, over_births
 from analysis.figures.forms import (
     NothingToDraw,
+    fitness_panels,
     over_runs,
     spread_caption,
     stacked,
 )
-from analysis.figures.style import colours, in_order, label, two_line_label
+from analysis.figures.style import colours, in_order, label, scales, two_line_label
 from tests.analysis.drawn import Row, layers, table
 
 
@@ -221,6 +222,26 @@ def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
     assert alone["scenario2"] == others["scenario2"]
     assert len(set(others.values())) == 3
     assert [label("scenario3"), label("no-selection")] == ["scenario 3", "no selection"]
+
+
+def test_a_figure_of_some_experiments_has_the_colours_of_the_report() -> None:
+    rows = [{"experiment": name} for name in ("a", "b", "c")]
+    lines, fills = scales({"runs": table("runs", rows)}, ["c", "b"])
+    paint = colours(["a", "b", "c"])
+    for scale in (lines, fills):
+        assert scale.limits == ["b", "c"]
+        assert scale.palette(2) == [paint["b"], paint["c"]]
+
+
+def test_long_titles_of_panels_have_several_lines() -> None:
+    rows = [
+        {"experiment": name, "fitness_function": text}
+        for name, text in (("a", "light"), ("b", "bobbing:bob (feet = 0.6, hertz = 2)"))
+    ]
+    assert fitness_panels({"runs": table("runs", rows)}) == {
+        "a": "light",
+        "b": "bobbing:bob (feet = 0.6,\nhertz = 2)",
+    }
 
 
 def test_colours_of_many_experiments_differ() -> None:

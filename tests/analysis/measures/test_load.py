@@ -192,6 +192,24 @@ def test_the_beginning_of_a_longer_run_is_not_another_run(
     ]
 
 
+@pytest.mark.parametrize(
+    ("chosen", "name"),
+    [
+        ({}, "e-4"),
+        ({"space.max_parts": 9}, "e"),
+        ({"space.max_parts": 9, "fitness.parameters.far": 0.5}, "e (far = 0.5)"),
+    ],
+)
+def test_points_of_a_sweep_with_another_fitness_are_other_experiments(
+    made: Maker, chosen: dict[str, object], name: str
+) -> None:
+    file = made("a") / "run.json"
+    document = {"births": 3, "arena": None, "sweep": {"chosen": chosen}}
+    details = {**json.loads(file.read_text()), "name": "e-4"}
+    file.write_text(json.dumps({**details, "document": json.dumps(document)}))
+    assert found_in(file.parent).experiment == name
+
+
 def test_a_finished_run_without_tables_is_reported(made: Maker, tmp_path: Path) -> None:
     made("whole")
     shutil.rmtree(made("gone", seed=2) / "tables")

@@ -63,6 +63,15 @@ def test_light_is_a_place_of_the_world_off_line_and_in_arenas() -> None:
     )
 
 
+def test_a_robot_of_an_arena_has_its_light_when_it_is_evaluated_alone() -> None:
+    arena = parse_experiment(HEAD + "[arena]\nlight = [2.0, 0.0, 0.5]\n", "mine.toml")
+    assert arena.environment.light is None
+    settings = read_evaluation_settings(evaluation_settings(arena))
+    assert settings.environment.light == (2.0, 0.0, 0.5)
+    dark = parse_experiment(HEAD + "[arena]\n", "mine.toml")
+    assert read_evaluation_settings(evaluation_settings(dark)).environment == FLAT
+
+
 def test_the_task_light_needs_a_light() -> None:
     text = '[fitness]\nfunction = "light"\n'
     assert refused(text) == (
