@@ -131,7 +131,9 @@ def _tree_number(experiment: str) -> str:
 def _place(one: DrawnFigure) -> tuple[bool, list[int], str]:
     """Return the sort key that puts the figures of the thesis first."""
     number = one.figure.number
-    digits = [int(part.rstrip("abc")) for part in number.split(".") if part[0] < "A"]
+    # The name of an experiment may follow.
+    parts = number.partition("-")[0].split(".")
+    digits = [int(part.rstrip("abc")) for part in parts if part[0] < "A"]
     return not digits, digits, number
 
 

@@ -222,13 +222,13 @@ def _experiment(name: str, point: Mapping[str, Any]) -> str:
     """
     if not point:
         return name
-    sweep = name.rpartition("-")[0]
     chosen = [
-        f"{key.rpartition('.')[2]} = {value}"
+        # Without spaces, as names of experiments are.
+        f"{key.rpartition('.')[2]}={''.join(str(value).split())}"
         for key, value in point.items()
         if key.startswith("fitness.")
     ]
-    return f"{sweep} ({', '.join(chosen)})" if chosen else sweep
+    return "-".join([name.rpartition("-")[0], *chosen])
 
 
 def _details(folder: Path) -> dict[str, Any]:

@@ -197,7 +197,7 @@ def test_the_beginning_of_a_longer_run_is_not_another_run(
     [
         ({}, "e-4"),
         ({"space.max_parts": 9}, "e"),
-        ({"space.max_parts": 9, "fitness.parameters.far": 0.5}, "e (far = 0.5)"),
+        ({"space.max_parts": 9, "fitness.parameters.far": 0.5}, "e-far=0.5"),
     ],
 )
 def test_points_of_a_sweep_with_another_fitness_are_other_experiments(
