@@ -165,13 +165,15 @@ def check_apart(
     )  # fmt: skip
     problems: list[str] = []
     begun = ""
+    # A plug-in that several experiments name is checked for each, and named once.
+    told: set[str] = set()
     for line in child.stdout.splitlines():
         step, text = json.loads(line)
         begun = text if step == "begin" else ""
-        if step == "fine":
-            tell(text)
-        elif step == "warn":
-            warn(text)
+        if step in ("fine", "warn"):
+            if text not in told:
+                (tell if step == "fine" else warn)(text)
+            told.add(text)
         elif step == "fault":
             problems.append(text)
     if not begun and child.returncode == (1 if problems else 0):

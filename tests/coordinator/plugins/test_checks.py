@@ -137,6 +137,16 @@ def test_each_fault_is_one_line(lab: Callable[[str], Path], fault: str) -> None:
     assert re.search(pattern, line), line
 
 
+def test_a_plug_in_that_is_named_twice_is_told_once(lab: Callable[[str], Path]) -> None:
+    file = lab("def f(a, b):\n    return -1.0")
+    lines: list[str] = []
+    warnings: list[str] = []
+    words = [f"{file}:f", f"{file}:f"]
+    assert check_apart(words, lines.append, warn=warnings.append) == []
+    assert lines == [f"{file.stem}:f: fitness at {file.name}:1: in order"]
+    assert len(warnings) == 1
+
+
 def test_experiment_without_own_plug_ins_is_in_order(tmp_path: Path) -> None:
     document = tmp_path / "small.toml"
     document.write_text('name = "small"\nbirths = 20\n')
