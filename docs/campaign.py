@@ -71,7 +71,8 @@ def run(
 ) -> int:
     """Start or resume parts of the campaign with ``revolve run`` or ``resume``.
 
-    A new campaign begins with the first repeat that has no rows.
+    Repeats are made in batches, one after the other, each in a folder of its own. A
+    new batch begins with its first repeat that has no rows.
 
     Args:
         folder: folder of the campaign.
@@ -85,31 +86,34 @@ def run(
     _note_commit(folder)
     wanted = [(part, each) for part in parts for each in part.experiments]
     for part, experiment in wanted:
-        out = folder.resolve() / "runs" / part.folder / Path(experiment).stem
-        if (out / "campaign.toml").exists():
-            words = ["resume", str(out)]
-        else:
-            first = _first_missing(data, part, Path(experiment).stem)
-            if first == part.repeats:
+        for start in range(0, part.repeats, part.batch):
+            words = _batch(folder, data, part, experiment, start)
+            if words is None:
                 continue
-            words = ["run", experiment, "--seed", str(part.seed)]
-            words += ["--first-repeat", str(first)] if first else []
-            words += ["--repeats", str(part.repeats - first)]
-            words += ["--births", str(part.births), "--out", str(out)]
-        if workers is not None:
-            words += ["--workers", str(workers)]
-        print(f"revolve {' '.join(words)}", flush=True)
-        if code := _revolve(words):
-            return code
+            if workers is not None:
+                words += ["--workers", str(workers)]
+            print(f"revolve {' '.join(words)}", flush=True)
+            if code := _revolve(words):
+                return code
     return 0
 
 
-def _first_missing(data: Path, part: Part, experiment: str) -> int:
-    """Return the first repeat of an experiment without rows; else their number."""
-    for number in range(part.repeats):
-        if any(problems_of(data, part, stem(experiment, number))):
-            return number
-    return part.repeats
+def _batch(
+    folder: Path, data: Path, part: Part, experiment: str, start: int
+) -> list[str] | None:
+    """Return the command that starts or resumes a batch; None if all rows are kept."""
+    name = Path(experiment).stem
+    first, end = start, min(start + part.batch, part.repeats)
+    while not any(problems_of(data, part, stem(name, first))):
+        first += 1
+        if first == end:
+            return None
+    out = folder.resolve() / "runs" / part.folder / stem(name, start)
+    if (out / "campaign.toml").exists():
+        return ["resume", str(out)]
+    words = ["run", experiment, "--seed", str(part.seed), "--births", str(part.births)]
+    words += ["--first-repeat", str(first)] if first else []
+    return [*words, "--repeats", str(end - first), "--out", str(out)]
 
 
 def _revolve(words: Sequence[str]) -> int:

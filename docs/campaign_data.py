@@ -33,6 +33,8 @@ class Part:
         repeats: repeats of each experiment.
         births: births of each run.
         seed: seed of all runs.
+        batch: repeats that share a campaign; the runs of arenas take turns, and a
+            batch of many would finish its first one late.
     """
 
     option: str
@@ -41,6 +43,7 @@ class Part:
     repeats: int
     births: int = 3000
     seed: int = 1
+    batch: int = 10
 
     @property
     def names(self) -> list[str]:
@@ -55,7 +58,7 @@ PARTS = (
         ("scenario1", "scenario2", "no-selection", "no-reproduction"),
         repeats=30,
     ),
-    Part("arena", "thesis-arena", ("scenario3",), repeats=10),
+    Part("arena", "thesis-arena", ("scenario3",), repeats=10, batch=2),
     Part(
         "touches",
         "thesis-touches",

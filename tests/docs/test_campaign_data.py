@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -176,10 +177,10 @@ def test_only_finished_runs_of_the_campaign_are_collected(
     place: Path, parts: Parts, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copytree(place / "runs" / "some", tmp_path / "runs" / "some")
-    (tmp_path / "runs" / "some" / "scenario2" / "scenario2-0" / "state").write_text(
+    (tmp_path / "runs" / "some" / "scenario2-00" / "scenario2-0" / "state").write_text(
         "running"
     )
-    lost = tmp_path / "runs" / "some" / "scenario2" / "scenario2-1" / "tables"
+    lost = tmp_path / "runs" / "some" / "scenario2-00" / "scenario2-1" / "tables"
     next(lost.rglob("evaluations.parquet")).unlink()
     fewer = Part("off-line", "some", parts[0].experiments, 1, BIRTHS, 3)
     assert campaign.collect(tmp_path, tmp_path / "data", COMMIT, (fewer,)) == 0
@@ -194,7 +195,7 @@ def test_a_lost_run_is_repeated(
 ) -> None:
     folder = tmp_path / "copy"
     shutil.copytree(place / "runs" / "some", folder / "runs" / "some")
-    shutil.rmtree(folder / "runs" / "some" / "scenario1" / "scenario1-0")
+    shutil.rmtree(folder / "runs" / "some" / "scenario1-00" / "scenario1-0")
     assert campaign.run(folder, parts[:1], 1, tmp_path / "none") == 0
     assert campaign.collect(folder, tmp_path / "again", COMMIT, parts[:1]) == 0
     again = _files(tmp_path / "again")
@@ -216,6 +217,22 @@ def test_kept_repeats_are_not_run_again(
     assert names == {"scenario1-1"}
     assert campaign.collect(folder, data, COMMIT, parts) == 0
     assert _files(data) == before
+
+
+def test_batches_have_folders_of_their_own(
+    parts: Parts, data: Path, tmp_path: Path
+) -> None:
+    folder, kept = tmp_path / "new", tmp_path / "kept"
+    for path in data.glob("*/scenario1-00.parquet"):
+        copy = kept / path.relative_to(data)
+        copy.parent.mkdir(parents=True)
+        shutil.copy(path, copy)
+    scenario1 = parts[0].experiments[1:]
+    ones = replace(parts[0], experiments=scenario1, repeats=3, batch=2)
+    assert campaign.run(folder, [ones], 1, kept) == 0
+    runs = sorted(path.parent for path in folder.glob("runs/some/*/*/run.json"))
+    names = [str(run.relative_to(folder / "runs" / "some")) for run in runs]
+    assert names == ["scenario1-00/scenario1-1", "scenario1-02/scenario1-2"]
 
 
 def _two_platforms(data: Path) -> None:
