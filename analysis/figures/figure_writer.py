@@ -235,7 +235,7 @@ def _add_gaits(
 ) -> None:
     number = GAITS
     for name, why in problems.items():
-        writer.leave_out(number, f"{name}: {why}")
+        writer.leave_out(f"{number} of {name}", why)
     if not pictures and not problems:
         writer.leave_out(number, "no robot was evaluated")
     if not pictures:

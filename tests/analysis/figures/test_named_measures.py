@@ -1,8 +1,10 @@
 """Figure of measures that experiments name."""
 
 import pyarrow as pa
+from matplotlib.text import Text
 
 from analysis.figures import named_measures
+from worker.measures.functions import BUILT_IN
 
 
 def test_figure_is_drawn_without_a_warning() -> None:
@@ -16,3 +18,11 @@ def test_figure_is_drawn_without_a_warning() -> None:
     drawn = named_measures.measures_over_births(tables).draw()
     (line,) = drawn.axes[0].lines or drawn.axes[0].collections
     assert line is not None
+    assert "height [m]" in {text.get_text() for text in drawn.findobj(Text)}
+
+
+def test_units_are_those_of_the_docstrings() -> None:
+    assert named_measures.UNITS.keys() < BUILT_IN.keys()
+    for name, function in BUILT_IN.items():
+        unit = named_measures.UNITS.get(name, "1")
+        assert f"[{unit}]" in (function.__doc__ or "").partition("Source")[0], name
