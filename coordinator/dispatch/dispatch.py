@@ -297,8 +297,8 @@ class Dispatch:
     def _learn(self, pending: Pending, agent: AgentState, took_s: float | None) -> None:
         """Note how long an agent took for a job, which it no longer holds.
 
-        The time between ticks is at least a pause of the coordinator: it is too long
-        for short jobs.
+        ``took_s`` is used if it is given. Otherwise the duration is measured between
+        ticks; that includes a pause of the coordinator and is too long for short jobs.
         """
         since_s, place = pending.holders.pop(agent.joined.agent)
         if self._now_s is not None:

@@ -245,7 +245,8 @@ class ShardSeen:
     Attributes:
         shard: the shard.
         platform: empty if it was never advanced.
-        may_drift: it may move to another platform, if shards may.
+        may_drift: it may move to another platform, provided that drift is allowed at
+            all.
         client: the run of the arena.
     """
 

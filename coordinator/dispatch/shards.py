@@ -290,7 +290,10 @@ class ShardDispatch:
                 yield from self._assignments()
 
     def _wait(self, shard: _Shard) -> None:
-        """Set when a shard without a worker of its platform may drift."""
+        """Set the time from which a shard that waits may drift.
+
+        It has none while a worker of its platform is connected.
+        """
         is_alone = shard.is_wanted and bool(shard.platform) and not self._equal(shard)
         if not is_alone:
             shard.drifts_at_s = None
