@@ -101,8 +101,8 @@ def parser(command: str) -> Flags:
         "--slots",
         choices=("parent", "own"),
         default="parent",
-        help="slot that labels a part in the distance of bodies: its parent's, as in "
-        "the thesis (default), or its own, as in the published code",
+        help="slot that labels a part in the tree edit distance between bodies: its "
+        "parent's, as in the thesis (default), or its own, as in the published code",
     )
     flags.add_argument(
         "--processes",

@@ -156,7 +156,7 @@ def _stoppable(
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
-    """Return the experiments to run, checked; imports the room of the worker."""
+    """Return the experiments to run, checked; imports package ``worker``."""
     import worker.kinds
 
     refuse_faulty(options.experiments, options.births)

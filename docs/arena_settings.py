@@ -187,7 +187,10 @@ def effect_lines(grid: Frame) -> Iterator[str]:
 
 
 def check_lines(grid: Frame, others: Frame) -> Iterator[str]:
-    """Yield a table: points beside the grid, and what the grid's means say of them."""
+    """Yield a table of points that are not in the grid.
+
+    It has values interpolated from the grid's means, and observed values.
+    """
     names = [name for name, _ in SHOWN.values()]
     yield (
         f"| birth interval [s] | survival share | runs | "

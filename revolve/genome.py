@@ -87,5 +87,5 @@ def _encoding(experiment: Experiment) -> IslandEncoding:
 
 
 def _birth(rng: np.random.Generator) -> BirthId:
-    """Return a name of its own for the new genes of a genome."""
+    """Return a random id that makes the new genes of a genome distinct."""
     return BirthId(0, int(rng.integers(_NUMBERS)))

@@ -151,8 +151,8 @@ CLAIMS: tuple[Claim, ...] = _in_order([
     *_of("6.2", "{a} ends fitter than {b}", "fitness", ">",
          (_ONE, _DRIFT), (_TWO, _DRIFT), is_automatic=True),
     *_of("6.2", "{a} and {b} end alike", "fitness", "=", (_ONE, _TWO)),
-    *_of("6.2", "the runs of {a} differ from each other more or less than those of "
-         "{b}", "fitness", "!=", (_TWO, _ONE), is_spread=True),
+    *_of("6.2", "the spread between runs differs between {a} and {b}", "fitness",
+         "!=", (_TWO, _ONE), is_spread=True),
     *_of("6.2", "{a} ends less fit than {b}", "fitness", "<", *_TO_3),
     *_all("6.2", "fitness stays about zero (within 0.01 m/s)", "fitness", "=",
           margin=0.01, of=(_DRIFT,), is_automatic=True),
@@ -165,8 +165,8 @@ CLAIMS: tuple[Claim, ...] = _in_order([
     *_of("6.4", "more ancestors per robot in {a} than in {b}", "ancestors_per_robot",
          ">", *_TO_3),
     *_all("6.5", "diversity falls", "diversity_change", "<", margin=1.0),
-    *_all("6.5", "early: the first tenth of births takes more than a tenth of it",
-          "early_drop", ">", 0.1, margin=0.05, births=EARLY_BIRTHS),
+    *_all("6.5", "more than a tenth of the loss of diversity happens in the first "
+          "tenth of births", "early_drop", ">", 0.1, margin=0.05, births=EARLY_BIRTHS),
     *_of("6.5", "less diversity is left in {a} than in {b}", "diversity", "<",
          (_TWO, _ONE)),
     *_of("6.5", "more diversity is left in {a} than in {b}", "diversity", ">", *_TO_3),
@@ -176,8 +176,8 @@ CLAIMS: tuple[Claim, ...] = _in_order([
          *_TO_3, births=RETAINED_BIRTHS),
     *_all("6.7", "retention mirrors fitness: their rank correlation over births",
           "retention_fitness", ">", margin=0.1, births=EARLY_BIRTHS),
-    *_all("6.8", "a robot's fitness ranges over more than a tenth of its "
-          "contemporaries'", "variability", ">", 0.1, margin=0.05, of=(_THREE,),
+    *_all("6.8", "the range of a robot's fitness is more than a tenth of the range "
+          "of its contemporaries", "variability", ">", 0.1, margin=0.05, of=(_THREE,),
           is_automatic=True),
     *_all("6.9", "robots outgrow random ones", "parts_change", ">", margin=1.0),
     *_of("6.9", "robots are larger in {a} than in {b}", "parts", ">", *_OVER),

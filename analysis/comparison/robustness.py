@@ -151,7 +151,7 @@ def _of_best(rows: Sequence[Row]) -> str:
     (low, worst), (high, gain) = known[0], known[-1]
     return (
         f"the best, {name}, keeps {percent(share)} of its fitness "
-        f"({rounded(undisturbed)}) in the mean, from {percent(low)} under {worst} to "
+        f"({rounded(undisturbed)}) on average, from {percent(low)} under {worst} to "
         f"{percent(high)} under {gain}"
     )
 

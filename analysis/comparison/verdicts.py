@@ -39,7 +39,10 @@ def verdict(expected: str, row: Row) -> Verdict:
         return _different(row, max(abs(low), abs(high)))
     sign = 1 if expected == ">" else -1
     if max(sign * low, sign * high) < margin:
-        why = f"the interval{of} ends below {margin:g}, at most negligible as expected"
+        why = (
+            f"the interval{of} ends below {margin:g}: the effect in the expected "
+            "direction is at most negligible"
+        )
         return "not reproduced", why
     return _directed(row, sign)
 

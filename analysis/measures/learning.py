@@ -73,9 +73,10 @@ def _selected(
 ) -> tuple[pa.Array, pa.Array]:
     """Return which robots were kept, and which of them learning saved.
 
-    Off-line both are null for robots that were born before the island's first recorded
-    population, and of a brood that is not recorded; in an arena for robots that the run
-    ends with too early, or that an operator or a migration took away.
+    Both are null in these cases. Off-line: the robot was born before the island's first
+    recorded population, or no population was recorded after its brood. In an arena: the
+    run ended before the robot was in two recorded populations as a mature robot, or the
+    robot migrated or was removed by an operator.
     """
     before = np.full(run.births.num_rows, np.nan)
     before[robots] = at_birth

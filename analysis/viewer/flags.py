@@ -47,7 +47,7 @@ def parser(_command: str = "view") -> Flags:
     )  # fmt: skip
     flags.add_argument(
         "--follow", type=_robot_name, metavar="ISLAND:BIRTH",
-        help="follow a robot with the camera, such as 1:17; 17 is of island 0",
+        help="robot that the camera follows, such as 1:17; without ISLAND, island 0",
     )  # fmt: skip
     flags.add_argument(
         "--robot", action="append", default=[], type=_selected, metavar="ROBOT",

@@ -120,7 +120,7 @@ class LivingRobots:
         return len(self._living) < self._rules.population_limit
 
     def get(self, birth: BirthId) -> LivingRobot | None:
-        """Return the robot with a birth id, None if none such lives."""
+        """Return the robot with a birth id, or None if no such robot is alive."""
         return self._living.get(birth)
 
     def mature(self) -> tuple[Individual, ...]:

@@ -29,9 +29,9 @@ ACTIONS = {
     "list": "list the living robots",
     "pause": "pause the arena at its next decision",
     "resume": "resume a paused arena",
-    "insert": "insert the robot of a file",
+    "insert": "insert the robot in a file",
     "remove": "remove a robot",
-    "brain": "replace a robot's brain by that of the robot of a file",
+    "brain": "replace a robot's brain with that of the robot in a file",
     "snapshot": "save the arena's state in the run folder",
 }
 
@@ -168,7 +168,7 @@ def parser(_command: str = "arena") -> Flags:
         add_connect(action)
         action.add_argument(
             "--run", default="", metavar="NAME",
-            help="run, by the end of its folder's name (default: the only run)",
+            help="run whose folder name ends with NAME (default: the only run)",
         )  # fmt: skip
         add_count(action, "--island", 0, "island number", least=0)
         add_network_flags(action)

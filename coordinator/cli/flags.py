@@ -125,7 +125,7 @@ def _add_bench(flags: argparse.ArgumentParser) -> None:
         type=positive_number,
         default=5.0,
         metavar="S",
-        help="duration of each measurement, over the network (default: 5)",
+        help="duration of each measurement over the network, in seconds (default: 5)",
     )
     add_count(flags, "--workers", 8, "number of workers; each sleeps 40 ms per job")
     add_count(flags, "--births", 1500, "number of births, without physics")
@@ -196,8 +196,8 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     flags.add_argument(
         "--connect",
         metavar="ADDRESS",
-        help=f"address of the hub, {FORMS}, or the folder of an active run; its "
-        "workers are shared (default: start a hub)",
+        help=f"address of the hub, {FORMS}, or the folder of an active run; the "
+        "workers of that hub are shared (default: start a hub)",
     )
     add_access(flags)
     add_network_flags(flags)
@@ -226,14 +226,15 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "--on-quarantine",
         choices=("go-on", "pause"),
         default="go-on",
-        help="whether to continue or stop the run after a robot's evaluation has "
-        "ended its process three times and counts as failed (default: go-on)",
+        help="whether to continue or stop the run when an evaluation has crashed its "
+        "worker process three times; it then counts as failed (default: go-on)",
     )
     flags.add_argument(
         "--allow-drift",
         action="store_true",
-        help="let an arena continue on a worker of another platform after 30 s without "
-        "one of its own; this is recorded and changes the results",
+        help="let an arena continue on a worker of another platform if no worker of "
+        "the same platform has been connected for 30 s; this is recorded and changes "
+        "the results",
     )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
     add_log(flags)

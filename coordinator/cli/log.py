@@ -168,9 +168,9 @@ def parser(_command: str = "log") -> Flags:
         prog="revolve log",
         description="Print the journal of a run, one line per event: the answers of "
         "analyzers and workers and the orders of operators, in the order in which the "
-        "run acted on them. A birth is ISLAND:NUMBER; try counts the attempts of "
-        "a birth and the evaluations of a robot. Only reads, also beside a running "
-        "coordinator.",
+        "run acted on them. A birth is ISLAND:NUMBER. The field 'try' counts the "
+        "attempts of a birth and the evaluations of a robot. The command only reads, "
+        "so it can be used while the coordinator is running.",
         examples=(
             "revolve log runs/scenario1-seed1 --follow",
             "revolve log runs/scenario1-seed1 --birth 12 --json",
@@ -178,15 +178,16 @@ def parser(_command: str = "log") -> Flags:
         allow_abbrev=False,
     )
     flags.add_argument("folder", type=Path, metavar="RUN", help="run folder")
-    islands = "island number, of the events to print (default: all)"
+    islands = "island number; only events of this island are printed (default: all)"
     add_count(flags, "--island", None, islands, least=0)
     flags.add_argument(
         "--birth",
         type=_birth,
         default=(None, None),
         metavar="N|ISLAND:N",
-        help="only events of the robot of birth N, on any island or of island ISLAND; "
-        "of an advance only that robot's state (default: all)",
+        help="only events of the robot with birth number N, on any island or on island "
+        "ISLAND; of an advance of an arena, only the state of that robot is printed "
+        "(default: all)",
     )
     flags.add_argument(
         "--json", action="store_true", help="print JSON, one object per line"

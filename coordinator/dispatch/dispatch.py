@@ -93,7 +93,7 @@ class Dispatch:
         self._pairs = PairedJobs()
         self._highest = -1
         self._now_s: float | None = None
-        self._doors: dict[type, Callable[..., Iterator[DispatchCommand]]] = {
+        self._handlers: dict[type, Callable[..., Iterator[DispatchCommand]]] = {
             Joined: self._joined,
             Left: self._left,
             Requested: self._requested,
@@ -152,9 +152,9 @@ class Dispatch:
         return self._pools[kind].agents[agent].joined.platform if kind else ""
 
     @property
-    def leisure_s(self) -> float:
+    def pause_s(self) -> float:
         """Time for which answers may collect before a worker runs out of jobs [s]."""
-        return self.workers.leisure_s
+        return self.workers.pause_s
 
     @property
     def wake_s(self) -> float | None:
@@ -173,7 +173,7 @@ class Dispatch:
                 job, an agent with less than one slot, an agent that joins again with
                 other properties, or a clock that runs backwards.
         """
-        return list(self._doors[type(event)](event))
+        return list(self._handlers[type(event)](event))
 
     def _joined(self, event: Joined) -> Iterator[DispatchCommand]:
         if event.slots < 1:
@@ -272,7 +272,7 @@ class Dispatch:
                 is_fault = not is_declined or event.agent in pending.avoid
                 yield from self._fail(pending, event, reason)
                 if is_fault:
-                    pool.rest(event.agent, self._now_s or 0.0)
+                    pool.back_off(event.agent, self._now_s or 0.0)
         elif not is_advance:
             self._note_late(event)
         pool.offer(event.agent)
@@ -297,8 +297,8 @@ class Dispatch:
     def _learn(self, pending: Pending, agent: AgentState, took_s: float | None) -> None:
         """Note how long an agent took for a job, which it no longer holds.
 
-        The time between ticks is at least a pause of the coordinator: it is too long
-        for short jobs.
+        ``took_s`` is used if it is given. Otherwise the duration is measured between
+        ticks; that includes a pause of the coordinator and is too long for short jobs.
         """
         since_s, place = pending.holders.pop(agent.joined.agent)
         if self._now_s is not None:
@@ -329,7 +329,7 @@ class Dispatch:
         """Remove a job that has ended, and cancel its copies."""
         job = pending.job
         del self._jobs[job.number]
-        if job.twin not in self._jobs:
+        if job.paired not in self._jobs:
             self._pairs.forget(job)
         for agent in pending.holders:
             yield Cancel(job, agent)
@@ -360,7 +360,7 @@ class Dispatch:
             raise UnexpectedEvent(f"{event.now_s} s comes after {self._now_s} s")
         self._now_s = event.now_s
         for pool in self._pools.values():
-            if pool.end_rests(event.now_s):
+            if pool.end_backoffs(event.now_s):
                 yield from self._assign(pool)
         if event.now_s >= self._next_look_s:
             self._next_look_s = event.now_s + LOOK_S

@@ -37,7 +37,7 @@ class Job:
         number: unique within the process, ascending.
         kind: "vet" goes to analyzers, "evaluate" and "call" to workers.
         payload: the encoded request.
-        twin: number of the same request's other job, which another agent does if
+        paired: number of the same request's other job, which another agent does if
             there is one; -1 if there is no other job.
         client: the run that requested it.
         subject: the client's own description of the job.
@@ -47,7 +47,7 @@ class Job:
     number: int
     kind: JobKind
     payload: bytes
-    twin: int = -1
+    paired: int = -1
     client: Client = NO_CLIENT
     subject: object = None
     read: Read = field(default=bytes, compare=False)
@@ -245,7 +245,8 @@ class ShardSeen:
     Attributes:
         shard: the shard.
         platform: empty if it was never advanced.
-        may_drift: it may move to another platform, if shards may.
+        may_drift: it may move to another platform, provided that drift is allowed at
+            all.
         client: the run of the arena.
     """
 

@@ -21,8 +21,8 @@ PAUSE_S = 0.2
 """Longest time that the coordinator lets answers collect [s]."""
 SPARE_SHARE = 0.125
 """Share of the time of an agent's spare jobs for which answers may collect."""
-REST_S = 0.05
-LONGEST_REST_S = 3.2
+BACKOFF_S = 0.05
+LONGEST_BACKOFF_S = 3.2
 REPLY_S = 5.0
 """Time that an agent has to report progress when it is asked [s]."""
 _NEWEST_WEIGHT = 0.1
@@ -80,7 +80,7 @@ class AgentState:
         most_ahead: most jobs that it holds ahead; fewer if it is slow, as they wait
             for it.
         failures: errors and losses since its last answer.
-        rests: it gets no jobs until its backoff ends.
+        is_backing_off: it gets no jobs until its backoff ends.
         stamp: of its only valid entry in the pool's heap.
         worked_s: time of its last report of progress [s].
         asked_s: time of the last question about it [s].
@@ -96,7 +96,7 @@ class AgentState:
     job_s: float = 0.0
     most_ahead: int = 0
     failures: int = 0
-    rests: bool = False
+    is_backing_off: bool = False
     stamp: int = 0
     worked_s: float = -inf
     asked_s: float = -inf
@@ -127,7 +127,7 @@ class Pool:
     Attributes:
         at_hand: jobs beyond its slots that an agent always holds.
         agents: by their names.
-        free: (load, name, stamp) of each agent that does not rest, a heap; entries
+        free: (load, name, stamp) of each agent that is not backing off, a heap; entries
             with an old stamp are invalid.
         waiting: numbers of jobs, a heap.
     """
@@ -136,31 +136,31 @@ class Pool:
     agents: dict[str, AgentState] = field(default_factory=dict)
     free: list[tuple[float, str, int]] = field(default_factory=list)
     waiting: list[int] = field(default_factory=list)
-    _rests: list[tuple[float, int, str]] = field(default_factory=list)
+    _backoffs: list[tuple[float, int, str]] = field(default_factory=list)
     _stamps: Iterator[int] = field(default_factory=lambda: count(1))
 
     @property
     def wake_s(self) -> float | None:
         """Time at which the next backoff ends [s]; None if there is none."""
-        return self._rests[0][0] if self._rests else None
+        return self._backoffs[0][0] if self._backoffs else None
 
-    def rest(self, name: str, now_s: float) -> None:
-        """Start the backoff of an agent that failed, unless it rests already."""
+    def back_off(self, name: str, now_s: float) -> None:
+        """Start the backoff of an agent that failed, unless it has begun already."""
         agent = self.agents[name]
-        if agent.rests:
+        if agent.is_backing_off:
             return
-        agent.rests = True
-        rest_s = min(REST_S * 2 ** min(agent.failures, 10), LONGEST_REST_S)
+        agent.is_backing_off = True
+        backoff_s = min(BACKOFF_S * 2 ** min(agent.failures, 10), LONGEST_BACKOFF_S)
         agent.failures += 1
-        heappush(self._rests, (now_s + rest_s, next(self._stamps), name))
+        heappush(self._backoffs, (now_s + backoff_s, next(self._stamps), name))
 
-    def end_rests(self, now_s: float) -> bool:
+    def end_backoffs(self, now_s: float) -> bool:
         """End the backoffs that are over; return whether there were any."""
         is_any = False
-        while self._rests and self._rests[0][0] <= now_s:
-            _, _, name = heappop(self._rests)
+        while self._backoffs and self._backoffs[0][0] <= now_s:
+            _, _, name = heappop(self._backoffs)
             if name in self.agents:
-                self.agents[name].rests = False
+                self.agents[name].is_backing_off = False
                 self.offer(name)
                 is_any = True
         return is_any
@@ -201,7 +201,7 @@ class Pool:
         """Note the load of an agent; its earlier entry becomes invalid."""
         agent = self.agents[name]
         agent.stamp = next(self._stamps)
-        if agent.rests:
+        if agent.is_backing_off:
             return
         if len(self.free) > 4 * len(self.agents) + 64:
             self.free = [entry for entry in self.free if self._is_live(entry)]
@@ -247,7 +247,7 @@ class Pool:
         return min(agent.most_ahead, len(self.waiting) // (2 * len(self.agents)))
 
     @property
-    def leisure_s(self) -> float:
+    def pause_s(self) -> float:
         """Time for which answers may collect before some agent runs out of jobs [s].
 
         A small share of the time that the spare jobs of the first such agent take:
@@ -259,18 +259,18 @@ class Pool:
         spare_s = min(
             self._spare(agent) / agent.joined.slots * agent.job_s
             for agent in self.agents.values()
-            if not agent.rests
+            if not agent.is_backing_off
         )
         return min(PAUSE_S, SPARE_SHARE * spare_s)
 
     def idle(self) -> list[str]:
-        """Return the agents without a job that do not rest, by name."""
+        """Return the agents without a job that are not backing off, by name."""
         if not self._least_busy() or self.free[0][0] > 0.0:
             return []
         return sorted(
             name
             for name, agent in self.agents.items()
-            if not (agent.held or agent.advances or agent.rests)
+            if not (agent.held or agent.advances or agent.is_backing_off)
         )
 
     def _is_live(self, entry: tuple[float, str, int]) -> bool:
@@ -321,19 +321,19 @@ class Pool:
 
 
 class PairedJobs:
-    """Agents that were given a job whose twin another agent is to do."""
+    """Agents that were given one of two paired jobs; the other job avoids them."""
 
     def __init__(self) -> None:
         self._agents: dict[int, dict[str, None]] = {}
 
     def note(self, job: Job, agent: str) -> None:
         """Note that a job is assigned to an agent."""
-        if job.twin >= 0:
+        if job.paired >= 0:
             self._agents.setdefault(job.number, {})[agent] = None
 
     def avoided(self, pending: Pending) -> tuple[str, ...]:
         """Return the agents that a job avoids if there are others."""
-        others = self._agents.get(pending.job.twin)
+        others = self._agents.get(pending.job.paired)
         if not others:
             return pending.avoid
         return (*pending.avoid, *(each for each in others if each not in pending.avoid))
@@ -341,7 +341,7 @@ class PairedJobs:
     def forget(self, job: Job) -> None:
         """Remove a pair, both jobs of which have ended."""
         self._agents.pop(job.number, None)
-        self._agents.pop(job.twin, None)
+        self._agents.pop(job.paired, None)
 
 
 class Deadlines:

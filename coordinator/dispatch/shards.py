@@ -54,7 +54,8 @@ class _Shard:
         client: the run of the arena.
         platform: of the last advance; empty before the first.
         holder: the worker that is bound to it; empty if none is.
-        heir: the worker that takes over after the present advance; empty if none does.
+        successor: the worker that takes over after the present advance; empty if none
+            does.
         has_state: the holder has its state.
         is_wanted: an advance is requested.
         number: of the job that is assigned; -1 if none is.
@@ -71,7 +72,7 @@ class _Shard:
     client: Client = NO_CLIENT
     platform: str = ""
     holder: str = ""
-    heir: str = ""
+    successor: str = ""
     has_state: bool = False
     is_wanted: bool = False
     may_drift: bool = True
@@ -206,15 +207,15 @@ class ShardDispatch:
 
     def _leave(self, agent: str) -> None:
         for shard in self._shards.values():
-            if shard.heir == agent:
-                shard.heir = ""
+            if shard.successor == agent:
+                shard.successor = ""
             if shard.holder == agent:
                 self._unbind(shard)
 
     def _unbind(self, shard: _Shard) -> None:
         if self._out.pop(shard.number, None) is not None:
             shard.lost[shard.number] = shard.holder
-        shard.holder, shard.heir = shard.heir, ""
+        shard.holder, shard.successor = shard.successor, ""
         shard.has_state, shard.number = False, -1
 
     def _tick(self, now_s: float) -> Iterator[ShardCommand]:
@@ -256,7 +257,7 @@ class ShardDispatch:
         shard = self._shards[number]
         if shard.number >= 0:
             yield CancelShard(shard.number, number, shard.holder)
-        shard.heir = to
+        shard.successor = to
         self._unbind(shard)
 
     def _share(self, joined: Joined) -> Iterator[ShardCommand]:
@@ -266,7 +267,7 @@ class ShardDispatch:
         while True:
             bound = self._bound()
             places = {
-                number: shard.heir or shard.holder
+                number: shard.successor or shard.holder
                 for number, shard in self._shards.items()
                 if shard.holder and to in self._fit(shard)
             }
@@ -284,13 +285,16 @@ class ShardDispatch:
                 return
             shard = self._shards[number]
             if shard.has_state and shard.number >= 0:
-                shard.heir = to
+                shard.successor = to
             else:
                 yield from self._move(number, to)
                 yield from self._assignments()
 
     def _wait(self, shard: _Shard) -> None:
-        """Set when a shard without a worker of its platform may drift."""
+        """Set the time from which a shard that waits may drift.
+
+        It has none while a worker of its platform is connected.
+        """
         is_alone = shard.is_wanted and bool(shard.platform) and not self._equal(shard)
         if not is_alone:
             shard.drifts_at_s = None
@@ -310,7 +314,7 @@ class ShardDispatch:
             if not shard.is_whole:
                 self._deadlines.learn(number, self._now_s - shard.since_s)
             self._forgive(shard)
-            if shard.heir:
+            if shard.successor:
                 self._unbind(shard)
             return [ShardDone(number, agent, event.answer)]
         if event.outcome == "stateless" and not shard.is_whole:
@@ -323,7 +327,7 @@ class ShardDispatch:
         if event.outcome == "lost":
             shard.lost[event.number] = agent
         shard.avoid = (*shard.avoid, agent)
-        self._workers.rest(agent, self._now_s)
+        self._workers.back_off(agent, self._now_s)
         # A malformed answer is a fault of its worker alone.
         shard.errors += event.outcome not in ("lost", "malformed")
         if shard.errors < MAX_ERRORS:
@@ -411,18 +415,22 @@ class ShardDispatch:
         ]
 
     def _choice(self, shard: _Shard) -> str:
-        """Return the best worker for a shard; "" if all of them rest.
+        """Return the best worker for a shard; "" if all are backing off.
 
         Workers that failed at the advance come last.
         """
         fit = self._fit(shard)
         fresh = [name for name in fit if name not in shard.avoid] or fit
-        awake = (name for name in fresh if not self._workers.agents[name].rests)
-        return min(awake, key=self._crowding(), default="")
+        ready = (
+            name for name in fresh if not self._workers.agents[name].is_backing_off
+        )
+        return min(ready, key=self._crowding(), default="")
 
     def _bound(self) -> Counter[str]:
         """Return how many shards each worker holds or takes over."""
-        return Counter(shard.heir or shard.holder for shard in self._shards.values())
+        return Counter(
+            shard.successor or shard.holder for shard in self._shards.values()
+        )
 
     def _crowding(self) -> Callable[[str], tuple[bool, bool, float, int, str]]:
         """Return by what workers compare: the least one gets the next shard.

@@ -137,7 +137,8 @@ def parser(_command: str = "doctor") -> Flags:
     """Return the parser of ``revolve doctor``."""
     flags = Flags(
         prog="revolve doctor",
-        description="Check this machine, its certificate and its way to the hub.",
+        description="Check this machine, its certificate and its connection to the "
+        "hub.",
         examples=(
             "revolve doctor",
             "revolve doctor --connect tls/hub.example:7447",

@@ -77,7 +77,7 @@ class NetworkGenes:
     def prune(
         self, draws: Draws, branches: Sequence[Branch], rules: BrainRules
     ) -> tuple[int, int]:
-        """Delete hidden neurons and connections; return their numbers before."""
+        """Delete hidden neurons and connections; return how many of each there were."""
         hidden = sum(len(branch.hidden) for branch in branches)
         connections = sum(len(branch.connections) for branch in branches)
         delete_hidden_neurons(draws, branches, rules.p_delete_hidden_neuron)

@@ -323,8 +323,8 @@ def _add_part(
 def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) -> float:
     """Return the mean number of parts to add; 0 or less means none.
 
-    It is the mean number that deletion removes less the mean number that duplication
-    adds, limited by the room that is left.
+    It is the mean number of parts that deletion removes minus the mean number that
+    duplication adds, but at most the number that still fits.
 
     Args:
         branches: those of the tree, depth first.

@@ -203,7 +203,7 @@ def check_here(
     Args:
         words: ``MODULE:NAME``, ``FILE.py:NAME``, or experiments.
         kinds: all kinds.
-        kind: name of the kind that the words are of; None: found out.
+        kind: name of the kind that the words are of; None: detected.
         output: gets the steps as lines of JSON.
         limit_s: time after which an import or a check ends this process [s].
         births: as for ``read_experiment``.

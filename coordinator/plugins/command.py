@@ -139,7 +139,7 @@ def check_flags(kinds: Sequence[Kind]) -> Flags:
     flags.add_argument(
         "--kind",
         choices=[kind.name for kind in kinds],
-        help="kind of the plug-ins (default: found out)",
+        help="kind of the plug-ins (default: detected)",
     )
     flags.add_argument(HERE, type=positive_number, help=argparse.SUPPRESS)
     flags.add_argument(BIRTHS, type=int, help=argparse.SUPPRESS)

@@ -133,7 +133,7 @@ class ExpectedAdvance:
 
     @property
     def most_bytes(self) -> int:
-        """Length of an answer."""
+        """Greatest length of a correct answer [bytes]."""
         robots, simulation = len(self.born), self.experiment.simulation
         window = simulation.window_steps // simulation.pose_steps + 2
         sample_bytes = SNAPSHOT_SAMPLE_BYTES + self._most_channel_bytes

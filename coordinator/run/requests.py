@@ -91,7 +91,7 @@ class Requests:
             identity = Identity(origin, command.birth, command.trial)
             robot = self._robot(command)
         run, epoch = context.client
-        for number, twin in self._numbers(command):
+        for number, paired in self._numbers(command):
             payload = encode_request(
                 run=run,
                 epoch=epoch,
@@ -104,7 +104,7 @@ class Requests:
             )
             read = self._reader(command, (epoch, number))
             self._fleet.request(
-                Job(number, kind, payload, twin, context.client, command, read)
+                Job(number, kind, payload, paired, context.client, command, read)
             )
 
     def _reader(self, command: Vet | Evaluate, expected: Expected) -> Read:
@@ -149,7 +149,7 @@ class Requests:
         return encode_robot(command.robot)
 
     def _numbers(self, command: Vet | Evaluate) -> list[tuple[int, int]]:
-        """Return the number of each job of a request, and of its twin or -1."""
+        """Return the number of each job of a request, and of its paired job or -1."""
         first, checks = self._fleet.new_number(), self._cross_checks
         if checks is None or isinstance(command, Vet) or not checks.chooses(command):
             return [(first, -1)]

@@ -1,6 +1,6 @@
 """``revolve completion``: completion scripts for shells, made by shtab.
 
-A script is static: pressing the tabulator key starts no Python. shtab (MPL-2.0) is
+A script is static: pressing Tab starts no Python. shtab (MPL-2.0) is
 loaded by this command only.
 """
 
@@ -62,7 +62,7 @@ def parser(_command: str = "completion") -> Flags:
     flags = Flags(
         prog="revolve completion",
         description="Print a script that completes commands, flags, experiments and "
-        "run folders at the tabulator key.",
+        "run folders when you press Tab.",
         allow_abbrev=False,
         examples=[f"revolve completion {one} > {_SHELLS[one]}" for one in _SHELLS],
     )

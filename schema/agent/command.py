@@ -101,8 +101,9 @@ def add_log(flags: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--log-json",
         action="store_true",
-        help=f"write each log line as a JSON object (default: ${LOG_VARIABLE}, else "
-        "with time and level unless standard error is a terminal)",
+        help="write each log line as a JSON object (default: the form in "
+        f"${LOG_VARIABLE}; without it plain text, with time and level unless standard "
+        "error is a terminal)",
     )
 
 
@@ -111,8 +112,9 @@ def add_access(flags: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--access",
         metavar="FILE",
-        help="certificates that may connect, and their roles: access.json of a kit of "
-        "'revolve cluster' (default: any certificate of the authority may do anything)",
+        help="file that lists the certificates that may connect and their roles: "
+        "access.json of a 'revolve cluster' kit (default: any certificate of the "
+        "authority may do anything)",
     )
 
 
@@ -132,14 +134,14 @@ def add_job_limits(flags: argparse.ArgumentParser) -> None:
         type=positive_number,
         default=CPU_LIMIT_S,
         metavar="S",
-        help=f"CPU time limit of one job in seconds (default: {CPU_LIMIT_S:.0f})",
+        help=f"CPU time limit of a job in seconds (default: {CPU_LIMIT_S:.0f})",
     )
     flags.add_argument(
         "--wait-limit",
         type=positive_number,
         default=WAIT_LIMIT_S,
         metavar="S",
-        help="time that one job may wait without using CPU time in seconds (default: "
+        help="time in seconds that a job may wait without using CPU time (default: "
         f"{WAIT_LIMIT_S:.0f})",
     )
 
@@ -330,7 +332,7 @@ def parser(role: Role, processes: int) -> Flags:
     flags.add_argument(
         "--until-closed",
         action="store_true",
-        help="stop when standard input is closed, too",
+        help="also stop when standard input is closed",
     )
     add_job_limits(flags)
     add_log(flags)

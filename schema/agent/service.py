@@ -114,7 +114,7 @@ class HubWatch:
         return self._lost_s is not None
 
     def seen(self, hubs: Iterable[object]) -> None:
-        """Note the ids of the connected hubs; another id is another hub.
+        """Note the ids of the connected hubs; a new id means a new hub.
 
         Raises:
             HubLost: none has been there for too long.

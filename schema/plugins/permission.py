@@ -57,11 +57,12 @@ def allow(entries: Iterable[str]) -> None:
 
 
 def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:
-    """Allow the modules that the references of an own document name.
+    """Allow the modules that a document of this user refers to.
 
     Args:
         paths: ``module:attribute`` of each; other texts are ignored.
-        folder: of the document: a module that is not installed may be a file there.
+        folder: folder of the document; a module that is not installed may be a file in
+            it.
 
     Raises:
         ExperimentError: a file in the folder has the name of another module.

@@ -106,7 +106,7 @@ def require_most(count: int, most: int, what: str) -> None:
 def _check_counts(data: bytes, descriptor: Descriptor) -> None:
     """Raise if a message has too many submessages or fields.
 
-    An empty submessage takes two bytes here and some hundred once it is parsed.
+    An empty submessage takes two bytes encoded and about a hundred once parsed.
 
     Raises:
         MalformedMessage: too many; a length or a field that cannot be.

@@ -112,7 +112,7 @@ class Run:
     plan: list[int]
 
 
-class Twin:
+class RecordedArena:
     """An arena equal to the timed one, which records the steps of its clusters.
 
     Attributes:
@@ -230,9 +230,9 @@ def time_arena(
     )
     world.apply(Changes(insertions=tuple(robots)))
     world.advance(warm_up_s * second)
-    twin = Twin(settings, robots) if measures == "all" else None
-    if twin is not None:
-        twin.world.advance(warm_up_s * second)
+    recorded = RecordedArena(settings, robots) if measures == "all" else None
+    if recorded is not None:
+        recorded.world.advance(warm_up_s * second)
     population, wall, cluster, solo = world.population, 0.0, 0.0, 0.0
     merging.wrap(population, "merge")
     changing.wrap(population, "regroup", "split", "remove", "catch_up")
@@ -243,21 +243,21 @@ def time_arena(
         changes = Changes()
         if unborn and world.births:
             changes = Changes((world.births[0],), (unborn.pop(0),))
-        if twin is not None:
-            twin.advance(changes, world.step + steps)
+        if recorded is not None:
+            recorded.advance(changes, world.step + steps)
             if number % 2:
-                cluster += twin.replay(clock)
+                cluster += recorded.replay(clock)
         start = clock()
         world.apply(changes)
         world.advance(world.step + steps)
         wall += clock() - start
-        if twin is not None and not number % 2:
-            cluster += twin.replay(clock)
+        if recorded is not None and not number % 2:
+            cluster += recorded.replay(clock)
         if measures:
             solo += solo_time(world, pool, steps, clock)
     world.close()
     pool.close()
-    assert twin is None or twin.world.digest() == world.digest()
+    assert recorded is None or recorded.world.digest() == world.digest()
     return ArenaTiming(
         simulated_s=seconds,
         wall_s=wall,

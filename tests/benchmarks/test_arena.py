@@ -24,8 +24,8 @@ from schema.wire.arena import Changes
 from schema.wire.codec import decode_genome
 from tests.benchmarks.arena_timing import (
     ArenaTiming,
+    RecordedArena,
     Stopwatch,
-    Twin,
     even_places,
     time_arena,
 )
@@ -171,14 +171,14 @@ def test_two_threads_spend_at_least_0_6_of_the_time_on_solo_steps() -> None:
 def test_recorded_steps_alone_end_where_the_arena_ends() -> None:
     """With a merge, whose dropped steps are not repeated."""
     inserted = insertions(random_robots(3), [(0.0, 0.0), (0.3, 0.0), (5.0, 0.0)])
-    twin = Twin(SETTINGS, inserted)
+    recorded = RecordedArena(SETTINGS, inserted)
     for until in (500, 1000):
-        twin.advance(Changes(), until)
-        copies = twin.copies
-        assert twin.replay(lambda: 0.0) == 0.0
-        for cluster in twin.world.population.clusters:
+        recorded.advance(Changes(), until)
+        copies = recorded.copies
+        assert recorded.replay(lambda: 0.0) == 0.0
+        for cluster in recorded.world.population.clusters:
             assert copies[cluster].qpos.tolist() == cluster.data.qpos.tolist()
-    assert twin.world.population.merges > 0
+    assert recorded.world.population.merges > 0
 
 
 def test_fit_recovers_the_coefficients_of_the_thesis() -> None:

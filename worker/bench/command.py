@@ -173,7 +173,12 @@ def parser() -> Flags:
         ),
     )
     study.add_argument("run", type=Path, metavar="RUN", help="run folder")
-    add_count(study, "--per-third", 20, "robots drawn from each third of the fitness")
+    add_count(
+        study,
+        "--per-third",
+        20,
+        "robots drawn from each third of the run's robots in order of fitness",
+    )
     add_count(study, "--seed", 1, "random seed, of the choice of robots", least=0)
     study.add_argument(
         "--against",

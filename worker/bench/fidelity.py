@@ -1,7 +1,8 @@
 """Sensitivity of fitness to the numerical settings of the simulator.
 
-Robots of a run, drawn from each third of its fitness, are re-simulated with a finer
-time step, or with another changed setting; the two rankings are compared.
+Robots of a run, drawn from each third of its robots in order of fitness, are
+re-simulated with a finer time step, or with another changed setting; the two rankings
+are compared.
 """
 
 from collections.abc import Iterable
@@ -70,7 +71,7 @@ def read_population(folder: Path) -> Population:
 
 
 def sample_thirds(fitness: Floats, per_third: int, seed: int = 1) -> list[int]:
-    """Return indices drawn from each third of fitness, the least fit third first.
+    """Return indices drawn from each third of the robots, the least fit third first.
 
     Args:
         fitness: (N,) of all.

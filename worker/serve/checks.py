@@ -18,7 +18,7 @@ T = TypeVar("T", EvaluationSettings, ArenaSettings)
 
 @lru_cache(maxsize=64)
 def checked_evaluation(settings: bytes) -> EvaluationSettings:
-    """Return the settings of an evaluation request, with plug-ins that are in order.
+    """Return the settings of an evaluation request, with checked plug-ins.
 
     Raises:
         ExperimentError: the bytes are not such settings; a plug-in cannot be loaded or
@@ -29,7 +29,11 @@ def checked_evaluation(settings: bytes) -> EvaluationSettings:
 
 @lru_cache(maxsize=64)
 def checked_arena(settings: bytes) -> ArenaSettings:
-    """Return the settings of a request to advance an arena; else as above."""
+    """Return the settings of a request to advance an arena, with checked plug-ins.
+
+    Raises:
+        ExperimentError: as ``checked_evaluation``.
+    """
     return _checked(read_arena_settings(settings))
 
 

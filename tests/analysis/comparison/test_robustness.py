@@ -51,7 +51,7 @@ def test_groups_count_equally() -> None:
 
 def test_line_about_a_run() -> None:
     assert summary(table_of(ROWS)) == (
-        "the best, 0:7, keeps 60 % of its fitness (0.1000) in the mean, from 40 % "
+        "the best, 0:7, keeps 60 % of its fitness (0.1000) on average, from 40 % "
         "under friction changed to 100 % under start changed; the last population of 3 "
         "keeps 85 % in the median, 60 % to 110 %; 1 of 9 evaluations failed"
     )

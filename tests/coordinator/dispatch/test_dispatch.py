@@ -38,13 +38,13 @@ from coordinator.dispatch.events import (
 )
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
+    BACKOFF_S,
     FIRST_S,
-    LONGEST_REST_S,
+    LONGEST_BACKOFF_S,
     MOST_AHEAD,
     PATIENCE,
     PAUSE_S,
     REPLY_S,
-    REST_S,
 )
 from schema.errors import UnexpectedEvent
 from schema.wire.decoding import fingerprint
@@ -110,7 +110,7 @@ def busy_pair(
     """
     dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(*range(30)))
     assert dispatch.waiting("worker") == 26  # how long they take is not known yet
-    assert dispatch.leisure_s == 0.0
+    assert dispatch.pause_s == 0.0
     given = []
     for number, (name, duration_s) in enumerate(zip("ab", job_s, strict=True)):
         dispatch.handle(Ticked(duration_s))
@@ -126,19 +126,19 @@ def test_short_jobs_are_given_ahead_while_many_wait() -> None:
     # The same: 4 of 16.
     assert second == [(number, "b") for number in range(10, 15)]
     # An eighth of what the second has to spare, 4 jobs, takes 20 ms.
-    assert dispatch.leisure_s == pytest.approx(0.02)
+    assert dispatch.pause_s == pytest.approx(0.02)
     dispatch.handle(Left("a"))
     # The other had 7, and half of what waits may be ahead at the only one: 9 of 18.
     held = dispatch._pools["worker"].agents["b"].held
     assert (len(held), dispatch.waiting("worker")) == (2 + 9, 17)
-    assert dispatch.leisure_s == pytest.approx(0.045)
+    assert dispatch.pause_s == pytest.approx(0.045)
     for event in requests(*range(30, 60)):
         dispatch.handle(event)
     assert len(held) == 2 + MOST_AHEAD
-    assert dispatch.leisure_s == pytest.approx(0.08)
+    assert dispatch.pause_s == pytest.approx(0.08)
     dispatch.handle(Ticked(100.0))
     dispatch.handle(ok(next(iter(held)), "b"))  # now jobs seem to take long
-    assert dispatch.leisure_s == PAUSE_S
+    assert dispatch.pause_s == PAUSE_S
 
 
 def test_a_pause_does_not_lengthen_the_next_one() -> None:
@@ -151,7 +151,7 @@ def test_a_pause_does_not_lengthen_the_next_one() -> None:
         place = len(dispatch._pools["worker"].agents["a"].held)
         dispatch.handle(replace(ok(turn, "a"), took_s=0.001 * place))
     # An eighth of what the 16 jobs ahead take.
-    assert dispatch.leisure_s == pytest.approx(0.002, rel=0.1)
+    assert dispatch.pause_s == pytest.approx(0.002, rel=0.1)
 
 
 def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
@@ -160,7 +160,7 @@ def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
     # One in the place of the one that is done, and what takes less than 0.8 s.
     assert second == [(10, "b"), (11, "b")]
     # The quick one, too, is done with 5 x 40 ms, and the slow one with 500 ms.
-    assert dispatch.leisure_s == pytest.approx(0.025)
+    assert dispatch.pause_s == pytest.approx(0.025)
     # What the slow one has keeps nothing from the quick one.
     for event in requests(*range(30, 90)):
         dispatch.handle(event)
@@ -178,7 +178,7 @@ def test_new_agent_gets_no_jobs_ahead_before_its_first_answer() -> None:
         dispatch.handle(event)
     agents = dispatch._pools["worker"].agents
     assert [len(agents[name].held) for name in "abc"] == [18, 18, 2]
-    assert dispatch.leisure_s == 0.0
+    assert dispatch.pause_s == 0.0
 
 
 def test_no_jobs_are_given_ahead_near_the_end() -> None:
@@ -188,13 +188,13 @@ def test_no_jobs_are_given_ahead_near_the_end() -> None:
         name = max(agents, key=lambda each: len(agents[each].held))
         dispatch.handle(ok(next(iter(agents[name].held)), name))
     assert [len(agent.held) for agent in agents.values()] == [2, 2]
-    assert dispatch.leisure_s == 0.0
+    assert dispatch.pause_s == 0.0
 
 
 def test_long_jobs_are_not_given_ahead() -> None:
     dispatch, first, second = busy_pair(1.0, 1.0)
     assert (first, second) == ([(4, "a")], [(5, "b")])
-    assert dispatch.leisure_s == 0.0
+    assert dispatch.pause_s == 0.0
 
 
 def test_least_busy_agent_gets_the_job_and_ties_break_on_its_name() -> None:
@@ -231,28 +231,28 @@ def test_agent_that_lost_a_job_is_given_no_job_until_backoff_ends() -> None:
     dispatch = told(Ticked(10.0), worker("a"), *requests(0))
     assert dispatch.wake_s is None
     assert dispatch.handle(lost(0, "a")) == []
-    assert dispatch.wake_s == pytest.approx(10.0 + REST_S)
-    assert dispatch.handle(Ticked(10.0 + 0.9 * REST_S)) == []
-    assert given_out(dispatch.handle(Ticked(10.0 + 1.1 * REST_S))) == [(0, "a")]
+    assert dispatch.wake_s == pytest.approx(10.0 + BACKOFF_S)
+    assert dispatch.handle(Ticked(10.0 + 0.9 * BACKOFF_S)) == []
+    assert given_out(dispatch.handle(Ticked(10.0 + 1.1 * BACKOFF_S))) == [(0, "a")]
 
 
 def test_backoff_grows_until_an_answer_arrives() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    rests = []
+    backoffs = []
     for _ in range(9):
         begin = dispatch._now_s
         dispatch.handle(lost(0, "a"))
         assert begin is not None
         assert dispatch.wake_s is not None
-        rests.append(dispatch.wake_s - begin)
+        backoffs.append(dispatch.wake_s - begin)
         dispatch.handle(Ticked(dispatch.wake_s))
-    doubled = [min(REST_S * 2**k, LONGEST_REST_S) for k in range(9)]
-    assert rests == pytest.approx(doubled)
+    doubled = [min(BACKOFF_S * 2**k, LONGEST_BACKOFF_S) for k in range(9)]
+    assert backoffs == pytest.approx(doubled)
     dispatch.handle(ok(0, "a"))
     dispatch.handle(Requested(job(1)))
     now_s = dispatch._now_s or 0.0
     dispatch.handle(lost(1, "a"))
-    assert dispatch.wake_s == pytest.approx(now_s + REST_S)
+    assert dispatch.wake_s == pytest.approx(now_s + BACKOFF_S)
 
 
 def test_failed_job_goes_to_another_agent() -> None:
@@ -522,9 +522,9 @@ def test_deadly_job_is_cancelled_where_it_still_runs() -> None:
     assert commands[2][1:] == [Cancel(job(0), "z")]
 
 
-def test_twins_go_to_two_workers_if_there_are_two() -> None:
-    first = Job(1, "evaluate", b"1", twin=2)
-    second = Job(2, "evaluate", b"2", twin=1)
+def test_paired_jobs_go_to_two_workers_if_there_are_two() -> None:
+    first = Job(1, "evaluate", b"1", paired=2)
+    second = Job(2, "evaluate", b"2", paired=1)
     dispatch = told(worker("a"))
     assert given_out(dispatch.handle(Requested(first))) == [(1, "a")]
     assert given_out(dispatch.handle(Requested(second))) == [(2, "a")]
@@ -685,7 +685,7 @@ class World:
         self.enter(Joined("z1", "worker", 1, "p"))
         self.enter(Joined("z2", "analyzer", 1, "p"))
         while self.dispatch.pending:
-            self.now_s += LONGEST_REST_S
+            self.now_s += LONGEST_BACKOFF_S
             self.tell(Ticked(self.now_s))
             self.answer()
 

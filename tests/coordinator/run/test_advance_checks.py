@@ -281,7 +281,7 @@ def test_false_advance_is_refused(lie: AnswerChange) -> None:
         true = replace(true, number=true.number + 1)
     assert two.answer(lie(true)) == []
     assert two.fleet.malformed == 1
-    # The liar rests. The other worker is given the state, and its answer counts.
+    # The liar backs off. The other worker is given the state, and its answer counts.
     assert two.sent[-1][1] != liar
     request = decode_advance_request(two.sent[-1][2])
     assert request.rebuild is not None

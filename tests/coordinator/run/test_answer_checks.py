@@ -65,7 +65,7 @@ REPORTS: dict[str, Evaluation | Report] = {
 def check_refused(
     sent_requests: SentRequests, ask: Vet | Evaluate, lie: Returned
 ) -> None:
-    """Fail unless a lie is counted, its agent rests, and another one gets the job."""
+    """Fail unless a lie is counted, its agent backs off, and another gets the job."""
     liar, honest = lie.agent, {"one": "two", "judge": "juror"}[lie.agent]
     assert sent_requests.tell(lie) == []
     assert sent_requests.fleet.malformed == 1

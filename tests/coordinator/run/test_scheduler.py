@@ -191,7 +191,7 @@ def broken() -> None:
 
 
 def replaced(planned: Planned) -> Planned:
-    """Return the same, but fail if it starts."""
+    """Return a planned run that raises if it is started."""
     return Planned(planned.status, never)
 
 

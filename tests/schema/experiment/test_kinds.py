@@ -1,4 +1,4 @@
-"""Sensors among the kinds of plug-ins that are checked by hand."""
+"""Tests of sensors as a kind of plug-in that ``revolve check`` checks."""
 
 from pathlib import Path
 

@@ -56,7 +56,7 @@ def raises(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
 CASES: dict[str, tuple[Change, str]] = {
     "shape": (lambda _, __, outputs: outputs[:, :3], "outputs of shape"),
     "not finite": (lambda _, __, outputs: outputs / 0.0, "outputs that are not finite"),
-    "company": (lambda _, readings, outputs: outputs + readings.max(), "alone"),
+    "other robots": (lambda _, readings, outputs: outputs + readings.max(), "alone"),
     "row": (
         lambda _, __, outputs: outputs + np.arange(len(outputs))[:, np.newaxis],
         "in another row",

@@ -70,7 +70,10 @@ def test_built_in_learners_keep_their_contract(learner: str) -> None:
 
 
 def test_cma_es_is_that_of_the_library() -> None:
-    """Compare with the library's own loop: the first generation has the start."""
+    """Compare with the library's own loop.
+
+    The first generation includes the start point.
+    """
     start = (0.2, 0.8, 0.5)
     own = NewbornLearner(Learning(sigma=0.1), start)
     library = CMA(np.array(start), 0.1, bounds=np.array([[0.0, 1.0]] * 3))
