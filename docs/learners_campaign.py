@@ -13,7 +13,7 @@ third of the time of scenario 1.
 import argparse
 import csv
 from collections.abc import Callable, Iterator
-from itertools import product
+from itertools import accumulate, product
 from math import inf, sqrt
 from pathlib import Path
 
@@ -123,7 +123,7 @@ def search(
         batch: Batch = (points[begin:], tuple(found[begin:]))
         own.tell(batch)
         begin = len(found)
-    return np.maximum.accumulate(found).tolist()
+    return list(accumulate(found, max))
 
 
 def _known(bodies: str) -> list[dict[str, str]]:

@@ -51,7 +51,7 @@ _MAP_BYTES = "131072"
 GRACE_S = 2.5
 """Time between asking a process to end and killing it [s]."""
 _BETWEEN_STARTS_S = 1.0
-_LONGEST_REST_S = 30.0
+_LONGEST_PAUSE_S = 30.0
 # A second Ctrl-C within this time does not count.
 _REPEAT_S = 1.0
 
@@ -104,7 +104,7 @@ class ProcessPool:
         self._processes: list[SpawnProcess | None] = [None] * size
         self._started_s = [-1.0] * size
         self._due_s = [0.0] * size
-        self._rests_s = [_BETWEEN_STARTS_S] * size
+        self._pauses_s = [_BETWEEN_STARTS_S] * size
         self._slots = [ProcessSlot(index, CurrentJob()) for index in range(size)]
         self._codes: list[int | None] = [None] * size
         self._until_s: float | None = None
@@ -156,10 +156,10 @@ class ProcessPool:
         if task is None and code >= 0:
             self._codes[index] = code
             self.exits += 1
-            if now_s - self._started_s[index] > _LONGEST_REST_S:
-                self._rests_s[index] = _BETWEEN_STARTS_S
-            self._due_s[index] = now_s + self._rests_s[index]
-            self._rests_s[index] = min(2.0 * self._rests_s[index], _LONGEST_REST_S)
+            if now_s - self._started_s[index] > _LONGEST_PAUSE_S:
+                self._pauses_s[index] = _BETWEEN_STARTS_S
+            self._due_s[index] = now_s + self._pauses_s[index]
+            self._pauses_s[index] = min(2.0 * self._pauses_s[index], _LONGEST_PAUSE_S)
         elif task is not None and (cause := crash_cause(code)):
             death = Death(task, cause)
             self.deaths.append(death)

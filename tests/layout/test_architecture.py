@@ -28,13 +28,17 @@ def step_lists(text: str) -> list[list[int]]:
     ]
 
 
+def code_spans(text: str) -> list[str]:
+    """Return the code spans of a text, without its code blocks."""
+    return re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+
+
 def paths(text: str) -> list[str]:
     """Return the paths of files and folders that a text names in code spans."""
-    spans = re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
     tops = "|".join((*ROOMS, "tests", "docs"))
     return [
         span.rstrip("/")
-        for span in spans
+        for span in code_spans(text)
         if re.fullmatch(rf"(?:{tops})/[\w./-]+|\w+\.(?:py|toml|md)|Makefile", span)
     ]
 
@@ -50,6 +54,20 @@ def test_files_named_on_the_page_exist() -> None:
     named = paths(PAGE.read_text("utf-8"))
     assert len(named) > 60
     assert [path for path in named if not (ROOT / path).exists()] == []
+
+
+def test_names_on_the_page_exist_in_the_code() -> None:
+    spans = code_spans(PAGE.read_text("utf-8"))
+    named = {span for span in spans if re.fullmatch(r"[A-Za-z_]\w*", span)}
+    assert len(named) > 60
+    files = [
+        path for top in (*ROOMS, "tests", "docs") for path in (ROOT / top).rglob("*.py")
+    ]
+    texts = [
+        path.read_text("utf-8") for path in files if path.name != Path(__file__).name
+    ]
+    known = {word for text in texts for word in re.findall(r"\w+", text)}
+    assert named - known == {"union_by_name"}  # an option of DuckDB
 
 
 def test_both_births_have_at_most_fifteen_steps() -> None:
