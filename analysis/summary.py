@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -16,6 +15,7 @@ from analysis.measures.fitness_functions import (
     functions_of,
     measured_apart,
 )
+from analysis.measures.last_populations import failures_as_best, last_rows
 from analysis.progress import print_line
 from schema.errors import rounded
 
@@ -41,8 +41,8 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
         _print_table(console, heads, populations, words={0, 1})
     else:
         print_line(console, "no population could be measured")
-    for line in _zeros(tables):
-        print_line(console, line)
+    if warning := failures_as_best(tables):
+        print_line(console, warning)
     if findings := _findings(tables["findings"]):
         heads = ("figure", "finding of the thesis", "a", "b", "q", "verdict")
         _print_table(console, heads, findings, words={1, 5})
@@ -123,40 +123,8 @@ def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
             str(row["judged"]),
             *("-" if row[name] is None else rounded(row[name]) for name in _FITNESS),
         )
-        for row in _last_rows(populations)
+        for row in last_rows(populations)
     ]
-
-
-def _last_rows(populations: pa.Table) -> list[dict[str, Any]]:
-    """Return the rows of each island's last population."""
-    keys = ["experiment", "folder", "island"]
-    last = populations.group_by(keys, use_threads=False).aggregate([("births", "max")])
-    joined = populations.join(last, keys)
-    rows = joined.filter(pc.equal(joined["births"], joined["births_max"]))
-    found: list[dict[str, Any]] = rows.sort_by(
-        [(key, "ascending") for key in keys]
-    ).to_pylist()
-    return found
-
-
-def _zeros(tables: dict[str, pa.Table]) -> list[str]:
-    """Return a line if failed evaluations may be the best of last populations."""
-    runs = tables["runs"].filter(pc.field("failures") > 0)
-    failures = dict(
-        zip(*(runs[name].to_pylist() for name in ("folder", "failures")), strict=True)
-    )
-    folders = [
-        row["folder"]
-        for row in _last_rows(tables["populations"])
-        if row["fitness_best"] == 0.0 and row["folder"] in failures
-    ]
-    names = ", ".join(
-        f"{Path(folder).name} ({failures[folder]} failed)"
-        for folder in dict.fromkeys(folders)
-    )
-    if not names:
-        return []
-    return [f"a failed evaluation counts as fitness 0, which is the best of {names}"]
 
 
 def _findings(findings: pa.Table) -> list[tuple[str, ...]]:

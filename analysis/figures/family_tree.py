@@ -41,10 +41,11 @@ def best_robots(robots: pa.Table) -> list[Best]:
 
     Args:
         robots: with the columns of ``outputs``; the first of equally fit robots is
-            the best.
+            the best, and one whose evaluation failed is none.
     """
     columns = ["experiment", "folder", "birth_island", "birth", "fitness"]
-    last = robots.filter(pc.field("is_last")).select(columns)
+    is_judged = pc.field("is_last") & pc.invert(pc.field("is_failed"))
+    last = robots.filter(is_judged).select(columns)
     fittest = last.sort_by([("experiment", "ascending"), ("fitness", "descending")])
     found: dict[str, Best] = {}
     for row in fittest.to_pylist():

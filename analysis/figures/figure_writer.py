@@ -203,12 +203,14 @@ def _robot_pictures(
 ) -> tuple[dict[str, RobotPicture], dict[str, str]]:
     """Return pictures of the best robots by experiment, and why others have none."""
     best = {one.experiment: one for one in best_robots(robots)}
+    living = robots.filter(pc.field("is_last"))["experiment"].to_pylist()
+    why = "all robots of its last populations failed"
+    problems = {name: why for name in in_order(living) if name not in best}
     try:
         simulation = simulate()
     except RevolveError as error:
-        return {}, dict.fromkeys(best, str(error))
+        return {}, problems | dict.fromkeys(best, str(error))
     pictures: dict[str, RobotPicture] = {}
-    problems: dict[str, str] = {}
     for name in bar.track(in_order(best), description="rendering robots"):
         run = runs[best[name].folder]
         try:

@@ -7,7 +7,9 @@ is left out, with the reason; all others are measured.
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from analysis.measures.ancestry import migrants
 from analysis.measures.bodies import extremity_bins
@@ -37,7 +39,7 @@ def robots(run: RunTables) -> pa.Table:
         One row per robot, in the order of birth, with the columns of
         ``outputs.OUTPUTS["robots"]`` except the run's.
     """
-    fitness, is_last = _evaluated(run)
+    fitness, is_last, is_failed = _evaluated(run)
     chosen = np.flatnonzero(~np.isnan(fitness))
     births = run.births.take(chosen)
     return pa.table(
@@ -50,17 +52,43 @@ def robots(run: RunTables) -> pa.Table:
             "ancestors": [run.lines[row].bit_count() for row in chosen.tolist()],
             **{name: values[chosen] for name, values in run.sizes.items()},
             "fitness_max": _greatest(run, fitness)[chosen],
+            "births": births_so_far(run.births)[chosen],
+            "is_failed": is_failed[chosen],
         }
     )
 
 
-def _evaluated(run: RunTables) -> tuple[Numbers, Booleans]:
-    """Return each individual's last fitness, NaN if none, and if it is alive last."""
+def births_so_far(births: pa.Table) -> npt.NDArray[np.int64]:
+    """Return the number of births on each individual's island up to its own.
+
+    Args:
+        births: ``island``, ``birth``, and ``sim_time_s``, which is null off-line.
+    """
+    islands = np.asarray(births["island"], np.int64)
+    times = np.asarray(pc.fill_null(births["sim_time_s"], 0.0), np.float64)
+    order = np.lexsort((np.asarray(births["birth"], np.int64), times, islands))
+    _, first = np.unique(islands[order], return_index=True)
+    found = np.empty(len(order), np.int64)
+    counts = np.diff(first, append=len(order))
+    found[order] = np.arange(1, len(order) + 1) - np.repeat(first, counts)
+    return found
+
+
+def _evaluated(run: RunTables) -> tuple[Numbers, Booleans, Booleans]:
+    """Return each individual's fitness, if it lives at the end, and if it failed.
+
+    Returns:
+        The last fitness, NaN if there is none; whether it is in a last population;
+        whether all its evaluations failed.
+    """
     fitness = np.full(run.births.num_rows, np.nan)
     evaluations = run.tables["evaluations"]
     rows = rows_of(individual_ids(evaluations), run.births)
     outcome = np.asarray(evaluations["fitness"].to_numpy(), np.float64)
-    fitness[rows[rows >= 0]] = np.nan_to_num(outcome[rows >= 0], nan=0.0)
+    rows, outcome = rows[rows >= 0], outcome[rows >= 0]
+    fitness[rows] = np.nan_to_num(outcome, nan=0.0)
+    is_failed = ~np.isnan(fitness)
+    is_failed[rows[~np.isnan(outcome)]] = False
     ids, sampled = last_fitness(run.tables["fitness"])
     rows = rows_of(ids, run.births)
     fitness[rows[rows >= 0]] = sampled[rows >= 0]
@@ -69,7 +97,7 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Booleans]:
     fitness[table.members[chosen]] = table.fitness[chosen]
     is_last = np.zeros(len(fitness), np.bool_)
     is_last[table.members[chosen]] = True
-    return fitness, is_last
+    return fitness, is_last, is_failed
 
 
 def _greatest(run: RunTables, last: Numbers) -> Numbers:

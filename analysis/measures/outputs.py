@@ -12,6 +12,7 @@ _KINDS = {
     "island": pa.int32(),
     "birth_island": pa.int32(),
     "is_last": pa.bool_(),
+    "is_failed": pa.bool_(),
     "near_automatic": pa.bool_(),
     "kept": pa.bool_(),
     "saved": pa.bool_(),
@@ -122,6 +123,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "fitness_function": "fitness function, its parameters and the digest of its "
         "source; only runs with the same text have comparable fitness",
         "plugins": "plug-in modules and the digests of their sources",
+        "arena_births": "recorded births in arenas; null without an arena",
+        "arena_living": "robots in the last recorded populations of the arenas; null "
+        "without an arena",
         "deaths": "robots of arenas that died; null without an arena",
         "simulated_s": "simulated time of the arenas up to the last sample of fitness; "
         "null without an arena [s]",
@@ -138,6 +142,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
         **PER_PART,
         "fitness_max": "greatest fitness recorded at a birth, or the last one; in an "
         "arena it can be greater than the last",
+        "births": "births on its island up to its own; in an arena the founders are "
+        "born in descending order of their numbers",
+        "is_failed": "whether all its evaluations failed, which counts as fitness 0",
     },
     "extremities": {
         **_RUN,
@@ -286,10 +293,11 @@ OUTPUTS: dict[str, dict[str, str]] = {
 }
 """Columns and their meanings, by table; each table is one Parquet file."""
 
-_INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
-             "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
-             "runs_a", "runs_b", "failures", "deaths", "finding", "births",
-             "birth", "members", "founders", "trials", "trial"}  # fmt: skip
+_INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "planned",
+             "islands", "robots", "samples", "pairs", "epoch", "to", "descendants",
+             "living", "reached", "runs", "runs_a", "runs_b", "failures", "deaths",
+             "finding", "births", "birth", "members", "founders", "trials",
+             "trial"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
           "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "setting", "value", "differs", "function", "fitness_function",

@@ -127,7 +127,9 @@ def _wanted(run: Run) -> frozenset[str]:
 def _summary(
     run: Run, tables: Mapping[str, pa.Table], unread: frozenset[str]
 ) -> pa.Table:
-    has_arena = any(island.is_online for island in run.islands)
+    arenas = [number for number, one in enumerate(run.islands) if one.is_online]
+    has_arena = bool(arenas)
+    born_there = pc.is_in(tables["births"]["island"], pa.array(arenas, pa.int32()))
     row = {
         "run": run.number,
         "seed": run.seed,
@@ -139,12 +141,22 @@ def _summary(
         "function": run.function,
         "fitness_function": run.fitness,
         "plugins": " ".join(f"{name}={digest}" for name, digest in run.plugins.items()),
+        "arena_births": (pc.sum(born_there).as_py() or 0) if has_arena else None,
+        "arena_living": _living(tables["population"]) if has_arena else None,
         "deaths": tables["deaths"].num_rows if has_arena else None,
         "simulated_s": _simulated_s(tables) if has_arena else None,
         "failures": None if unread & {"evaluations", "deaths"} else _failures(tables),
         "duration_s": read_duration_s(run.folder),
     }
     return pa.Table.from_pylist([row], run_schema("runs"))
+
+
+def _living(population: pa.Table) -> int:
+    """Return the number of robots in the last populations of arenas."""
+    in_arenas = population.filter(pc.field("is_online"))
+    last = in_arenas.group_by("island").aggregate([("births", "max")])
+    here = in_arenas.join(last, "island")
+    return int(pc.sum(pc.equal(here["births"], here["births_max"])).as_py() or 0)
 
 
 def _simulated_s(tables: Mapping[str, pa.Table]) -> float | None:

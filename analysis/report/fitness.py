@@ -119,8 +119,9 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
 
 def _records(robots: pa.Table, *, few: bool) -> pa.Table:
     """Return the robots that are fitter than all that were born before in their run."""
-    keys = ["folder", "birth", "birth_island"]
-    born = robots.sort_by([(key, "ascending") for key in keys])
+    keys = ["folder", "births", "birth_island"]
+    known = robots.filter(pc.invert(pc.field("is_failed")))
+    born = known.sort_by([(key, "ascending") for key in keys])
     fitness = np.asarray(born["fitness_max"], np.float64)
     folders = np.asarray(born["folder"].combine_chunks().dictionary_encode().indices)
     starts = np.flatnonzero(np.diff(folders, prepend=-1))
@@ -168,7 +169,7 @@ def _dots(
     marks: dict[str, list[str]] = {}
     for row in robots.to_pylist():
         name = names[row["folder"]]
-        births = row["birth"] + 1
+        births = row["births"]
         described = _described(row, row["fitness_max"])
         text = f"robot {row['birth_island']}:{row['birth']}, {name}\n{described}"
         if births <= axes.x_range[1]:

@@ -13,6 +13,7 @@ from analysis.measures.fitness_functions import (
     fitness_unit,
     functions_of,
 )
+from analysis.measures.last_populations import failures_as_best
 from analysis.report.fitness import run_names
 from analysis.report.html import cell, duration, folded, plural, table
 
@@ -62,7 +63,17 @@ def summary(tables: Tables) -> str:
             *([cell(mine[0]["differs"] or "")] if has_settings else []),
         ]
         rows.append(cells)
-    return table(heads, rows) + _summary_note(set(functions.values())) if rows else ""
+    if not rows:
+        return ""
+    warning = failures_as_best(tables)
+    noted = f'<p class="warning">{escape(warning)}.</p>'.replace(">a ", ">A ", 1)
+    return (
+        table(heads, rows)
+        + noted * bool(warning)
+        + _summary_note(
+            set(functions.values()), has_islands=any(row["islands"] > 1 for row in runs)
+        )
+    )
 
 
 def _columns(rows: Sequence[tuple[float, float]]) -> list[list[float]]:
@@ -82,12 +93,14 @@ def _states(runs: Sequence[Row]) -> str:
     return ", ".join(f"{count} {state}" for state, count in counts.items() if count)
 
 
-def _summary_note(functions: Collection[str]) -> str:
+def _summary_note(functions: Collection[str], *, has_islands: bool) -> str:
     text = (
         "Fitness of the last populations: the best robot of all runs, the mean over "
         "runs of each run's best robot, and the mean over runs of the mean of each "
         "run's population. "
     )
+    if has_islands:
+        text += "A run of several islands counts with the mean of their means. "
     if len(functions) > 1:
         text += (
             "The experiments have different fitness functions: compare numbers only "
@@ -102,30 +115,24 @@ def arenas(tables: Tables) -> str:
     """Return a sentence about what happened in the arenas of each experiment.
 
     Args:
-        tables: ``runs`` and ``populations``.
+        tables: ``runs``.
 
     Returns:
         HTML; empty if no run has an arena.
     """
-    populations = tables["populations"]
-    keys = ["folder", "island"]
-    last = populations.group_by(keys).aggregate([("births", "max")])
-    rows = populations.join(last, keys).filter(
-        pc.field("births") == pc.field("births_max")
-    )
-    living: dict[str, int] = {}
-    for row in rows.select(["folder", "size"]).to_pylist():
-        living[row["folder"]] = living.get(row["folder"], 0) + (row["size"] or 0)
     names = run_names(tables["runs"])
     lines = []
     for row in tables["runs"].to_pylist():
         if row["simulated_s"] is None:
             continue
-        alive = f"{living.get(row['folder'], 0)} were alive at the last birth"
+        alive = f"{row['arena_living']} were alive at the last birth"
         if row["islands"] == 1:
             alive = f"{row['births'] - row['deaths']} were alive at the end"
+        born, place = plural(row["births"], "robot"), ""
+        if row["arena_births"] < row["births"]:
+            born, place = f"{row['arena_births']} of {born}", "in arenas, "
         lines.append(
-            f"{names[row['folder']]}: {plural(row['births'], 'robot')} were born in "
+            f"{names[row['folder']]}: {born} were born {place}in "
             f"{duration(row['simulated_s'])} of simulated time, {row['deaths']} died, "
             f"{alive}."
         )

@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import pyarrow as pa
@@ -94,9 +95,12 @@ def _results(run: RunSession) -> list[str]:
         none = f"{births}; no robot of the last population has a fitness"
         return [none, *_counted_as_zero(run, last)]
     best = min(judged, key=lambda row: (-row["fitness"], individual(row)))
-    mean = sum(row["fitness"] for row in judged) / len(judged)
+    means = _means(run, last)
+    mean = f"mean fitness of the last population {rounded(fmean(means))}"
+    if len(means) > 1:
+        mean += f", the mean over {len(means)} islands"
     lines = [
-        f"{births}; mean fitness of the last population {rounded(mean)}",
+        f"{births}; {mean}",
         *_best_robot(run, individual(best), best["fitness"]),
     ]
     lines[1:1] = _counted_as_zero(run, last)
@@ -115,6 +119,19 @@ def _last_populations(folder: Path, islands: Collection[int]) -> list[dict[str, 
         for row in rows.to_pylist()
         if row["island"] in islands and (row["island"], row["births"]) in last
     ]
+
+
+def _means(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list[float]:
+    """Return the mean fitness of each island, as analyses compute it.
+
+    Failed evaluations count as 0. Robots of arenas without a fitness do not count.
+    """
+    fitness: dict[int, list[float]] = {}
+    for row in last:
+        is_online = isinstance(run.loop.islands[row["island"]], Arena)
+        if not (is_online and row["fitness"] is None):
+            fitness.setdefault(row["island"], []).append(row["fitness"] or 0.0)
+    return [fmean(each) for each in fitness.values()]
 
 
 def _counted_as_zero(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -18,7 +18,11 @@ from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
 from analysis.measures.study import MeasuredRun
 
 Level = Mapping[str, float | None]
-ROBOT = dict.fromkeys(OUTPUTS["robots"], 0) | {"experiment": "", "folder": ""}
+ROBOT = dict.fromkeys(OUTPUTS["robots"], 0) | {
+    "experiment": "",
+    "folder": "",
+    "is_failed": False,
+}
 
 
 def tables(

@@ -131,11 +131,11 @@ def test_a_lineage_contains_migrants_whose_rows_come_later() -> None:
 def test_the_best_robot_is_the_fittest_of_the_last_population() -> None:
     rows = [
         {"experiment": "b", "folder": "f", "birth_island": 0, "birth": n,
-         "is_last": n != 1, "fitness": fitness}
-        for n, fitness in enumerate([0.1, 0.9, 0.3, 0.3])
+         "is_last": n != 1, "is_failed": n == 4, "fitness": fitness}
+        for n, fitness in enumerate([-0.1, 0.9, -0.3, -0.1, 0.0])
     ]  # fmt: skip
     (found,) = best_robots(pa.Table.from_pylist(rows, schema("robots")))
-    assert found == Best("b", Path("f"), 0, 2, 0.3)
+    assert found == Best("b", Path("f"), 0, 0, -0.1)
 
 
 def test_row_of_a_robot_is_found_by_its_birth_id(members: pa.Table) -> None:

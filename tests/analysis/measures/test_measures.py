@@ -11,7 +11,7 @@ from analysis.comparison.progression import progression
 from analysis.measures.ancestry import ancestors, migrants, parents_of
 from analysis.measures.bodies import body_sizes, extremity_bins
 from analysis.measures.diversity import diversity, mean_distances
-from analysis.measures.measures import measure, robots
+from analysis.measures.measures import births_so_far, measure, robots
 from analysis.measures.outputs import OUTPUTS
 from analysis.measures.population_table import population_table
 from analysis.measures.populations import populations, retention
@@ -236,6 +236,16 @@ def test_robots_have_their_last_fitness() -> None:
     assert found["fitness"].to_pylist() == [0.2, 0.0, 0.3]
     assert found["is_last"].to_pylist() == [True, False, True]
     assert found["ancestors"].to_pylist() == [0, 0, 2]
+    assert found["is_failed"].to_pylist() == [False, True, False]
+
+
+def test_births_so_far_are_in_the_order_of_birth_on_each_island() -> None:
+    rows = [
+        {"island": 0, "birth": birth, "sim_time_s": time_s}
+        for birth, time_s in enumerate((2.0, 1.0, 0.0, 15.0, 15.0))
+    ] + [{"island": 1, "birth": birth, "sim_time_s": None} for birth in range(3)]
+    born = pa.Table.from_pylist(rows)
+    assert births_so_far(born).tolist() == [3, 2, 1, 4, 5, 1, 2, 3]
 
 
 def test_robots_of_an_arena_count_if_they_were_ever_mature() -> None:

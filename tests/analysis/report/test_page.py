@@ -156,6 +156,8 @@ def test_fitness_in_arenas_and_off_line_has_no_winner(others_s: float | None) ->
     names = runs["experiment"].to_pylist()
     seconds = [9.0 if name == "soft" else others_s for name in names]
     runs = runs.append_column("deaths", pa.array([0] * len(names), pa.int64()))
+    places = runs.schema.get_field_index("arena_births")
+    runs = runs.set_column(places, "arena_births", runs["births"])
     given["runs"] = runs.append_column("simulated_s", pa.array(seconds, pa.float64()))
     text = read_page(given).text
     where = "in arenas ( soft ) is measured in another way than off-line ( hard & <b> )"
@@ -166,17 +168,18 @@ def test_fitness_in_arenas_and_off_line_has_no_winner(others_s: float | None) ->
     assert ("undecided: the interval excludes 0" in text) != is_mixed
 
 
+def with_arena(given: dict[str, pa.Table], **columns: float) -> None:
+    """Give the second run some columns of a run with an arena; the others have none."""
+    for name, value in columns.items():
+        runs = given["runs"]
+        place = runs.schema.get_field_index(name)
+        values = pa.array([None, value, None], runs.schema.field(name).type)
+        given["runs"] = runs.set_column(place, name, values)
+
+
 def test_an_arena_is_summed_up(tmp_path: Path) -> None:
     given = tables()
-    runs = given["runs"].drop_columns(["deaths", "simulated_s"])
-    runs = runs.append_column("deaths", pa.array([None, 9, None], pa.int64()))
-    seconds = pa.array([None, 125.0, None], pa.float64())
-    given["runs"] = runs.append_column("simulated_s", seconds)
-    names = given["populations"].column_names
-    sizes = pa.array([3, 4] * 3, pa.int64())
-    given["populations"] = given["populations"].set_column(
-        names.index("size"), "size", sizes
-    )
+    with_arena(given, arena_births=60, arena_living=50, deaths=9, simulated_s=125.0)
     text = read_page(given).text
     assert text.count("of simulated time") == 1
     assert (
@@ -187,6 +190,50 @@ def test_an_arena_is_summed_up(tmp_path: Path) -> None:
     with_film = read_page(given, drawings(tmp_path)).text
     assert "simulated alone, from the middle of" in with_film
     assert "Among the robots of an arena it may move differently." in with_film
+
+
+def test_births_of_off_line_islands_are_no_births_in_arenas() -> None:
+    given = tables()
+    with_arena(given, arena_births=45, arena_living=16, deaths=35, simulated_s=125.0)
+    islands = given["runs"].schema.get_field_index("islands")
+    several = pa.array([1, 4, 1], pa.int64())
+    given["runs"] = given["runs"].set_column(islands, "islands", several)
+    text = read_page(given).text
+    assert (
+        "soft, run 1, seed 7: 45 of 60 robots were born in arenas, in 2 min 05 s of "
+        "simulated time, 35 died, 16 were alive at the last birth." in text
+    )
+    assert "A run of several islands counts with the mean of their means." in text
+
+
+def test_failed_robots_that_are_the_best_are_told() -> None:
+    given = tables()
+    assert "counts as fitness 0" not in read_page(given).text
+    zero = pa.array([-1.0, 0.0] * 3)
+    place = given["populations"].schema.get_field_index("fitness_best")
+    given["populations"] = given["populations"].set_column(place, "fitness_best", zero)
+    place = given["runs"].schema.get_field_index("failures")
+    failures = pa.array([0, 5, None], pa.int64())
+    given["runs"] = given["runs"].set_column(place, "failures", failures)
+    warning = "A failed evaluation counts as fitness 0, which is the best of "
+    assert f"{warning}soft-1 (5 failed)." in read_page(given).text
+
+
+def test_dots_are_in_the_order_of_birth_and_of_robots_that_did_not_fail() -> None:
+    given = tables()
+    robots = given["robots"]
+    # As the founders of an arena: the one of the greatest number is born first.
+    places = robots.schema.get_field_index("births")
+    robots = robots.set_column(places, "births", pa.array([3, 2, 1] * 3, pa.int64()))
+    given["robots"] = robots
+    text = read_page(given).text
+    for number, count in ((0, 0), (1, 1), (2, 2)):  # those of the last population, too
+        assert text.count(f"robot 0:{number}, soft, run 1") == count
+    failed = robots.schema.get_field_index("is_failed")
+    is_failed = pa.array([False, False, True] * 3)
+    given["robots"] = robots.set_column(failed, "is_failed", is_failed)
+    text = read_page(given).text
+    assert text.count("robot 0:1, soft, run 1") == 2
 
 
 def test_dots_over_births_are_at_the_greatest_fitness_of_robots() -> None:
