@@ -67,7 +67,8 @@ POPULATION = {
 OUTCOME = {
     "births": "births of the comparison: the most that all compared runs reach",
     **POPULATION,
-    "retention": "mean over the run's births",
+    "retention": "share of living robots that are still alive 120 births later, as the "
+    "mean over the run's births",
     "late_gain": "share of the gain in fitness in the second half of births",
     "early_drop": "share of the loss of diversity in the first tenth of births",
     "diversity_change": "diversity of the last population minus that of the founders",

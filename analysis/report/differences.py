@@ -23,7 +23,7 @@ _MOST_PAIRS = 3
 """Pairs of experiments on the first screen, those with the smallest p."""
 _COMPARED = {
     "fitness": "Difference of mean fitness",
-    "fitness_best": "Difference of best fitness",
+    "fitness_best": "Difference of the mean of bests",
 }
 _LEVEL = 0.05
 """Greatest p of a difference that counts as shown."""
