@@ -19,7 +19,13 @@ from msgspec import Struct
 
 from schema.errors import ExperimentError, unreadable
 from schema.limits import MOST_PLUGIN_BYTES
-from schema.plugins.permission import FLAG, allow_file, allowed_file
+from schema.plugins.permission import (
+    FLAG,
+    allow_file,
+    allowed_file,
+    is_only_found,
+    source_of,
+)
 from schema.plugins.source import digest_of, digest_of_bytes, modules_named
 
 PLUGINS = "plugins"
@@ -100,8 +106,7 @@ def allow_kept(
             if found != note.digest:
                 raise ExperimentError(
                     f"plug-in {name}: has source digest {found}, but {folder} was made "
-                    f"with {note.digest}; to use that one: {FLAG} {copy} (in Python: "
-                    "read the folder in a new process)"
+                    f"with {note.digest}; to use that one: {_how_to_use(name, copy)}"
                 )
         else:
             if is_resumed:
@@ -113,6 +118,14 @@ def allow_kept(
 def _is_unused(name: str) -> bool:
     """Return whether a module is neither imported nor allowed by the user."""
     return name not in sys.modules and allowed_file(name) is None
+
+
+def _how_to_use(name: str, copy: Path) -> str:
+    """Return how a copy takes precedence over the module that is found."""
+    if name in sys.modules or allowed_file(name) or is_only_found(name):
+        return f"{FLAG} {copy} (in Python: read the folder in a new process)"
+    found = ", ".join(map(str, source_of(name)))
+    return f"remove {found} from the import path, and add {FLAG} {copy}"
 
 
 def _check_installed(name: str, note: KeptPlugin) -> None:

@@ -39,7 +39,8 @@ def allow(entries: Iterable[str]) -> None:
 
     Raises:
         ExperimentError: no such module or file; a module of the standard library or of
-            Revolve; a file with the name of another module.
+            Revolve; a file with the name of another module (``is_only_found`` ones do
+            not count).
     """
     for entry in entries:
         if entry.endswith(".py"):
@@ -173,6 +174,22 @@ def source_of(top: str) -> list[Path]:
     return _source(top) or []
 
 
+def is_only_found(top: str) -> bool:
+    """Return whether a module is only a file where Python looks first.
+
+    That is the current folder, with ``python -m``, or the folder of the script. A file
+    that is named takes precedence, unless the module is named or imported already.
+    """
+    if top in _allowed or top in sys.modules:
+        return False
+    first = {Path(folder).resolve() for folder in ("", *sys.path[:1])}
+    return any(
+        found.is_file() and found.resolve() == folder / f"{top}.py"
+        for found in _source(top) or ()
+        for folder in first
+    )
+
+
 def _source(top: str) -> list[Path] | None:
     """Return where a top-level module is installed; None if it is not."""
     try:
@@ -196,7 +213,7 @@ def _check_file(file: Path, where: str) -> None:
     others = [named] if named else [each.resolve() for each in found or ()]
     # A copy, as a run folder keeps it, is no other module.
     is_same = any(one.is_file() and cmp(file, one, shallow=False) for one in others)
-    if not is_same and (named or found is not None):
+    if not is_same and (named or found is not None) and not is_only_found(file.stem):
         other = others[0] if others else "a built-in module"
         raise ExperimentError(
             f"{where}: {file} has the name of another module, {other}: rename the file"

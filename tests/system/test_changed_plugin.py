@@ -1,8 +1,10 @@
 """A run whose plug-in was changed after its start."""
 
+import signal
+
 import pytest
 
-from tests.system.workspace import Workspace
+from tests.system.workspace import PATIENCE_S, Workspace, wait_until
 
 pytestmark = pytest.mark.system
 
@@ -58,3 +60,37 @@ def test_resume_and_check_name_the_changed_module(
     assert "in order" in workspace.run("check", "a", *kept)
     workspace.run("resume", "a", *HOW, *kept)
     assert (run / "state").read_text().strip() == "finished"
+
+
+def test_the_named_copy_comes_before_a_file_of_the_current_folder(
+    workspace: Workspace,
+) -> None:
+    """``python -m revolve`` searches the folder for modules; so do its workers."""
+    run, module = workspace.folder / "a", workspace.folder / "lab.py"
+    slow = DOCUMENT.replace("births = 8", "births = 40").replace("= 40\n[", "= 600\n[")
+    (workspace.folder / "mine.toml").write_text(slow)
+    module.write_text(MODULE)
+    own = ("--workers", "1", "--quiet")
+    started = workspace.start("run", "mine.toml", "--out", "a", *own)
+    journal = run / "journal.bin"
+    wait_until(lambda: journal.exists() and journal.stat().st_size > 3000, "births")
+    started.send_signal(signal.SIGINT)
+    started.communicate(timeout=PATIENCE_S)
+    assert (run / "state").read_text().strip() == "stopped"
+    module.write_text(FAULTY)
+
+    line = workspace.run("resume", "a", *own, code=2).splitlines()[-1]
+    assert "to use that one: --plugins a/plugins/lab.py" in line
+    kept = ("--plugins", "a/plugins/lab.py")
+    assert "lab.py:2: in order" in workspace.run("check", "a", *kept)
+    workspace.run("resume", "a", *own, *kept)
+    assert (run / "state").read_text().strip() == "finished"
+    workspace.run("robot", "simulate", "a/best.yaml", *kept)
+
+    elsewhere = workspace.folder / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "lab.py").write_text(FAULTY)
+    words = ("robustness", "../a", "--plugins", "../a/plugins/lab.py")
+    done = workspace.start(*words, "--workers", "1", folder=elsewhere)
+    output, errors = done.communicate(timeout=PATIENCE_S)
+    assert done.returncode == 0, output + errors

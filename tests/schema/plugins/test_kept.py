@@ -1,5 +1,7 @@
 """Copies of plug-ins in run folders: only the user's own ones are imported."""
 
+import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -7,7 +9,7 @@ import pytest
 from schema.errors import ExperimentError
 from schema.plugins import permission
 from schema.plugins.kept import KeptPlugin, allow_kept, kept_file, plugins_to_keep
-from schema.plugins.permission import allow, allowed
+from schema.plugins.permission import allow, allowed, import_allowed
 
 DOCUMENT = '{"function":"kept_lab:judge"}'
 
@@ -68,6 +70,59 @@ def test_a_changed_original_stops_a_resumed_run_only(
         permission._allowed.clear()
     with pytest.raises(ExperimentError, match="was made with 5ff4453f1603; to use"):
         allow_kept(tmp_path / "run", kept, is_resumed=True)
+
+
+@pytest.mark.parametrize("place", ["current folder", "script", "import path"])
+def test_the_way_to_use_the_copy_is_named_and_works(
+    tmp_path: Path,
+    original: Path,
+    kept: dict[str, KeptPlugin],
+    monkeypatch: pytest.MonkeyPatch,
+    place: str,
+) -> None:
+    original.write_text("judge = 2\n")
+    other = tmp_path / "other"
+    other.mkdir()
+    if place == "current folder":  # python -m revolve
+        monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    if place != "script":
+        monkeypatch.syspath_prepend(other)
+    copy = kept_file(tmp_path / "run", "kept_lab")
+    way = f"--plugins {copy}"
+    if place == "import path":
+        way = f"remove {original} from the import path, and add {way}"
+    with pytest.raises(ExperimentError, match=f"to use that one: {re.escape(way)}"):
+        allow_kept(tmp_path / "run", kept, is_resumed=True)
+    if place == "import path":
+        with pytest.raises(ExperimentError, match="has the name of another module"):
+            allow([str(copy)])
+        monkeypatch.syspath_prepend(other)
+        sys.path.remove(str(tmp_path))
+    allow([str(copy)])
+    allow_kept(tmp_path / "run", kept, is_resumed=True)
+    assert allowed() == (str(copy),)
+    assert import_allowed("kept_lab").judge == 1
+    del sys.modules["kept_lab"]
+
+
+def test_a_copy_does_not_replace_a_module_that_is_imported_or_named(
+    tmp_path: Path,
+    original: Path,
+    kept: dict[str, KeptPlugin],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    original.write_text("judge = 2\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    copy = str(kept_file(tmp_path / "run", next(iter(kept))))
+    allow(["kept_lab"])
+    with pytest.raises(ExperimentError, match="has the name of another module"):
+        allow([copy])
+    assert import_allowed("kept_lab").judge == 2
+    permission._allowed.clear()
+    with pytest.raises(ExperimentError, match="has the name of another module"):
+        allow([copy])
+    del sys.modules["kept_lab"]
 
 
 def test_another_file_of_the_user_is_refused(
