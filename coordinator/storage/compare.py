@@ -27,8 +27,10 @@ def compare(first: Path, second: Path) -> list[str]:
     Returns:
         One line for each run without births, for each table whose number of rows
         differs, and for the first differing row and column of each table; nothing
-        if the runs are equal. If they differ and ran on different platforms, a last
-        line says so, because equality is only guaranteed on one platform.
+        if the runs are equal. A line also names the population of a last brood that
+        is smaller than in the longer run, as it has no counterpart there. If the runs
+        differ and ran on different platforms, a last line says so, because equality
+        is only guaranteed on one platform.
 
     Raises:
         RunFolderError: a folder holds no run, or a table cannot be read.
@@ -41,7 +43,10 @@ def compare(first: Path, second: Path) -> list[str]:
         if not repeatable(schema):
             continue
         tables = [_read(folder, name) for folder in (first, second)]
-        lines += _differences(name, tables, repeatable(schema))
+        lines += _unequal_rows(name, tables)
+        if name == "population":
+            lines += _drop_early_ends(tables, (first, second))
+        lines += _difference(name, tables, repeatable(schema))
         if name == "births":
             lines += [
                 f"{folder}: has no births yet, so there is nothing to compare"
@@ -84,25 +89,66 @@ def _with_defaults(document: str) -> str:
         return document
 
 
-def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[str]:
-    """Return the differences of two tables of one name."""
+def _unequal_rows(name: str, tables: list[pa.Table]) -> list[str]:
+    """Return a line if two tables of one name have different numbers of rows."""
+    ours, theirs = (table.num_rows for table in tables)
+    return [] if ours == theirs else [f"{name}: {ours} rows against {theirs}"]
+
+
+def _drop_early_ends(tables: list[pa.Table], folders: tuple[Path, Path]) -> list[str]:
+    """Drop last populations that the longer run does not have; return what they are.
+
+    The last brood of a run ends at its number of births, and the brood of a longer run
+    goes on there.
+
+    Args:
+        tables: populations of both runs; changed.
+        folders: of the runs.
+    """
     lines = []
-    rows = [table.num_rows for table in tables]
-    if rows[0] != rows[1]:
-        lines.append(f"{name}: {rows[0]} rows against {rows[1]}")
+    ends = [_last_births(table) for table in tables]
+    for one, other in ((0, 1), (1, 0)):
+        for island, births in sorted(ends[one].items()):
+            there = pa.compute.any(_is_at(tables[other], island, births))
+            if births >= ends[other].get(island, 0) or there.as_py():
+                continue
+            rows = _is_at(tables[one], island, births)
+            tables[one] = tables[one].filter(pa.compute.invert(rows))
+            lines.append(
+                f"population: not compared at {births} births of island {island}, "
+                f"where the last brood of {folders[one]} ends and that of the longer "
+                "run goes on"
+            )
+    return lines
+
+
+def _last_births(population: pa.Table) -> dict[int, int]:
+    """Return the number of births of the last population of each island."""
+    found = population.group_by("island").aggregate([("births", "max")])
+    names = ("island", "births_max")
+    return dict(zip(*(found[name].to_pylist() for name in names), strict=True))
+
+
+def _is_at(population: pa.Table, island: int, births: int) -> pa.ChunkedArray:
+    """Return which rows are of an island at a number of births."""
+    is_there = pa.compute.equal(population["island"], island)
+    is_then = pa.compute.equal(population["births"], births)
+    return pa.compute.and_(is_there, is_then)
+
+
+def _difference(name: str, tables: list[pa.Table], columns: list[str]) -> list[str]:
+    """Return a line on the first difference of two tables of one name, if any."""
     found = [
         (row, column)
         for column in columns
         if (row := _first_difference(*(table[column] for table in tables))) is not None
     ]
-    if found:
-        row, column = min(found, key=itemgetter(0))
-        one, other = (table[column][row].as_py() for table in tables)
-        lines.append(
-            f"{name}: first at record {row}, column {column}: "
-            f"{_short(one)} against {_short(other)}"
-        )
-    return lines
+    if not found:
+        return []
+    row, column = min(found, key=itemgetter(0))
+    one, other = (table[column][row].as_py() for table in tables)
+    values = f"{_short(one)} against {_short(other)}"
+    return [f"{name}: first at record {row}, column {column}: {values}"]
 
 
 def _first_difference(ours: pa.ChunkedArray, theirs: pa.ChunkedArray) -> int | None:

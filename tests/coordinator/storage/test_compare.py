@@ -122,6 +122,28 @@ def test_missing_rows_are_counted_and_the_common_ones_compared(
     ]
 
 
+@pytest.mark.parametrize("is_equal", [True, False])
+def test_the_last_smaller_brood_of_a_shorter_run_is_named_and_left_out(
+    tmp_path: Path, make_records: Make, *, is_equal: bool
+) -> None:
+    """The run of 8 births has populations at 3, 6 and 8 births, the other at 9, too."""
+    shorter = make_records(8)
+    shorter += [replace(each, row={**each.row, "births": 8}) for each in shorter[-7:-4]]
+    assert [each.table for each in shorter[-4:]] == ["evaluations", *["population"] * 3]
+    if not is_equal:
+        shorter = changed(shorter, 15, "fitness", 0.25)
+    first = written(tmp_path / "a", shorter)
+    second = written(tmp_path / "b", make_records(12))
+    early = (
+        f"population: not compared at 8 births of island 0, where the last brood of "
+        f"{first} ends and that of the longer run goes on"
+    )
+    difference = "population: first at record 3, column fitness: 0.25 against 0.5"
+    expected = [early] if is_equal else [early, difference]
+    assert compare(first, second)[3:] == expected
+    assert compare(second, first)[3] == early
+
+
 def test_different_platforms_are_named_beside_a_difference(
     tmp_path: Path, make_records: Make
 ) -> None:
