@@ -20,6 +20,7 @@ from analysis.viewer.replay import (
     rows_by_robot,
     shown_run,
 )
+from analysis.viewer.scene import scene_of
 from schema.agent.log import tell_user
 from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.file import own_experiment
@@ -98,7 +99,7 @@ def draw_film(
 
     Raises:
         RunFolderError: the folder has no run, or the run has no robot yet.
-        NoPictures: no poses are recorded.
+        NoPictures: the run has no arena, or no poses are recorded.
     """
     run = shown_run(folder)
     allow_plugins_of(folder)
@@ -106,9 +107,13 @@ def draw_film(
     bodies = {one.birth: one.body for one in read_news(run).births}
     found = read_frames(folder, *span)
     if not found:
+        why = (
+            f"no poses of an arena between {span[0]:g} and {span[1]:g} s"
+            if scene_of(experiment).arenas
+            else "the run has no arena"
+        )
         raise NoPictures(
-            f"{folder}: no poses of an arena between {span[0]:g} and {span[1]:g} s; "
-            "for the film of a robot use: revolve robot render"
+            f"{folder}: {why}; for the film of a robot use: revolve robot render"
         )
     times_s = sorted({time_s for frames in found.values() for time_s in frames})
     with ExitStack() as stack, bars(f"rendering {len(times_s)} pictures") as bar:
