@@ -114,16 +114,22 @@ def _print_table(
 
 
 def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
-    """Return name, run, births, judged robots, mean and best of each island's last."""
+    """Return name, run, births, judged robots, mean and best of each island's last.
+
+    The island is named beside the run, unless it is island 0 and the only one.
+    """
+    rows = last_rows(populations)
+    divided = {row["folder"] for row in rows if row["island"]}
     return [
         (
             row["experiment"],
-            Path(row["folder"]).name + (f" {row['island']}" if row["island"] else ""),
+            Path(row["folder"]).name
+            + (f" {row['island']}" if row["folder"] in divided else ""),
             str(row["births"]),
             str(row["judged"]),
             *("-" if row[name] is None else rounded(row[name]) for name in _FITNESS),
         )
-        for row in last_rows(populations)
+        for row in rows
     ]
 
 

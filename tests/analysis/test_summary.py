@@ -53,6 +53,15 @@ def test_folded_names_are_complete() -> None:
     assert "".join(run.strip() for _, run in cells).replace(" ", "") == f"{NAME}-123"
 
 
+def test_all_islands_of_a_run_are_named_if_it_has_several() -> None:
+    (row, _) = ROWS["populations"]
+    places = [("runs/arch", 0), ("runs/arch", 1), ("runs/alone", 0)]
+    rows = [row | {"folder": folder, "island": island} for folder, island in places]
+    lines = output({"populations": rows}, 120).splitlines()
+    runs = [line.split("│")[2].strip() for line in lines if line.startswith("│")]
+    assert runs == ["alone", "arch 0", "arch 1"]
+
+
 def test_failed_evaluations_that_are_the_best_are_named() -> None:
     (row, _) = ROWS["populations"]
     rows = [row | {"folder": name, "fitness_best": best}
