@@ -17,7 +17,7 @@ SPAN_S = 10.0
 
 @contextmanager
 def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
-    """Show progress bars on a terminal; in a log, a title, and lines every ``SPAN_S``.
+    """Show progress bars on a terminal; in a log, a title, and lines at intervals.
 
     Args:
         title: text printed in a log.
@@ -44,14 +44,17 @@ def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
 
 @contextmanager
 def _lines(progress: Progress, console: Console) -> Iterator[None]:
-    """Print a line about the unfinished tasks every ``SPAN_S``."""
+    """Print a line about the unfinished tasks every ``SPAN_S`` if it has changed."""
     has_ended = Event()
 
     def tell() -> None:
+        last = ""
         while not has_ended.wait(SPAN_S):
             unfinished = [task for task in progress.tasks if not task.finished]
-            if unfinished:
-                print_line(console, "; ".join(map(_count, unfinished)))
+            line = "; ".join(map(_count, unfinished))
+            if line and line != last:
+                print_line(console, line)
+                last = line
 
     thread = Thread(target=tell, daemon=True)
     thread.start()
@@ -74,7 +77,8 @@ def _count(task: Task) -> str:
 class ProgressLine:
     """Progress of a task of unknown length; a context manager.
 
-    A line that is updated on a terminal, a line every ``SPAN_S`` in a log.
+    A line that is updated on a terminal; in a log, a line every ``SPAN_S`` if it has
+    changed.
 
     Args:
         console: console to print on; standard error by default.
@@ -84,6 +88,7 @@ class ProgressLine:
         self._console = console or Console(stderr=True)
         self._line = Status("", console=self._console)
         self._next_s = -math.inf
+        self._last = ""
 
     def __enter__(self) -> Self:
         return self
@@ -101,8 +106,9 @@ class ProgressLine:
         if self._console.is_terminal:
             self._line.start()
             self._line.update(Text(text))
-        elif now_s >= self._next_s:
+        elif now_s >= self._next_s and text != self._last:
             self._next_s = now_s + SPAN_S
+            self._last = text
             print_line(self._console, text)
 
 
