@@ -2,7 +2,7 @@
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,7 +77,7 @@ class Deployment:
 @contextmanager
 def connected_agents(
     folder: Path, deployment: Deployment
-) -> Iterator[tuple[Network | LocalAgents, list[ProcessPool]]]:
+) -> Iterator[tuple[Network | LocalAgents, dict[AgentKind, ProcessPool]]]:
     """Open the connection to agents and start the processes of a deployment.
 
     Args:
@@ -85,11 +85,11 @@ def connected_agents(
         deployment: what to open and start.
 
     Yields:
-        The connection, and the process pools that need regular supervision.
+        The connection, and the process pools by kind, which need regular supervision.
     """
     if deployment.answers is not None:
         keep_flags(folder, deployment.resume_flags)
-        yield LocalAgents(deployment.answers, platform_tag()), []
+        yield LocalAgents(deployment.answers, platform_tag()), {}
         return
     with ExitStack() as stack:
         network = stack.enter_context(
@@ -113,7 +113,7 @@ def connected_agents(
         if deployment.view:
             open_viewer(network.own_address, deployment.fleet, deployment.tls)
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
-        pools: list[ProcessPool] = []
+        pools: dict[AgentKind, ProcessPool] = {}
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
                 kind, f"own-{kind}", network.own_address, deployment.fleet,
@@ -123,15 +123,15 @@ def connected_agents(
                 plugins=allowed(),
             )  # fmt: skip
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
-            pools.append(stack.enter_context(pool))
+            pools[kind] = stack.enter_context(pool)
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
         # All at once before one is waited for: their grace times run together.
-        stack.callback(_terminate, pools)
+        stack.callback(_terminate, pools.values())
         yield network, pools
 
 
-def _terminate(pools: list[ProcessPool]) -> None:
+def _terminate(pools: Iterable[ProcessPool]) -> None:
     for pool in pools:
         pool.terminate()
 

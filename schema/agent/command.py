@@ -262,7 +262,7 @@ def run_pool(
                 for death in process_pool.deaths[deaths:]:
                     warn_user(tell_death(death))
                 if process_pool.restarts > restarts:
-                    warn_user(f"a {role} process ended and is restarted")
+                    warn_user(tell_restart(role))
                 restarts, deaths = process_pool.restarts, len(process_pool.deaths)
                 if GAVE_UP in process_pool.exit_codes:
                     tell_error(gave_up(connect, options.give_up_after))
@@ -290,6 +290,16 @@ def _name(given: str | None, connect: str, tls: Tls | None) -> str:
             f"--name: must be {name!r}, the name of {tls.certificate}, got {given!r}"
         )
     return check_name(name, tls.certificate)
+
+
+def tell_restart(role: Role) -> str:
+    """Return a line about a process that ended.
+
+    Args:
+        role: of the process.
+    """
+    article = "an" if role == "analyzer" else "a"
+    return f"{article} {role} process ended and is restarted"
 
 
 def tell_death(death: Death) -> str:

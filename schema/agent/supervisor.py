@@ -92,6 +92,7 @@ class ProcessPool:
     Attributes:
         restarts: number of restarts.
         exits: number of processes that exited by themselves outside a job.
+        losses: number of the other processes that ended: killed, or in a job.
         deaths: of the processes that their jobs crashed.
     """
 
@@ -109,7 +110,7 @@ class ProcessPool:
         self._codes: list[int | None] = [None] * size
         self._until_s: float | None = None
         self.restarts = 0
-        self.exits = 0
+        self.exits = self.losses = 0
         self.deaths: list[Death] = []
 
     def __enter__(self) -> Self:
@@ -160,7 +161,9 @@ class ProcessPool:
                 self._pauses_s[index] = _BETWEEN_STARTS_S
             self._due_s[index] = now_s + self._pauses_s[index]
             self._pauses_s[index] = min(2.0 * self._pauses_s[index], _LONGEST_PAUSE_S)
-        elif task is not None and (cause := crash_cause(code)):
+            return
+        self.losses += 1
+        if task is not None and (cause := crash_cause(code)):
             death = Death(task, cause)
             self.deaths.append(death)
             deaths = (*slot.deaths, death)[-LAST_DEATHS:]
