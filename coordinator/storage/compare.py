@@ -11,6 +11,7 @@ from coordinator.storage.folder import read_details
 from schema.errors import ExperimentError
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.tables.columns import TABLES, repeatable
+from schema.tables.description import read_state
 from schema.tables.files import read_table
 
 LONGEST = 60
@@ -25,7 +26,8 @@ def compare(first: Path, second: Path) -> list[str]:
         second: another run folder.
 
     Returns:
-        One line for each run without births, for each table whose number of rows
+        One line for each run that has no births or is the shorter one and not
+        finished, for each table whose number of rows
         differs, and for the first differing row and column of each table; nothing
         if the runs are equal. A line also names the population of a last brood that
         is smaller than in the longer run, as it has no counterpart there. If the runs
@@ -48,16 +50,13 @@ def compare(first: Path, second: Path) -> list[str]:
             lines += _drop_early_ends(tables, (first, second))
         lines += _difference(name, tables, repeatable(schema))
         if name == "births":
-            lines += [
-                f"{folder}: has no births yet, so there is nothing to compare"
-                for folder, table in zip((first, second), tables, strict=True)
-                if not table.num_rows
-            ]
+            lines += _unfinished((first, second), tables)
         if "platform" in schema.names:
             for found, table in zip(platforms, tables, strict=True):
                 found.update(pa.compute.unique(table["platform"]).to_pylist())
-    if lines and platforms[0] != platforms[1]:
-        ours, theirs = (", ".join(sorted(each)) or "none" for each in platforms)
+    # Arenas do not record their platform before they end.
+    if lines and all(platforms) and platforms[0] != platforms[1]:
+        ours, theirs = (", ".join(sorted(each)) for each in platforms)
         lines.append(
             f"platforms differ: {ours} against {theirs}; only runs on the same "
             "platform are guaranteed to be equal"
@@ -87,6 +86,18 @@ def _with_defaults(document: str) -> str:
         return experiment_text(experiment_from_text(document))
     except ExperimentError:
         return document
+
+
+def _unfinished(folders: tuple[Path, Path], births: list[pa.Table]) -> list[str]:
+    """Return a line for each run without births, and for a shorter, unfinished one."""
+    most = max(table.num_rows for table in births)
+    lines = []
+    for folder, table in zip(folders, births, strict=True):
+        if not table.num_rows:
+            lines.append(f"{folder}: has no births yet, so there is nothing to compare")
+        elif table.num_rows < most and read_state(folder) != "finished":
+            lines.append(f"{folder}: is not finished, so it has fewer rows")
+    return lines
 
 
 def _unequal_rows(name: str, tables: list[pa.Table]) -> list[str]:

@@ -19,12 +19,13 @@ Make = Callable[..., list[Record]]
 
 def written(path: Path, rows: list[Record], *, is_finished: bool = True) -> Path:
     """Write a run; return its folder."""
-    with RunFolder(path, DETAILS):
+    with RunFolder(path, DETAILS) as held:
         recorder = Recorder(path, DETAILS)
         for record in rows:
             recorder.write(record)
         if is_finished:
             recorder.finish()
+            held.set_state("finished")
         else:
             recorder.flush()
             recorder.close()
@@ -117,6 +118,7 @@ def test_missing_rows_are_counted_and_the_common_ones_compared(
     second = written(tmp_path / "b", make_records(9), is_finished=False)
     assert compare(first, second) == [
         "births: 12 rows against 9",
+        f"{second}: is not finished, so it has fewer rows",
         "evaluations: 12 rows against 9",
         "population: 12 rows against 9",
     ]
@@ -157,6 +159,18 @@ def test_different_platforms_are_named_beside_a_difference(
             "platform are guaranteed to be equal"
         ),
     ]
+
+
+def test_a_run_without_a_recorded_platform_differs_from_none(
+    tmp_path: Path, make_records: Make
+) -> None:
+    rows = make_records(9)
+    births = [each for each in rows if each.table == "births"]
+    first = written(tmp_path / "a", rows)
+    second = written(tmp_path / "b", births, is_finished=False)
+    lines = compare(first, second)
+    assert "evaluations: 9 rows against 0" in lines
+    assert not any("platform" in line for line in lines)
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path: Path, make_records: Make) -> None:
