@@ -15,7 +15,7 @@ from analysis.measures.fitness_functions import (
     functions_of,
     measured_apart,
 )
-from analysis.measures.last_populations import failures_as_best, last_rows
+from analysis.measures.populations import failures_as_best, last_rows
 from analysis.progress import print_line
 from schema.errors import rounded
 

@@ -13,7 +13,7 @@ from analysis.measures.fitness_functions import (
     fitness_unit,
     functions_of,
 )
-from analysis.measures.last_populations import failures_as_best
+from analysis.measures.populations import failures_as_best
 from analysis.report.fitness import run_names
 from analysis.report.html import cell, duration, folded, plural, table
 

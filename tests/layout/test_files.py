@@ -1,4 +1,4 @@
-"""Checks that no committed file contains a local path or a registry's address."""
+"""Checks of committed files: no local paths or registries; rooms and packages small."""
 
 import re
 import shutil
@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 
 # Joined at run time so that this file does not contain them either.
 HOSTS = tuple(
@@ -43,6 +44,22 @@ def texts() -> dict[str, str]:
         path.relative_to(ROOT).as_posix(): path.read_text("utf-8", errors="ignore")
         for path in tracked()
     }
+
+
+def test_rooms_and_packages_hold_few_names() -> None:
+    """A room has at most 12 names beside its commands, a package at most 20 files."""
+    names: dict[str, set[str]] = {}
+    for path in tracked():
+        room, *rest = path.relative_to(ROOT).parts
+        if room in ROOMS and path.suffix == ".py" and path.name != "__init__.py":
+            names.setdefault(room, set()).add(rest[0])
+            if len(rest) > 1:
+                package = "/".join((room, *rest[:-1]))
+                names.setdefault(package, set()).add(path.name)
+    assert names.keys() > set(ROOMS)
+    for room in ROOMS:
+        assert len(names.pop(room) - {"__main__.py"}) <= 12, room
+    assert {name: len(each) for name, each in names.items() if len(each) > 20} == {}
 
 
 def test_no_file_contains_the_address_of_a_registry() -> None:
