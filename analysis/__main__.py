@@ -48,8 +48,8 @@ def main(arguments: list[str]) -> int:
     options = parser(arguments[0]).parse_args(arguments[1:])
     if arguments[0] == "robot render":
         simulate = _simulation()
-        from analysis.render.command import render
-
+        with _extra("pictures need", "pictures"):
+            from analysis.render.command import render
         return render(options, simulate)
     if arguments[0] == "view":
         return _view(options)

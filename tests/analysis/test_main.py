@@ -1,0 +1,40 @@
+"""Commands whose libraries are not installed name the command that installs them."""
+
+import subprocess
+import sys
+
+import pytest
+
+HIDE = """
+import sys
+sys.modules[sys.argv[1]] = None
+from analysis.__main__ import main
+from schema.errors import RevolveError
+try:
+    main(sys.argv[2:])
+except RevolveError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(
+    ("library", "words", "extra"),
+    [
+        ("PIL", ("robot render", "best.yaml", "best.png"), "pictures"),
+        ("PIL", ("view", "run", "--save", "arena.gif"), "pictures"),
+        ("rerun", ("view", "run", "--save", "run.rrd"), "view"),
+        ("plotnine", ("analyze", "run"), "analysis"),
+    ],
+)
+def test_a_missing_library_is_named_with_its_extra(
+    library: str, words: tuple[str, ...], extra: str
+) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", HIDE, library, *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert f"[{extra}]" in done.stdout
+    assert "install" in done.stdout
