@@ -6,14 +6,13 @@ from statistics import mean
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import (
     fitness_unit,
     functions_of,
 )
-from analysis.measures.populations import failures_as_best
+from analysis.measures.populations import failures_as_best, last_rows
 from analysis.report.fitness import run_names
 from analysis.report.html import cell, duration, folded, plural, table
 
@@ -66,7 +65,7 @@ def summary(tables: Tables) -> str:
     if not rows:
         return ""
     warning = failures_as_best(tables)
-    noted = f'<p class="warning">{escape(warning)}.</p>'.replace(">a ", ">A ", 1)
+    noted = f'<p class="warning">{escape(warning[:1].upper() + warning[1:])}.</p>'
     return (
         table(heads, rows)
         + noted * bool(warning)
@@ -151,14 +150,11 @@ def arenas(tables: Tables) -> str:
 
 def _last_fitness(populations: pa.Table) -> dict[str, tuple[float, float]]:
     """Return best and mean fitness of the last populations of each run, by folder."""
-    judged = populations.filter(pc.field("fitness").is_valid())
-    keys = ["folder", "island"]
-    last = judged.group_by(keys).aggregate([("births", "max")])
-    rows = judged.join(last, keys).filter(pc.field("births") == pc.field("births_max"))
     islands: dict[str, list[tuple[float, float]]] = {}
-    for row in rows.to_pylist():
-        both = row["fitness_best"], row["fitness"]
-        islands.setdefault(row["folder"], []).append(both)
+    for row in last_rows(populations):
+        if row["fitness"] is not None:
+            both = row["fitness_best"], row["fitness"]
+            islands.setdefault(row["folder"], []).append(both)
     return {
         folder: (max(best for best, _ in each), mean(value for _, value in each))
         for folder, each in islands.items()

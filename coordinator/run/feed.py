@@ -7,6 +7,7 @@ so that a viewer that connects late or lost an update gets the whole.
 from collections import Counter, defaultdict
 from typing import Any
 
+from msgspec.msgpack import Decoder, encode
 from msgspec.structs import replace
 
 from coordinator.islands.events import Record
@@ -24,6 +25,8 @@ from schema.wire.updates import (
     read_levels,
     read_migrant,
 )
+
+_BIRTH, _DEATH, _LEVEL = Decoder(Birth), Decoder(Death), Decoder(Level)
 
 
 class Feed:
@@ -46,12 +49,12 @@ class Feed:
             run, epoch, 0, is_whole=True, experiment=details.name,
             document=details.document,
         )  # fmt: skip
-        self._births: dict[BirthId, Birth] = {}
-        self._bodies: list[BirthId] = []
-        self._dead: set[BirthId] = set()
+        # Bytes take less than half the memory of objects. Births are without bodies.
+        self._births: list[bytes] = []
+        self._deaths: list[bytes] = []
+        self._levels: list[bytes] = []
+        self._bodies: dict[BirthId, tuple[int, Birth]] = {}
         self._born = Counter[int]()
-        self._deaths: list[Death] = []
-        self._levels: dict[tuple[int, int], Level] = {}
         self._newest: dict[int, Level] = {}
         self._migrants: list[Migrant] = []
         # By table: births, deaths, migrants, and rows of populations.
@@ -95,35 +98,40 @@ class Feed:
 
     def whole(self) -> Update:
         """Return everything that ``update`` has returned so far, as one update."""
+        births = [_BIRTH.decode(each) for each in self._births]
+        for index, birth in self._bodies.values():
+            births[index] = birth
+        levels = [_LEVEL.decode(each) for each in self._levels]
         return replace(
             self._past,
-            births=tuple(self._births.values()),
-            deaths=tuple(self._deaths),
-            levels=tuple(self._levels.values()),
+            births=tuple(births),
+            deaths=tuple(_DEATH.decode(each) for each in self._deaths),
+            levels=(*levels, *self._newest.values()),
             migrants=tuple(self._migrants),
         )
 
     def _remember(self, update: Update) -> None:
         """Add an update to the past; drop the bodies of dead robots."""
-        self._migrants += update.migrants
-        self._deaths += update.deaths
-        self._dead.update(gone.birth for gone in update.deaths)
+        for birth in update.births:
+            self._bodies[birth.birth] = len(self._births), birth
+            self._births.append(encode(replace(birth, body=None)))
+        for death in update.deaths:
+            self._bodies.pop(death.birth, None)
+            self._deaths.append(encode(death))
         for level in update.levels:
-            if before := self._newest.get(level.island):
-                short = replace(before, members=())
-                self._levels[before.island, before.births] = short
-            self._levels[level.island, level.births] = level
+            before = self._newest.get(level.island, level)
+            if before.births != level.births:
+                self._levels.append(encode(replace(before, members=())))
             self._newest[level.island] = level
-        self._births.update((one.birth, one) for one in update.births)
-        self._bodies += [one.birth for one in update.births]
+        self._migrants += update.migrants
         members = {birth for level in self._newest.values() for birth in level.members}
-        kept: list[BirthId] = []
-        for birth in self._bodies:
-            one = self._births[birth]
-            newest = self._newest.get(birth.island)
-            is_new = newest is None or one.births > newest.births
-            if birth not in self._dead and (is_new or birth in members):
-                kept.append(birth)
-            else:
-                self._births[birth] = replace(one, body=None)
-        self._bodies = kept
+        self._bodies = {
+            name: (index, birth)
+            for name, (index, birth) in self._bodies.items()
+            if name in members or self._is_new(birth)
+        }
+
+    def _is_new(self, birth: Birth) -> bool:
+        """Return whether no population of its island is as new as a birth."""
+        newest = self._newest.get(birth.birth.island)
+        return newest is None or birth.births > newest.births

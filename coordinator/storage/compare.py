@@ -101,9 +101,33 @@ def _unfinished(folders: tuple[Path, Path], births: list[pa.Table]) -> list[str]
 
 
 def _unequal_rows(name: str, tables: list[pa.Table]) -> list[str]:
-    """Return a line if two tables of one name have different numbers of rows."""
+    """Return a line if two tables of one name have different numbers of rows.
+
+    Tables with as many rows are compared island by island.
+    """
     ours, theirs = (table.num_rows for table in tables)
-    return [] if ours == theirs else [f"{name}: {ours} rows against {theirs}"]
+    if ours != theirs:
+        return [f"{name}: {ours} rows against {theirs}"]
+    for island in _islands(tables):
+        ours, theirs = (_of_island(table, island).num_rows for table in tables)
+        if ours != theirs:
+            return [f"{name}: {ours} rows of island {island} against {theirs}"]
+    return []
+
+
+def _islands(tables: list[pa.Table]) -> list[int | None]:
+    """Return the islands of two tables, ascending; one None if they name none."""
+    if "island" not in tables[0].column_names:
+        return [None]
+    found = (pa.compute.unique(table["island"]).to_pylist() for table in tables)
+    return sorted(set[int].union(*map(set, found)))
+
+
+def _of_island(table: pa.Table, island: int | None) -> pa.Table:
+    """Return a table's rows of one island; all if it is None."""
+    if island is None:
+        return table
+    return table.filter(pa.compute.equal(table["island"], island))
 
 
 def _drop_early_ends(tables: list[pa.Table], folders: tuple[Path, Path]) -> list[str]:
@@ -148,18 +172,28 @@ def _is_at(population: pa.Table, island: int, births: int) -> pa.ChunkedArray:
 
 
 def _difference(name: str, tables: list[pa.Table], columns: list[str]) -> list[str]:
-    """Return a line on the first difference of two tables of one name, if any."""
-    found = [
-        (row, column)
-        for column in columns
-        if (row := _first_difference(*(table[column] for table in tables))) is not None
-    ]
-    if not found:
-        return []
-    row, column = min(found, key=itemgetter(0))
-    one, other = (table[column][row].as_py() for table in tables)
-    values = f"{_short(one)} against {_short(other)}"
-    return [f"{name}: first at record {row}, column {column}: {values}"]
+    """Return a line on the first difference of two tables of one name, if any.
+
+    Tables are sorted by island, and each island is compared by itself: where one has
+    fewer rows, the rows of the next island have other record numbers.
+    """
+    islands = _islands(tables)
+    for island in islands:
+        common = [_of_island(table, island) for table in tables]
+        found = [
+            (row, column)
+            for column in columns
+            if column != "record"
+            and (row := _first_difference(*(table[column] for table in common)))
+            is not None
+        ]
+        if found:
+            row, column = min(found, key=itemgetter(0))
+            one, other = (table[column][row].as_py() for table in common)
+            place = f" of island {island}" if len(islands) > 1 else ""
+            values = f"{_short(one)} against {_short(other)}"
+            return [f"{name}: first at record {row}{place}, column {column}: {values}"]
+    return []
 
 
 def _first_difference(ours: pa.ChunkedArray, theirs: pa.ChunkedArray) -> int | None:

@@ -66,7 +66,7 @@ def test_the_first_difference_of_a_table_is_named(
     # Record 3 and, in an earlier column, record 7 of the births.
     births = [index for index, each in enumerate(rows) if each.table == "births"]
     other = changed(rows, births[3], "genome", b"\x00" * 100)
-    other = changed(other, births[7], "island", 4)
+    other = changed(other, births[7], "birth", 99)
     first = written(tmp_path / "a", rows)
     second = written(tmp_path / "b", other, is_finished=is_finished)
     (line,) = compare(first, second)
@@ -122,6 +122,27 @@ def test_missing_rows_are_counted_and_the_common_ones_compared(
         "evaluations: 12 rows against 9",
         "population: 12 rows against 9",
     ]
+
+
+def test_islands_are_compared_one_by_one(tmp_path: Path, make_records: Make) -> None:
+    births = [each for each in make_records(12) if each.table == "births"]
+    rows = [
+        replace(each, row={**each.row, "island": index % 2})
+        for index, each in enumerate(births)
+    ]
+    first = written(tmp_path / "a", rows)
+    second = written(tmp_path / "b", rows[:7], is_finished=False)
+    shorter = [
+        "births: 12 rows against 7",
+        f"{second}: is not finished, so it has fewer rows",
+    ]
+    assert compare(first, second) == shorter
+    other = written(tmp_path / "c", changed(rows, 5, "rank", 40))
+    assert compare(second, other)[1] == (
+        "births: first at record 2 of island 1, column rank: 2 against 40"
+    )
+    moved = written(tmp_path / "d", changed(rows, 11, "island", 0))
+    assert compare(first, moved) == ["births: 6 rows of island 0 against 7"]
 
 
 @pytest.mark.parametrize("is_equal", [True, False])
