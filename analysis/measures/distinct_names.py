@@ -1,4 +1,4 @@
-"""Distinct names for experiments of the same name with different settings.
+"""Distinct names for experiments with different settings, and how these differ.
 
 A mean over runs with different settings would describe neither experiment. The source
 of a plug-in counts as a setting: an edited fitness function is another one. The number
@@ -29,7 +29,8 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
 
     The settings that most runs of a name have (the first of equally many) keep the
     name. The next settings become ``name~2``, or the next free number, and ``differs``
-    lists how they differ.
+    lists how they differ. For any other experiment, ``differs`` lists how it differs
+    from the first one, and names that one.
 
     Args:
         runs: runs of any experiments.
@@ -47,7 +48,18 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
             differs = _compared(group[0], first[0])
             for run in group:
                 renamed[id(run)] = replace(run, experiment=experiment, differs=differs)
-    return [renamed.get(id(run), run) for run in runs]
+    named = [renamed.get(id(run), run) for run in runs]
+    kept = {run.experiment: run for run in reversed(named) if not run.differs}
+    first_kept = next((run for run in named if not run.differs), None)
+    against_first = {
+        name: f"{text} (compared with {first_kept.experiment})"
+        for name, run in kept.items()
+        if first_kept is not None and (text := _compared(run, first_kept))
+    }
+    return [
+        replace(run, differs=run.differs or against_first.get(run.experiment, ""))
+        for run in named
+    ]
 
 
 def _settings(document: str) -> dict[str, Any]:

@@ -65,7 +65,8 @@ class Run:
         state: finished, stopped or running (also if it was killed).
         document: the experiment as JSON.
         islands: settings of each island.
-        differs: settings that differ from other runs of the same experiment name.
+        differs: settings that differ from other runs of the same experiment name, or
+            from those of the first experiment.
         has_measures: the experiment names measures of robots.
         function: fitness function; empty if the document does not name one.
         fitness: fitness functions as ``fitness_text``, with digests of their sources.

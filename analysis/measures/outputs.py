@@ -117,7 +117,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "births": "recorded births of all islands",
         "planned": "births of all islands in a finished run",
         "islands": "number of islands",
-        "differs": "settings that differ from most runs of the same experiment name",
+        "differs": "settings that differ from most runs of the same experiment name, "
+        "or from those of the experiment that is named at the end",
         "function": "fitness function",
         "failures": "failed evaluations, and robots of arenas whose physics diverged",
         "duration_s": "time from the start to the end of the run, pauses included [s]",

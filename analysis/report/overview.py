@@ -19,8 +19,8 @@ from analysis.report.html import cell, duration, folded, plural, table
 Tables = Mapping[str, pa.Table]
 Row = Mapping[str, Any]
 
-_MOST_ARENAS = 3
-"""Runs of arenas that are described without a fold."""
+_MOST_LINES = 3
+"""Differing experiments, or runs of arenas, that are described without a fold."""
 
 
 def summary(tables: Tables) -> str:
@@ -33,13 +33,11 @@ def summary(tables: Tables) -> str:
     fitness = _last_fitness(tables["populations"])
     names = in_order(row["experiment"] for row in runs)
     paint = colours(names)
-    has_settings = any(row["differs"] for row in runs)
     functions = functions_of(tables["runs"])
     has_functions = len(set(functions.values())) > 1
     heads = ["experiment", *(["fitness function"] if has_functions else []), "runs",
              "births of a run", "best fitness", "mean of bests", "mean of populations",
-             "time of a run", "failures",
-             *(["settings"] if has_settings else [])]  # fmt: skip
+             "time of a run", "failures"]  # fmt: skip
     rows = []
     for name in names:
         mine = [row for row in runs if row["experiment"] == name]
@@ -59,7 +57,6 @@ def summary(tables: Tables) -> str:
             *(cell(mean(each) if each else None) for each in _columns(known)),
             cell(duration(mean(times) if times else None)),
             cell(sum(failures) if failures else None),
-            *([cell(mine[0]["differs"] or "")] if has_settings else []),
         ]
         rows.append(cells)
     if not rows:
@@ -68,11 +65,24 @@ def summary(tables: Tables) -> str:
     noted = f'<p class="warning">{escape(warning[:1].upper() + warning[1:])}.</p>'
     return (
         table(heads, rows)
+        + _differing({row["experiment"]: row["differs"] for row in runs})
         + noted * bool(warning)
         + _summary_note(
             set(functions.values()), has_islands=any(row["islands"] > 1 for row in runs)
         )
     )
+
+
+def _differing(differs: Mapping[str, str]) -> str:
+    """Return how the settings of each experiment differ from those of another one."""
+    lines = [
+        f"<p>{escape(label(name))}: {escape(text)}</p>"
+        for name, text in differs.items()
+        if text
+    ]
+    if len(lines) > _MOST_LINES:
+        return folded(f"Settings of {len(lines)} experiments", "".join(lines))
+    return "".join(lines)
 
 
 def _columns(rows: Sequence[tuple[float, float]]) -> list[list[float]]:
@@ -143,7 +153,7 @@ def arenas(tables: Tables) -> str:
         "none."
     )
     content = "".join(f"<p>{escape(line)}</p>" for line in lines)
-    if len(lines) > _MOST_ARENAS:
+    if len(lines) > _MOST_LINES:
         content = folded(f"Births and deaths in {len(lines)} runs of arenas", content)
     return f'{content}<p class="note">{rule}</p>'
 

@@ -145,6 +145,29 @@ def test_an_edited_plug_in_is_another_setting() -> None:
     ]
 
 
+def test_other_experiments_are_compared_with_the_first() -> None:
+    other = changed(simulation={"friction": 0.5})
+    third = changed(selection={"population": 30})
+    some = [*runs(SCENARIO), *runs(other), *runs(third, third, other, name="mine")]
+    against = "(compared with scenario1)"
+    friction = "simulation.friction: 0.5 instead of"
+    found = [(run.experiment, run.differs) for run in with_distinct_names(some)]
+    assert found[0] == ("scenario1", "")
+    assert (
+        found[2:4]
+        == [("mine", f"selection.population: 30 instead of 15 {against}")] * 2
+    )
+    assert [name for name, _ in found] == [
+        "scenario1",
+        "scenario1~2",
+        *["mine"] * 2,
+        "mine~2",
+    ]
+    for _, differs in (found[1], found[4]):
+        assert friction in differs
+        assert against not in differs
+
+
 def test_each_name_is_numbered_separately() -> None:
     some = [*runs(SCENARIO), *runs(changed(births=5), name="mine")]
     some += runs(json.loads(experiment_text(Experiment("mine"))), name="mine")
