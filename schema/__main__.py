@@ -7,12 +7,10 @@ from schema.agent.flags import Flags, add_plugins
 from schema.errors import RevolveError, counted
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.run_settings import experiment_of, types_of
-from schema.parts import PARAMETRIC_BAR_JOINT, BodySpace
+from schema.parts import BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import NeuronKinds, neuron_names
 from schema.robot.robot import Robot
-
-_BAR_UNITS = {"connection_length": "mm", "alpha": "rad", "beta": "rad"}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -115,17 +113,15 @@ def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> Non
             )
         own = space[part.kind].own_parameters
         for parameter, value in zip(own, part.parameters, strict=False):
-            label += f", {parameter.name} {value:g}"
-            if part.kind == PARAMETRIC_BAR_JOINT.name:
-                label += f" {_BAR_UNITS[parameter.name]}"
+            label += f", {parameter.text(value)}"
         trees.append(Tree(Text(label)))
         if index:
             trees[part.parent].children.append(trees[index])
     for number, neuron in enumerate(robot.brain.neurons):
-        own_names = [each.name for each in kinds.get(neuron.kind, ())]
+        own = kinds.get(neuron.kind, ())
         values = ", ".join(
-            f"{name} {value:g}"
-            for name, value in zip(own_names, neuron.parameters, strict=False)
+            parameter.text(value)
+            for parameter, value in zip(own, neuron.parameters, strict=False)
         )
         kind = f"{neuron.kind}({values})" if values else neuron.kind
         branch = trees[neuron.part].add(Text(f"{names[number]} {kind}", style="cyan"))

@@ -156,7 +156,8 @@ class OwnSensor(Protocol):
 class Parameter:
     """Parameter of a part or neuron, drawn uniformly from [low, high].
 
-    Parameters that are not mutable (colours) keep their inherited value.
+    Parameters that are not mutable (colours) keep their inherited value. The unit is
+    for display; values are not converted.
     """
 
     name: str
@@ -164,6 +165,11 @@ class Parameter:
     high: float
     default: float
     is_mutable: bool = True
+    unit: str = ""
+
+    def text(self, value: float) -> str:
+        """Return name, value and unit, for example ``alpha 0.5 rad``."""
+        return f"{self.name} {value:g} {self.unit}".rstrip()
 
 
 class Shape(Struct, frozen=True, cache_hash=True):
@@ -337,10 +343,10 @@ PARAMETRIC_BAR_JOINT = PartType(
     2,
     _bar,
     own_parameters=(
-        Parameter("connection_length", 20.0, 100.0, 50.0),
-        Parameter("alpha", -math.pi / 2, math.pi / 2, 0.0),
+        Parameter("connection_length", 20.0, 100.0, 50.0, unit="mm"),
+        Parameter("alpha", -math.pi / 2, math.pi / 2, 0.0, unit="rad"),
         # Planar bodies, the default, have beta 0.
-        Parameter("beta", 0.0, 0.0, 0.0),
+        Parameter("beta", 0.0, 0.0, 0.0, unit="rad"),
     ),
     is_levelled=True,
     not_on=("ParametricBarJoint",),

@@ -124,8 +124,8 @@ IR_RANGE_M = 0.5
 _WHEEL_M = 0.003
 """Thickness of wheels [m]."""
 _MINUS_Z: Vector = (0.0, 0.0, -1.0)
-_RADIUS = Parameter("radius", 40.0, 80.0, 60.0)
-"""In millimetres, as the lengths in the genome of the original."""
+_RADIUS = Parameter("radius", 40.0, 80.0, 60.0, unit="mm")
+"""As the lengths in the genome of the original."""
 WHEEL_MOTOR = Motor(gain=0.0, max_torque=0.3924, max_velocity=5.236, control="velocity")
 """4 kg cm, 50 rpm; outputs from 0 to 1 command -50 to 50 rpm."""
 

@@ -7,7 +7,12 @@ import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.figures.forms import NothingToDraw, Tables, fitness_panels
+from analysis.figures.forms import (
+    NothingToDraw,
+    Tables,
+    fitness_panels,
+    fitness_text,
+)
 from analysis.figures.style import (
     OTHERS,
     in_order,
@@ -49,7 +54,11 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
         + p9.scale_colour_manual(hues[: len(names)], limits=names)
         + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))
         + p9.expand_limits(y=0)
-        + p9.labs(x="births on the island", y="mean fitness", colour="island ")
+        + p9.labs(
+            x="births on the island",
+            y=fitness_text(tables, "mean fitness"),
+            colour="island ",
+        )
         + theme_of_size(3.8)
         + p9.theme(legend_title=p9.element_text())
     )

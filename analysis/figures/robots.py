@@ -8,7 +8,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.statistics import half_interval
-from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables, fitness_panels
+from analysis.figures.forms import (
+    BAND_RUNS,
+    NothingToDraw,
+    Tables,
+    fitness_panels,
+    fitness_text,
+)
 from analysis.figures.style import (
     in_order,
     integer_breaks,
@@ -121,7 +127,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         + p9.facet_wrap(in_panels, ncol=2, scales="free_y" if functions else "fixed")
         + scales(tables, experiments, is_filled=False)
         + p9.expand_limits(y=0)
-        + p9.labs(x=axis, y="mean fitness")
+        + p9.labs(x=axis, y=fitness_text(tables, "mean fitness"))
         + theme_of_size(0.6 + 3.0 * lines)
     )
 

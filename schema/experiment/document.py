@@ -606,7 +606,7 @@ def body_space(space: Space) -> BodySpace:
 
 def _freed(kind: PartType) -> PartType:
     """Return a part type whose beta may vary; in planar bodies it is 0."""
-    free = Parameter("beta", 0.0, pi, 0.0)
+    free = Parameter("beta", 0.0, pi, 0.0, unit="rad")
     own = (free if each.name == "beta" else each for each in kind.own_parameters)
     return replace(kind, own_parameters=tuple(own))
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -159,6 +160,9 @@ def _parameter_problems(parameter: Parameter, at: str) -> Iterator[str]:
             f"{at} ({parameter.name}): must be finite with low <= default <= high, "
             f"got {shown(low)}, {shown(default)}, {shown(high)}"
         )
+    unit: Any = parameter.unit
+    if not isinstance(unit, str):
+        yield f"{at}.unit ({parameter.name}): must be a text, got {shown(unit)}"
 
 
 def _motor_problems(motor: Motor) -> Iterator[str]:

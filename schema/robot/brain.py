@@ -30,8 +30,8 @@ NEURON_TYPES: dict[str, tuple[Parameter, ...]] = {
     "Simple": _WEIGHTED,
     "Sigmoid": _WEIGHTED,
     "Oscillator": (
-        Parameter("period", 0.0, 10.0, 5.0),
-        Parameter("phase_offset", 0.0, 3.14, 0.0),
+        Parameter("period", 0.0, 10.0, 5.0, unit="s"),
+        Parameter("phase_offset", 0.0, 3.14, 0.0, unit="periods"),
         Parameter("amplitude", 0.0, 2.0, 1.0),
     ),
 }

@@ -54,7 +54,7 @@ def cpg_neurons(parameters: CpgParameters) -> NeuronKinds:
     low, high = parameters.lowest_hz, parameters.highest_hz
     return {
         PHASE_OSCILLATOR: (
-            Parameter("frequency", low, high, 0.5 * (low + high)),
+            Parameter("frequency", low, high, 0.5 * (low + high), unit="Hz"),
             Parameter("phase_offset", 0.0, 1.0, 0.0),
             Parameter("amplitude", 0.0, 1.0, 0.5),
             Parameter("centre", 0.0, 1.0, 0.5),

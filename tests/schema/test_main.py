@@ -61,6 +61,26 @@ def test_show(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert words in shown
 
 
+def test_show_has_the_units_of_parameters(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    experiment = path.with_name("mine.toml")
+    experiment.write_text(
+        'name = "mine"\n[space]\n'
+        'part_types = ["schema.parts:CORE", "schema.robogen_parts:ACTIVE_WHEEL"]'
+    )
+    path.write_text(
+        "body: {type: Core, children: {1: {slot: 0, type: ActiveWheel, id: wheel, "
+        "params: {radius: 45}}}}\nbrain: {neurons: [{part: wheel, layer: output, "
+        "type: Oscillator, params: {period: 2.5, phase_offset: 0.25}}]}"
+    )
+    words = ["robot", "show", str(path), "--experiment", str(experiment)]
+    assert main(words) == 0
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "orientation 0°, radius 45 mm" in shown
+    assert "Oscillator(period 2.5 s, phase_offset 0.25 periods, amplitude 1)" in shown
+
+
 def test_part_types_of_an_experiment(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

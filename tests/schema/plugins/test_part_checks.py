@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from msgspec.structs import replace as changed
@@ -153,6 +153,10 @@ WRONG = {
         r"own_parameters\[0\] \(size\): must be finite with .* got 1.0, 0.7, 0.5",
     ),
     "default": (measured(Parameter("size", 0.0, 1.0, 2.0)), r"got 0.0, 2.0, 1.0"),
+    "unit": (
+        measured(Parameter("size", 0.0, 1.0, 0.5, unit=cast("str", 1))),
+        r"own_parameters\[0\].unit \(size\): must be a text, got 1",
+    ),
     "name of a colour": (
         measured(Parameter("red", 0.0, 1.0, 0.5)),
         r"own_parameters: two are named 'red'",
