@@ -85,6 +85,11 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
         return read_mjcf(path)
     found = experiment_of(path, experiment, tells_default=True)
     settings = settings_of(found)
+    if found is not None and found.arena is not None:
+        sys.stderr.write(
+            "revolve: simulated alone; in an arena, fitness is that of a window of a "
+            "robot's life among other robots\n"
+        )
     kinds = neuron_kinds(settings.brain, settings.space)
     return read_robot(path, body_space(settings.space), kinds), settings
 

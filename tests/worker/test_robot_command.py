@@ -24,6 +24,16 @@ def test_file_has_the_evaluation_of_its_robot(
         assert lines[3] == "simulated:         12.0 s"
 
 
+def test_fitness_in_an_arena_is_told_from_that_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    for experiment, is_arena in (("scenario1", False), ("scenario3", True)):
+        words = [str(tmp_path / "spider.yaml"), "--experiment", experiment]
+        assert main(["robot simulate", *words]) == 0
+        assert ("simulated alone; in an arena" in capsys.readouterr().err) is is_arena
+
+
 def test_robustness_is_shown_by_change_and_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
