@@ -273,13 +273,17 @@ def _is_folder(folder: Path) -> bool:
 
 
 def _placed(error: ExperimentError, word: str, use: Use) -> ExperimentError:
-    """Return an error with file and line: of the plug-in, or of where it is named."""
+    """Return an error with file and line: of the plug-in, its name, or another key."""
     story = one_line(error)
     if word.endswith(".toml") and not _PLACE.search(story):
+        key = story.partition(":")[0]
+        leaf = re.escape(key.rpartition(".")[2])
+        sought = re.escape(use.path) if key == use.key else rf"^\s*{leaf}\s*="
         lines = Path(word).read_text("utf-8").splitlines()
         for number, line in enumerate(lines, 1):
-            if use.path in line:
+            if re.search(sought, line):
                 return ExperimentError(f"{Path(word).name}:{number}: {story}")
+        return ExperimentError(f"{Path(word).name}: {story}")
     return error
 
 

@@ -83,6 +83,10 @@ def check_use(use: Use, begin: Callable[[str], None] = lambda _: None) -> str:
             line = where_raised(error, file) or where
             story = f"{line}: raised {type(error).__name__}: {story}"
         story = story.removeprefix(f"{use.key}: ")
+        section, _, _ = use.key.partition(".")
+        if isinstance(error, ExperimentError) and story.startswith(f"{section}."):
+            # Of another key, such as the plug-in's parameters: not in its file.
+            raise ExperimentError(story) from error
         if f"{file}:" not in story:
             story = f"{where}: {story}"
         raise ExperimentError(f"{use.key}: {story}") from error

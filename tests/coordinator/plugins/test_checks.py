@@ -269,6 +269,37 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
     assert permission.allowed() == ()
 
 
+@pytest.mark.parametrize(
+    ("entry", "expected"),
+    [
+        (
+            "heigth_m = 0.2",
+            r"mine.toml:5: fitness.parameters.heigth_m: no such",
+        ),
+        (
+            "height_m = true",
+            "mine.toml:5: fitness.parameters.height_m: must be a number",
+        ),
+        ("", r"mine.toml: fitness.parameters: .*height_m"),
+    ],
+)
+def test_a_wrong_parameter_is_placed_in_the_experiment(
+    lab: Callable[[str], Path], tmp_path: Path, entry: str, expected: str
+) -> None:
+    file = lab(
+        "from msgspec import Struct\n\n\nclass Own(Struct):\n    height_m: float\n\n\n"
+        "def judge(trace, own: Own):\n    return own.height_m\n"
+    )
+    document = tmp_path / "mine.toml"
+    document.write_text(
+        f'name = "x"\n[fitness]\nfunction = "{file.stem}:judge"\n'
+        f"[fitness.parameters]\n{entry}\n"
+    )
+    step, line = checked(str(document))[-1]
+    assert step == "fault"
+    assert re.match(expected, line), line
+
+
 def test_a_key_of_fitness_without_effect_is_refused(
     lab: Callable[[str], Path], tmp_path: Path
 ) -> None:
