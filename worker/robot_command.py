@@ -12,7 +12,7 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import MJCF_ENDING, read_robot, settings_of
 from schema.formats.mjcf import read_mjcf
-from schema.formats.run_settings import experiment_of
+from schema.formats.run_settings import experiment_of, tell
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
@@ -86,9 +86,9 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
     found = experiment_of(path, experiment, tells_default=True)
     settings = settings_of(found)
     if found is not None and found.arena is not None:
-        sys.stderr.write(
-            "revolve: simulated alone; in an arena, fitness is that of a window of a "
-            "robot's life among other robots\n"
+        tell(
+            "simulated alone; in an arena, fitness is that of a window of a robot's "
+            "life among other robots"
         )
     kinds = neuron_kinds(settings.brain, settings.space)
     return read_robot(path, body_space(settings.space), kinds), settings

@@ -41,25 +41,20 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
         text = json.dumps(both, sort_keys=True)
         groups.setdefault(run.experiment, {}).setdefault(text, []).append(run)
     renamed: dict[int, Run] = {}
+    reference: Run | None = None
     for name, by_settings in groups.items():
         first, *others = sorted(by_settings.values(), key=len, reverse=True)
+        reference = reference or first[0]
+        if differs := _compared(first[0], reference):
+            differs += f" (compared with {reference.experiment})"
+            for run in first:
+                renamed[id(run)] = replace(run, differs=differs)
         free = (each for n in count(2) if (each := f"{name}{MARK}{n}") not in groups)
         for experiment, group in zip(free, others, strict=False):
             differs = _compared(group[0], first[0])
             for run in group:
                 renamed[id(run)] = replace(run, experiment=experiment, differs=differs)
-    named = [renamed.get(id(run), run) for run in runs]
-    kept = {run.experiment: run for run in reversed(named) if not run.differs}
-    first_kept = next((run for run in named if not run.differs), None)
-    against_first = {
-        name: f"{text} (compared with {first_kept.experiment})"
-        for name, run in kept.items()
-        if first_kept is not None and (text := _compared(run, first_kept))
-    }
-    return [
-        replace(run, differs=run.differs or against_first.get(run.experiment, ""))
-        for run in named
-    ]
+    return [renamed.get(id(run), run) for run in runs]
 
 
 def _settings(document: str) -> dict[str, Any]:

@@ -63,6 +63,11 @@ def folded(title: str, content: str, *, is_open: bool = False) -> str:
     )
 
 
+def capitalised(text: str) -> str:
+    """Return a text with a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
 def plural(count: int, noun: str) -> str:
     """Return a number and a noun, for example ``3 runs``."""
     return f"{count} {noun}{'s' * (count != 1)}"

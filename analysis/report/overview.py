@@ -14,7 +14,7 @@ from analysis.measures.fitness_functions import (
 )
 from analysis.measures.populations import failures_as_best, last_rows
 from analysis.report.fitness import run_names
-from analysis.report.html import cell, duration, folded, plural, table
+from analysis.report.html import capitalised, cell, duration, folded, plural, table
 
 Tables = Mapping[str, pa.Table]
 Row = Mapping[str, Any]
@@ -62,7 +62,7 @@ def summary(tables: Tables) -> str:
     if not rows:
         return ""
     warning = failures_as_best(tables)
-    noted = f'<p class="warning">{escape(warning[:1].upper() + warning[1:])}.</p>'
+    noted = f'<p class="warning">{escape(capitalised(warning))}.</p>'
     return (
         table(heads, rows)
         + _differing({row["experiment"]: row["differs"] for row in runs})

@@ -23,7 +23,7 @@ from analysis.report.fitness import (
     of_each_function,
     run_names,
 )
-from analysis.report.html import cell, folded, number, plural, table
+from analysis.report.html import capitalised, cell, folded, number, plural, table
 from analysis.report.overview import all_runs, arenas, speed, summary
 from analysis.report.thesis import findings
 
@@ -261,7 +261,7 @@ def _file_of(drawn: DrawnFigure) -> str:
     thesis = f"figure {one.number} of the thesis; " * one.number[0].isdigit()
     text = f"{thesis}file <code>figures/{escape(drawn.picture.stem)}.pdf</code>, .png"
     sources = ", ".join(map(_source, one.source))
-    return f"{text[0].upper()}{text[1:]}; source: {sources}."
+    return f"{capitalised(text)}; source: {sources}."
 
 
 def _embedded(drawn: DrawnFigure) -> str:

@@ -278,12 +278,13 @@ def _placed(error: ExperimentError, word: str, use: Use) -> ExperimentError:
     if word.endswith(".toml") and not _PLACE.search(story):
         key = story.partition(":")[0]
         leaf = re.escape(key.rpartition(".")[2])
-        sought = re.escape(use.path) if key == use.key else rf"^\s*{leaf}\s*="
-        lines = Path(word).read_text("utf-8").splitlines()
-        for number, line in enumerate(lines, 1):
-            if re.search(sought, line):
-                return ExperimentError(f"{Path(word).name}:{number}: {story}")
-        return ExperimentError(f"{Path(word).name}: {story}")
+        is_named = key == use.key
+        sought = re.escape(use.path) if is_named else rf"^\s*{leaf}\s*="
+        lines = enumerate(Path(word).read_text("utf-8").splitlines(), 1)
+        found = [number for number, line in lines if re.search(sought, line)]
+        # Another section may have a key of the same name.
+        place = f":{found[0]}" if (is_named and found) or len(found) == 1 else ""
+        return ExperimentError(f"{Path(word).name}{place}: {story}")
     return error
 
 

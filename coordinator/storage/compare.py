@@ -105,29 +105,31 @@ def _unequal_rows(name: str, tables: list[pa.Table]) -> list[str]:
 
     Tables with as many rows are compared island by island.
     """
-    ours, theirs = (table.num_rows for table in tables)
-    if ours != theirs:
-        return [f"{name}: {ours} rows against {theirs}"]
-    for island in _islands(tables):
-        ours, theirs = (_of_island(table, island).num_rows for table in tables)
+    for place, rows in [("", tables), *_by_island(tables)]:
+        ours, theirs = (table.num_rows for table in rows)
         if ours != theirs:
-            return [f"{name}: {ours} rows of island {island} against {theirs}"]
+            return [f"{name}: {ours} rows{place} against {theirs}"]
     return []
 
 
-def _islands(tables: list[pa.Table]) -> list[int | None]:
-    """Return the islands of two tables, ascending; one None if they name none."""
-    if "island" not in tables[0].column_names:
-        return [None]
-    found = (pa.compute.unique(table["island"]).to_pylist() for table in tables)
-    return sorted(set[int].union(*map(set, found)))
+def _by_island(tables: list[pa.Table]) -> list[tuple[str, list[pa.Table]]]:
+    """Return the rows of each island in two tables, and where that is, for messages.
 
-
-def _of_island(table: pa.Table, island: int | None) -> pa.Table:
-    """Return a table's rows of one island; all if it is None."""
-    if island is None:
-        return table
-    return table.filter(pa.compute.equal(table["island"], island))
+    Tables that name at most one island are returned whole, with an empty text.
+    """
+    islands: set[int] = set()
+    if "island" in tables[0].column_names:
+        for table in tables:
+            islands.update(pa.compute.unique(table["island"]).to_pylist())
+    if len(islands) <= 1:
+        return [("", tables)]
+    return [
+        (
+            f" of island {island}",
+            [each.filter(pa.compute.equal(each["island"], island)) for each in tables],
+        )
+        for island in sorted(islands)
+    ]
 
 
 def _drop_early_ends(tables: list[pa.Table], folders: tuple[Path, Path]) -> list[str]:
@@ -177,20 +179,17 @@ def _difference(name: str, tables: list[pa.Table], columns: list[str]) -> list[s
     Tables are sorted by island, and each island is compared by itself: where one has
     fewer rows, the rows of the next island have other record numbers.
     """
-    islands = _islands(tables)
-    for island in islands:
-        common = [_of_island(table, island) for table in tables]
+    for place, rows in _by_island(tables):
         found = [
             (row, column)
             for column in columns
             if column != "record"
-            and (row := _first_difference(*(table[column] for table in common)))
+            and (row := _first_difference(*(table[column] for table in rows)))
             is not None
         ]
         if found:
             row, column = min(found, key=itemgetter(0))
-            one, other = (table[column][row].as_py() for table in common)
-            place = f" of island {island}" if len(islands) > 1 else ""
+            one, other = (table[column][row].as_py() for table in rows)
             values = f"{_short(one)} against {_short(other)}"
             return [f"{name}: first at record {row}{place}, column {column}: {values}"]
     return []

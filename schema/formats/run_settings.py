@@ -43,7 +43,7 @@ def experiment_of(
     folder = file.parent
     if not (folder / DETAILS).is_file():
         if tells_default:
-            _tell("with the settings of scenario1; --experiment names others")
+            tell("with the settings of scenario1; --experiment names others")
         return None
     allow_plugins_of(folder)
     experiment = own_experiment(read_description(folder).document)
@@ -55,7 +55,7 @@ def experiment_of(
         for number in range(1, island_count(experiment))
     ):
         where += ", island 0; other islands differ: --experiment names others"
-    _tell(where)
+    tell(where)
     return first
 
 
@@ -71,5 +71,6 @@ def types_of(experiment: Experiment | None) -> tuple[BodySpace, NeuronKinds]:
     return body_space(experiment.space), kinds
 
 
-def _tell(line: str) -> None:
+def tell(line: str) -> None:
+    """Write a line about the settings of a robot file to standard error."""
     sys.stderr.write(f"revolve: {line}\n")

@@ -300,6 +300,22 @@ def test_a_wrong_parameter_is_placed_in_the_experiment(
     assert re.match(expected, line), line
 
 
+def test_no_line_is_named_if_another_section_has_the_key(
+    lab: Callable[[str], Path], tmp_path: Path
+) -> None:
+    file = lab(
+        "from msgspec import Struct\n\n\nclass Own(Struct):\n    friction: float\n\n\n"
+        "def judge(trace, own: Own):\n    return own.friction\n"
+    )
+    document = tmp_path / "mine.toml"
+    document.write_text(
+        'name = "x"\n[simulation]\nfriction = 0.5\n[fitness]\n'
+        f'function = "{file.stem}:judge"\n[fitness.parameters]\nfriction = true\n'
+    )
+    _, line = checked(str(document))[-1]
+    assert line.startswith("mine.toml: fitness.parameters.friction: must be"), line
+
+
 def test_a_key_of_fitness_without_effect_is_refused(
     lab: Callable[[str], Path], tmp_path: Path
 ) -> None:
