@@ -180,7 +180,7 @@ def _robots(tables: Tables) -> dict[str, Figure]:
         ]
         relatives[name] = _family(rows, bodies)
         best = Best(
-            name, Path(), 0, rows["birth"][0].as_py(), rows["fitness"][0].as_py()
+            name, Path(), 0, 0, rows["birth"][0].as_py(), rows["fitness"][0].as_py()
         )
         births = pa.table(
             {

@@ -2,7 +2,7 @@
 
 import html
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError, rounded
 from schema.experiment.document import island_experiment
 from schema.experiment.file import own_experiment
+from schema.robot.ids import BirthId
 from schema.tables.description import (
     DETAILS,
     allow_plugins_of,
@@ -26,6 +27,7 @@ from schema.tables.description import (
 from schema.tables.files import read_table
 from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
+from schema.wire.updates import individual
 
 Folder = str | Path
 
@@ -143,16 +145,19 @@ class Run:
         Raises:
             RunFolderError: there is no such birth.
         """
-        births = self.births
-        own = pc.and_(
-            pc.equal(births["island"], island), pc.equal(births["birth"], number)
+        return self.robots(self._birth(BirthId(island, number)))[0]
+
+    def _birth(self, birth: BirthId) -> pa.Table:
+        """Return the row of a birth."""
+        is_it = (pc.field("island") == birth.island) & (
+            pc.field("birth") == birth.number
         )
-        found = births.filter(own)
+        found = self.births.filter(is_it)
         if not found.num_rows:
             raise RunFolderError(
-                f"{self.folder}: has no birth {number} on island {island}"
+                f"{self.folder}: has no birth {birth.number} on island {birth.island}"
             )
-        return self.robots(found)[0]
+        return found
 
     def robots(self, births: pa.Table | None = None) -> list[Robot]:
         """Return the robots of some births, with the brains that they have learnt.
@@ -163,10 +168,13 @@ class Run:
         Raises:
             RunFolderError: the table is damaged.
         """
-        allow_plugins_of(self.folder)
         rows = self.births if births is None else births
-        rows = with_learnt(rows, self.learning)
-        homes = rows["island"].to_pylist()
+        return self._robots(rows, rows["island"].to_pylist())
+
+    def _robots(self, births: pa.Table, homes: Sequence[int]) -> list[Robot]:
+        """Return the robots of some births, with the settings of one island each."""
+        allow_plugins_of(self.folder)
+        rows = with_learnt(births, self.learning)
         documents = {
             island: island_experiment(document_of(self.experiment), island)
             for island in set(homes)
@@ -180,6 +188,8 @@ class Run:
 
     def best(self, count: int = 1) -> list[Robot]:
         """Return the robots with the highest fitness of all evaluations.
+
+        Each has the settings of the island on which it had this fitness.
 
         Robots of arenas count with the best sample (table ``fitness``) while they were
         mature; the end of a run names the best robot of its last population instead.
@@ -198,13 +208,16 @@ class Run:
         )
         found = found.filter(pc.is_valid(found["fitness"]))
         order = pc.sort_indices(found, [("fitness", "descending")])
-        born: dict[tuple[int, int], None] = {}
+        best: dict[BirthId, int] = {}
         for row in found.take(order).to_pylist():
-            home = row["birth_island"]
-            born[row["island"] if home is None else home, row["birth"]] = None
-            if len(born) == count:
+            best.setdefault(individual(row), row["island"])
+            if len(best) == count:
                 break
-        return [self.robot(number, island) for island, number in born]
+        return [
+            robot
+            for birth, island in best.items()
+            for robot in self._robots(self._birth(birth), [island])
+        ]
 
     def __repr__(self) -> str:
         return f"<Run {self.name}, seed {self.seed}: {self.state}, {self.folder}>"

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from schema.agent.flags import Flags, add_plugins
+from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.errors import RevolveError, counted
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.run_settings import experiment_of, types_of
@@ -28,7 +28,7 @@ def main(argv: list[str] | None = None) -> int:
     words = ["robot", *sys.argv[1:]] if argv is None else argv
     options = parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
     allow(options.plugins)
-    experiment = experiment_of(options.file, options.experiment)
+    experiment = experiment_of(options.file, options.experiment, options.island)
     space, kinds = types_of(experiment)
     robot = read_robot(options.file, space, kinds)
     if options.command == "check":
@@ -75,11 +75,10 @@ def parser(_command: str = "robot") -> Flags:
             command.add_argument(
                 "output", type=Path, metavar="OUTPUT", help="robot file to write"
             )
-        command.add_argument(
-            "--experiment",
-            metavar="NAME|FILE.toml",
-            help="experiment whose settings to use (default: that of the run folder "
-            "that holds the file, else all built-in part types and the default world)",
+        add_settings(
+            command,
+            "that of the run folder that holds the file, else all built-in part types "
+            "and the default world",
         )
         add_plugins(command)
     return flags

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from schema.agent.flags import Flags, add_plugins
+from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.errors import rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> int:
     """
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
-    robot, settings = _read(options.file, options.experiment)
+    robot, settings = _read(options.file, options.experiment, options.island)
     found = evaluate(robot, settings)
     labels = settings.measures.labels
     for name, value, unit in (
@@ -79,11 +79,13 @@ def _share(found: float | None, fitness: float) -> str:
     return f"{rounded(found)}{share}"
 
 
-def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings]:
+def _read(
+    path: Path, experiment: str | None, island: int | None
+) -> tuple[Robot, EvaluationSettings]:
     """Return a file's robot and its settings; those of an MJCF file are the default."""
-    if path.suffix.lower() == MJCF_ENDING and experiment is None:
+    if path.suffix.lower() == MJCF_ENDING and experiment is None and island is None:
         return read_mjcf(path)
-    found = experiment_of(path, experiment, tells_default=True)
+    found = experiment_of(path, experiment, island, tells_default=True)
     settings = settings_of(found)
     if found is not None and found.arena is not None:
         tell(
@@ -105,11 +107,10 @@ def parser(_command: str = "robot simulate") -> Flags:
         ),
     )
     flags.add_argument("file", type=Path, metavar="FILE", help="robot file")
-    flags.add_argument(
-        "--experiment",
-        metavar="NAME|FILE.toml",
-        help="experiment whose settings to use (default: those in an MJCF file, "
-        "else those of the run folder that holds the file, else those of scenario1)",
+    add_settings(
+        flags,
+        "those in an MJCF file, else those of the run folder that holds the file, else "
+        "those of scenario1",
     )
     flags.add_argument(
         "--robustness",

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 from pathlib import Path
 
@@ -27,10 +27,14 @@ rank, parents' births rows."""
 
 @dataclass(frozen=True, slots=True)
 class Best:
-    """The fittest robot of the last populations of an experiment's runs."""
+    """The fittest robot of the last populations of an experiment's runs.
+
+    ``island`` is the one on which it had this fitness.
+    """
 
     experiment: str
     folder: Path
+    island: int
     birth_island: int
     birth: int
     fitness: float
@@ -43,7 +47,7 @@ def best_robots(robots: pa.Table) -> list[Best]:
         robots: with the columns of ``outputs``; the first of equally fit robots is
             the best, and one whose evaluation failed is none.
     """
-    columns = ["experiment", "folder", "birth_island", "birth", "fitness"]
+    columns = [each.name for each in fields(Best)]
     is_judged = pc.field("is_last") & pc.invert(pc.field("is_failed"))
     last = robots.filter(is_judged).select(columns)
     fittest = last.sort_by([("experiment", "ascending"), ("fitness", "descending")])

@@ -142,7 +142,7 @@ def family_picture(
         SimulationDiverged: the physics diverged.
     """
     ((row,), *_) = relatives.levels
-    settings = evaluation_settings_of(island_experiment(experiment, best.birth_island))
+    settings = evaluation_settings_of(island_experiment(experiment, best.island))
     paint = dict(zip(relatives.founders, FOUNDERS, strict=False))
 
     def colour(gene: int) -> Colour:
@@ -167,8 +167,8 @@ def family_picture(
             pictures[member] = _cut(renderer.picture(), _CLOSE)
         columns = (births["island"], births["birth"])
         names[member] = BirthId(*(column[member].as_py() for column in columns))
-    island = best.birth_island
-    own = Identity(replace(origin, island=island), BirthId(island, best.birth), 0)
+    birth = BirthId(best.birth_island, best.birth)
+    own = Identity(replace(origin, island=best.island), birth, 0)
     return RobotPicture(
         best,
         *_motion(painted(row), settings, partial(simulate, identity=own)),

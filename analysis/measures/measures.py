@@ -22,10 +22,14 @@ from analysis.measures.population_table import (
     Booleans,
     Numbers,
     individual_ids,
+    is_last_of_each,
+    residence_columns,
+    residence_ids,
     rows_of,
 )
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import Problems, RunTables
+from analysis.measures.trees import Integers
 from analysis.measures.variability import last_fitness, variability
 from schema.errors import RevolveError
 
@@ -39,11 +43,12 @@ def robots(run: RunTables) -> pa.Table:
         One row per robot, in the order of birth, with the columns of
         ``outputs.OUTPUTS["robots"]`` except the run's.
     """
-    fitness, is_last, is_failed = _evaluated(run)
+    fitness, islands, is_last, is_failed = _evaluated(run)
     chosen = np.flatnonzero(~np.isnan(fitness))
     births = run.births.take(chosen)
     return pa.table(
         {
+            "island": islands[chosen],
             "birth_island": births["island"],
             "birth": births["birth"],
             "is_last": is_last[chosen],
@@ -74,30 +79,53 @@ def births_so_far(births: pa.Table) -> npt.NDArray[np.int64]:
     return found
 
 
-def _evaluated(run: RunTables) -> tuple[Numbers, Booleans, Booleans]:
+def _evaluated(run: RunTables) -> tuple[Numbers, Integers, Booleans, Booleans]:
     """Return each individual's fitness, if it lives at the end, and if it failed.
 
     Returns:
-        The last fitness, NaN if there is none; whether it is in a last population;
-        whether all its evaluations failed.
+        The last fitness, the greatest one of an individual that was judged on several
+        islands, NaN if there is none; the island of it, -1 if there is none; whether
+        it is in a last population; whether all its evaluations failed.
     """
     fitness = np.full(run.births.num_rows, np.nan)
+    islands = np.full(len(fitness), -1, np.int64)
+    born_on = np.append(np.asarray(run.births["island"], np.int64), -1)
+
+    def take(rows: Integers, values: Numbers, homes: Integers) -> None:
+        """Replace the fitness of some births rows; of equal rows the fittest counts.
+
+        Of equal fitness that on the island of birth counts.
+        """
+        is_native = homes == born_on[rows]
+        greatness = np.nan_to_num(values, nan=-np.inf)
+        order = np.lexsort((-homes, is_native, greatness, rows))
+        order = order[rows[order] >= 0]
+        last = order[is_last_of_each(rows[order])]
+        fitness[rows[last]] = np.nan_to_num(values[last], nan=0.0)
+        islands[rows[last]] = homes[last]
+
     evaluations = run.tables["evaluations"]
     rows = rows_of(individual_ids(evaluations), run.births)
     outcome = np.asarray(evaluations["fitness"].to_numpy(), np.float64)
-    rows, outcome = rows[rows >= 0], outcome[rows >= 0]
-    fitness[rows] = np.nan_to_num(outcome, nan=0.0)
+    there = residence_ids(evaluations)
+    order = np.argsort(there, kind="stable")
+    latest = order[is_last_of_each(there[order])]
+    homes = np.asarray(evaluations["island"], np.int64)
+    take(rows[latest], outcome[latest], homes[latest])
     is_failed = ~np.isnan(fitness)
-    is_failed[rows[~np.isnan(outcome)]] = False
+    is_failed[rows[(rows >= 0) & ~np.isnan(outcome)]] = False
     ids, sampled = last_fitness(run.tables["fitness"])
-    rows = rows_of(ids, run.births)
-    fitness[rows[rows >= 0]] = sampled[rows >= 0]
+    sampled_on, *born = residence_columns(ids).values()
+    named = pa.table(dict(zip(("birth_island", "birth"), born, strict=True)))
+    rows = rows_of(individual_ids(named), run.births)
+    take(rows, sampled, np.asarray(sampled_on, np.int64))
     table = run.population_table
     chosen = table.is_last[table.group_of] & table.is_judged
-    fitness[table.members[chosen]] = table.fitness[chosen]
+    homes = table.islands[table.group_of[chosen]]
+    take(table.members[chosen], table.fitness[chosen], homes)
     is_last = np.zeros(len(fitness), np.bool_)
     is_last[table.members[chosen]] = True
-    return fitness, is_last, is_failed
+    return fitness, islands, is_last, is_failed
 
 
 def _greatest(run: RunTables, last: Numbers) -> Numbers:

@@ -135,6 +135,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
     "populations": {**_ISLAND, **POPULATION},
     "robots": {
         **_RUN,
+        "island": "island on which it had this fitness; copies of migrants are judged "
+        "on several islands, and the greatest fitness counts",
         **_ROBOT,
         "is_last": "whether it is judged in an island's last population",
         "fitness": "last fitness; off-line 0 if the evaluation failed",

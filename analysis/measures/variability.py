@@ -5,7 +5,6 @@ import pyarrow as pa
 
 from analysis.measures.population_table import (
     Numbers,
-    individual_ids,
     is_last_of_each,
     residence_columns,
     residence_ids,
@@ -79,16 +78,16 @@ def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers
 
 
 def last_fitness(fitness: pa.Table) -> tuple[Integers, Numbers]:
-    """Return the ids of robots evaluated in arenas, and their last fitness [m/s].
+    """Return the last fitness of each robot in each of the arenas that it lived in.
 
     Args:
         fitness: samples, as for ``variability``.
 
     Returns:
-        Two arrays, (R,) each.
+        Ids of the robots there, as of ``residence_ids``, (R,); fitness [m/s], (R,).
     """
     mature = fitness.filter(fitness["is_mature"])
-    robots = individual_ids(mature)
+    robots = residence_ids(mature)
     times = np.asarray(mature["sim_time_s"], np.float64)
     order = np.lexsort((times, robots))
     chosen = order[is_last_of_each(robots[order])]

@@ -52,7 +52,8 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
         raise NoPictures(f"{out}: must end in one of {allowed}, got {out.suffix!r}")
     if is_film and options.gait:
         raise NoPictures(f"{out}: --gait needs a {PICTURE_ENDING} file")
-    experiment = experiment_of(options.file, options.experiment, tells_default=True)
+    named, island = options.experiment, options.island
+    experiment = experiment_of(options.file, named, island, tells_default=True)
     settings = settings_of(experiment)
     world = settings.simulation
     _check_gait(options.gait, world)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from schema.agent.flags import Flags, add_plugins, whole_number
+from schema.agent.flags import Flags, add_plugins, add_settings, whole_number
 
 
 def parser(_command: str = "robot render") -> Flags:
@@ -34,11 +34,6 @@ def parser(_command: str = "robot render") -> Flags:
         metavar="PIXELS",
         help="width of a picture (default: 640)",
     )
-    flags.add_argument(
-        "--experiment",
-        metavar="NAME|FILE.toml",
-        help="experiment whose settings to use (default: that of the run folder "
-        "that holds the file, else scenario1)",
-    )
+    add_settings(flags, "that of the run folder that holds the file, else scenario1")
     add_plugins(flags)
     return flags

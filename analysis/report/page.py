@@ -223,6 +223,8 @@ def _film(one: Film, run: str, *, has_arena: bool) -> str:
     best = one.best
     data = base64.b64encode(one.path.read_bytes()).decode()
     name = f"Robot {best.birth_island}:{best.birth} of {best.folder.name} ({run})"
+    if best.island != best.birth_island:
+        name += f" on island {best.island}"
     others = " Among the robots of an arena it may move differently." * has_arena
     return (
         f'<figure><img alt="{escape(name)}" src="data:image/gif;base64,{data}">'

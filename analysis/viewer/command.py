@@ -86,6 +86,8 @@ def _replay(
     _check(options, born, is_online=bool(scene.arenas))
     motions = _motions(options, run, simulators)
     moving = [each.birth for each in motions]
+    for line in scene.omissions(moving):
+        tell_user(line)
     blueprint = layout(scene, follow=options.follow, motions=moving)
     name = recording_name(news.experiment, folder.resolve().name)
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
@@ -146,8 +148,11 @@ def _wanted(options: argparse.Namespace) -> list[BirthId]:
     """Return the robots of ``--robot``; print which one is the best."""
     if None not in options.robot:
         return list(options.robot)
-    best, fitness = best_evaluated(options.run)
-    tell_user(f"best ever evaluated: {name_of(best)}, fitness {rounded(fitness)}")
+    best, island, fitness = best_evaluated(options.run)
+    line = f"best ever evaluated: {name_of(best)}, fitness {rounded(fitness)}"
+    if island != best.island:
+        line += f" on island {island}; shown as on its island of birth"
+    tell_user(line)
     return [best if birth is None else birth for birth in options.robot]
 
 

@@ -61,7 +61,7 @@ def selected_robots(
     return list(found)
 
 
-def best_evaluated(folder: Path) -> tuple[BirthId, float]:
+def best_evaluated(folder: Path) -> tuple[BirthId, int, float]:
     """Return the fittest robot that a run ever evaluated, the first of equal ones.
 
     The robot may be dead, and is then fitter than the best of the last population.
@@ -70,7 +70,7 @@ def best_evaluated(folder: Path) -> tuple[BirthId, float]:
         folder: the run folder.
 
     Returns:
-        The robot and its fitness [m/s].
+        The robot, the island on which it had its fitness, and the fitness [m/s].
 
     Raises:
         ViewerError: no robot was evaluated.
@@ -83,7 +83,7 @@ def best_evaluated(folder: Path) -> tuple[BirthId, float]:
     if best is None:
         raise ViewerError(f"{folder}: no robot has been evaluated yet")
     (row,) = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
-    return individual(row), best
+    return individual(row), row["island"], best
 
 
 def show_motion(

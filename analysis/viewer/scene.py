@@ -1,6 +1,6 @@
 """The scene of a run: islands, arenas, walls and ground of an experiment."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +43,7 @@ class Scene:
     walls: tuple[Floats, ...]
     surfaces: tuple[tuple[Surface, ...], ...]
 
-    def below(self, births: Iterable[BirthId]) -> tuple[Surface, ...]:
+    def below(self, births: Sequence[BirthId]) -> tuple[Surface, ...]:
         """Return the ground below robots, if they are shown at their recorded places.
 
         This applies to robots of one arena, and to a single off-line robot.
@@ -53,6 +53,31 @@ class Scene:
         if not is_one_place or (len(islands) > 1 and islands[0] not in self.arenas):
             return ()
         return self.surfaces[self.islands.index(islands[0])]
+
+    def omissions(self, births: Sequence[BirthId]) -> list[str]:
+        """Return lines that say which ground a recording does not show.
+
+        Args:
+            births: robots that are simulated again.
+        """
+        uneven = {
+            island
+            for island, found in zip(self.islands, self.surfaces, strict=True)
+            if found
+        }
+        what = "rough ground and scenery are not shown"
+        lines = []
+        if uneven - self.arenas and not births:
+            lines.append(
+                f"off-line robots stand side by side on a plane: {what}; a single "
+                "--robot shows them"
+            )
+        if uneven & {birth.island for birth in births} and not self.below(births):
+            lines.append(
+                "robots that were simulated alone move side by side on a plane: "
+                f"{what}, although they were there; a single --robot shows them"
+            )
+        return lines
 
 
 def scene_of(experiment: Experiment) -> Scene:

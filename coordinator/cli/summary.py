@@ -1,12 +1,11 @@
 """Summary of a finished run: best robot, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import fmean
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -18,14 +17,12 @@ from schema.agent.screen import missing_screen
 from schema.errors import counted, rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
-from schema.formats.files import write_robot
-from schema.robot.ids import BirthId
+from schema.formats.files import BEST, write_robot
 from schema.tables.files import read_table
+from schema.tables.last_populations import Row, best_of, last_populations
 from schema.tables.learnt import learnt_births
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual
-
-BEST = "best.yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,46 +79,28 @@ def _results(run: RunSession) -> list[str]:
     """
     folder, islands = run.held.path, run.loop.islands
     births = counted(sum(island.births for island in islands.values()), "birth")
-    alive = {
-        number
-        for number, each in islands.items()
-        if not (isinstance(each, Arena) and each.is_extinct)
-    }
-    if not alive:
+    if all(isinstance(one, Arena) and one.is_extinct for one in islands.values()):
         return [f"extinct after {births}: too few robots are left to mate"]
-    last = _last_populations(folder, alive)
-    judged = [row for row in last if row["fitness"] is not None]
-    if not judged:
+    last = last_populations(folder)
+    best = best_of(last)
+    if best is None:
         none = f"{births}; no robot of the last population has a fitness"
         return [none, *_counted_as_zero(run, last)]
-    best = min(judged, key=lambda row: (-row["fitness"], individual(row)))
     means = _means(run, last)
     mean = f"mean fitness of the last population {rounded(fmean(means))}"
     if len(means) > 1:
         mean += f", the mean over {len(means)} islands"
     lines = [
         f"{births}; {mean}",
-        *_best_robot(run, individual(best), best["fitness"]),
+        *_best_robot(run, best),
     ]
     lines[1:1] = _counted_as_zero(run, last)
-    if any(isinstance(islands[number], Arena) for number in alive):
+    if any(isinstance(island, Arena) for island in islands.values()):
         lines[-1:-1] = _windows(folder, run.experiment.simulation)
     return lines
 
 
-def _last_populations(folder: Path, islands: Collection[int]) -> list[dict[str, Any]]:
-    """Return the population rows of some islands' last populations."""
-    rows = read_table(folder, "population")
-    newest = rows.group_by("island").aggregate([("births", "max")]).to_pylist()
-    last = {(row["island"], row["births_max"]) for row in newest}
-    return [
-        row
-        for row in rows.to_pylist()
-        if row["island"] in islands and (row["island"], row["births"]) in last
-    ]
-
-
-def _means(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list[float]:
+def _means(run: RunSession, last: Sequence[Row]) -> list[float]:
     """Return the mean fitness of each island, as analyses compute it.
 
     Failed evaluations count as 0. Robots of arenas without a fitness do not count.
@@ -134,7 +113,7 @@ def _means(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list[float]:
     return [fmean(each) for each in fitness.values()]
 
 
-def _counted_as_zero(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list[str]:
+def _counted_as_zero(run: RunSession, last: Sequence[Row]) -> list[str]:
     """Return a line about failed robots that win over others, or are the only ones."""
     # Robots of an arena without a fitness are young, not failed.
     off_line = [
@@ -149,8 +128,9 @@ def _counted_as_zero(run: RunSession, last: Sequence[Mapping[str, Any]]) -> list
     return [f"{line}, more than the {worse} negative ones" if worse else line]
 
 
-def _best_robot(run: RunSession, birth: BirthId, fitness: float) -> list[str]:
-    """Describe a robot; write it to a file."""
+def _best_robot(run: RunSession, best: Row) -> list[str]:
+    """Describe the robot of a population row; write it to a file."""
+    birth = individual(best)
     folder, space = run.held.path, body_space(run.experiment.space)
     births = learnt_births(folder)
     is_it = pc.and_(
@@ -163,10 +143,13 @@ def _best_robot(run: RunSession, birth: BirthId, fitness: float) -> list[str]:
     write_robot(robot, folder / BEST, space, kinds=kinds)
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
+    lives = f" on island {best['island']}" if best["island"] != birth.island else ""
     what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
-    line = f"best robot: birth {birth.number}{where}, fitness {rounded(fitness)}"
+    line = (
+        f"best robot: birth {birth.number}{where}, fitness {rounded(best['fitness'])}"
+    )
     return [
-        f"{line}, rank in ancestry {row['rank']} (founders: 1), {what}",
+        f"{line}{lives}, rank in ancestry {row['rank']} (founders: 1), {what}",
         f"its file: {folder / BEST}",
     ]
 

@@ -86,7 +86,7 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
             "is_last": number in last,
             "recorded": row["fitness"],
         }
-        chosen.append(Chosen(head, _alone(own.experiment, island), robot, own))
+        chosen.append(Chosen(head, _alone(own.experiment, row["island"]), robot, own))
     return chosen
 
 

@@ -115,6 +115,28 @@ def add_plugins(flags: argparse.ArgumentParser) -> None:
     )
 
 
+def add_settings(flags: argparse.ArgumentParser, default: str) -> None:
+    """Add the flags for the settings of a robot file (``run_settings.experiment_of``).
+
+    Args:
+        flags: parser that gets the flags.
+        default: the settings if no experiment is named.
+    """
+    flags.add_argument(
+        "--experiment",
+        metavar="NAME|FILE.toml",
+        help=f"experiment whose settings to use (default: {default})",
+    )
+    add_count(
+        flags,
+        "--island",
+        None,
+        "island number, for experiments whose islands differ (default: for best.yaml "
+        "of a run the island on which it is the best robot, else 0)",
+        least=0,
+    )
+
+
 def number(text: str) -> float:
     """Return a flag's value as a finite number."""
     return _number(text, "a finite number", lambda _value: True)

@@ -45,6 +45,8 @@ def robot_from_yaml(
     return reader(space, file, kinds).read(document)
 
 
+BEST = "best.yaml"
+"""Name of the file of a run's best robot, in the run folder."""
 MJCF_ENDING = ".xml"
 _YAML = (".yaml", ".yml")
 _ROBOGEN = {".txt": robot_from_robogen_text, ".json": robot_from_robogen_json}
@@ -86,7 +88,7 @@ def read_robot(
         MalformedMessage: a .pb file that does not hold a robot.
     """
     if path.is_dir():
-        best = path / "best.yaml"
+        best = path / BEST
         hint = f"; its best robot is {best}" if best.is_file() else ""
         raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
     ending = _ending(path, _READ)

@@ -90,7 +90,7 @@ def drawings(folder: Path) -> Drawings:
         )
         for number, source in (("6.9", "outcomes"), ("A", "<a> file"))
     ]
-    films = [Film(Best("soft", Path("soft-1"), 0, 2, 0.3), folder / "one.gif")]
+    films = [Film(Best("soft", Path("soft-1"), 0, 0, 2, 0.3), folder / "one.gif")]
     return Drawings(figures, films, {"hard & <b>": "no driver <x>"}, [])
 
 

@@ -130,17 +130,17 @@ def test_a_lineage_contains_migrants_whose_rows_come_later() -> None:
 
 def test_the_best_robot_is_the_fittest_of_the_last_population() -> None:
     rows = [
-        {"experiment": "b", "folder": "f", "birth_island": 0, "birth": n,
+        {"experiment": "b", "folder": "f", "island": 3, "birth_island": 0, "birth": n,
          "is_last": n != 1, "is_failed": n == 4, "fitness": fitness}
         for n, fitness in enumerate([-0.1, 0.9, -0.3, -0.1, 0.0])
     ]  # fmt: skip
     (found,) = best_robots(pa.Table.from_pylist(rows, schema("robots")))
-    assert found == Best("b", Path("f"), 0, 0, -0.1)
+    assert found == Best("b", Path("f"), 3, 0, 0, -0.1)
 
 
 def test_row_of_a_robot_is_found_by_its_birth_id(members: pa.Table) -> None:
-    assert row_of(Best("x", Path("f"), 0, 4, 0.0), members) == 4
-    assert row_of(Best("x", Path("f"), 1, 4, 0.0), members) == -1
+    assert row_of(Best("x", Path("f"), 0, 0, 4, 0.0), members) == 4
+    assert row_of(Best("x", Path("f"), 0, 1, 4, 0.0), members) == -1
 
 
 def test_a_level_is_sorted_by_the_level_below() -> None:
@@ -162,7 +162,7 @@ def robot_picture(members: pa.Table) -> RobotPicture:
     relatives = family(members, 5, 3)
     pictures = {row: np.full((9, 16, 3), row, np.uint8) for row in range(6)}
     return RobotPicture(
-        Best("scenario1", Path("f"), 0, 5, 0.25),
+        Best("scenario1", Path("f"), 0, 0, 5, 0.25),
         (pictures[0], pictures[1]),
         (0.0, 0.5),
         (pictures[0], pictures[1]),

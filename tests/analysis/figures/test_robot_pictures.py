@@ -21,7 +21,7 @@ from tests.analysis.tables import births
 EXPERIMENT = Experiment(name="x", islands=(Islands(count=3),))
 
 
-def test_gait_uses_noise_of_the_robots_run_and_island() -> None:
+def test_gait_uses_noise_of_the_run_and_the_island_of_the_fitness() -> None:
     asked: list[Identity] = []
 
     def simulate(
@@ -36,14 +36,14 @@ def test_gait_uses_noise_of_the_robots_run_and_island() -> None:
     )
     with pytest.raises(SimulationDiverged):
         robot_picture(
-            Best("x", Path("f"), 2, 4, 0.1),
+            Best("x", Path("f"), 1, 2, 4, 0.1),
             members,
             EXPERIMENT,
             simulate,
             origin=Origin(seed=7, run=3),
             has_family=False,
         )
-    origin = Origin(seed=7, run=3, island=2)
+    origin = Origin(seed=7, run=3, island=1)
     assert asked == [Identity(origin, BirthId(2, 4), 0)]
 
 

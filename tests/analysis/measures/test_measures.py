@@ -239,6 +239,37 @@ def test_robots_have_their_last_fitness() -> None:
     assert found["is_failed"].to_pylist() == [False, True, False]
 
 
+def test_of_several_islands_the_greatest_of_the_last_fitness_counts() -> None:
+    evaluations: list[dict[str, Any]] = [
+        {"island": 0, "birth": 0, "trial": 0, "fitness": 0.9},
+        {"island": 0, "birth": 0, "trial": 1, "fitness": 0.15},
+        {"island": 1, "birth": 0, "trial": 0, "fitness": 0.11, "birth_island": 0},
+        {"island": 0, "birth": 3, "fitness": 0.5},
+        {"island": 1, "birth": 3, "fitness": 0.5, "birth_island": 0},
+        {"island": 1, "birth": 1, "trial": 0, "fitness": 0.2, "birth_island": 0},
+        {"island": 0, "birth": 1, "trial": 0, "fitness": None},
+    ]
+    samples = [
+        # Clocks of islands cannot be compared.
+        {"island": 2, "birth": 2, "sim_time_s": 99.0, "fitness": 0.3},
+        {"island": 1, "birth": 2, "sim_time_s": 20.0, "fitness": 0.4},
+    ]
+    samples = [{**each, "birth_island": 0, "is_mature": True} for each in samples]
+    living = population((0, 5, {A: 0.15}), (1, 3, {A: 0.11, B: 0.2}), (1, 2, {A: 7.0}))
+    tables = run(
+        births=FAMILY,
+        population=living,
+        evaluations=table("evaluations", evaluations),
+        fitness=table("fitness", samples),
+    )
+    found = robots(RunTables(tables))
+    assert found["birth"].to_pylist() == [0, 1, 2, 3]
+    assert found["fitness"].to_pylist() == [0.15, 0.2, 0.4, 0.5]
+    assert found["island"].to_pylist() == [0, 1, 1, 0]
+    assert found["is_last"].to_pylist() == [True, True, False, False]
+    assert not any(found["is_failed"].to_pylist())
+
+
 def test_births_so_far_are_in_the_order_of_birth_on_each_island() -> None:
     rows = [
         {"island": 0, "birth": birth, "sim_time_s": time_s}

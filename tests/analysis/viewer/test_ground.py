@@ -113,6 +113,14 @@ def test_ground_is_below_robots_at_their_recorded_places() -> None:
     assert scene.below([hermit, other]) == scene.below([hermit, here]) == ()
     assert scene.below([]) == ()
     assert surfaces(FLAT, WORLD) == ()
+    # What is not shown is said.
+    assert scene.omissions([hermit]) == scene.omissions([here, there]) == []
+    assert ["stand side by side" in line for line in scene.omissions([])] == [True]
+    for apart in ([hermit, other], [hermit, here]):
+        assert ["move side by side" in line for line in scene.omissions(apart)] == [
+            True
+        ]
+    assert scene_of(Experiment(name="b", islands=(Islands(),))).omissions([]) == []
 
 
 def test_an_arena_shows_its_recorded_ground(tmp_path: Path) -> None:

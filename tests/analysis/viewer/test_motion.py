@@ -25,10 +25,11 @@ def test_the_best_is_the_first_of_the_fittest_ever_evaluated(tmp_path: Path) -> 
     judged = [{"birth": n, "fitness": value} for n, value in enumerate(fitness)]
     young = {"birth": 7, "fitness": 0.9, "is_mature": False}
     write(tmp_path, evaluations=judged, fitness=[young])
-    assert best_evaluated(tmp_path) == (BirthId(0, 1), 0.5)
-    grown = {"birth": 8, "island": 1, "fitness": 0.8, "is_mature": True}
+    assert best_evaluated(tmp_path) == (BirthId(0, 1), 0, 0.5)
+    grown = {"birth": 8, "island": 2, "birth_island": 1, "fitness": 0.8}
+    grown["is_mature"] = True
     write(tmp_path, evaluations=judged, fitness=[young, grown])
-    assert best_evaluated(tmp_path) == (BirthId(1, 8), 0.8)
+    assert best_evaluated(tmp_path) == (BirthId(1, 8), 2, 0.8)
 
 
 def test_without_evaluations_there_is_no_best(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from coordinator.cli import summary
+from schema.formats.files import BEST
 
 
 @pytest.mark.parametrize("screen", ["", ":0"])
@@ -15,7 +16,7 @@ def test_only_commands_that_work_are_suggested(
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", screen)
     monkeypatch.setattr(summary, "find_spec", lambda _name: viewer)
-    best = tmp_path / summary.BEST
+    best = tmp_path / BEST
     view = f"view {tmp_path}" if screen else f"view {tmp_path} --save run.rrd"
     show = f"robot show {best}" if viewer is None else view
     analyze = f"  revolve analyze {tmp_path}"

@@ -2,7 +2,9 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 
 from schema.__main__ import main
@@ -14,6 +16,8 @@ from schema.formats.run_settings import experiment_of
 from schema.plugins import permission
 from schema.plugins.kept import kept_file, plugins_to_keep
 from schema.tables.description import Description, description_text
+from schema.tables.files import parquet_path
+from tests.analysis.tables import table
 
 BUMPY = 'name = "bumpy"\n[environment]\nroughness_m = 0.04\n'
 PADDLES = """
@@ -87,7 +91,49 @@ def test_islands_of_different_worlds_are_said(
 ) -> None:
     text = f'name = "two"\n[[islands]]\n[[islands]]\n{changed}\n'
     experiment_of(written(tmp_path / "run", text), None)
-    assert ("island 0; other islands differ" in capsys.readouterr().err) == is_said
+    assert ("island 0; --island names" in capsys.readouterr().err) == is_said
+
+
+def test_best_robot_has_the_world_of_the_island_where_it_is_the_best(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = 'name = "two"\n[[islands]]\n[[islands]]\n[islands.simulation]\n'
+    file = written(tmp_path / "run", f"{text}friction = 0.5\n")
+    rows: list[dict[str, Any]] = [
+        {"island": 0, "births": 3, "birth": 1, "fitness": 0.9},
+        {"island": 0, "births": 5, "birth": 2, "fitness": 0.2},
+        {"island": 0, "births": 5, "birth": 4, "fitness": None},
+        # A copy of a migrant from island 0.
+        {"island": 1, "births": 4, "birth": 2, "birth_island": 0, "fitness": 0.3},
+    ]
+    path = parquet_path(tmp_path / "run", "bumpy", 0, "population")
+    path.parent.mkdir(parents=True)
+    pq.write_table(table("population", rows), path)
+    frictions = []
+    for name, island in (("best", None), ("best", 0), ("mine", None), ("mine", 1)):
+        found = experiment_of(file.with_stem(name), None, island)
+        assert found is not None
+        frictions.append(found.simulation.friction)
+    default = read_experiment("scenario1").simulation.friction
+    assert frictions == [0.5, default, default, 0.5]
+    said = [
+        line.partition("(two), ")[2] for line in capsys.readouterr().err.split("\n")
+    ]
+    best = "island 1, where it is the best robot; --island names another"
+    other = "island 0; --island names another"
+    assert said == [best, "island 0", other, "island 1", ""]
+
+
+def test_island_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    file = written(tmp_path / "run", 'name = "two"\n[[islands]]\ncount = 2\n')
+    with pytest.raises(ExperimentError, match=r"^--island must be in 0\.\.1, got 2$"):
+        experiment_of(file, None, 2)
+    with pytest.raises(ExperimentError, match=r"^--island must be in 0\.\.0, got 2$"):
+        experiment_of(file, "scenario1", 2)
+    with pytest.raises(
+        ExperimentError, match="is in no run folder; name an experiment"
+    ):
+        experiment_of(tmp_path / "a.yaml", None, 0)
 
 
 def test_damaged_description_is_refused(tmp_path: Path) -> None:
