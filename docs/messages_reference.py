@@ -185,7 +185,8 @@ def _messagepack() -> Iterator[str]:
     yield "## MessagePack messages\n"
     yield (
         "Maps with the names of the fields. Actions of operators have a field `type` "
-        "that names them. Fields with a default may be missing.\n"
+        "that names them. Fields with a default may be missing. A `BirthId` is a list "
+        "of two whole numbers from 0: the island of birth and the number there.\n"
     )
     for name, found in messagepack().items():
         yield f"### `{name}`\n"

@@ -20,8 +20,6 @@ from schema.experiment.file import experiment_from_text, experiment_text
 MARK = "~"
 """Separator of a name and a number that makes it distinct."""
 _NOT_SETTINGS = frozenset({"name", "births"})
-_LISTED = 3
-"""Differences that are listed; others are only counted."""
 
 
 def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
@@ -29,8 +27,9 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
 
     The settings that most runs of a name have (the first of equally many) keep the
     name. The next settings become ``name~2``, or the next free number, and ``differs``
-    lists how they differ. For any other experiment, ``differs`` lists how it differs
-    from the first one, and names that one.
+    lists how they differ. For an experiment of another name than the first one,
+    ``differs`` lists how it differs from the earlier one that is most like it, and
+    names that one.
 
     Args:
         runs: runs of any experiments.
@@ -41,17 +40,19 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
         text = json.dumps(both, sort_keys=True)
         groups.setdefault(run.experiment, {}).setdefault(text, []).append(run)
     renamed: dict[int, Run] = {}
-    reference: Run | None = None
+    earlier: list[Run] = []
     for name, by_settings in groups.items():
         first, *others = sorted(by_settings.values(), key=len, reverse=True)
-        reference = reference or first[0]
-        if differs := _compared(first[0], reference):
-            differs += f" (compared with {reference.experiment})"
+        lists = [(_compared(first[0], other), other) for other in earlier]
+        found, nearest = min(lists, key=lambda one: len(one[0]), default=([], first[0]))
+        if found:
+            differs = f"{', '.join(found)} (compared with {nearest.experiment})"
             for run in first:
                 renamed[id(run)] = replace(run, differs=differs)
+        earlier.append(first[0])
         free = (each for n in count(2) if (each := f"{name}{MARK}{n}") not in groups)
         for experiment, group in zip(free, others, strict=False):
-            differs = _compared(group[0], first[0])
+            differs = ", ".join(_compared(group[0], first[0]))
             for run in group:
                 renamed[id(run)] = replace(run, experiment=experiment, differs=differs)
     return [renamed.get(id(run), run) for run in runs]
@@ -84,8 +85,8 @@ def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _compared(mine: Run, other: Run) -> str:
-    """Return the differences of the settings of two runs as text."""
+def _compared(mine: Run, other: Run) -> list[str]:
+    """Return the differences of the settings of two runs."""
     # A plug-in that only one of them has is named by another setting.
     found = [
         f"source of plug-in {name} (plugins/{name}.py in the run folders): digest "
@@ -93,9 +94,8 @@ def _compared(mine: Run, other: Run) -> str:
         for name, digest in other.plugins.items()
         if mine.plugins.get(name, digest) != digest
     ]
-    found += _differences(_settings(mine.document), _settings(other.document), "")
-    more = [f"and {len(found) - _LISTED} more"] if len(found) > _LISTED else []
-    return ", ".join(found[:_LISTED] + more)
+    settings = _settings(mine.document), _settings(other.document)
+    return [*found, *_differences(*settings, "")]
 
 
 def _differences(mine: object, other: object, where: str) -> Iterator[str]:

@@ -20,6 +20,7 @@ Tables = Mapping[str, pa.Table]
 Row = Mapping[str, Any]
 
 _MOST_LINES = 3
+_MOST_TEXT = 800
 """Differing experiments, or runs of arenas, that are described without a fold."""
 
 
@@ -80,9 +81,11 @@ def _differing(differs: Mapping[str, str]) -> str:
         for name, text in differs.items()
         if text
     ]
-    if len(lines) > _MOST_LINES:
-        return folded(f"Settings of {len(lines)} experiments", "".join(lines))
-    return "".join(lines)
+    text = "".join(lines)
+    if len(lines) > _MOST_LINES or len(text) > _MOST_TEXT:
+        title = f"Settings that differ: {plural(len(lines), 'experiment')}"
+        return folded(title, text)
+    return text
 
 
 def _columns(rows: Sequence[tuple[float, float]]) -> list[list[float]]:

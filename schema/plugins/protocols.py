@@ -462,7 +462,7 @@ class Selectable(Protocol):
 
     @property
     def birth(self) -> BirthId:
-        """Birth id: island and number."""
+        """Birth id: ``island`` of birth and ``number`` there; hashable, in order."""
         ...
 
     @property

@@ -19,7 +19,8 @@ SCENARIO = json.loads(experiment_text(read_experiment("scenario1")))
 ALL_TYPES = json.dumps(SCENARIO["space"]["part_types"])
 MANY = (
     "generation.parts_mean: 1.0 instead of 12.0, generation.parts_sd: 1.0 instead of "
-    "5.0, generation.max_tries: 1 instead of 100, and 2 more"
+    "5.0, generation.max_tries: 1 instead of 100, variation.body_epsilon: 0.5 instead "
+    "of 0.05, variation.brain_epsilon: 0.5 instead of 0.1"
 )
 
 
@@ -166,6 +167,18 @@ def test_other_experiments_are_compared_with_the_first() -> None:
     for _, differs in (found[1], found[4]):
         assert friction in differs
         assert against not in differs
+
+
+def test_an_experiment_is_compared_with_the_one_that_is_most_like_it() -> None:
+    tuned = changed(selection={"population": 30, "tournament_size": 8})
+    more = changed(selection={"population": 30, "tournament_size": 8, "children": 9})
+    some = [run for at, one in enumerate((SCENARIO, tuned, more))
+            for run in runs(one, name=f"e{at}")]  # fmt: skip
+    found = [
+        run.differs.partition(" (compared")[::2] for run in with_distinct_names(some)
+    ]
+    assert [against for _, against in found] == ["", " with e0)", " with e1)"]
+    assert found[2][0] == "selection.children: 9 instead of 15"
 
 
 def test_each_name_is_numbered_separately() -> None:
