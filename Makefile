@@ -136,7 +136,7 @@ $(NEEDED) $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
 		|| { echo '"$(PYTHON)" lacks venv: install it (Debian: python3-venv)' >&2; \
 		exit 1; }
-	@echo 'Installing what $(VENV) needs: about $(SIZE) on disk, a minute or two.'
+	@echo 'Installing what $(VENV) needs: about $(SIZE) on disk in all, a minute or two.'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@{ $(BIN)/python -m pip install --disable-pip-version-check --no-compile \
 		--progress-bar off -c constraints.txt -e '.[$(EXTRAS)]'; echo "ended $$?"; } \

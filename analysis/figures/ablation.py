@@ -8,8 +8,8 @@ from analysis.figures.forms import NothingToDraw
 from analysis.figures.robustness import points_of_shares
 
 _SENSORS = {HELD: "at 0", MEAN: "at mean"}
-_MOTORS = ("most important", "2nd", "3rd", "4th", "5th", "6th")
-"""Motors with a row of their own, in the order of what robots lose without them."""
+_MOTOR = " motor dead"
+_MOST_IMPORTANT = "most important"
 _ROW_IN = 0.2
 
 
@@ -45,8 +45,8 @@ def _label(row: dict[str, object]) -> str:
     if group == RANDOM:
         return "random brains"
     if group == DEAD and scope == ONE:
-        place = int(float(str(row["place"]))) - 1
-        return f"{_MOTORS[place]} motor dead" if place < len(_MOTORS) else ""
+        place = int(float(str(row["place"])))
+        return (_MOST_IMPORTANT if place == 1 else _ordinal(place)) + _MOTOR
     if scope == ONE:
         return ""
     if group == DEAD:
@@ -58,6 +58,13 @@ def _place(label: str) -> tuple[int, int, str]:
     """Return the sort key of a row of the figure."""
     blocks = ("at 0", "at mean", "motor dead", "all motors", "random")
     block = next(number for number, text in enumerate(blocks) if text in label)
-    first = label.removesuffix(" motor dead")
-    inner = _MOTORS.index(first) if first in _MOTORS else label.startswith("all")
-    return block, int(inner), label
+    if label.endswith(_MOTOR):
+        digits = "".join(filter(str.isdigit, label))
+        return block, int(digits or 1), label
+    return block, int(label.startswith("all")), label
+
+
+def _ordinal(number: int) -> str:
+    endings = {1: "st", 2: "nd", 3: "rd"}
+    is_teen = number // 10 % 10 == 1
+    return f"{number}{'th' if is_teen else endings.get(number % 10, 'th')}"

@@ -9,7 +9,9 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.comparison.statistics import mean_difference
 from analysis.figures.forms import NothingToDraw, Tables
+from analysis.measures.population_table import Numbers
 
 MEASURES = {
     "fitness": "mean fitness",
@@ -103,20 +105,45 @@ def sweep_map(tables: Tables, experiment: str) -> Figure:
 
 
 def sweep_caption(tables: Tables, experiment: str) -> str:
-    """Return what the map shows, and the settings with the highest mean fitness."""
+    """Return what the map shows, and the two settings with the highest mean fitness."""
     runs = sweep_runs(tables, experiment)
-    means = runs.frame.groupby(runs.settings)["fitness"].agg(["mean", "size"])
-    best = means["mean"].idxmax()
-    values = best if isinstance(best, tuple) else (best,)
-    pairs = zip(runs.settings, values, strict=True)
-    at = ", ".join(f"{setting} = {_text(value)}" for setting, value in pairs)
-    few = "Means over finished runs" if means["size"].max() > 1 else "Finished runs"
-    kind = (
-        "" if _is_map(runs) else " Each point is a run; the line joins means over runs."
-    )
+    points = [
+        (values, group.to_numpy(np.float64))
+        for values, group in runs.frame.groupby(runs.settings)["fitness"]
+    ]
+    has_means = any(len(fitness) > 1 for _, fitness in points)
+    few = "Means over finished runs" if has_means else "Finished runs"
+    line = "; the line joins means over runs" * has_means
+    kind = "" if _is_map(runs) else f" Each point is a run{line}."
     return (
-        f"{few} at each point of the sweep ({len(runs.frame)} runs at {len(means)} "
-        f"points).{kind} Mean fitness is highest at {at}: {means['mean'].max():.3g}."
+        f"{few} at each point of the sweep ({len(runs.frame)} runs at {len(points)} "
+        f"points).{kind} {_best_points(runs.settings, points)}"
+    )
+
+
+def _best_points(settings: Sequence[str], points: Sequence[tuple[Any, Numbers]]) -> str:
+    """Return which point has the highest mean fitness, and how sure this is."""
+
+    def text(values: Any, fitness: Numbers) -> str:  # noqa: ANN401 - of any settings
+        pairs = zip(settings, values, strict=True)
+        at = ", ".join(f"{setting} = {_text(value)}" for setting, value in pairs)
+        spread = f" (sd {fitness.std(ddof=1):.2g})" if len(fitness) > 1 else ""
+        return f"{at}: {fitness.mean():.3g}{spread}"
+
+    ordered = sorted(points, key=lambda point: -point[1].mean())
+    best = f"Mean fitness is highest at {text(*ordered[0])}"
+    if len(ordered) == 1:
+        return f"{best}."
+    best += f", then at {text(*ordered[1])}."
+    first, second = ordered[0][1], ordered[1][1]
+    if min(len(first), len(second)) == 1:
+        return f"{best} One run at a point has no spread; --repeats adds runs."
+    difference, low, high = mean_difference(first, second)
+    verdict = "is shown" if low > 0 else "is not shown"
+    return (
+        f"{best} The difference of these two, {difference:.2g} (95 % interval "
+        f"{low:.2g} to {high:.2g}, Welch's t), {verdict}; the best of many points is "
+        "often best by chance."
     )
 
 

@@ -48,6 +48,11 @@ def differences(tables: Tables) -> str:
     for row in every:
         pair = {row["a"], row["b"]}
         row["apart"] = not (online.isdisjoint(pair) or offline.isdisjoint(pair))
+    # Both measures show the same pairs in the same order.
+    first = [row for row in every if row["measure"] == next(iter(_COMPARED))]
+    first.sort(key=lambda row: (row["apart"], 1.0 if row["p"] is None else row["p"]))
+    place = {(row["a"], row["b"]): at for at, row in enumerate(first)}
+    every.sort(key=lambda row: place.get((row["a"], row["b"]), len(place)))
     parts = [_differences_of(every, *one) for one in _COMPARED.items()]
     apart = not_compared(tables)
     if not any(parts):
@@ -102,7 +107,6 @@ def _bold(names: Sequence[str]) -> str:
 def _differences_of(comparison: Sequence[Row], measure: str, title: str) -> str:
     """Return the differences of one measure; empty if nothing is compared."""
     rows = [row for row in comparison if row["measure"] == measure]
-    rows.sort(key=lambda row: (row["apart"], 1.0 if row["p"] is None else row["p"]))
     shown = rows[:_MOST_PAIRS]
     if not shown:
         return ""

@@ -88,6 +88,7 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
         shown = course(tables, "fitness")
     except NothingToDraw:
         return ""
+    islands = tables["runs"]["islands"].to_pylist()
     names = run_names(tables["runs"])
     of_all = [name.experiment for name in names.values()]
     paint = colours(of_all)
@@ -111,7 +112,7 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
         axes,
         marks,
         description="Fitness over births",
-        x_text="births on each island",
+        x_text="births on each island" if max(islands) > 1 else "births",
         y_text=y_text,
     )
     return legend(in_order(shown.sizes), of_all) + drawn

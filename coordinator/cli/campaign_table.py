@@ -30,6 +30,7 @@ class RunOutcome:
         took_s: from start to end by the clock, pauses included [s]; None: no end.
         has_failed: it was not finished, or no evaluation succeeded.
         function: fitness functions, as ``fitness_text``; empty if unknown.
+        point: settings that a sweep chose, as text; empty without a sweep.
     """
 
     experiment: str
@@ -37,6 +38,7 @@ class RunOutcome:
     took_s: float | None
     has_failed: bool
     function: str = ""
+    point: str = ""
 
 
 def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome:
@@ -52,13 +54,18 @@ def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome
     try:
         bests = [island.best for island in folder_status(folder).islands]
         (row,) = read_table(folder, "runs").to_pylist()
-        function = fitness_text(json.loads(row["document"]))
+        document = json.loads(row["document"])
+        function = fitness_text(document)
+        chosen = (document.get("sweep") or {}).get("chosen") or {}
     except (RevolveError, ValueError):
         return RunOutcome(experiment, None, None, has_failed=True)
     judged = [best for best in bests if best is not None]
     took_s = (row["end"] - row["start"]).total_seconds() if row["end"] else None
     best = max(judged, default=None)
-    return RunOutcome(experiment, best, took_s, has_failed=False, function=function)
+    point = ", ".join(f"{key} = {json.dumps(value)}" for key, value in chosen.items())
+    return RunOutcome(
+        experiment, best, took_s, has_failed=False, function=function, point=point
+    )
 
 
 def rows(outcomes: Iterable[RunOutcome]) -> list[tuple[str, ...]]:
@@ -103,6 +110,9 @@ def show(outcomes: Iterable[RunOutcome]) -> None:
     console = Console(width=_WIDEST, highlight=False, markup=False)
     console.print(table)
     console.print("fitness of each run's best robot in its last population")
+    points = {run.experiment: run.point for run in known if run.point}
+    for name, point in points.items():
+        console.print(f"{name}: {point}")
     functions = {run.experiment: run.function for run in known if run.function}
     if len(set(functions.values())) > 1:
         lists = ", ".join(f"{name} {text}" for name, text in functions.items())

@@ -103,5 +103,16 @@ def test_figure_orders_motors_by_what_robots_lose() -> None:
         ):  # fmt: skip
             chosen = last_or_best[last_or_best["label"] == label]
             assert sorted(chosen["share"]) == pytest.approx(wanted)
+    many = [
+        row(7, DEAD, "one", 0.01 * n, "ActiveHinge", channel=n) for n in range(1, 23)
+    ]
+    labels = ablation(table_of(many)).scales[1].limits
+    assert labels[-3:] == [
+        "3rd motor dead",
+        "2nd motor dead",
+        "most important motor dead",
+    ]
+    assert labels[0] == "22nd motor dead"
+    assert {f"{n}th motor dead" for n in (11, 12, 13)} < set(labels)
     with pytest.raises(NothingToDraw, match="positive fitness"):
         ablation(table_of([row(7, HELD, "all", 0.1, undisturbed=0.0)]))

@@ -44,7 +44,28 @@ def test_a_grid_of_two_settings_is_a_map_of_means_over_runs() -> None:
     plt.close(figure)
     assert sweep_caption(_tables(GRID), "e") == (
         "Means over finished runs at each point of the sweep (8 runs at 4 points). "
-        "Mean fitness is highest at a.b = 2, c = 30: 32."
+        "Mean fitness is highest at a.b = 2, c = 30: 32 (sd 0), then at a.b = 1, "
+        "c = 30: 31 (sd 0). The difference of these two, 1 (95 % interval 1 to 1, "
+        "Welch's t), is shown; the best of many points is often best by chance."
+    )
+
+
+def test_a_caption_says_how_sure_the_best_point_is() -> None:
+    """Means 2 and 2.5 of two runs each, variances 0.5 and 0.5: t of 2 d.f. is 4.303."""
+    tables = _tables([{"a": 1.0}, {"a": 1.0}, {"a": 2.0}, {"a": 2.0}])
+    at = tables["outcomes"].schema.get_field_index("fitness")
+    values = pa.array([1.5, 2.5, 2.0, 3.0], pa.float64())
+    tables["outcomes"] = tables["outcomes"].set_column(at, "fitness", values)
+    assert sweep_caption(tables, "e").endswith(
+        "Each point is a run; the line joins means over runs. Mean fitness is highest "
+        "at a = 2: 2.5 (sd 0.71), then at a = 1: 2 (sd 0.71). The difference of these "
+        "two, 0.5 (95 % interval -2.5 to 3.5, Welch's t), is not shown; the best of "
+        "many points is often best by chance."
+    )
+    alone = sweep_caption(_tables([{"a": 1.0}, {"a": 2.0}]), "e")
+    assert alone.endswith(
+        "Each point is a run. Mean fitness is highest at a = 2: 2, then at a = 1: 1. "
+        "One run at a point has no spread; --repeats adds runs."
     )
 
 

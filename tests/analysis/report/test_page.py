@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from PIL import Image
 
 from analysis.comparison.progression import progression
 from analysis.figures.figure_writer import Drawings
+from analysis.measures.outputs import schema
+from analysis.report.differences import differences
 from tests.analysis.reported import NOTHING, drawings, page, tables
 
 VOID = {"meta", "img", "br", "link"}
@@ -116,6 +119,20 @@ def test_differences_have_an_interval_where_both_have_two_runs(read: Reader) -> 
     # One run of b is no spread of zero.
     assert "\u22120.05 (2 and 1 run, at 30 births) no interval" in read.text
     assert "0.02" not in read.text
+
+
+def test_both_comparisons_of_fitness_show_the_pairs_in_one_order() -> None:
+    pairs = {"fitness": {"b": 0.3, "c": 0.1}, "fitness_best": {"b": 0.2, "c": 0.4}}
+    rows = [
+        {"measure": measure, "a": "a", "b": b, "births": 9, "runs_a": 1, "runs_b": 1,
+         "mean_a": 1.0, "mean_b": 1.0, "difference": 0.0, "effect": 0.0, "p": p}
+        for measure, found in pairs.items()
+        for b, p in found.items()
+    ]  # fmt: skip
+    given = tables()
+    given["comparison"] = pa.Table.from_pylist(rows, schema("comparison"))
+    lines = re.findall(r"<b>a</b> minus <b>(.)</b>", differences(given))
+    assert lines == ["c", "b"] * 2
 
 
 def test_compared_measures_are_explained_and_equal_ones_counted(read: Reader) -> None:

@@ -43,6 +43,21 @@ def test_the_table_fits_80_columns_and_explains_itself(
     assert "best robot in its last population" in note
 
 
+def test_points_of_a_sweep_have_their_settings(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runs = [
+        RunOutcome(name, 0.1, 60.0, has_failed=False, point=point)
+        for name, point in (("s-0", "a.b = 1"), ("s-1", 'a.b = 2, c = "x"'), ("d", ""))
+    ]
+    show([*runs, runs[0]])
+    assert capsys.readouterr().out.splitlines()[-3:] == [
+        "fitness of each run's best robot in its last population",
+        "s-0: a.b = 1",
+        's-1: a.b = 2, c = "x"',
+    ]
+
+
 def test_different_fitness_functions_are_named(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
