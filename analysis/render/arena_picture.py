@@ -5,7 +5,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from analysis.render.stage import HIGH, Picture, Stage, choose_engine, furnish
+from analysis.render.stage import (
+    AZIMUTH,
+    HIGH,
+    Picture,
+    Stage,
+    choose_engine,
+    furnish,
+)
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
@@ -20,6 +27,8 @@ _HIDDEN_M = -100.0
 _LEAST_REACH_M = 0.5
 _WHOLE = (0.0, 0.0)
 """Shares of a picture that are cut off."""
+_RIM_M = 0.005
+"""Half height of walls between the camera and the robots [m]."""
 
 
 class ArenaRenderer:
@@ -56,6 +65,7 @@ class ArenaRenderer:
 
         def furnish_arena(spec: Any) -> None:  # noqa: ANN401 - imported late
             mjcf.add_ring_wall(spec, settings.arena)
+            _lower_near_walls(spec, len(mjcf.ring_wall(settings.arena)))
             furnish(size, settings.light, reach_m, spec)
 
         specs = [
@@ -106,3 +116,17 @@ class ArenaRenderer:
         return self._stage.framing(
             np.concatenate(centres), np.concatenate(radii), _WHOLE
         )
+
+
+def _lower_near_walls(spec: Any, count: int) -> None:  # noqa: ANN401 - imported late
+    """Draw the walls on the camera's side as a rim, which hides no robot.
+
+    Args:
+        spec: of the arena, with its walls.
+        count: number of walls.
+    """
+    view = np.radians(AZIMUTH)
+    for number in range(count):
+        wall = spec.geom(f"wall{number}")
+        if wall.pos[0] * np.cos(view) + wall.pos[1] * np.sin(view) < 0.0:
+            wall.pos[2] = wall.size[2] = _RIM_M

@@ -29,7 +29,7 @@ _LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
 _SETTING = "MUJOCO_GL"
 _OFF = ("disable", "disabled", "off", "false", "0")
 """Values of the setting for which MuJoCo loads no graphics library."""
-_AZIMUTH = 130.0
+AZIMUTH = 130.0
 """Direction of the camera's view, as MuJoCo's [degrees]."""
 LOW, HIGH = -28.0, -38.0
 """Elevations of the camera's view: at a robot, and down on many [degrees]."""
@@ -118,7 +118,7 @@ class Stage:
         """
         camera = self._mujoco.MjvCamera()
         camera.lookat[:], camera.distance = look_at, distance_m
-        camera.azimuth, camera.elevation = _AZIMUTH, self._elevation
+        camera.azimuth, camera.elevation = AZIMUTH, self._elevation
         self._renderer.update_scene(self.data, camera)
         return np.array(self._renderer.render())
 
@@ -137,7 +137,7 @@ class Stage:
         """
         edge, (width, height) = np.tan(np.radians(FIELD_OF_VIEW / 2)), self._size
         above, below = ((1 - 2 * share) * edge for share in cut)
-        view = np.radians(_AZIMUTH), np.radians(self._elevation)
+        view = np.radians(AZIMUTH), np.radians(self._elevation)
         return framed(centres, radii, *view, (above, below, width / height * edge))
 
 

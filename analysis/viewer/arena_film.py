@@ -129,6 +129,7 @@ def draw_film(
                     renderers[island].picture(frames.get(time_s, {}))
                     for island, frames in found.items()
                 ],
+                [time_s] * len(found),
                 columns=_COLUMNS,
             )
             for time_s in bar.track(times_s, description="rendering")

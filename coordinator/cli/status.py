@@ -263,7 +263,10 @@ def _without_coordinator(status: Status, root: Path) -> str:
     if is_campaign(root) or holds_run(root):
         if running:
             return "the coordinator does not answer"
-        return f"no coordinator is running; to continue: {resume_command(root)}"
+        return (
+            "no coordinator is running; the newest births are perhaps in the journal "
+            f"only, and are kept; to continue: {resume_command(root)}"
+        )
     if not running:
         return "no coordinator is running"
     # Each coordinator has a folder of its own: that of its campaign or its run.

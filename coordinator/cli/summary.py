@@ -9,6 +9,7 @@ from statistics import fmean
 
 import pyarrow as pa
 import pyarrow.compute as pc
+from msgspec import to_builtins
 
 from coordinator.arena.arena import Arena
 from coordinator.run.session import RunSession
@@ -16,7 +17,14 @@ from coordinator.storage.hints import command
 from schema.agent.screen import missing_screen
 from schema.errors import counted, rounded
 from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import Simulation, body_space
+from schema.experiment.document import (
+    Experiment,
+    Simulation,
+    body_space,
+    island_count,
+    island_experiment,
+)
+from schema.experiment.fitness_keys import fitness_text
 from schema.formats.files import BEST, write_robot
 from schema.tables.files import read_table
 from schema.tables.last_populations import Row, best_of, last_populations
@@ -94,7 +102,7 @@ def _results(run: RunSession) -> list[str]:
         f"{births}; {mean}",
         *_best_robot(run, best),
     ]
-    lines[1:1] = _counted_as_zero(run, last)
+    lines[1:1] = [*_counted_as_zero(run, last), *judged_apart(run.experiment)]
     if any(isinstance(island, Arena) for island in islands.values()):
         lines[-1:-1] = _windows(folder, run.experiment.simulation)
     return lines
@@ -126,6 +134,23 @@ def _counted_as_zero(run: RunSession, last: Sequence[Row]) -> list[str]:
     line = f"{failed} of {len(off_line)} robots of the last population failed: "
     line += "selection counts them as fitness 0"
     return [f"{line}, more than the {worse} negative ones" if worse else line]
+
+
+def judged_apart(experiment: Experiment) -> list[str]:
+    """Return a line if the fitness of different islands cannot be compared."""
+    each: dict[str, list[str]] = {}
+    for number in range(island_count(experiment)):
+        own = island_experiment(experiment, number)
+        text = fitness_text({"fitness": to_builtins(own.fitness)})
+        text += " in an arena" * (own.arena is not None)
+        each.setdefault(text, []).append(str(number))
+    if len(each) == 1:
+        return []
+    lists = "; ".join(
+        f"{text} on {'island' if len(numbers) == 1 else 'islands'} {', '.join(numbers)}"
+        for text, numbers in each.items()
+    )
+    return [f"fitness of different islands is not comparable: {lists}"]
 
 
 def _best_robot(run: RunSession, best: Row) -> list[str]:

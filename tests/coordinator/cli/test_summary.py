@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from coordinator.cli import summary
+from schema.experiment.document import Arena, Experiment, Fitness, Islands
 from schema.formats.files import BEST
 
 
@@ -25,3 +26,14 @@ def test_only_commands_that_work_are_suggested(
     best.touch()
     render = f"  revolve robot render {best} best.gif"
     assert summary.next_steps(tmp_path) == [render, f"  revolve {show}", analyze]
+
+
+def test_islands_that_judge_in_other_ways_are_said() -> None:
+    alike = (Islands(count=2), Islands(fitness=Fitness()))
+    assert summary.judged_apart(Experiment("e", islands=alike)) == []
+    others = (Islands(fitness=Fitness(limit=0.5)), Islands(arena=Arena()))
+    (line,) = summary.judged_apart(Experiment("e", islands=alike + others))
+    assert line == (
+        "fitness of different islands is not comparable: locomotion on islands 0, 1, "
+        "2; locomotion (limit = 0.5) on island 3; locomotion in an arena on island 4"
+    )
