@@ -113,6 +113,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         **_RUN,
         "run": "number of the repeat",
         "seed": "seed of the run",
+        "run_id": "identifier of the run, a column of all tables in its folder; null "
+        "if its description is damaged",
         "state": "finished, stopped or running (also if it was killed)",
         "births": "recorded births of all islands",
         "planned": "births of all islands in a finished run",
@@ -302,8 +304,8 @@ _INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "pla
              "living", "reached", "runs", "runs_a", "runs_b", "failures", "deaths",
              "finding", "births", "birth", "members", "founders", "trials",
              "trial"}  # fmt: skip
-_TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
-          "figure", "claim", "expected", "verdict", "why", "what", "topic",
+_TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measure",
+          "a", "b", "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "setting", "value", "differs", "function", "fitness_function",
           "plugins"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}

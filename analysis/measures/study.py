@@ -16,6 +16,7 @@ from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
 from schema.agent.import_path import safe_import_path
+from schema.tables.description import run_columns
 
 _FEW = 3
 """Number of runs that are measured faster than another process starts."""
@@ -133,6 +134,7 @@ def _summary(
     row = {
         "run": run.number,
         "seed": run.seed,
+        "run_id": run_columns(run.folder)["run_id"],
         "state": run.state,
         "births": tables["births"].num_rows,
         "planned": planned_births(run),

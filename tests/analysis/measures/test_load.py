@@ -13,7 +13,7 @@ import pytest
 from analysis.measures.load import Run, read_runs, read_tables
 from analysis.measures.study import MeasuredRun, measure_run, measure_runs
 from schema.errors import RunFolderError
-from schema.tables.files import parquet_path
+from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path
 from tests.analysis.tables import births, population, table
 
@@ -79,9 +79,13 @@ def fitness(measured: MeasuredRun) -> list[float]:
 def test_finished_and_unfinished_runs_are_measured_alike(
     made: Maker, state: str
 ) -> None:
-    measured = measure_run(found_in(made("x", state=state)), "parent")
+    folder = made("x", state=state)
+    measured = measure_run(found_in(folder), "parent")
     assert fitness(measured) == pytest.approx([0.2, 0.4])
     assert measured.tables["robots"].num_rows == 3
+    (row,) = measured.tables["runs"].to_pylist()
+    # As in the run's own tables.
+    assert row["run_id"] == read_table(folder, "births")["run_id"][0].as_py()
     expected = {} if state == "finished" else {
         "comparison": "the run is not finished: 3 of 3 births are recorded"
     }  # fmt: skip
