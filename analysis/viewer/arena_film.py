@@ -107,13 +107,14 @@ def draw_film(
     bodies = {one.birth: one.body for one in read_news(run).births}
     found = read_frames(folder, *span)
     if not found:
-        why = (
-            f"no poses of an arena between {span[0]:g} and {span[1]:g} s"
-            if scene_of(experiment).arenas
-            else "the run has no arena"
-        )
+        if scene_of(experiment).arenas:
+            raise NoPictures(
+                f"{folder}: no poses of an arena between {span[0]:g} and {span[1]:g} "
+                f"s; the run ends at {last_time(folder):g} s"
+            )
         raise NoPictures(
-            f"{folder}: {why}; for the film of a robot use: revolve robot render"
+            f"{folder}: the run has no arena; for the film of a robot use: revolve robot "
+            "render"
         )
     times_s = sorted({time_s for frames in found.values() for time_s in frames})
     with ExitStack() as stack, bars(f"rendering {len(times_s)} pictures") as bar:

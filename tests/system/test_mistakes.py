@@ -96,7 +96,7 @@ MISTAKES = {
     "other ending": ("view run --save a.mp4", "--save a.mp4: must end in .rrd", 2),
     "film of a time without robots": (
         "view run --save a.gif --from 1e5 --until 1.1e5",
-        "run: no poses of an arena between 100000 and 110000 s; for the film of a ",
+        "run: no poses of an arena between 100000 and 110000 s; the run ends at ",
         2,
     ),
     "film of one robot": (
