@@ -279,10 +279,10 @@ def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None
             "founders of parts are not known."
         )
     caption = (
-        f"Robot {best.birth} of {best.folder.name}, the fittest robot of the last "
-        "populations, at the bottom, and its ancestors over five levels of "
-        "reproduction: parents are drawn above their children. A dotted line leads to "
-        f"a parent that is drawn on another level. {colours} The robot has "
+        f"Robot {best.birth_island}:{best.birth} of {best.folder.name}, the fittest "
+        "robot of the last populations, at the bottom, and its ancestors over five "
+        "levels of reproduction: parents are drawn above their children. A dotted line "
+        f"leads to a parent that is drawn on another level. {colours} The robot has "
         f"{one.lineage.num_rows - 1} ancestors in total."
     )
     title = f"Ancestry of the best robot of {label(best.experiment)}"

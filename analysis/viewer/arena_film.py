@@ -113,8 +113,8 @@ def draw_film(
                 f"s; the run ends at {last_time(folder):g} s"
             )
         raise NoPictures(
-            f"{folder}: the run has no arena; for the film of a robot use: revolve robot "
-            "render"
+            f"{folder}: the run has no arena; for the film of a robot use: revolve "
+            "robot render"
         )
     times_s = sorted({time_s for frames in found.values() for time_s in frames})
     with ExitStack() as stack, bars(f"rendering {len(times_s)} pictures") as bar:
