@@ -23,7 +23,7 @@ from coordinator.cli.format import (
     run_details,
 )
 from coordinator.run.scheduler import RunScheduler
-from coordinator.run.session import SPAN_S, RunSession
+from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
 from schema.agent.log import log_form, tell_user, warn_user
 from schema.errors import counted
@@ -32,6 +32,8 @@ from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
 """Bars of single runs or islands that fit on a screen."""
+_LINE_S = 10.0
+"""Time between two lines of progress, where there is no terminal [s]."""
 _SOON_S = 2.0
 """Time after which a run says how to start the agents that it waits for [s]."""
 _LEAST_FOR_BAR = 60
@@ -65,7 +67,7 @@ class Display:
         self._quiet = quiet
         self._place = place
         self._flags = [word for each in plugins for word in (FLAG, each)]
-        self._patience_s = _SOON_S if place and not quiet else SPAN_S
+        self._patience_s = _SOON_S if place and not quiet else _LINE_S
         # Bars would break lines of JSON.
         self._has_bars = self._console.is_terminal and log_form() != "json"
         self._progress = Progress(
@@ -101,7 +103,7 @@ class Display:
         elif self._has_bars:
             self._draw(status)
         elif now_s >= self._next_line_s:
-            self._next_line_s = now_s + SPAN_S
+            self._next_line_s = now_s + _LINE_S
             tell_user(", ".join([_line(status), *self._recoveries()]))
         self._warn_of_missing(status, now_s)
 
@@ -153,7 +155,7 @@ class Display:
         elif self._missing_since_s is None or missing != self._missing:
             self._missing, self._missing_since_s = missing, now_s
         elif now_s - self._missing_since_s > self._patience_s:
-            self._missing_since_s = now_s + 6 * SPAN_S
+            self._missing_since_s = now_s + 6 * _LINE_S
             is_refused = any(each.kind == "refused" for each in status.faults)
             who = (
                 "none that is connected can do the jobs"

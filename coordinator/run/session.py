@@ -38,8 +38,8 @@ from schema.tables.files import has_rows
 from schema.wire.status import IslandStatus, RunStatus
 
 _LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
-SPAN_S = 10.0
-"""Time over which a rate is averaged [s]."""
+RATE_S = 60.0
+"""Time over which a rate is averaged [s]; births of runs that take turns are bursts."""
 
 
 class RateMeter:
@@ -56,7 +56,7 @@ class RateMeter:
             count: does not decrease.
         """
         self._seen.append((now_s, count))
-        while now_s - self._seen[0][0] > SPAN_S:
+        while now_s - self._seen[0][0] > RATE_S:
             self._seen.popleft()
 
     @property

@@ -166,9 +166,9 @@ def test_a_rate_covers_the_last_seconds() -> None:
     assert meter.per_s == 0.0
     meter.note(0.0, 1000)
     assert meter.per_s == 0.0
-    for second in range(1, 31):
+    for second in range(1, 131):
         meter.note(
-            float(second), 1000 + (50 if second <= 20 else 50 + 3 * (second - 20))
+            float(second), 1000 + (50 if second <= 70 else 50 + 3 * (second - 70))
         )
     assert meter.per_s == pytest.approx(3.0)
 
