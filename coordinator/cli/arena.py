@@ -8,6 +8,7 @@ from uuid import uuid4
 from coordinator.cli.status import ask, ask_status
 from schema.agent.command import add_connect, add_network_flags
 from schema.agent.flags import Flags, add_count, number, whole_number
+from schema.agent.log import tell_user
 from schema.errors import InvalidRobot, NetworkError
 from schema.formats.files import read_robot
 from schema.formats.run_settings import experiment_of, types_of
@@ -24,6 +25,7 @@ from schema.wire.operator import (
     SaveSnapshot,
     SetBrain,
 )
+from schema.wire.status import RunStatus
 
 ACTIONS = {
     "list": "list the living robots",
@@ -84,17 +86,24 @@ def _coordinator(options: argparse.Namespace) -> str:
         NetworkError: not exactly one coordinator has such a run.
     """
     found = ask_status(options)
-    names = [
-        name
+    folders = {
+        name: chosen
         for name, status in found.items()
-        if any(Path(run.folder).name.endswith(options.run) for run in status.runs)
-    ]
-    if len(names) == 1:
-        return names[0]
+        if (chosen := [run.folder for run in status.runs if _is_of(run, options.run)])
+    }
+    if len(folders) == 1:
+        ((name, chosen),) = folders.items()
+        # The hub of the user may have another run than the one that is meant.
+        tell_user(f"arena of {chosen[0]}" if len(chosen) == 1 else f"arena of {name}")
+        return name
     raise NetworkError(
         f"{options.connect}: exactly one coordinator must have a run "
-        f"{options.run!r}, got {len(names)} of {len(found)}; choose one by --run"
+        f"{options.run!r}, got {len(folders)} of {len(found)}; choose one by --run"
     )
+
+
+def _is_of(run: RunStatus, wanted: str) -> bool:
+    return Path(run.folder).name.endswith(wanted)
 
 
 def _action(options: argparse.Namespace) -> OperatorAction:

@@ -68,7 +68,9 @@ def test_pause_list_insert_remove_snapshot_resume(
         until(lambda: arena("list").startswith("paused"), "the arena pauses")
         before = arena("list")
         first = before.splitlines()[2].split()[0]
-        assert "is not alive" in arena("remove", "999", code=1)
+        refused = arena("remove", "999", code=1)
+        assert f"arena of {folder}" in refused
+        assert "is not alive" in refused
         arena("remove", first)
         crowded_arena_workspace.run(
             "robot", "convert", str(crowded_arena_run / "best.yaml"), "guest.pb"
