@@ -20,6 +20,8 @@ from schema.experiment.file import experiment_from_text, experiment_text
 MARK = "~"
 """Separator of a name and a number that makes it distinct."""
 _NOT_SETTINGS = frozenset({"name", "births"})
+_SWEPT = "swept"
+"""Value of a setting that a sweep chooses, as runs of a sweep are one experiment."""
 
 
 def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
@@ -65,15 +67,16 @@ def _settings(document: str) -> dict[str, Any]:
     entries: dict[str, Any] = json.loads(document)
     # Runs of a sweep are one experiment.
     for key in (entries.get("sweep") or {}).pop("chosen", None) or {}:
-        _remove(entries, key.split("."))
+        _mark_swept(entries, key.split("."))
     return _without(entries)
 
 
-def _remove(section: dict[str, Any], words: Sequence[str]) -> None:
-    """Remove the value of a dotted key, if it is there."""
+def _mark_swept(section: dict[str, Any], words: Sequence[str]) -> None:
+    """Replace the value of a dotted key, if it is there."""
     for word in words[:-1]:
         section = section.get(word) or {}
-    section.pop(words[-1], None)
+    if words[-1] in section:
+        section[words[-1]] = _SWEPT
 
 
 def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,6 +98,10 @@ def _compared(mine: Run, other: Run) -> list[str]:
         if mine.plugins.get(name, digest) != digest
     ]
     settings = _settings(mine.document), _settings(other.document)
+    if not all(each.get("sweep") for each in settings):
+        # The settings that only one of them sweeps are listed.
+        for each in settings:
+            each.pop("sweep", None)
     return [*found, *_differences(*settings, "")]
 
 
@@ -110,4 +117,6 @@ def _differences(mine: object, other: object, where: str) -> Iterator[str]:
 def _text(value: object) -> str:
     if value is None:
         return "none"
+    if value == _SWEPT:
+        return _SWEPT
     return "settings" if isinstance(value, dict) else json.dumps(value)

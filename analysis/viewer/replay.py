@@ -36,7 +36,7 @@ def shown_run(folder: Path) -> Run:
         return read_run(folder)
     except RunFolderError as error:
         why = str(error).removeprefix(f"{folder}: ")
-        raise RunFolderError(f"{folder}: no run found: {why}") from None
+        raise RunFolderError(f"{folder}: {why}") from None
 
 
 def read_news(run: Run) -> Update:

@@ -29,6 +29,7 @@ from schema.agent.import_path import environment, python_command
 from schema.agent.log import warn_user
 from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
 from schema.experiment.document import (
+    Arena,
     Experiment,
     island_count,
     island_experiment,
@@ -129,16 +130,47 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
     """
     for kind in kinds:
         for use in kind.used(experiment):
-            if not is_own(use.path):
+            if is_own(use.path):
+                continue
+            try:
                 use.check(use.load())
+            except ExperimentError as error:
+                raise _with_hint(error, experiment) from None
     for number in range(island_count(experiment)):
         own = island_experiment(experiment, number)
+        _check_births(own.arena)
         if not is_own(own.fitness.function):
             check_fitness_keys(own.fitness)
         if own.learning is not None:
             IslandLearning(own, encoding_of(own))
         elif not is_own(own.encoding.type):
             encoding_of(own)
+
+
+def _with_hint(error: ExperimentError, experiment: Experiment) -> ExperimentError:
+    """Return an error, with a hint if an island may have a table of the top level."""
+    is_inherited = experiment.islands and experiment.fitness.parameters
+    if not (is_inherited and str(error).startswith("fitness.parameters")):
+        return error
+    hint = "'parameters = {}' in [islands.fitness] replaces those of [fitness]"
+    return type(error)(f"{error}; {hint}")
+
+
+def _check_births(arena: Arena | None) -> None:
+    """Raise if robots of an arena may be born outside its wall.
+
+    A run that was started before this check keeps its births: it is not part of
+    ``check_experiment``.
+    """
+    if arena is None or not arena.wall_diameter_m:
+        return
+    radius_m = 0.5 * arena.wall_diameter_m
+    if arena.birth_radius_m >= radius_m:
+        raise ExperimentError(
+            f"arena.birth_radius_m: must be less than half of wall_diameter_m, "
+            f"{radius_m:g} m, as robots are born inside the wall; got "
+            f"{arena.birth_radius_m:g}"
+        )
 
 
 def check_apart(

@@ -377,7 +377,8 @@ class Arena(Section, frozen=True):
         birth_distance_m: least distance of a birth place from robots [m].
         birth_place_tries: places to try for that; the last one is used in any case.
         drop_m: height above the ground at birth [m].
-        wall_diameter_m: diameter of the ring wall [m]; 0 is no wall.
+        wall_diameter_m: diameter of the ring wall, more than twice the birth radius
+            [m]; 0 is no wall.
         wall_segments: number of straight segments of the wall.
         wall_height_m: height of the wall [m].
         wall_thickness_m: thickness of the wall [m].

@@ -284,8 +284,7 @@ def fitness_argument(
     if fitness.parameters:
         raise ExperimentError(
             f"{where}: {fitness.function} has no parameters of its own; it must "
-            "annotate its second argument with a msgspec Struct, or get none; "
-            "'parameters = {}' in [islands.fitness] replaces those of [fitness]"
+            "annotate its second argument with a msgspec Struct"
         )
     return fitness
 

@@ -154,6 +154,12 @@ def _load(path: str, where: str) -> object:
     words = [*module_name.split("."), attribute]
     if not (colon and all(word.isidentifier() for word in words)):
         raise UnknownPlugin(f"{where}: must be 'module:attribute', got {shown(path)}")
+    if module_name.endswith(".py"):
+        meant = f"{module_name.removesuffix('.py')}:{attribute}"
+        raise UnknownPlugin(
+            f"{where}: must be 'module:attribute', got {shown(path)}; did you mean "
+            f"{meant!r}?"
+        )
     if not is_allowed(module_name):
         raise UnknownPlugin(
             f"{where}: {shown(path)}: module {shown(module_name)} is not allowed: "
@@ -205,8 +211,10 @@ def _imported(name: str, where: str, path: str) -> ModuleType:
     try:
         return import_allowed(name)
     except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError) and error.name == name
+        hint = f": no {name}.py is beside the experiment" if missing else ""
         raise UnknownPlugin(
-            f"{where}: {_line_of(error, name)}{path!r}: {error}"
+            f"{where}: {_line_of(error, name)}{path!r}: {error}{hint}"
         ) from None
     # A module may call exit().
     except (Exception, SystemExit) as error:

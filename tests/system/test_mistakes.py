@@ -111,7 +111,7 @@ MISTAKES = {
     ),
     "run to view is missing": (
         "view nowhere --save a.rrd",
-        "nowhere: no run found: no such folder",
+        "nowhere: no such folder",
         2,
     ),
     "no robot file": ("robot check nowhere.yaml", "nowhere.yaml: cannot be read", 2),

@@ -304,7 +304,7 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
         (("view", "x", "--connect", "hub"), "give either a run folder or --connect"),
         (
             ("view", "nowhere", "--save", "a.rrd"),
-            "nowhere: no run found: no such folder",
+            "nowhere: no such folder",
         ),
         (
             ("view", "--connect", "tcp/127.0.0.1:1", "--save", "a.rrd"),

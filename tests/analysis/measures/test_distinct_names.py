@@ -181,6 +181,21 @@ def test_an_experiment_is_compared_with_the_one_that_is_most_like_it() -> None:
     assert found[2][0] == "selection.children: 9 instead of 15"
 
 
+def test_settings_of_a_sweep_are_swept() -> None:
+    points = [
+        changed(
+            selection={"population": population},
+            sweep={"chosen": {"selection.population": population}},
+        )
+        for population in (10, 20)
+    ]
+    some = [*runs(SCENARIO), *runs(*points, name="s")]
+    assert [run.differs for run in with_distinct_names(some)] == [
+        "",
+        *["selection.population: swept instead of 15 (compared with scenario1)"] * 2,
+    ]
+
+
 def test_each_name_is_numbered_separately() -> None:
     some = [*runs(SCENARIO), *runs(changed(births=5), name="mine")]
     some += runs(json.loads(experiment_text(Experiment("mine"))), name="mine")

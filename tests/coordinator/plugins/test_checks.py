@@ -335,6 +335,43 @@ def test_a_key_of_fitness_without_effect_is_refused(
         assert re.search(why, line)
 
 
+def test_births_outside_the_wall_are_refused(tmp_path: Path) -> None:
+    document = tmp_path / "mine.toml"
+    for wall, why in (
+        ("wall_diameter_m = 3.0", "less than half of wall_diameter_m, 1.5 m"),
+        ("wall_diameter_m = 3.0\nbirth_radius_m = 1.5", "1.5 m, as .*; got 1.5"),
+        ("wall_diameter_m = 3.0\nbirth_radius_m = 1.4", ""),
+        ("birth_radius_m = 9.0", ""),
+    ):
+        document.write_text(
+            f'name = "x"\n[[islands]]\n[[islands]]\n[islands.arena]\n{wall}\n'
+        )
+        step, line = checked(str(document))[-1]
+        assert step == ("fault" if why else "fine"), line
+        assert re.search(why, line)
+
+
+def test_inherited_parameters_of_an_island_are_explained(
+    lab: Callable[[str], Path], tmp_path: Path
+) -> None:
+    file = lab(
+        "import msgspec\nclass P(msgspec.Struct):\n    a: float = 1.0\n"
+        "def judge(track, parameters: P):\n    return parameters.a\n"
+    )
+    document = tmp_path / "mine.toml"
+    for own, is_fine in (("", False), ("parameters = {}", True)):
+        document.write_text(
+            f'name = "x"\n[fitness]\nfunction = "{file.stem}:judge"\n'
+            "[fitness.parameters]\na = 2.0\n[[islands]]\n[[islands]]\n"
+            f'[islands.fitness]\nfunction = "locomotion"\n{own}\n'
+        )
+        step, line = checked(str(document))[-1]
+        assert step == ("fine" if is_fine else "fault"), line
+        assert is_fine or line.endswith(
+            "'parameters = {}' in [islands.fitness] replaces those of [fitness]"
+        )
+
+
 def test_check_refuses_what_a_run_would_refuse(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
