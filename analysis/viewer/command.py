@@ -66,6 +66,9 @@ def view(options: argparse.Namespace, simulators: Simulators) -> int:
         return 0
     if options.robot or (options.start, options.until) != (None, None):
         raise ViewerError("--robot, --from and --until: for a run folder only")
+    if options.connect is not None:
+        # The folder of an active run; of an address nothing is known.
+        allow_plugins_of(Path(options.connect))
     output = Output.of(options.save, options.serve)
     stop = stop_on_signals()
     with LiveSource(connect_of(options), options.fleet, tls_of(options)) as source:

@@ -2,8 +2,8 @@
 
 import inspect
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -35,29 +35,36 @@ from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
 
+Labels = tuple[str, ...] | None
+"""Measures that an experiment records; None: every one that a rule may ask for."""
+
 _CHILDREN = 15
+_FAILED = 4
+"""One of so many robots of a population has failed."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Example:
-    """An individual of a check, with every measure that a rule may ask for."""
+    """An individual of a check."""
 
     birth: BirthId
     parents: tuple[BirthId, ...]
     fitness: float
     size: int
     rank: int
-    measures: defaultdict[str, float] = field(hash=False)
+    measures: Mapping[str, float] = field(hash=False)
 
 
-def _example(number: int, fitness: float) -> _Example:
+def _example(number: int, fitness: float, labels: Labels) -> _Example:
     parents = (BirthId(0, number // 2), BirthId(0, number // 3)) if number else ()
-    measures: defaultdict[str, float] = defaultdict(lambda: number / 7)
+    measures: Mapping[str, float] = defaultdict(lambda: number / 7)
+    if labels is not None:
+        measures = dict.fromkeys(labels, number / 7)
     size, rank = 3 + number % 5, 1 + number // 4
     return _Example(BirthId(0, number), parents, fitness, size, rank, measures)
 
 
-def _populations(least: int) -> Iterator[list[_Example]]:
+def _populations(least: int, labels: Labels) -> Iterator[list[_Example]]:
     """Yield populations: small, of equals, varied, in part without fitness."""
     for count, fitness in (
         (least, float),
@@ -65,38 +72,44 @@ def _populations(least: int) -> Iterator[list[_Example]]:
         (30, lambda number: (number * 7 % 30) / 10),
         (30, lambda number: float(number) if number % 3 else -1.0),
     ):
-        yield [_example(number, fitness(number)) for number in range(count)]
+        yield [_example(number, fitness(number), labels) for number in range(count)]
 
 
-def check_parents(function: Callable[..., Any], parameters: object = None) -> None:
+def check_parents(
+    function: Callable[..., Any], parameters: object = None, labels: Labels = None
+) -> None:
     """Raise unless a selection of parents keeps its contract on simple populations.
 
     Args:
         function: a ``ParentSelection``.
         parameters: its last argument.
+        labels: measures of the individuals.
 
     Raises:
         ExperimentError: it raises, returns other than two different places, or other
             ones for the same population and stream.
     """
     rule = Rule("selection.parents", function, parameters)
-    for population in _populations(2):
+    for population in _populations(2, labels):
         _check_twice(rule, 2, population)
 
 
-def check_survivors(function: Callable[..., Any], parameters: object = None) -> None:
+def check_survivors(
+    function: Callable[..., Any], parameters: object = None, labels: Labels = None
+) -> None:
     """Raise unless a selection of survivors keeps its contract on simple populations.
 
     Args:
         function: a ``SurvivorSelection``.
         parameters: its last argument.
+        labels: measures of the individuals.
 
     Raises:
         ExperimentError: it raises, returns other than ``count`` different places, or
             different ones for the same population and stream.
     """
     rule = Rule("selection.survivors", function, parameters)
-    for population in _populations(_CHILDREN + 1):
+    for population in _populations(_CHILDREN + 1, labels):
         _check_twice(rule, _CHILDREN, population, _CHILDREN)
 
 
@@ -114,27 +127,53 @@ def _check_twice(
         )
 
 
-def _use(name: str, selection: Selection) -> Use:
+def _advise(name: str, function: Callable[..., Any], parameters: object) -> str:
+    """Return what a rule raises for a population with failed robots, or nothing.
+
+    It is not an error: a run in which no robot fails goes on.
+    """
+    *_, population = _populations(_CHILDREN + 1, None)
+    mixed = [
+        replace(one, fitness=0.0, measures={}) if number % _FAILED == 0 else one
+        for number, one in enumerate(population)
+    ]
+    is_parents = name == "parents"
+    count, rest = (2, ()) if is_parents else (_CHILDREN, (_CHILDREN,))
+    rule = Rule(f"selection.{name}", function, parameters)
+    try:
+        rule.places(count, mixed, *rest, np.random.default_rng(1))
+    except ExperimentError as error:
+        why = str(error).removeprefix(f"{rule.key}: {where_defined(function)}: ")
+        return f"of a population with failed robots (fitness 0, no measures): {why}"
+    return ""
+
+
+def _use(name: str, selection: Selection, labels: Labels) -> Use:
     """Return the use of an own rule of a section; ``name`` as of ``own_rule``."""
 
+    def own() -> tuple[Callable[..., Any], Any]:
+        found = own_rule(selection, name)
+        assert found is not None
+        return found
+
     def check(function: Callable[..., Any]) -> None:
-        found = own_rule(selection, name)
-        assert found is not None
-        (check_parents if name == "parents" else check_survivors)(function, found[1])
+        keeps = check_parents if name == "parents" else check_survivors
+        keeps(function, own()[1], labels)
 
-    def load() -> object:
-        found = own_rule(selection, name)
-        assert found is not None
-        return found[0]
-
-    return Use(f"selection.{name}", getattr(selection, name), load, check)
+    return Use(
+        f"selection.{name}",
+        getattr(selection, name),
+        lambda: own()[0],
+        check,
+        lambda function: _advise(name, function, own()[1]),
+    )
 
 
 def _used(name: str, experiment: Experiment) -> Iterator[Use]:
     sections = (experiment.selection, *(each.selection for each in experiment.islands))
     for selection in dict.fromkeys(filter(None, sections)):
         if ":" in getattr(selection, name):
-            yield _use(name, selection)
+            yield _use(name, selection, experiment.measures.labels)
 
 
 def _takes(arguments: int, plugin: object) -> bool:
@@ -227,14 +266,14 @@ KINDS = (
         "parents",
         PARENTS,
         partial(_takes, 3),
-        lambda path: _use("parents", Selection(parents=path)),
+        lambda path: _use("parents", Selection(parents=path), None),
         partial(_used, "parents"),
     ),
     Kind(
         "survivors",
         SURVIVORS,
         partial(_takes, 4),
-        lambda path: _use("survivors", Selection(survivors=path)),
+        lambda path: _use("survivors", Selection(survivors=path), None),
         partial(_used, "survivors"),
     ),
     Kind(

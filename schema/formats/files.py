@@ -41,8 +41,15 @@ def robot_from_yaml(
             message names file, line and field.
     """
     document = compose(text, file)
-    reader = RevolveReader if is_of_revolve(document) else Reader
-    return reader(space, file, kinds).read(document)
+    if not is_of_revolve(document):
+        return Reader(space, file, kinds).read(document)
+    try:
+        return RevolveReader(space, file, kinds).read(document)
+    except InvalidRobot as error:
+        raise InvalidRobot(
+            f"{error} (read in the form of the original Revolve; a file that begins "
+            "with 'revolve_robot: 1' has this project's form)"
+        ) from None
 
 
 BEST = "best.yaml"

@@ -55,7 +55,7 @@ def cpg_neurons(parameters: CpgParameters) -> NeuronKinds:
     return {
         PHASE_OSCILLATOR: (
             Parameter("frequency", low, high, 0.5 * (low + high), unit="Hz"),
-            Parameter("phase_offset", 0.0, 1.0, 0.0, unit="cycles"),
+            Parameter("phase_offset", 0.0, 1.0, 0.0, unit="periods"),
             Parameter("amplitude", 0.0, 1.0, 0.5),
             Parameter("centre", 0.0, 1.0, 0.5),
         )

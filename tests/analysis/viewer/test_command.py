@@ -15,13 +15,16 @@ from msgspec.structs import replace
 
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
+from analysis.viewer.command import view
 from analysis.viewer.entities import TimePoint, recording_name
+from analysis.viewer.flags import parser
 from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
 from analysis.viewer.output import Output, Window, keep_serving, ways_to_view
 from analysis.viewer.recording import ViewerError
 from analysis.viewer.replay import shown_run
+from analysis.viewer.resimulate import Simulators
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from schema.errors import RunFolderError
@@ -238,6 +241,13 @@ def test_a_campaign_is_told_to_name_a_run(tmp_path: Path) -> None:
         (tmp_path / f"a-{number}" / "run.json").touch()
     with pytest.raises(RunFolderError, match=f"is a campaign; .* as {tmp_path}/a-0$"):
         shown_run(tmp_path)
+
+
+def test_plug_ins_of_a_running_run_are_those_of_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}")
+    options = parser().parse_args(["--connect", str(tmp_path), "--save", "a.rrd"])
+    with pytest.raises(RunFolderError, match=r"run\.json: damaged"):
+        view(options, Simulators(*[NotImplemented] * 3))
 
 
 @pytest.mark.parametrize(

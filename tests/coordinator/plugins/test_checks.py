@@ -372,6 +372,26 @@ def test_inherited_parameters_of_an_island_are_explained(
         )
 
 
+def test_selection_gets_the_measures_that_the_experiment_records(
+    lab: Callable[[str], Path], tmp_path: Path
+) -> None:
+    file = lab(
+        "def keep(population, count, rng, parameters):\n"
+        "    heights = [-one.measures['height'] for one in population]\n"
+        "    return sorted(range(len(heights)), key=heights.__getitem__)[:count]\n"
+    )
+    document = tmp_path / "mine.toml"
+    own = f'name = "x"\n[selection]\nsurvivors = "{file.stem}:keep"\n'
+    document.write_text(own)
+    step, line = checked(str(document))[-1]
+    assert (step, "raised KeyError: 'height'" in line) == ("fault", True), line
+    document.write_text(f'{own}[measures]\nnames = ["height"]\n')
+    found = dict(checked(str(document)))
+    assert "in order" in found["fine"]
+    # It is no fault: perhaps no robot of a run fails.
+    assert "of a population with failed robots (fitness 0, no" in found["warn"]
+
+
 def test_check_refuses_what_a_run_would_refuse(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
