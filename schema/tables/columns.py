@@ -401,11 +401,11 @@ DEATHS = _table(
         "reason",
         pa.string(),
         '"selection" (below the share of the mean fitness), "cull" (removed from an '
-        'arena full of mature robots), "diverged" (its simulation diverged), "removed" '
-        '(by an operator), "migrated" (moved to another island) or "replaced" (made '
-        "room for an immigrant)",
+        'arena full of mature robots), "diverged" (its physics or brain diverged, or '
+        'code of a plug-in failed: see detail), "removed" (by an operator), "migrated" '
+        '(moved to another island) or "replaced" (made room for an immigrant)',
     ),
-    _column("detail", pa.string(), "how its simulation diverged; otherwise empty"),
+    _column("detail", pa.string(), "what diverged or failed; otherwise empty"),
     *_axes("xy", _FLOAT, "the centre of its core"),
     _column(
         "z",
