@@ -254,7 +254,8 @@ def _execute_campaign(
     if scheduler.failed:
         tell_user(
             f"{len(scheduler.failed)} of {counted(len(planned), 'run')} failed; after "
-            f"fixing the cause, run: {command('resume', folder)}"
+            f"fixing the cause, run: {command('resume', folder)} (with a plug-in that "
+            "has changed: start new runs)"
         )
         return 1
     runs = counted(len(planned), "run")
