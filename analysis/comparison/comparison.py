@@ -17,7 +17,7 @@ import pyarrow as pa
 
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.samples import Row, correct, known, two_samples
-from analysis.measures.outputs import OUTCOME, schema
+from analysis.measures.outputs import OUTCOME, OWN, schema
 from analysis.measures.population_table import Numbers
 from analysis.measures.study import MeasuredRun, reach
 
@@ -40,6 +40,13 @@ class RunOutcomes(Protocol):
 
     def fitness_functions(self, *experiments: str) -> list[str]:
         """Return the fitness functions of experiments, each once."""
+
+
+class Compared(RunOutcomes, Protocol):
+    """Outcomes of experiments that may name measures of their own."""
+
+    def own_measures(self, births: int, *experiments: str) -> list[str]:
+        """Return the outcomes that are measures named by experiments, by name."""
 
 
 class Outcomes:
@@ -75,6 +82,11 @@ class Outcomes:
         values: Numbers = found[~np.isnan(found)]
         return values
 
+    def own_measures(self, births: int, *experiments: str) -> list[str]:
+        """Return the outcomes that are measures named by experiments, by name."""
+        runs = (run for name in experiments for run in self.at(name, births))
+        return sorted({key for run in runs for key in run if key.startswith(OWN)})
+
     def fitness_functions(self, *experiments: str) -> list[str]:
         """Return the fitness functions of experiments, each once."""
         runs = (one.run for name in experiments for one in self._runs[name])
@@ -92,7 +104,7 @@ class Outcomes:
         return pa.Table.from_pylist(rows, schema("outcomes"))
 
 
-def comparison(outcomes: RunOutcomes) -> pa.Table:
+def comparison(outcomes: Compared) -> pa.Table:
     """Return the comparison of every pair of experiments by every measure.
 
     Args:
@@ -108,7 +120,7 @@ def comparison(outcomes: RunOutcomes) -> pa.Table:
     for a, b in combinations(outcomes.experiments, 2):
         births = outcomes.births(a, b)
         is_alike = len(outcomes.fitness_functions(a, b)) == 1
-        for measure in OUTCOME:
+        for measure in (*OUTCOME, *outcomes.own_measures(births, a, b)):
             if measure in OF_FITNESS and not is_alike:
                 continue
             samples = [outcomes.values(name, measure, births) for name in (a, b)]

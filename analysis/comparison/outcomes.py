@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 
 from analysis.comparison.statistics import ranks
 from analysis.measures.families import FOUNDERS
-from analysis.measures.outputs import POPULATION
+from analysis.measures.outputs import OWN, POPULATION
 from analysis.measures.population_table import Numbers
 
 
@@ -22,7 +22,8 @@ def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
 
     Returns:
         Numbers by the names of ``outputs.OUTCOME``, the mean over several islands;
-        NaN where a measure has no value.
+        NaN where a measure has no value. Measures that the experiment names follow
+        ``outputs.OWN``; one without a value is missing.
     """
     populations = tables["populations"]
     islands = np.asarray(populations["island"], np.int64)
@@ -38,6 +39,7 @@ def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
         found[name] = _mean(np.array([one[name] for one in each]))
     if "robots" in tables:
         found |= _of_robots(tables["robots"], found, births)
+    found |= _own_measures(tables, births)
     return found | _of_families(tables, births) | _of_arena(tables, births)
 
 
@@ -90,6 +92,19 @@ def _of_robots(
         correlation = _correlation(_column(born, name), _column(born, "fitness"))
         found[f"{name}_fitness"] = correlation
     return found
+
+
+def _own_measures(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
+    if "named_measures" not in tables:
+        return {}
+    last: dict[tuple[str, int], float] = {}
+    rows = tables["named_measures"].filter(pc.field("births") <= births)
+    for row in rows.sort_by("births").to_pylist():
+        last[row["measure"], row["island"]] = row["mean"]
+    each: dict[str, list[float]] = {}
+    for (name, _), mean in last.items():
+        each.setdefault(f"{OWN}{name}", []).append(mean)
+    return {name: _mean(np.array(means)) for name, means in each.items()}
 
 
 def _of_families(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:

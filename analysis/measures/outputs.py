@@ -64,6 +64,8 @@ POPULATION = {
 }
 """Measures of a population at a number of births."""
 
+OWN = "measures."
+"""Start of the names of an experiment's own measures among other outcomes."""
 OUTCOME = {
     "births": "births of the comparison: the most that all compared runs reach",
     **POPULATION,
@@ -309,6 +311,13 @@ _TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measur
           "setting", "value", "differs", "function", "fitness_function",
           "plugins"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
+
+
+def meaning(outcome: str) -> str:
+    """Return the meaning of an outcome, or of a measure that an experiment names."""
+    if outcome.startswith(OWN):
+        return "mean of judged robots of the last population, in the measure's unit"
+    return OUTCOME[outcome]
 
 
 def schema(table: str) -> pa.Schema:

@@ -13,7 +13,7 @@ from analysis.measures.fitness_functions import (
     functions_of,
     measured_apart,
 )
-from analysis.measures.outputs import OUTCOME
+from analysis.measures.outputs import OUTCOME, meaning
 from analysis.report.html import cell, folded, number, plural, table
 
 Tables = Mapping[str, pa.Table]
@@ -215,7 +215,7 @@ def all_differences(tables: Tables) -> str:
             known = row if _interval(row) else {**row, "difference_low": None,
                                                 "difference_high": None}  # fmt: skip
             name = row["measure"]
-            first = f'<td title="{escape(OUTCOME[name])}">{_words(name)}</td>'
+            first = f'<td title="{escape(meaning(name))}">{escape(_words(name))}</td>'
             rows.append([first, *(cell(known[column]) for column in columns)])
         title = (
             f"{label(a)} ({plural(every[0]['runs_a'], 'run')}) and {label(b)} "
@@ -250,7 +250,8 @@ def _equal(rows: Sequence[Row]) -> str:
 def _meanings(measures: Collection[str]) -> str:
     """Return a table of the meanings of measures, in the order of ``OUTCOME``."""
     named = [name for name in OUTCOME if name in measures]
-    rows = [[cell(_words(name)), cell(OUTCOME[name])] for name in named]
+    named += sorted(set(measures) - set(named))
+    rows = [[cell(_words(name)), cell(meaning(name))] for name in named]
     return table(("measure", "meaning"), rows)
 
 

@@ -57,6 +57,30 @@ def runs(name: str, values: list[float], *, births: int = 100) -> list[MeasuredR
     ]
 
 
+def test_measures_of_the_experiments_are_compared() -> None:
+    """Means of the last populations at 100 births: islands 2 and 4, hence 3."""
+    every = []
+    for name, energies in (("a", [2.0, 3.0]), ("b", [5.0, 7.0]), ("c", [])):
+        for number, energy in enumerate(energies or [0.0]):
+            (one,) = runs(name, [0.1])
+            rows = [
+                {"island": island, "births": births, "measure": "energy", "mean": mean}
+                for island, births, mean in (
+                    (0, 50, 99.0), (0, 100, energy - 1.0), (1, 90, energy + 1.0),
+                    (0, 130, 99.0),
+                )
+            ] * bool(energies)  # fmt: skip
+            named = pa.Table.from_pylist(rows, schema("named_measures"))
+            run = replace(one.run, number=number, folder=Path(f"{name}{number}"))
+            every.append(
+                replace(one, run=run, tables={**one.tables, "named_measures": named})
+            )
+    found = comparison(Outcomes(every)).to_pylist()
+    (row,) = [row for row in found if row["measure"].startswith("measures.")]
+    assert (row["measure"], row["a"], row["b"]) == ("measures.energy", "a", "b")
+    assert (row["mean_a"], row["mean_b"], row["effect"]) == (2.5, 6.0, -1.0)
+
+
 def test_outcomes_by_hand() -> None:
     levels = [
         {"births": 15, "fitness": 0.1, "diversity": 10.0, "parts": 12.0, "hidden": 4.0},
