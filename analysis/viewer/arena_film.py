@@ -65,7 +65,8 @@ def film(options: argparse.Namespace) -> int:
         "--connect": options.connect,
     }
     if given := [flag for flag, value in unfit.items() if value]:
-        raise NoPictures(f"--save {out}: a film takes no {', '.join(given)}")
+        hint = "; of one robot: revolve robot render" if options.robot else ""
+        raise NoPictures(f"--save {out}: a film takes no {', '.join(given)}{hint}")
     if options.run is None:
         raise NoPictures(f"--save {out}: a film needs a run folder")
     if not out.absolute().parent.is_dir():

@@ -443,9 +443,10 @@ def _refuse_unknown(
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     for key, value in document.items():
         if key not in fields:
+            own = f"; those of a plug-in are in [{prefix}parameters]"
             raise ExperimentError(
                 f"{where}: {prefix}{cut(key)}: no such key{nearest(key, fields)}; "
-                f"allowed: {', '.join(fields)}"
+                f"allowed: {', '.join(fields)}{own if 'parameters' in fields else ''}"
             )
         for number in value if isinstance(value, list) else (value,):
             if isinstance(number, float) and not isfinite(number):
