@@ -157,8 +157,8 @@ def spread_caption(tables: Tables, panels: Panels, note: str = "") -> str:
         texts.append(f"With fewer than {BOX_RUNS} runs a bar shows their median.")
     if _violins(tables, panels, {}, in_order(sizes)):
         texts.append(
-            "Pale shapes show the robots of all last populations, from the least to "
-            "the greatest value."
+            "Pale shapes show the robots of all last populations, each once, from the "
+            "least to the greatest value."
         )
     texts += [note] if note else []
     return " ".join(texts) + (fitness_note(tables) if FITNESS in panels else "")

@@ -266,9 +266,11 @@ def _floor_problems(
 ) -> Iterator[str]:
     needed = selection.parents_needed
     if rules.population_floor < needed:
+        how = f"tournament_size = {selection.tournament_size}"
+        by = f" with {how}" if selection.parents == "tournament" else ""
         yield (
             f"{where}.population_floor: must be >= {needed}, so that there are always "
-            f"two parents to choose, got {rules.population_floor}"
+            f"two parents to choose{by}, got {rules.population_floor}"
         )
 
 
