@@ -2,6 +2,8 @@
 
 import argparse
 import shutil
+from contextlib import suppress
+from ipaddress import ip_address
 from pathlib import Path
 from typing import get_args
 
@@ -137,7 +139,11 @@ def parser(_command: str = "cluster") -> Flags:
 
     init = action("init", "create a kit: authority, certificates, samples")
     init.add_argument(
-        "--hub", required=True, metavar="HOST", help="host name or address of the hub"
+        "--hub",
+        type=_host,
+        required=True,
+        metavar="HOST",
+        help="host name or address of the hub",
     )
     add_count(init, "--port", PORT, "port of the hub")
     init.add_argument(
@@ -164,3 +170,14 @@ def parser(_command: str = "cluster") -> Flags:
     revoke.add_argument("name", metavar="NAME", help="name of the machine")
     action("list", "list the certificates, and when they expire")
     return flags
+
+
+def _host(text: str) -> str:
+    """Return a host name or an address, without a port."""
+    with suppress(ValueError):
+        return str(ip_address(text))
+    if text and all(each.isalnum() or each in ".-_" for each in text):
+        return text
+    raise argparse.ArgumentTypeError(
+        f"must be a host name or address without a port (see --port), got {text[:80]!r}"
+    )

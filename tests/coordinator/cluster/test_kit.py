@@ -160,6 +160,26 @@ def test_command_makes_a_kit_and_lists_it(
     assert "export REVOLVE_CONNECT=tls/hub.example:7447\n" in environment
 
 
+@pytest.mark.parametrize("hub", ["127.0.0.1:7449", "tls/hub.example", "a b", ""])
+def test_a_hub_with_a_port_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], hub: str
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["cluster", "init", str(tmp_path / "lab"), "--hub", hub])
+    assert "without a port (see --port), got" in capsys.readouterr().err
+    assert not (tmp_path / "lab").exists()
+
+
+def test_a_hub_may_have_an_address_of_version_6(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lab = str(tmp_path / "lab")
+    assert main(["cluster", "init", lab, "--hub", "2001:db8::7"]) == 0
+    capsys.readouterr()
+    assert main(["cluster", "list", lab]) == 0
+    assert capsys.readouterr().out.startswith("hub at tls/[2001:db8::7]:7447\n")
+
+
 @pytest.fixture
 def samples(tmp_path: Path) -> Path:
     main(["cluster", "init", str(tmp_path / "lab"), "--hub", "hub.example"])
