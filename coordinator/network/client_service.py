@@ -50,8 +50,11 @@ def ask_coordinators(
                 if reply is not None:
                     replies_of[member.name] = reply
     if not replies_of:
+        # The hub drops what a certificate may not send, without an answer.
+        role = "; only an operator's certificate may ask" * connect.startswith("tls/")
         raise NetworkError(
             f"{connect}: none of {len(there)} coordinators of fleet {fleet} replies"
+            f"{role}"
         )
     return replies_of
 
