@@ -28,6 +28,7 @@ from schema.agent.network import DEFAULT_FLEET, Tls
 from schema.agent.supervisor import cores
 from schema.agent.topics import unique_name
 from schema.errors import ExperimentError, JobRefused, RevolveError
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.load import load_function
 from schema.plugins.permission import allow, allow_references
@@ -243,13 +244,16 @@ class Fleet:
         return self._order(order)
 
     def _submit(
-        self, robot: Robot | PlainRobot, settings: EvaluationSettings
+        self,
+        robot: Robot | PlainRobot,
+        settings: EvaluationSettings,
+        identity: Identity = NO_IDENTITY,
     ) -> "Future[Result]":
         encoded = encode_robot(checked(robot, settings))
         data, simulated_s = _job_of(settings)
         order = Order(
             "evaluate",
-            partial(_encode, settings=data, robot=encoded),
+            partial(_encode, settings=data, robot=encoded, identity=identity),
             lambda expected: partial(
                 read_evaluation,
                 expected=expected,
@@ -319,7 +323,13 @@ def _job_of(settings: EvaluationSettings) -> tuple[bytes, float]:
 
 
 def _encode(
-    run: str, epoch: int, number: int, *, settings: bytes, robot: bytes
+    run: str,
+    epoch: int,
+    number: int,
+    *,
+    settings: bytes,
+    robot: bytes,
+    identity: Identity,
 ) -> bytes:
     """Return the request of an evaluation."""
     return encode_request(
@@ -328,6 +338,7 @@ def _encode(
         number=number,
         settings=settings,
         robot=robot,
+        identity=identity,
         plugins=plugins_of(settings),
     )
 

@@ -92,6 +92,14 @@ def _read(
             "simulated alone; in an arena, fitness is that of a window of a robot's "
             "life among other robots"
         )
+    draws = (
+        settings.simulation.sensor_noise,
+        settings.simulation.actuator_noise,
+        settings.environment.push_impulse,
+        settings.robust,
+    )
+    if any(draws):
+        tell("noise, pushes and [robust] are drawn anew: a run drew others")
     kinds = neuron_kinds(settings.brain, settings.space)
     return read_robot(path, body_space(settings.space), kinds), settings
 

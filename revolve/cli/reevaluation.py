@@ -58,15 +58,15 @@ def reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
     title = f"re-evaluating {robots} {len(jobs)} times in all"
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
     with Fleet(workers) as fleet, bars(title, *columns, TimeRemainingColumn()) as bar:
-        known: dict[tuple[Robot | PlainRobot, EvaluationSettings], Future[Result]] = {}
+        known: dict[tuple[object, ...], Future[Result]] = {}
         for job in jobs:
-            key = job.robot, job.settings
+            key = job.robot, job.settings, job.one.identity
             if key not in known:
                 # Settings of a request; an experiment has no ablation.
                 known[key] = fleet._submit(*key)  # noqa: SLF001 - of this package
         undisturbed: float | None = None
         for job in bar.track(jobs, description="re-evaluating"):
-            result = known[job.robot, job.settings].result()
+            result = known[job.robot, job.settings, job.one.identity].result()
             if job.columns is None:
                 undisturbed = result.fitness
                 continue

@@ -17,7 +17,10 @@ from revolve.runs import Run as OwnRun
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment as Document
 from schema.experiment.document import island_experiment, light_of
+from schema.experiment.identity import Identity, Origin
+from schema.robot.ids import BirthId
 from schema.tables.description import check_folder
+from schema.wire.updates import individual
 
 
 class Chosen(NamedTuple):
@@ -29,12 +32,15 @@ class Chosen(NamedTuple):
         document: settings of its island, for an evaluation alone.
         robot: the robot.
         run: its run.
+        identity: of the recorded evaluation, which determines noise, pushes and
+            disturbances; of a robot of an arena, of a first evaluation there.
     """
 
     row: dict[str, Any]
     document: Document
     robot: Robot
     run: OwnRun
+    identity: Identity
 
 
 def chosen_robots(folders: Iterable[Path], most: int | None = None) -> list[Chosen]:
@@ -68,6 +74,10 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     last = _last(found, most)
     own = OwnRun(folder)
     births = tables["births"]
+    trials = {
+        (row["island"], individual(row)): row["trial"]
+        for row in tables["evaluations"].to_pylist()
+    }
     chosen: list[Chosen] = []
     for number, row in enumerate(found.to_pylist()):
         if not (number in last or number == best):
@@ -86,7 +96,11 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
             "is_last": number in last,
             "recorded": row["fitness"],
         }
-        chosen.append(Chosen(head, _alone(own.experiment, row["island"]), robot, own))
+        there, name = row["island"], BirthId(island, birth)
+        origin = Origin(seed=run.seed, run=run.number, island=there)
+        identity = Identity(origin, name, trials.get((there, name), 0))
+        document = _alone(own.experiment, there)
+        chosen.append(Chosen(head, document, robot, own, identity))
     return chosen
 
 

@@ -13,6 +13,7 @@ from revolve.command import main
 from revolve.robot import plain
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
+from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import evaluation_settings_of
 from schema.robot.ids import BirthId
 from worker.robot.ablation import all_ablations
@@ -32,6 +33,7 @@ parents = "random"
 window_steps = 80
 brain_steps = 20
 pose_steps = 20
+actuator_noise = 0.1
 [robust]
 draws = 2
 """
@@ -65,14 +67,21 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
         robot = plain(run.robot(row["birth"]))
         if row["change"] not in ("friction 0.9", "sensor noise 0.05"):
             continue
-        assert row["undisturbed"] == evaluate(robot, settings).fitness
-        assert row["fitness"] == evaluate(robot, changes[row["change"]]).fitness
+        own = identity(row["birth"])
+        assert row["undisturbed"] == evaluate(robot, settings, own).fitness
+        changed = changes[row["change"]]
+        assert row["fitness"] == evaluate(robot, changed, own).fitness
 
     _check_ablations(capsys, run)
     (Path("a") / "state").write_text("running")
     for command in ("robustness", "ablate"):
         assert main([command, "a"]) == 2
         assert "'revolve resume a' finishes it" in capsys.readouterr().err
+
+
+def identity(birth: int) -> Identity:
+    """Return the identity of the run's evaluation, which determines the noise."""
+    return Identity(Origin(seed=3, run=0, island=0), BirthId(0, birth), 0)
 
 
 def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
@@ -91,15 +100,18 @@ def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
     for birth in {each["birth"] for each in rows}:
         robot = plain(run.robot(birth))
         own = [each for each in rows if each["birth"] == birth]
-        assert own[0]["undisturbed"] == evaluate(robot, settings).fitness
+        same = identity(birth)
+        # The same draws of noise and [robust] as in the run.
+        assert own[0]["undisturbed"] == own[0]["recorded"]
+        assert own[0]["undisturbed"] == evaluate(robot, settings, same).fitness
         changes = all_ablations(robot, body_space(settings.space))
         assert len(own) == len(changes) + 2
         for change, each in zip(changes, own, strict=False):
             assert (each["change"], each["channel"]) == (change.name, change.channel)
         chosen = len(changes) - 1
         ablated = replace(settings, ablation=changes[chosen].ablation)
-        assert own[chosen]["fitness"] == evaluate(robot, ablated).fitness
+        assert own[chosen]["fitness"] == evaluate(robot, ablated, same).fitness
         assert own[-1]["change"] == "random brain 2"
         rng = stream(3, 0, BirthId(0, birth), 1, Purpose.OTHER_BRAIN)
         other = random_brain(rng, robot, read_experiment("short.toml"))
-        assert own[-1]["fitness"] == evaluate(other, settings).fitness
+        assert own[-1]["fitness"] == evaluate(other, settings, same).fitness

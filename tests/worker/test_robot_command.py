@@ -34,6 +34,26 @@ def test_fitness_in_an_arena_is_told_from_that_alone(
         assert ("simulated alone; in an arena" in capsys.readouterr().err) is is_arena
 
 
+@pytest.mark.parametrize(
+    "section",
+    [
+        "[simulation]\nactuator_noise = 0.1",
+        "[environment]\npush_impulse = 0.1",
+        "[robust]\ndraws = 2",
+    ],
+)
+def test_draws_of_a_run_are_told_from_those_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], section: str
+) -> None:
+    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    file = tmp_path / "mine.toml"
+    for text, is_told in (("", False), (section, True)):
+        file.write_text(f'name = "mine"\n{text}\n')
+        words = [str(tmp_path / "spider.yaml"), "--experiment", str(file)]
+        assert main(["robot simulate", *words]) == 0
+        assert ("are drawn anew" in capsys.readouterr().err) is is_told
+
+
 def test_robustness_is_shown_by_change_and_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
