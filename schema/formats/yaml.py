@@ -20,10 +20,11 @@
       connections:
       - {source: part-0-in-2, target: leg-out-0, weight: 0.25}
 
-Defaults of omitted keys: a parameter its default, an orientation or gene 0, an id
-``part-<index>``, and for neurons ``<part>-in-k``, ``<part>-out-k`` or
-``<part>-hidden-k``. Input neurons follow from the sensors: connections name them, but
-they are not written. Floats are written with all digits and read back bit for bit.
+Defaults of omitted keys: a parameter its default, a slot of a part's own, an
+orientation or gene 0, an id ``part-<index>``, and for neurons ``<part>-in-k``,
+``<part>-out-k`` or ``<part>-hidden-k``. Input neurons follow from the sensors:
+connections name them, but they are not written. Floats are written with all digits and
+read back bit for bit.
 """
 
 from typing import Any

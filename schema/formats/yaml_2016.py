@@ -48,10 +48,6 @@ class RevolveReader(Reader):
             table.refuse_word("type", self.space, OTHER_TYPES)
         return kind
 
-    def own_slot(self, table: Table) -> int:
-        """Return the slot by which a part is attached to its parent; 0 by default."""
-        return table.integer("slot", 0)
-
     def orientation(self, table: Table) -> int:
         """Return the orientation of a part; Revolve also writes 90.0 and -90."""
         degrees = table.number("orientation", 0.0)

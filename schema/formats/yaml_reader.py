@@ -140,8 +140,8 @@ class Reader:
         return kind
 
     def own_slot(self, table: Table) -> int:
-        """Return the slot by which a part is attached to its parent."""
-        return table.integer("slot")
+        """Return the slot by which a part is attached to its parent; 0 by default."""
+        return table.integer("slot", 0)
 
     def orientation(self, table: Table) -> int:
         """Return the orientation of a part about the axis of its slot [degrees]."""

@@ -33,7 +33,7 @@ def test_the_message_is_the_one_of_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    wrong = block("yaml").replace("{1: {slot: 0, id: leg", "{0: {slot: 0, id: leg")
+    wrong = block("yaml").replace("{1: {id: leg", "{0: {id: leg")
     Path("walker.yaml").write_text(wrong)
     with pytest.raises(InvalidRobot) as error:
         read_robot(Path("walker.yaml"))

@@ -90,6 +90,10 @@ def test_body_without_a_brain() -> None:
     assert len(read("body: {type: Core}").brain.neurons) == 6
 
 
+def test_a_part_is_attached_by_its_slot_0_unless_it_names_another() -> None:
+    assert read(TEXT.replace("slot: 0, type: T", "type: T", 1)) == read(TEXT)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "message"),
     [
@@ -115,7 +119,6 @@ def test_body_without_a_brain() -> None:
         ("    2:", "    007:", 6, "must be a slot number"),
         ("    2:", "    -1:", 6, "must be a slot number"),
         ("    2:", "    [1, 2]:", 6, "a key must be a word or a number"),
-        ("slot: 0, type: T", "type: T", 17, "children.0.slot: is missing"),
         ("      slot: 0\n", "      slot: 5\n", 7, "slot: ActiveHinge has slots 0..1"),
         ("id: leg", "id: trunk", 8, "id: duplicate part name 'trunk'"),
         ("id: leg", "id:", 8, "id: must be a word, got nothing"),
