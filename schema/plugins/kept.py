@@ -147,8 +147,8 @@ def _check_original(name: str, note: KeptPlugin, copy: Path) -> None:
     if found != note.digest:
         raise ExperimentError(
             f"plug-in {name}: {original} has changed since the run began (source "
-            f"digest {found}, expected {note.digest}): undo that, continue with the "
-            f"copy in the run folder: {FLAG} {copy}, or start another run"
+            f"digest {found}, expected {note.digest}): undo that, start another run, "
+            f"or continue with the copy in the run folder: {FLAG} {copy}"
         )
 
 
