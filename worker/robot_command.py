@@ -99,7 +99,7 @@ def _read(
         settings.robust,
     )
     if any(draws):
-        tell("noise, pushes and [robust] are drawn anew: a run drew others")
+        tell("noise, pushes and [robust] use other random numbers than the run")
     kinds = neuron_kinds(settings.brain, settings.space)
     return read_robot(path, body_space(settings.space), kinds), settings
 

@@ -23,14 +23,13 @@ from analysis.measures.population_table import (
     Numbers,
     individual_ids,
     is_last_of_each,
-    residence_columns,
-    residence_ids,
+    last_there,
     rows_of,
 )
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import Problems, RunTables
 from analysis.measures.trees import Integers
-from analysis.measures.variability import last_fitness, variability
+from analysis.measures.variability import last_samples, variability
 from schema.errors import RevolveError
 
 _OF_ROBOTS = ("births", "population", "evaluations", "fitness")
@@ -104,21 +103,18 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Integers, Booleans, Booleans]:
         fitness[rows[last]] = np.nan_to_num(values[last], nan=0.0)
         islands[rows[last]] = homes[last]
 
+    def take_table(rows: pa.Table) -> None:
+        values = np.asarray(rows["fitness"].to_numpy(), np.float64)
+        homes = np.asarray(rows["island"], np.int64)
+        take(rows_of(individual_ids(rows), run.births), values, homes)
+
     evaluations = run.tables["evaluations"]
-    rows = rows_of(individual_ids(evaluations), run.births)
-    outcome = np.asarray(evaluations["fitness"].to_numpy(), np.float64)
-    there = residence_ids(evaluations)
-    order = np.argsort(there, kind="stable")
-    latest = order[is_last_of_each(there[order])]
-    homes = np.asarray(evaluations["island"], np.int64)
-    take(rows[latest], outcome[latest], homes[latest])
+    take_table(last_there(evaluations, np.arange(evaluations.num_rows)))
     is_failed = ~np.isnan(fitness)
-    is_failed[rows[(rows >= 0) & ~np.isnan(outcome)]] = False
-    ids, sampled = last_fitness(run.tables["fitness"])
-    sampled_on, *born = residence_columns(ids).values()
-    named = pa.table(dict(zip(("birth_island", "birth"), born, strict=True)))
-    rows = rows_of(individual_ids(named), run.births)
-    take(rows, sampled, np.asarray(sampled_on, np.int64))
+    succeeded = evaluations.filter(pc.is_valid(evaluations["fitness"]))
+    rows = rows_of(individual_ids(succeeded), run.births)
+    is_failed[rows[rows >= 0]] = False
+    take_table(last_samples(run.tables["fitness"]))
     table = run.population_table
     chosen = table.is_last[table.group_of] & table.is_judged
     homes = table.islands[table.group_of[chosen]]

@@ -107,6 +107,18 @@ def residence_ids(table: pa.Table) -> Integers:
     return np.asarray(table["island"], np.int64) << _PLACE | individual_ids(table)
 
 
+def last_there(table: pa.Table, times: Numbers | Integers) -> pa.Table:
+    """Return the last row of each individual on each island that it lives on.
+
+    Args:
+        table: as for ``residence_ids``.
+        times: (N,) of the rows; times of different islands are not compared.
+    """
+    ids = residence_ids(table)
+    order = np.lexsort((times, ids))
+    return table.take(pa.array(order[is_last_of_each(ids[order])]))
+
+
 def residence_columns(ids: Integers) -> dict[str, pa.Array]:
     """Return the columns that ``residence_ids`` combines, by name."""
     births = ids >> _BITS & 2 ** (_PLACE - _BITS) - 1

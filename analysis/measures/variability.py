@@ -5,11 +5,10 @@ import pyarrow as pa
 
 from analysis.measures.population_table import (
     Numbers,
-    is_last_of_each,
+    last_there,
     residence_columns,
     residence_ids,
 )
-from analysis.measures.trees import Integers
 
 
 def variability(fitness: pa.Table) -> pa.Table:
@@ -77,18 +76,11 @@ def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers
     return clock, least, greatest
 
 
-def last_fitness(fitness: pa.Table) -> tuple[Integers, Numbers]:
-    """Return the last fitness of each robot in each of the arenas that it lived in.
+def last_samples(fitness: pa.Table) -> pa.Table:
+    """Return the last sample of each mature robot in each of its arenas.
 
     Args:
         fitness: samples, as for ``variability``.
-
-    Returns:
-        Ids of the robots there, as of ``residence_ids``, (R,); fitness [m/s], (R,).
     """
     mature = fitness.filter(fitness["is_mature"])
-    robots = residence_ids(mature)
-    times = np.asarray(mature["sim_time_s"], np.float64)
-    order = np.lexsort((times, robots))
-    chosen = order[is_last_of_each(robots[order])]
-    return robots[chosen], np.asarray(mature["fitness"], np.float64)[chosen]
+    return last_there(mature, np.asarray(mature["sim_time_s"], np.float64))

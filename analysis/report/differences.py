@@ -49,10 +49,9 @@ def differences(tables: Tables) -> str:
         pair = {row["a"], row["b"]}
         row["apart"] = not (online.isdisjoint(pair) or offline.isdisjoint(pair))
     # Both measures show the same pairs in the same order.
-    first = [row for row in every if row["measure"] == next(iter(_COMPARED))]
-    first.sort(key=lambda row: (row["apart"], 1.0 if row["p"] is None else row["p"]))
-    place = {(row["a"], row["b"]): at for at, row in enumerate(first)}
-    every.sort(key=lambda row: place.get((row["a"], row["b"]), len(place)))
+    known = {(row["a"], row["b"]): row["p"] for row in every
+             if row["measure"] == "fitness" and row["p"] is not None}  # fmt: skip
+    every.sort(key=lambda row: (row["apart"], known.get((row["a"], row["b"]), 1.0)))
     parts = [_differences_of(every, *one) for one in _COMPARED.items()]
     apart = not_compared(tables)
     if not any(parts):

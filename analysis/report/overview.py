@@ -20,8 +20,9 @@ Tables = Mapping[str, pa.Table]
 Row = Mapping[str, Any]
 
 _MOST_LINES = 3
-_MOST_TEXT = 800
 """Differing experiments, or runs of arenas, that are described without a fold."""
+_MOST_TEXT = 800
+"""Characters of HTML about differing experiments that are shown without a fold."""
 
 
 def summary(tables: Tables) -> str:

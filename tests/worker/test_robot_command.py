@@ -51,7 +51,9 @@ def test_draws_of_a_run_are_told_from_those_alone(
         file.write_text(f'name = "mine"\n{text}\n')
         words = [str(tmp_path / "spider.yaml"), "--experiment", str(file)]
         assert main(["robot simulate", *words]) == 0
-        assert ("are drawn anew" in capsys.readouterr().err) is is_told
+        assert (
+            "use other random numbers than the run" in capsys.readouterr().err
+        ) is is_told
 
 
 def test_robustness_is_shown_by_change_and_in_one_line(
