@@ -28,6 +28,7 @@ class Oracle:
         schedule = world._schedule
         self._moments, self._arrive = schedule.moments, world._arrive
         schedule.moments = self._every_step  # type: ignore[method-assign]
+        world.population._most_moments = schedule.tick_steps
         world._arrive = self._observed_arrive  # type: ignore[method-assign]
 
     def _every_step(self, step: int, until: int) -> tuple[int, ...]:

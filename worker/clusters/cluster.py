@@ -109,6 +109,8 @@ class EngineView:
 class StateHistory:
     """A cluster's states at K moments of an interval, one row each.
 
+    The states are columns of an array of all clusters, which need not be gathered.
+
     Attributes:
         state: (K, W) all of ``Cluster.live``.
         qpos, qvel: positions and velocities of it, (K, Q) and (K, V).
@@ -117,39 +119,50 @@ class StateHistory:
         probed: numbers of the members' probes, if there are any.
     """
 
-    def __init__(self, cluster: "Cluster", count: int) -> None:
-        """Allocate rows for ``count`` moments of a cluster."""
-        self.state = np.zeros((count, sum(cluster.sizes)))
+    def __init__(self, cluster: "Cluster", states: Floats, start: int) -> None:
+        """Take the columns of a cluster.
+
+        Args:
+            cluster: whose states are kept.
+            states: (K, at least W) of all clusters.
+            start: first column of the cluster's states.
+        """
+        count, width = states.shape
         ends = np.cumsum(cluster.sizes).tolist()
-        parts = np.split(self.state, ends[:-1], axis=1)
-        self.qpos, self.qvel = parts[:2]
+        self.state = states[:, start : start + ends[-1]]
+        self.qpos = self.state[:, : ends[0]]
+        self.qvel = self.state[:, ends[0] : ends[1]]
         warnings = cluster.data.warning.number
         self.warnings = np.zeros((count, len(warnings)), dtype=warnings.dtype)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
         self.probed: list[list[Floats]] = [[] for _ in range(count)]
         # Copies between memory views are faster than between arrays, and one view of
         # all rows is faster than one of each, as few of them stay in the caches.
-        self._cells = self.state.reshape(-1).data
+        self._cells = states.reshape(-1).data
         self._counts = self.warnings.reshape(-1).data
         self._live = [array.data for array in (*cluster.live, warnings)]
         self._ends = *ends, len(warnings)
-        self._count = count
-
-    def __len__(self) -> int:
-        return self._count
+        self._start, self._width = start, width
 
     def keep(self, moment: int) -> None:
         """Copy the present state and warnings to the rows of a moment."""
         cells, counts = self._cells, self._counts
         qpos, qvel, xpos, xmat, warnings = self._live
-        first, second, third, width, kinds = self._ends
-        at = moment * width
+        first, second, third, end, kinds = self._ends
+        at = moment * self._width + self._start
         cells[at : at + first] = qpos
         cells[at + first : at + second] = qvel
         cells[at + second : at + third] = xpos
-        cells[at + third : at + width] = xmat
+        cells[at + third : at + end] = xmat
         at = moment * kinds
         counts[at : at + kinds] = warnings
+
+    def copy_from(self, other: "StateHistory") -> None:
+        """Copy the rows of the same cluster from another array of all clusters."""
+        count = len(other.state)
+        self.state[:count] = other.state
+        self.warnings[:count] = other.warnings
+        self.touching[:count], self.probed[:count] = other.touching, other.probed
 
 
 class Cluster:
@@ -199,7 +212,8 @@ class Cluster:
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
         self._contacts = self.data.contact
-        self.history = StateHistory(self, 0)
+        self.history: StateHistory
+        self.drop_history()
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
         self.touched: frozenset[int] = frozenset()
@@ -215,8 +229,6 @@ class Cluster:
             plan: steps to each moment from the one before.
             first: moment to start with; the rows before it stay unchanged.
         """
-        if len(self.history) < len(plan):
-            self.history = StateHistory(self, len(plan))
         model, data, keep = self.model, self.data, self.history.keep
         for moment in range(first, len(plan)):
             try:
@@ -236,13 +248,25 @@ class Cluster:
 
     def keep(self, moments: range) -> None:
         """Copy the present state to the rows of some moments."""
-        if len(self.history) < moments.stop:
-            self.history = StateHistory(self, moments.stop)
         for moment in moments:
             self.history.keep(moment)
             self._keep_probed(moment)
             self.history.touching[moment] = self.touching()
         self._read_touched()
+
+    def keep_in(self, states: Floats, start: int) -> None:
+        """Move the history to another array of all clusters' states.
+
+        Args:
+            states: (K, at least W), K at least as great as before.
+            start: first column of this cluster's states.
+        """
+        before, self.history = self.history, StateHistory(self, states, start)
+        self.history.copy_from(before)
+
+    def drop_history(self) -> None:
+        """Forget the history, as the array of all clusters may be large."""
+        self.history = StateHistory(self, np.zeros((0, sum(self.sizes))), 0)
 
     def _keep_probed(self, moment: int) -> None:
         numbers = [probe.numbers.copy() for probe in self.probes]

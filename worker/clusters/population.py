@@ -17,7 +17,13 @@ from worker.clusters.cluster import Cluster
 from worker.clusters.models import ModelCache
 from worker.clusters.proximity import Proximity, Scene
 from worker.clusters.robot import ArenaRobot
-from worker.clusters.states import Layout, Pairs, RobotRows, Rollout
+from worker.clusters.states import (
+    Layout,
+    Pairs,
+    RobotRows,
+    Rollout,
+    Schedule,
+)
 
 Group = tuple[BirthId, ...]
 """Members of one cluster, ascending."""
@@ -46,7 +52,8 @@ class ArenaPopulation:
         self.clusters: tuple[Cluster, ...] = ()
         self.by_cost: list[Cluster] = []
         self.cluster_of: dict[BirthId, Cluster] = {}
-        self.layout = Layout((), self.robot_rows)
+        self._most_moments = Schedule(settings).most_moments
+        self.layout = Layout((), self.robot_rows, self._most_moments)
         self.rollout: Rollout | None = None
         self.merges = self.splits = 0
         self._proximity = Proximity(settings)
@@ -189,19 +196,20 @@ class ArenaPopulation:
 
     def _settle(self, clusters: Sequence[Cluster]) -> None:
         """Replace the clusters; record the state of new ones from now on."""
-        known = {id(cluster) for cluster in self.clusters}
-        rows = self.robot_rows.rows
+        known, rows = set(self.clusters), self.robot_rows.rows
+        for cluster in known.difference(clusters):
+            cluster.drop_history()
         self.clusters = tuple(sorted(clusters, key=lambda c: rows[c.members[0]]))
         self.cluster_of = {
             birth: cluster for cluster in self.clusters for birth in cluster.members
         }
-        self.layout = Layout(self.clusters, self.robot_rows)
+        self.layout = Layout(self.clusters, self.robot_rows, self._most_moments)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
         if self.rollout is None:
             return
         moment, count = self.rollout.moment, len(self.rollout.plan)
         for cluster in self.clusters:
-            if id(cluster) not in known:
+            if cluster not in known:
                 cluster.keep(range(moment, count))
                 self._new.append(cluster)
         self.rollout.read(self.layout)

@@ -91,14 +91,18 @@ class Layout:
         motions: (R, 6) of velocity and angular velocity of the core.
         joints: of the joint angles, robot by robot.
         velocities: of all velocities, robot by robot.
+        states: (K, W) at the moments of an interval, in which the clusters keep them.
     """
 
-    def __init__(self, clusters: Sequence[Cluster], robot_rows: RobotRows) -> None:
-        """Compute the indices.
+    def __init__(
+        self, clusters: Sequence[Cluster], robot_rows: RobotRows, moments: int
+    ) -> None:
+        """Compute the indices, and move the clusters' histories to ``states``.
 
         Args:
             clusters: all of an arena, in a fixed order.
             robot_rows: all robots.
+            moments: K, the most that an interval has.
         """
         self.robot_rows = robot_rows
         self.clusters = tuple(clusters)
@@ -109,6 +113,9 @@ class Layout:
         sizes = np.array([c.sizes for c in clusters], dtype=np.intp).reshape(-1)
         # Where each cluster's four parts start, for each of its members.
         blocks = (np.cumsum(sizes) - sizes).reshape(-1, _PARTS)
+        self.states = np.zeros((moments, int(sizes.sum())))
+        for cluster, start in zip(clusters, blocks[:, 0].tolist(), strict=True):
+            cluster.keep_in(self.states, start)
         counts = [len(cluster.members) for cluster in clusters]
         offsets = np.repeat(blocks, counts, axis=0)
         offsets += np.array(own, dtype=np.intp).reshape(-1, _PARTS)
@@ -130,13 +137,6 @@ class Layout:
     def read(self) -> Floats:
         """Return a copy of the present state, (W,)."""
         return _joined([part for cluster in self.clusters for part in cluster.live])
-
-    def history(self, count: int) -> Floats:
-        """Return the states at the first moments of an interval, (count, W)."""
-        if not self.clusters:
-            return np.zeros((count, 0))
-        states = [cluster.history.state[:count] for cluster in self.clusters]
-        return np.concatenate(states, axis=1)
 
     def speeds(self, states: Floats) -> Floats:
         """Return an upper bound on the speed of each robot's points, (L, R) [m/s].
@@ -185,6 +185,7 @@ class Schedule:
 
     Attributes:
         tick_steps: between two ticks of the controllers.
+        most_moments: upper bound on the number of moments of an interval.
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
@@ -193,6 +194,9 @@ class Schedule:
         self.tick_steps = clock.brain_steps
         self._sample_steps, self._merge_steps = clock.pose_steps, merge_steps
         self._split_steps = MERGES_PER_SPLIT * merge_steps
+        spacings = self._sample_steps, self._merge_steps
+        between = sum(1 + self.tick_steps // each for each in spacings)
+        self.most_moments = min(self.tick_steps, 1 + between)
 
     def is_tick(self, step: int) -> bool:
         """Whether controllers tick at a step."""
@@ -270,7 +274,7 @@ class Rollout:
 
     def read(self, layout: Layout) -> None:
         """Read all states; drops pairs that were computed from the old ones."""
-        self.states = layout.history(len(self.plan))
+        self.states = layout.states[: len(self.plan)]
         velocities = np.abs(self.states.take(layout.velocities, axis=1))
         self.max_velocity = float(velocities.max(initial=0.0))
         self.has_failures = any(cluster.failure for cluster in layout.clusters)
