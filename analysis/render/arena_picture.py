@@ -29,6 +29,8 @@ _WHOLE = (0.0, 0.0)
 """Shares of a picture that are cut off."""
 _RIM_M = 0.005
 """Half height of walls between the camera and the robots [m]."""
+_HEIGHTS = (2, 9)
+"""Columns of a wall: z of its centre, half its height."""
 
 
 class ArenaRenderer:
@@ -63,9 +65,10 @@ class ArenaRenderer:
         places = np.array([pose[:2] for poses in frames for pose in poses.values()])
         reach_m = max(_LEAST_REACH_M, float(np.ptp(places, axis=0).max()))
 
+        walls = _lowered(mjcf.ring_wall(settings.arena))
+
         def furnish_arena(spec: Any) -> None:  # noqa: ANN401 - imported late
-            mjcf.add_ring_wall(spec, settings.arena)
-            _lower_near_walls(spec, len(mjcf.ring_wall(settings.arena)))
+            mjcf.add_walls(spec, walls)
             furnish(size, settings.light, reach_m, spec)
 
         specs = [
@@ -118,15 +121,10 @@ class ArenaRenderer:
         )
 
 
-def _lower_near_walls(spec: Any, count: int) -> None:  # noqa: ANN401 - imported late
-    """Draw the walls on the camera's side as a rim, which hides no robot.
-
-    Args:
-        spec: of the arena, with its walls.
-        count: number of walls.
-    """
+def _lowered(walls: Floats) -> Floats:
+    """Return (W, 10) walls, on the camera's side only a rim, which hides no robot."""
     view = np.radians(AZIMUTH)
-    for number in range(count):
-        wall = spec.geom(f"wall{number}")
-        if wall.pos[0] * np.cos(view) + wall.pos[1] * np.sin(view) < 0.0:
-            wall.pos[2] = wall.size[2] = _RIM_M
+    is_near = walls[:, 0] * np.cos(view) + walls[:, 1] * np.sin(view) < 0.0
+    lowered = walls.copy()
+    lowered[np.ix_(is_near, _HEIGHTS)] = _RIM_M
+    return lowered

@@ -266,10 +266,10 @@ def ring_wall(arena: Arena) -> Floats:
     return np.array(walls)
 
 
-def add_ring_wall(spec: mujoco.MjSpec, arena: Arena) -> None:
-    """Add the walls of ``ring_wall`` as geoms ``wall{k}``."""
+def add_walls(spec: mujoco.MjSpec, walls: Floats) -> None:
+    """Add walls, as from ``ring_wall``, as geoms ``wall{k}``."""
     box = mujoco.mjtGeom.mjGEOM_BOX
-    for index, wall in enumerate(ring_wall(arena)):
+    for index, wall in enumerate(walls):
         geom = spec.worldbody.add_geom(name=f"wall{index}", type=box)
         geom.pos, geom.quat, geom.size = wall[:3], wall[3:7], wall[7:]
 

@@ -21,7 +21,13 @@ from schema.experiment.document import body_space
 from schema.experiment.scenery import refuse_objects
 from schema.experiment.settings import ArenaSettings
 from schema.mjcf.footing import footprint, standing_height
-from schema.mjcf.model import add_ring_wall, robot_spec, shared_model, solo_spec
+from schema.mjcf.model import (
+    add_walls,
+    ring_wall,
+    robot_spec,
+    shared_model,
+    solo_spec,
+)
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
@@ -102,7 +108,7 @@ class ModelCache:
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
         self.controls = controls_of(settings)
         self._types = body_space(settings.space)
-        self._furnish = partial(add_ring_wall, arena=settings.arena)
+        self._furnish = partial(add_walls, walls=ring_wall(settings.arena))
         self._clusters: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()
         self._specs: dict[BirthId, mujoco.MjSpec] = {}
 

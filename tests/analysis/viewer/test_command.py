@@ -30,7 +30,7 @@ from analysis.viewer.show import Show
 from schema.errors import RunFolderError
 from schema.experiment.document import Arena, Experiment
 from schema.experiment.file import read_experiment
-from schema.mjcf.model import add_ring_wall
+from schema.mjcf.model import add_walls, ring_wall
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
@@ -95,7 +95,7 @@ def test_duplicate_messages_are_no_gap() -> None:
 def test_a_ring_wall_is_where_mujoco_has_it() -> None:
     arena = Arena(wall_diameter_m=3.0, wall_segments=5)
     spec = mujoco.MjSpec()
-    add_ring_wall(spec, arena)
+    add_walls(spec, ring_wall(arena))
     model = spec.compile()
     (walls,) = scene_of(Experiment(name="e", arena=arena)).walls
     assert len(walls) == model.ngeom == 5
