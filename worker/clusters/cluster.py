@@ -113,36 +113,51 @@ class StateHistory:
 
     Attributes:
         state: (K, W) all of ``Cluster.live``.
-        qpos, qvel: positions and velocities of it, (K, Q) and (K, V).
         warnings: (K, N) the engine's counts of each of its warnings.
         touching: pairs of members in contact, if they are recorded.
         probed: numbers of the members' probes, if there are any.
     """
 
-    def __init__(self, cluster: "Cluster", states: Floats, start: int) -> None:
-        """Take the columns of a cluster.
-
-        Args:
-            cluster: whose states are kept.
-            states: (K, at least W) of all clusters.
-            start: first column of the cluster's states.
-        """
-        count, width = states.shape
-        ends = np.cumsum(cluster.sizes).tolist()
-        self.state = states[:, start : start + ends[-1]]
-        self.qpos = self.state[:, : ends[0]]
-        self.qvel = self.state[:, ends[0] : ends[1]]
+    def __init__(self, cluster: "Cluster") -> None:
+        """Initialise without rows."""
         warnings = cluster.data.warning.number
-        self.warnings = np.zeros((count, len(warnings)), dtype=warnings.dtype)
-        self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
-        self.probed: list[list[Floats]] = [[] for _ in range(count)]
+        ends = np.cumsum(cluster.sizes).tolist()
         # Copies between memory views are faster than between arrays, and one view of
         # all rows is faster than one of each, as few of them stay in the caches.
-        self._cells = states.reshape(-1).data
-        self._counts = self.warnings.reshape(-1).data
         self._live = [array.data for array in (*cluster.live, warnings)]
         self._ends = *ends, len(warnings)
-        self._start, self._width = start, width
+        self.state = np.zeros((0, ends[-1]))
+        self.warnings = np.zeros((0, len(warnings)), dtype=warnings.dtype)
+        self.touching: list[list[tuple[int, int]]] = []
+        self.probed: list[list[Floats]] = []
+
+    @property
+    def qpos(self) -> Floats:
+        """Positions, (K, Q)."""
+        return self.state[:, : self._ends[0]]
+
+    @property
+    def qvel(self) -> Floats:
+        """Velocities, (K, V)."""
+        return self.state[:, self._ends[0] : self._ends[1]]
+
+    def move(self, states: Floats, start: int) -> None:
+        """Move the rows to columns of an array of all clusters' states.
+
+        Args:
+            states: (K, at least W), K at least as great as before; contiguous.
+            start: first column of the cluster.
+        """
+        count, self._width = states.shape
+        state = states[:, start : start + self._ends[3]]
+        if new := count - len(self.state):
+            self.warnings = np.pad(self.warnings, ((0, new), (0, 0)))
+            self._counts = self.warnings.reshape(-1).data
+            self.touching += [[] for _ in range(new)]
+            self.probed += [[] for _ in range(new)]
+        state[: len(self.state)] = self.state
+        self.state, self._start = state, start
+        self._cells = states.reshape(-1).data
 
     def keep(self, moment: int) -> None:
         """Copy the present state and warnings to the rows of a moment."""
@@ -156,13 +171,6 @@ class StateHistory:
         cells[at + third : at + end] = xmat
         at = moment * kinds
         counts[at : at + kinds] = warnings
-
-    def copy_from(self, other: "StateHistory") -> None:
-        """Copy the rows of the same cluster from another array of all clusters."""
-        count = len(other.state)
-        self.state[:count] = other.state
-        self.warnings[:count] = other.warnings
-        self.touching[:count], self.probed[:count] = other.touching, other.probed
 
 
 class Cluster:
@@ -212,8 +220,7 @@ class Cluster:
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
         self._contacts = self.data.contact
-        self.history: StateHistory
-        self.drop_history()
+        self.history = StateHistory(self)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
         self.touched: frozenset[int] = frozenset()
@@ -254,19 +261,9 @@ class Cluster:
             self.history.touching[moment] = self.touching()
         self._read_touched()
 
-    def keep_in(self, states: Floats, start: int) -> None:
-        """Move the history to another array of all clusters' states.
-
-        Args:
-            states: (K, at least W), K at least as great as before.
-            start: first column of this cluster's states.
-        """
-        before, self.history = self.history, StateHistory(self, states, start)
-        self.history.copy_from(before)
-
     def drop_history(self) -> None:
         """Forget the history, as the array of all clusters may be large."""
-        self.history = StateHistory(self, np.zeros((0, sum(self.sizes))), 0)
+        self.history = StateHistory(self)
 
     def _keep_probed(self, moment: int) -> None:
         numbers = [probe.numbers.copy() for probe in self.probes]

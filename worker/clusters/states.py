@@ -115,7 +115,7 @@ class Layout:
         blocks = (np.cumsum(sizes) - sizes).reshape(-1, _PARTS)
         self.states = np.zeros((moments, int(sizes.sum())))
         for cluster, start in zip(clusters, blocks[:, 0].tolist(), strict=True):
-            cluster.keep_in(self.states, start)
+            cluster.history.move(self.states, start)
         counts = [len(cluster.members) for cluster in clusters]
         offsets = np.repeat(blocks, counts, axis=0)
         offsets += np.array(own, dtype=np.intp).reshape(-1, _PARTS)
