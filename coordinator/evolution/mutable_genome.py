@@ -10,12 +10,12 @@ from operator import add, le, sub
 from typing import NamedTuple
 
 from msgspec import Struct, field
-from msgspec.structs import astuple, replace
+from msgspec.structs import replace
 
 from schema.experiment.document import Space
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node
 from schema.robot.ids import BirthId
 
 
@@ -94,14 +94,26 @@ def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
 def to_branches(genome: Genome, space: BodySpace) -> list[MutableGenome]:
     """Return the branches of a genome's mutable tree, depth first."""
     branches: list[MutableGenome] = []
-    for node, parent, slot in walk(genome):
-        kind, *fields, _children = astuple(node)
-        branch = MutableGenome(space[kind], *fields)
+    stack: list[tuple[Node, MutableGenome | None, int]] = [(genome, None, -1)]
+    while stack:
+        node, parent, slot = stack.pop()
+        branch = MutableGenome(
+            space[node.kind],
+            node.slot,
+            node.orientation,
+            node.parameters,
+            node.gene,
+            node.outputs,
+            node.hidden,
+            node.connections,
+            parent,
+            slot,
+        )
         branches.append(branch)
-        if parent >= 0:
-            above = branch.parent = branches[parent]
-            branch.parent_slot = slot
-            above.children[slot] = branch
+        if parent is not None:
+            parent.children[slot] = branch
+        if node.children:
+            stack += [(child, branch, own) for own, child in reversed(node.children)]
     return branches
 
 
