@@ -151,6 +151,11 @@ class Dispatch:
         kind = self._kind_of.get(agent)
         return self._pools[kind].agents[agent].joined.platform if kind else ""
 
+    def wait_s(self, job: Job) -> float:
+        """Return the time without a reply after which a pending job is lost [s]."""
+        lost = self._jobs[job.number].lost.total()
+        return self._deadlines.wait_s(job.kind, lost)
+
     @property
     def pause_s(self) -> float:
         """Time for which answers may collect before a worker runs out of jobs [s]."""
@@ -196,7 +201,7 @@ class Dispatch:
         pool = self._pools[kind]
         for number in pool.agents.pop(event.agent).held:
             if pending := self._jobs.get(number):
-                pending.lost[event.agent] = None
+                pending.lost[event.agent] += 1
                 self._put_back(pending, event.agent)
         yield from self._assign(pool)
 
@@ -314,7 +319,7 @@ class Dispatch:
         A malformed answer is a fault of its agent alone, so it is no such error.
         """
         if event.outcome == "lost":
-            pending.lost[event.agent] = None
+            pending.lost[event.agent] += 1
         pending.errors += event.outcome == "error"
         if pending.errors == MAX_ERRORS:
             del pending.holders[event.agent]

@@ -43,6 +43,7 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.faults import PeerFaults
+from coordinator.dispatch.pool import LONGEST_WAIT_S
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage
 from schema.wire.decoding import fingerprint
@@ -51,8 +52,15 @@ from schema.wire.decoding import fingerprint
 class Agents(Protocol):
     """Connection to the agents: a network, or functions in this process."""
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
-        """Send a job to an agent; ``receive`` returns its outcome."""
+    def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
+        """Send a job to an agent; ``receive`` returns its outcome.
+
+        Args:
+            number: of the job.
+            agent: that gets it.
+            payload: an encoded request.
+            wait_s: time without a reply after which the job is lost [s].
+        """
 
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
         """Tell an agent, by the job's request, that a job is no longer wanted."""
@@ -278,7 +286,8 @@ class Fleet:
         for command in commands:
             match command:
                 case Assign(job, agent):
-                    self._agents.send(job.number, agent, job.payload)
+                    wait_s = self.dispatch.wait_s(job)
+                    self._agents.send(job.number, agent, job.payload, wait_s)
                 case Cancel(job, agent):
                     self._agents.cancel(agent, job.payload)
                 case Deliver(job):
@@ -287,7 +296,8 @@ class Fleet:
                     payload, read = self._shard_clients[shard][1](command)
                     self._advance_reads[number] = read
                     self._advances[number] = (shard, payload)
-                    self._agents.send(number, agent, payload)
+                    # A rebuild may take very much longer than an advance.
+                    self._agents.send(number, agent, payload, LONGEST_WAIT_S)
                 case CancelShard(number, _, agent):
                     self._agents.cancel(agent, self._advances[number][1])
                 case ShardDone(shard) | ShardFailed(shard):

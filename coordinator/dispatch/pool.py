@@ -4,6 +4,7 @@ Jobs and advances of arenas share one account of load, one backoff, one judgemen
 which agents are silent, and one rule for deadlines.
 """
 
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
@@ -31,6 +32,14 @@ PATIENCE = 4.0
 """A job is late after this multiple of the typical duration of its kind."""
 FIRST_S = 60.0
 """Deadline of a job without history [s]."""
+LONGEST_WAIT_S = 7 * 24 * 3600.0
+"""Effectively no limit: a week is longer than any job [s]."""
+LEAST_WAIT_S = 300.0
+"""A job without a reply never counts as lost before this time [s]."""
+_WAIT = 100.0
+"""A job without a reply is lost after this multiple of the typical duration."""
+_WAIT_GROWTH = 10.0
+"""Growth of that time with every reply that did not come."""
 LOOK_S = 0.25
 """Interval between checks for late jobs [s]."""
 _MOST_DOUBLINGS = 16
@@ -50,7 +59,7 @@ class Pending:
             assignment [s], and its place in the queue of a slot (1.0 is first).
         errors: number of agents that could not do it.
         avoid: agents that failed at it.
-        lost: agents that had it and gave no reply.
+        lost: how often each agent had it and gave no reply.
         killed: processes that it crashed, with the causes.
     """
 
@@ -58,7 +67,7 @@ class Pending:
     holders: dict[str, tuple[float, float]] = field(default_factory=dict)
     errors: int = 0
     avoid: tuple[str, ...] = ()
-    lost: dict[str, None] = field(default_factory=dict)
+    lost: Counter[str] = field(default_factory=Counter)
     killed: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -368,3 +377,19 @@ class Deadlines:
         if typical_s is not None:
             first_s = max(self._least_s, PATIENCE * typical_s)
         return first_s * float(2 ** min(misses, _MOST_DOUBLINGS))
+
+    def wait_s(self, kind: Hashable, lost: int) -> float:
+        """Return the time without a reply after which a job counts as lost [s].
+
+        The network holds some memory of each request until this time is over, even if
+        the reply came long ago: half a kilobyte, three times per birth.
+
+        Args:
+            kind: of the job.
+            lost: how many times its reply did not come.
+        """
+        typical_s = self._typical_s.get(kind)
+        if typical_s is None:
+            return LONGEST_WAIT_S
+        wait_s = max(LEAST_WAIT_S, _WAIT * typical_s)
+        return min(LONGEST_WAIT_S, wait_s * _WAIT_GROWTH ** min(lost, _MOST_DOUBLINGS))

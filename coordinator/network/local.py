@@ -26,7 +26,7 @@ class LocalAgents:
             for kind in sorted(answers)
         ]
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
+    def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
         """Queue a job; a later ``receive`` does it."""
         self._asked.append((number, agent, payload))
 

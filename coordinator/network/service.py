@@ -30,7 +30,6 @@ from schema.agent.network import (
     CANCELLED,
     DEFAULT_FLEET,
     FENCED,
-    JOB_TIMEOUT_S,
     UNFIT,
     Tls,
     cannot_listen,
@@ -66,7 +65,7 @@ _THREAD = threading.local()
 class _Asked:
     """A query to an agent; ``number`` is the job's, -1 asks for its ``AgentInfo``.
 
-    ``took_s`` is the time from sending it to its reply [s].
+    ``took_s`` is the time from sending it to its reply, ``wait_s`` the longest [s].
 
     Any process can serve the agent's key. All that do get the query, so that none can
     keep it from the agent, and only the reply of the agent's own session counts.
@@ -75,6 +74,7 @@ class _Asked:
     member: Member
     number: int
     inbox: "Inbox[_News]"
+    wait_s: float
     reply: zenoh.Reply | None = None
     has_stray: bool = False
     asked_s: float = field(default_factory=time.monotonic)
@@ -84,15 +84,15 @@ class _Asked:
         """Pass the first reply on at once: another process may never end its own."""
         _keep_thread_state()
         replier = reply.replier_id
-        if replier is None:
-            return  # of the engine itself, after the timeout
+        took_s = time.monotonic() - self.asked_s
+        if replier is None or (reply.ok is None and took_s >= self.wait_s):
+            return  # of the engine itself or of the hub, after the wait
         if str(replier.zid) != self.member.session:
             self._pass_on("foreign")
         elif self.reply is not None:
             self._pass_on("late")
         else:
-            self.reply = reply
-            self.took_s = time.monotonic() - self.asked_s
+            self.reply, self.took_s = reply, took_s
             self.inbox.put(self)
 
     def end(self) -> None:
@@ -253,20 +253,21 @@ class Network:
                 return next(str(each) for each in found if each.startswith("tcp/"))
         raise NetworkError(f"the hub did not report its port on {self.address}")
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
+    def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
         """Send a job to an agent; ``receive`` returns exactly one ``Returned`` for it.
 
         Args:
             number: of the job.
             agent: that has joined; if it has left since, the job is lost.
             payload: an encoded request.
+            wait_s: time without a reply after which the job is lost [s].
         """
         if member := self._membership.joined.get(agent):
-            asked = _Asked(member, number, self._inbox)
-            self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
+            asked = _Asked(member, number, self._inbox, wait_s)
+            self._ask(asked, member.jobs, payload)
         else:
             gone = Member(self._me.fleet, "worker", agent)
-            _Asked(gone, number, self._inbox).end()
+            _Asked(gone, number, self._inbox, wait_s).end()
 
     def cancel(self, agent: str, payload: bytes) -> None:
         """Tell an agent that a job is no longer wanted; it may have started it.
@@ -283,16 +284,14 @@ class Network:
         if member := self._membership.joined.get(agent):
             self._ask_info(member)
 
-    def _ask(
-        self, asked: _Asked, key: str, payload: bytes | None, timeout_s: float
-    ) -> None:
+    def _ask(self, asked: _Asked, key: str, payload: bytes | None) -> None:
         self._session.get(
             key,
             zenoh.handlers.Callback(asked.take, asked.end, indirect=False),
             payload=payload,
             # Agents share their time between coordinators.
             attachment=self._me.name,
-            timeout=timeout_s,
+            timeout=asked.wait_s,
             target=zenoh.QueryTarget.ALL,
             consolidation=_NOW,
         )
@@ -378,8 +377,8 @@ class Network:
             self._info_queue.add_again(member, 1, time.monotonic())
             return
         self._asked_infos.add(member)
-        asked = _Asked(member, -1, self._inbox)
-        self._ask(asked, member.info, None, ASK_TIMEOUT_S)
+        asked = _Asked(member, -1, self._inbox, ASK_TIMEOUT_S)
+        self._ask(asked, member.info, None)
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
         """Let an agent join if its properties are valid and its version is equal."""

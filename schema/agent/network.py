@@ -25,8 +25,6 @@ FENCED = "fenced: "
 CANCELLED = "the job was cancelled"
 # Prefix of a refusal if the agent lacks the plug-ins of the run.
 UNFIT = "unfit: "
-# Effectively no limit: a week is longer than any job [s].
-JOB_TIMEOUT_S = 7 * 24 * 3600.0
 ASK_TIMEOUT_S = 10.0
 # A frozen process counts as gone after this [ms].
 LEASE_MS = 5000

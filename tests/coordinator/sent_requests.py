@@ -67,7 +67,7 @@ class SentRequests:
         self.tell(Joined("judge", "analyzer", 1, "platform"))
         self.tell(Ticked(0.0))
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
+    def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
         self.sent.append((number, agent, payload))
 
     def cancel(self, agent: str, payload: bytes) -> None:

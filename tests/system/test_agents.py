@@ -69,7 +69,7 @@ def test_agent_reports_and_retries_a_missing_coordinator(role: str) -> None:
             (joined,) = until(network, 1)
             assert isinstance(joined, Joined)
             assert joined.kind == role
-            network.send(1, joined.agent, b"\xff")
+            network.send(1, joined.agent, b"\xff", PATIENCE_S)
             (refused,) = until(network, 1)
             assert isinstance(refused, Returned)
             assert refused.outcome == "error"

@@ -97,11 +97,11 @@ class Counting:
         self._agents = fleet._agents
         fleet._agents = self
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
+    def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
         if request_kind(payload) == "advance":
             request = decode_advance_request(payload)
             self.rebuilt += request.rebuild is not None and request.from_step > 0
-        self._agents.send(number, agent, payload)
+        self._agents.send(number, agent, payload, wait_s)
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - of the real one
         return getattr(self._agents, name)

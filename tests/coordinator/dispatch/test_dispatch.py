@@ -40,7 +40,9 @@ from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     BACKOFF_S,
     FIRST_S,
+    LEAST_WAIT_S,
     LONGEST_BACKOFF_S,
+    LONGEST_WAIT_S,
     MOST_AHEAD,
     PATIENCE,
     PAUSE_S,
@@ -288,6 +290,25 @@ def test_lost_jobs_are_never_given_up() -> None:
     for tries in range(1, 20):
         assert dispatch.handle(lost(0, "a")) == []
         assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(0, "a")]
+
+
+def test_a_reply_has_ever_more_time_after_each_loss() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    assert dispatch.wait_s(job(0)) == LONGEST_WAIT_S
+    dispatch.handle(replace(ok(0, "a"), took_s=20.0))
+    dispatch.handle(Requested(job(1)))
+    for tries in range(1, 4):
+        assert dispatch.wait_s(job(1)) == pytest.approx(2000.0 * 10.0 ** (tries - 1))
+        dispatch.handle(lost(1, "a"))
+        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(1, "a")]
+    assert dispatch.wait_s(job(1)) == LONGEST_WAIT_S
+
+
+def test_a_reply_has_a_least_time() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    dispatch.handle(replace(ok(0, "a"), took_s=0.01))
+    dispatch.handle(Requested(job(1)))
+    assert dispatch.wait_s(job(1)) == LEAST_WAIT_S
 
 
 def test_late_answers_change_nothing() -> None:

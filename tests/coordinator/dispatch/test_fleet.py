@@ -52,7 +52,7 @@ class Agents:
             Joined("two", "worker", 2, "p"),
         ]
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
+    def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
         self.sent.append((number, agent, payload))
 
     def cancel(self, agent: str, payload: bytes, /) -> None:

@@ -46,6 +46,8 @@ pytestmark = pytest.mark.system
 ROOT = Path(__file__).parents[3]
 PROGRAM = Path(__file__).with_name("agent_process.py")
 PATIENCE_S = 30.0
+WAIT_S = 3600.0
+"""Longer than any job here [s]."""
 
 
 def request(number: int, *, settings: bytes = b"", epoch: int = 1) -> bytes:
@@ -114,7 +116,7 @@ class Driver:
                 continue
             job = command.job
             if isinstance(command, Assign):
-                self.network.send(job.number, command.agent, job.payload)
+                self.network.send(job.number, command.agent, job.payload, WAIT_S)
             elif isinstance(command, Deliver):
                 assert job.number not in self.delivered
                 assert isinstance(command.answer, Answer)
@@ -196,7 +198,7 @@ def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
 
             assert quiet_s("busy") == quiet_s("stuck") == -1.0
             for process, name in ((busy, "busy"), (it, "stuck")):
-                network.send(0, name, request(0))
+                network.send(0, name, request(0), WAIT_S)
                 assert line_of(process) == "begun\n"
             end_s = time.monotonic() + PATIENCE_S
             while quiet_s("stuck") <= LONGEST_QUIET_S:
@@ -215,8 +217,8 @@ def test_a_worker_told_to_end_finishes_its_job_and_drops_the_next(
 ) -> None:
     with agent(network, "w", "slow") as process:
         until(network, has(1))
-        network.send(0, "w", request(0))
-        network.send(1, "w", request(1))
+        network.send(0, "w", request(0), WAIT_S)
+        network.send(1, "w", request(1), WAIT_S)
         assert line_of(process) == "begun\n"
         process.terminate()
         assert process.stdin is not None
@@ -234,7 +236,7 @@ def test_suspended_worker_leaves_and_joins_again_when_resumed(network: Network) 
     with agent(network, "w") as process:
         joined = until(network, has(1))
         process.send_signal(signal.SIGSTOP)
-        network.send(0, "w", request(0))
+        network.send(0, "w", request(0), WAIT_S)
         gone = until(network, has(2))
         assert Left("w") in gone
         assert Returned(0, "w", "lost") in gone
@@ -242,15 +244,38 @@ def test_suspended_worker_leaves_and_joins_again_when_resumed(network: Network) 
         assert until(network, has(1)) == joined
 
 
+def test_a_job_without_a_reply_is_lost_after_its_wait(network: Network) -> None:
+    with agent(network, "w", "stuck"):
+        until(network, has(1))
+        network.send(0, "w", request(0), 0.5)
+        assert until(network, has(1)) == [Returned(0, "w", "lost")]
+
+
+def test_the_memory_of_requests_is_free_after_their_wait(network: Network) -> None:
+    """The engine holds half a kilobyte of each until then."""
+    with agent(network, "w"):
+        until(network, has(1))
+        held_kb = []
+        for turn in range(6):
+            for number in range(2000):
+                network.send(2000 * turn + number, "w", request(number), 0.02)
+                until(network, has(1))
+            status = Path("/proc/self/status").read_text()
+            (line,) = [each for each in status.splitlines() if "RssAnon" in each]
+            held_kb.append(int(line.split()[1]))
+        # With the longest wait these 6,000 requests would take more than 3,600 kB.
+        assert held_kb[-1] - held_kb[2] < 1000
+
+
 def test_cancelled_job_is_not_done(
     network: Network,
 ) -> None:
     with agent(network, "w", "slow") as process:
         until(network, has(1))
-        network.send(0, "w", request(0))
+        network.send(0, "w", request(0), WAIT_S)
         # What is sent in this order arrives in it.
         network.cancel("w", request(1))
-        network.send(1, "w", request(1))
+        network.send(1, "w", request(1), WAIT_S)
         network.cancel("nobody", request(1))
         assert line_of(process) == "begun\n"
         assert process.stdin is not None
@@ -265,7 +290,7 @@ def test_agent_without_a_plugin_is_unfit_for_the_run(network: Network) -> None:
     with agent(network, "w"):
         until(network, has(1))
         message = pb.Request(run="r", epoch=1, number=4, plugins="not_here=abc")
-        network.send(4, "w", message.SerializeToString())
+        network.send(4, "w", message.SerializeToString(), WAIT_S)
         (unfit,) = until(network, has(1))
         assert isinstance(unfit, Returned)
         assert (unfit.number, unfit.outcome) == (4, "unfit")
@@ -294,9 +319,9 @@ def test_a_bad_request_is_refused_and_the_next_one_served(
 ) -> None:
     with agent(network, "w"):
         until(network, has(1))
-        network.send(0, "w", payload)
+        network.send(0, "w", payload, WAIT_S)
         (refusal,) = until(network, has(1))
-        network.send(1, "w", request(1))
+        network.send(1, "w", request(1), WAIT_S)
         (answer,) = until(network, has(1))
     assert isinstance(refusal, Returned)
     assert refusal.outcome == "error"
@@ -308,11 +333,11 @@ def test_a_bad_request_is_refused_and_the_next_one_served(
 def test_an_older_coordinator_is_told_once_that_it_is_fenced(network: Network) -> None:
     with agent(network, "w"):
         until(network, has(1))
-        network.send(0, "w", request(0, epoch=2))
+        network.send(0, "w", request(0, epoch=2), WAIT_S)
         until(network, has(1))
-        network.send(1, "w", request(1, epoch=1))
+        network.send(1, "w", request(1, epoch=1), WAIT_S)
         (told,) = until(network, has(1))
-        network.send(2, "w", request(2, epoch=1))
+        network.send(2, "w", request(2, epoch=1), WAIT_S)
         (answer,) = until(network, has(1))
     assert isinstance(told, Returned)
     assert told.outcome == "fenced"
@@ -322,7 +347,7 @@ def test_an_older_coordinator_is_told_once_that_it_is_fenced(network: Network) -
 
 
 def test_job_for_an_agent_that_left_is_lost(network: Network) -> None:
-    network.send(7, "nobody", request(7))
+    network.send(7, "nobody", request(7), WAIT_S)
     assert until(network, has(1)) == [Returned(7, "nobody", "lost")]
 
 
@@ -385,7 +410,7 @@ def test_two_coordinators_share_a_hub_and_its_workers(network: Network) -> None:
     with agent(network, "w"), Network(name="d", connect=network.address) as other:
         for coordinator in (network, other):
             assert until(coordinator, has(1)) == [Joined("w", "worker", 1, "p")]
-            coordinator.send(3, "w", request(3))
+            coordinator.send(3, "w", request(3), WAIT_S)
             (returned,) = until(coordinator, has(1))
             assert isinstance(returned, Returned)
             assert returned.outcome == "ok"

@@ -101,7 +101,7 @@ class Two:
         changes = Changes((FIRST,), (Insertion(THIRD, ROBOT, (1.0, 0.0)),))
         self.requests.send(AdvanceShard(0, 1, NEXT, changes, True))
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
+    def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
         self.sent.append((number, agent, payload))
 
     def cancel(self, _agent: str, _payload: bytes, /) -> None:

@@ -209,7 +209,7 @@ class Silent:
             Joined("judge", "analyzer", 1, "p"),
         ]
 
-    def send(self, number: int, agent: str, payload: bytes) -> None:
+    def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
         """Take a job and never answer."""
 
     def cancel(self, agent: str, payload: bytes, /) -> None:
