@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
@@ -151,7 +150,7 @@ def setting_lines(rows: Frame, setting: str) -> Iterator[str]:
     )
     yield "|---|---|---|---|---|---|---|---|"
     for value, own in rows.groupby(setting):
-        middle, low, high = mean_difference(own["fitness"].to_numpy(), np.zeros(1))
+        middle, low, high = mean_difference(own["fitness"].to_numpy(), 0.0)
         means = own.mean(numeric_only=True)
         yield (
             f"| {value:g} | {len(own)} | {middle:.4f} ({low:.4f} to {high:.4f}) "

@@ -210,7 +210,7 @@ CLAIMS: tuple[Claim, ...] = _in_order([
     *_of("6.16", "as many hidden neurons in {a} as in {b}", "hidden", "=",
          (_ONE, _DRIFT)),
     *(claim for number, a in enumerate(_EVOLVED, 18) for claim in (
-        *_all(f"6.{number}", "the best robot and ancestors of five levels differ less "
+        *_all(f"6.{number}", "the best robot and ancestors of four levels differ less "
               "than half as much as founders", "family_distance", "<", 0.5,
               margin=0.05, of=(a,)),
         *_all(f"6.{number}", "their parts come from less than a third of the 15 "

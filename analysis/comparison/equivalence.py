@@ -14,6 +14,7 @@ import numpy as np
 from analysis.comparison.statistics import (
     rank_sum_ways,
     score_variance,
+    standard_error,
     t_quantile,
     t_tail,
 )
@@ -69,7 +70,9 @@ def mean_alike_p(values: Numbers, reference: float, margin: float) -> float:
     Source: Schuirmann, 1987, with Student's t.
     """
     room = margin - abs(float(values.mean()) - reference)
-    error = _error(values)
+    error = standard_error(values)
+    if math.isnan(error):
+        return 1.0
     if error == 0:
         return 0.0 if room > 0 else 1.0
     return t_tail(room / error, len(values) - 1)
@@ -84,13 +87,10 @@ def mean_alike_power(values: Numbers, margin: float) -> float:
         values: (N,) one number per run, N >= 2.
         margin: largest difference that counts as alike, in the measure's unit.
     """
-    error, freedom = _error(values), len(values) - 1
+    error, freedom = standard_error(values), len(values) - 1
+    if math.isnan(error):
+        return 0.0
     if error == 0:
         return 1.0
     room = margin / error - t_quantile(freedom, 1 - 2 * ALPHA)
     return max(0.0, 1 - 2 * t_tail(room, freedom))
-
-
-def _error(values: Numbers) -> float:
-    """Return the standard error of a mean."""
-    return float(values.std(ddof=1)) / math.sqrt(len(values))

@@ -35,15 +35,15 @@ def two_samples(a: Numbers, b: Numbers) -> Row:
 def one_sample(a: Numbers, reference: float) -> Row:
     """Return means, effect and p of an experiment and a number."""
     effect, p = signed_rank(a - reference)
-    return {**_described(a, np.array([reference])), "effect": effect, "p": p}
+    return {**_described(a, reference), "effect": effect, "p": p}
 
 
-def _described(a: Numbers, b: Numbers) -> Row:
+def _described(a: Numbers, b: Numbers | float) -> Row:
     difference, low, high = mean_difference(a, b)
     return {
         "runs_a": len(a),
         "mean_a": float(a.mean()),
-        "mean_b": float(b.mean()),
+        "mean_b": float(np.mean(b)),
         "median_a": float(np.median(a)),
         "median_b": float(np.median(b)),
         "difference": difference,

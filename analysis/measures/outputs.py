@@ -204,7 +204,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
     "families": {
         **_ISLAND,
         "birth": "number of birth of the fittest robot of the last population",
-        "members": "robots of its family: its ancestors of five levels, and itself",
+        "members": "robots of its family: its ancestors of four levels, and itself",
         "distance": "mean tree edit distance of pairs of the family",
         "founder_distance": "mean tree edit distance of pairs of robots born first",
         "founders": "founders whose parts are in the family; null if unknown",

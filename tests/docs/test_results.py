@@ -18,6 +18,8 @@ from docs.campaign_data import DATA
 from docs.results_parts import parts_of
 
 Row = dict[str, Any]
+FEW = 10
+"""Fewer equal runs show no spread."""
 DRAWS = 20000
 
 
@@ -139,6 +141,8 @@ def _of_one(claim: Claim, a: Numbers) -> Row:
     effect = 2 * above / places.sum() - 1 if len(sizes) else 0.0
     ends = (away.mean(), away.mean())
     sides = [0.0 if abs(away.mean()) < claim.margin else 1.0]
+    if not np.ptp(away) and len(away) < FEW:
+        ends, sides = (None, None), [1.0]
     if np.ptp(away) > 0:
         ends = stats.ttest_1samp(away, 0).confidence_interval(0.95)
         sides = [
@@ -175,7 +179,7 @@ def _recomputed(claim: Claim) -> Row:
 
 
 def _verdict(claim: Claim, row: Row) -> str:
-    low, high = row["ends"]
+    low, high = (math.nan if end is None else end for end in row["ends"])
     is_sure, margin = row["q"] < 0.05, row["margin"]
     if claim.expected == "=":
         if row["q_alike"] < 0.05:

@@ -56,8 +56,14 @@ def test_mean_alike_equals_two_t_tests_of_scipy() -> None:
             stats.ttest_1samp(values, 1 + 0.8, alternative="less").pvalue,
         ]
         assert mean_alike_p(values, 1, 0.8) == pytest.approx(max(sides), abs=1e-7)
-    equal = np.full(3, 1.5)
+    equal = np.full(10, 1.5)
     assert (mean_alike_p(equal, 1, 0.8), mean_alike_p(equal, 1, 0.2)) == (0, 1)
+
+
+def test_few_equal_runs_show_nothing() -> None:
+    equal = np.full(9, 1.5)
+    assert mean_alike_p(equal, 1, 0.8) == 1
+    assert mean_alike_power(equal, 0.8) == 0
 
 
 def test_mean_power_grows_with_the_margin_and_the_runs() -> None:

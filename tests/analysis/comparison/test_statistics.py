@@ -113,15 +113,22 @@ def test_difference_of_means_equals_scipy() -> None:
     )
     # Against a reference: the interval of one mean.
     alone = stats.ttest_1samp(a, 0.5).confidence_interval()
-    _, low, high = mean_difference(a, numbers(0.5))
+    _, low, high = mean_difference(a, 0.5)
     assert (low + 0.5, high + 0.5) == pytest.approx((alone.low, alone.high), rel=1e-5)
 
 
-def test_one_run_has_no_interval() -> None:
-    difference, low, high = mean_difference(numbers(3), numbers(1, 2))
-    assert difference == 1.5
+@pytest.mark.parametrize("turns", [1, -1])
+@pytest.mark.parametrize("few", [numbers(3), numbers(3, 3), np.full(9, 3.0)])
+def test_one_run_or_few_equal_ones_have_no_interval(few: Numbers, turns: int) -> None:
+    difference, low, high = mean_difference(*(few, numbers(1, 2))[::turns])
+    assert difference == turns * 1.5
     assert math.isnan(low)
     assert math.isnan(high)
+
+
+def test_ten_equal_runs_have_no_spread() -> None:
+    assert mean_difference(np.full(10, 3.0), 1.0) == (2.0, 2.0, 2.0)
+    assert math.isnan(mean_difference(np.full(9, 3.0), 1.0)[1])
 
 
 @pytest.mark.parametrize("delta", [-1.0, -0.6, 0.0, 0.3, 1.0])
