@@ -41,7 +41,7 @@ def measured_rows(one: Run, commit: str | None) -> dict[str, pa.Table]:
         raise RunFolderError(f"{incomplete[0].what}: {incomplete[0].why}")
     last = reach(measured)
     marks = sorted({last, *(births for births in MARKS if births < last)})
-    outcomes = [outcome(measured.tables, births) for births in marks]
+    outcomes = [outcome(measured.tables, births, one.islands) for births in marks]
     births = read_table(one.folder, "births")
     found = {
         **measured.tables,

@@ -72,7 +72,9 @@ class Outcomes:
         """Return each run's outcomes at a number of births, in the runs' order."""
         key, runs = (experiment, births), self._runs[experiment]
         if key not in self._known:
-            self._known[key] = [outcome(one.tables, births) for one in runs]
+            self._known[key] = [
+                outcome(one.tables, births, one.run.islands) for one in runs
+            ]
         return self._known[key]
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:

@@ -1,24 +1,30 @@
 """Outcomes of a run: one number per measure, by which experiments are compared."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.statistics import ranks
-from analysis.measures.families import FOUNDERS
+from analysis.measures.load import IslandSettings
 from analysis.measures.outputs import OWN, POPULATION
 from analysis.measures.population_table import Numbers
+from analysis.measures.populations import RETENTION_BIRTHS
 
 
-def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
+def outcome(
+    tables: Mapping[str, pa.Table], births: int, settings: Sequence[IslandSettings]
+) -> dict[str, float]:
     """Return the outcomes of a run at a number of births.
+
+    No outcome depends on what happened after these births.
 
     Args:
         tables: tables of one run, with the columns of ``outputs``.
         births: births on each island; the last population at or before is used.
+        settings: of each island.
 
     Returns:
         Numbers by the names of ``outputs.OUTCOME``, the mean over several islands;
@@ -33,30 +39,36 @@ def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
         rows = np.flatnonzero((islands == island) & (counts <= births))
         if len(rows):
             columns = {name: _column(populations, name)[rows] for name in POPULATION}
-            each.append(_of_island(columns, counts[rows], births))
+            founders = settings[island].founders
+            each.append(_of_island(columns, counts[rows], births, founders))
     found = {"births": float(births)}
     for name in each[0] if each else ():
         found[name] = _mean(np.array([one[name] for one in each]))
     if "robots" in tables:
         found |= _of_robots(tables["robots"], found, births)
     found |= _own_measures(tables, births)
-    return found | _of_families(tables, births) | _of_arena(tables, births)
+    # Families and contacts are those of whole runs.
+    whole = tables if births >= counts.max(initial=0) else {}
+    found |= _of_families(whole) | _of_arena(tables, births)
+    return found | _of_contacts(whole)
 
 
 def _of_island(
-    columns: dict[str, Numbers], counts: Numbers, births: int
+    columns: dict[str, Numbers], counts: Numbers, births: int, founders: int
 ) -> dict[str, float]:
     found = {name: float(values[-1]) for name, values in columns.items()}
-    found["retention"] = _mean(columns["retention"])
+    is_past = counts + RETENTION_BIRTHS <= births
+    retention = np.where(is_past, columns["retention"], np.nan)
+    found["retention"] = _mean(retention)
     found["late_gain"] = _share(columns["fitness"], counts, births / 2, is_late=True)
-    first = int(np.searchsorted(counts, min(FOUNDERS, counts[-1])))
+    first = int(np.searchsorted(counts, min(founders, counts[-1])))
     diversity = columns["diversity"][first:]
     drop = _share(diversity, counts[first:], births / 10, is_late=False)
     found["early_drop"] = drop
     found["diversity_change"] = float(diversity[-1] - diversity[0])
     found["gain"] = float(columns["fitness"][-1] - columns["fitness"][first])
     found["size_mean"] = _mean(columns["size"])
-    found["retention_fitness"] = _correlation(columns["retention"], columns["fitness"])
+    found["retention_fitness"] = _correlation(retention, columns["fitness"])
     return found
 
 
@@ -107,10 +119,9 @@ def _own_measures(tables: Mapping[str, pa.Table], births: int) -> dict[str, floa
     return {name: _mean(np.array(means)) for name, means in each.items()}
 
 
-def _of_families(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
+def _of_families(tables: Mapping[str, pa.Table]) -> dict[str, float]:
     found = dict.fromkeys(("family_distance", "family_founders"), math.nan)
-    # Families are those of the last populations.
-    if "families" in tables and births >= pc.max(tables["families"]["births"]).as_py():
+    if "families" in tables:
         families = tables["families"]
         distance, apart = (
             _column(families, name) for name in ("distance", "founder_distance")
@@ -123,20 +134,25 @@ def _of_families(tables: Mapping[str, pa.Table], births: int) -> dict[str, float
 
 
 def _of_arena(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
-    names = ("variability", "touched", "touching", "between", "real_time_factor")
+    names = ("variability", "between", "real_time_factor")
     found = dict.fromkeys(names, math.nan)
     if "variability" in tables:
         born = tables["variability"].filter(pc.field("birth") < births)
         values = _column(born, "variability")
         values = values[~np.isnan(values)]
         found["variability"] = float(np.median(values)) if len(values) else math.nan
-    if "interactions" in tables:
-        for name in ("touched", "touching"):
-            found[name] = _mean(_column(tables["interactions"], name))
     if "between" in tables:
         until = tables["between"].filter(pc.field("births") <= births)
         if until.num_rows:
             found["between"] = float(_column(until, "between")[-1])
+    return found
+
+
+def _of_contacts(tables: Mapping[str, pa.Table]) -> dict[str, float]:
+    found = dict.fromkeys(("touched", "touching"), math.nan)
+    if "interactions" in tables:
+        for name in found:
+            found[name] = _mean(_column(tables["interactions"], name))
     return found
 
 

@@ -16,6 +16,7 @@ from msgspec import structs
 from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
+from schema.experiment.document import Selection
 from schema.experiment.fitness_keys import fitness_text
 from schema.plugins.source import modules_named
 from schema.tables.columns import TABLES, VERSION
@@ -27,6 +28,7 @@ from schema.tables.segments import FINISHED, warn_once
 TABLE = "table "
 """Prefix of the name of a table that was left out."""
 
+_FOUNDERS = Selection().population
 _MOST_ISLANDS = 10_000
 _NEEDED = (
     "births", "evaluations", "population", "fitness", "deaths", "touches",
@@ -45,12 +47,21 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class IslandSettings:
-    """Settings of an island that an analysis needs."""
+    """Settings of an island that an analysis needs.
+
+    Attributes:
+        births: on the island.
+        is_online: it is an arena.
+        records_touches: it records which robots touch.
+        learns: its robots learn.
+        founders: size of its first population.
+    """
 
     births: int
     is_online: bool
     records_touches: bool
     learns: bool = False
+    founders: int = _FOUNDERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,8 +291,10 @@ def _settings(document: dict[str, Any]) -> Iterable[IslandSettings]:
         if not 0 < count <= _MOST_ISLANDS:
             raise ValueError(f"islands: count must be from 1 to {_MOST_ISLANDS}")
         learns = bool(entry.get("learning") or document.get("learning"))
+        selection = entry.get("selection") or document.get("selection") or {}
+        founders = int(selection.get("population", _FOUNDERS))
         for _ in range(count):
-            yield IslandSettings(births, arena is not None, touches, learns)
+            yield IslandSettings(births, arena is not None, touches, learns, founders)
 
 
 def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:

@@ -328,7 +328,7 @@ def test_kept_outcomes_give_the_same_comparison(
     assert early.births("scenario1", "scenario3") == MARK
     for one in ("scenario1", "scenario2"):
         found = [
-            outcome(each.tables, MARK)["parts_change"]
+            outcome(each.tables, MARK, each.run.islands)["parts_change"]
             for each in measured
             if each.run.experiment == one
         ]

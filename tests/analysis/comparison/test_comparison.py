@@ -41,10 +41,13 @@ def tables(
     }
 
 
+SETTINGS = (IslandSettings(100, is_online=False, records_touches=False),) * 2
+
+
 def measured(
     name: str, number: int, made: dict[str, pa.Table], state: str = "finished"
 ) -> MeasuredRun:
-    settings = (IslandSettings(100, is_online=False, records_touches=False),)
+    settings = SETTINGS[:1]
     folder = Path(f"{name}-{number}")
     return MeasuredRun(Run(folder, name, number, 1, state, "", settings), made, ())
 
@@ -94,16 +97,20 @@ def test_outcomes_by_hand() -> None:
         {"parts": 14.0, "hidden": 5.0, "fitness": 0.2, "extremities": 3.0},
         {"parts": 99.0, "ancestors": 2.0, "fitness": 0.3, "extremities": 5.0},
     ]
-    found = outcome(tables(levels, robots), 120)
+    found = outcome(tables(levels, robots), 120, SETTINGS)
     assert (found["births"], found["fitness"], found["parts"]) == (120, 0.5, 20)
-    assert found["retention"] == pytest.approx(0.3)
+    # Nothing is recorded 120 births earlier.
+    assert math.isnan(found["retention"])
+    late = [*levels[:4], {**levels[3], "births": 150, "retention": 0.9}]
+    assert outcome(tables(late), 150, SETTINGS)["retention"] == 0.5
+    assert outcome(tables(late), 300, SETTINGS)["retention"] == pytest.approx(0.5)
     # Of 0.4 gained, 0.1 came after birth 60; nothing is recorded from birth 15 to 12;
     # of 8 lost, 4 were lost up to birth 30.
     assert found["late_gain"] == pytest.approx(0.25)
     assert math.isnan(found["early_drop"])
-    assert math.isnan(outcome(tables(levels[1:4]), 100)["late_gain"])
+    assert math.isnan(outcome(tables(levels[1:4]), 100, SETTINGS)["late_gain"])
     longer = [*levels[:4], {**levels[3], "births": 300}]
-    assert outcome(tables(longer), 300)["early_drop"] == pytest.approx(0.5)
+    assert outcome(tables(longer), 300, SETTINGS)["early_drop"] == pytest.approx(0.5)
     assert found["diversity_change"] == -8
     # Random robots have no ancestors: 12 parts and 4 hidden neurons on average.
     assert found["parts_change"] == 8
@@ -112,13 +119,39 @@ def test_outcomes_by_hand() -> None:
     assert math.isnan(found["touched"])
 
 
+def test_changes_are_counted_from_the_founders_of_the_experiment() -> None:
+    """Eight founders, not fifteen."""
+    levels = [
+        {"births": births, "fitness": fitness, "diversity": 10 * fitness}
+        for births, fitness in ((8, 0.1), (16, 0.3), (24, 0.6))
+    ]
+    eight = (replace(SETTINGS[0], founders=8),)
+    assert outcome(tables(levels), 24, eight)["gain"] == pytest.approx(0.5)
+    assert outcome(tables(levels), 24, eight)["diversity_change"] == pytest.approx(5)
+    assert outcome(tables(levels), 24, SETTINGS)["gain"] == pytest.approx(0.3)
+
+
+def test_families_without_rows_have_no_outcome() -> None:
+    empty = pa.Table.from_pylist([], schema("families"))
+    made = {**tables([{"births": 15, "fitness": 0.1}]), "families": empty}
+    assert math.isnan(outcome(made, 15, SETTINGS)["family_distance"])
+
+
+def test_contacts_of_later_births_do_not_count() -> None:
+    contacts = pa.Table.from_pylist([{"touched": 0.5}], schema("interactions"))
+    levels = [{"births": births, "fitness": 0.1} for births in (15, 30)]
+    made = {**tables(levels), "interactions": contacts}
+    assert outcome(made, 30, SETTINGS)["touched"] == 0.5
+    assert math.isnan(outcome(made, 15, SETTINGS)["touched"])
+
+
 def test_outcome_of_several_islands_is_their_mean() -> None:
     levels = [
         {"island": 0, "births": 15, "fitness": 0.1},
         {"island": 1, "births": 15, "fitness": 0.5},
         {"island": 0, "births": 30, "fitness": 0.3},
     ]
-    assert outcome(tables(levels), 30)["fitness"] == pytest.approx(0.4)
+    assert outcome(tables(levels), 30, SETTINGS)["fitness"] == pytest.approx(0.4)
 
 
 def test_every_measure_of_every_pair_is_compared_once() -> None:
