@@ -242,7 +242,7 @@ def _violins(
     robots = tables.get("robots")
     if robots is None or not panels.keys() & set(robots.column_names):
         return []
-    rows = _by_function(stacked(robots.filter(pc.field("is_last")), panels), functions)
+    rows = _by_function(stacked(_last_robots(tables), panels), functions)
     rows = rows[rows["experiment"].isin(experiments)]
     values = _grouped(rows)
     # A distribution of equal values has no shape.
@@ -259,6 +259,24 @@ def _violins(
             width=0.85,
         )
     ]
+
+
+def _last_robots(tables: Tables) -> pa.Table:
+    """Return the robots of last populations at the births of their run's outcomes.
+
+    Runs that are unfinished or longer than the others have other last populations.
+    """
+    robots = tables["robots"].filter(pc.field("is_last"))
+    populations = tables.get("populations")
+    if populations is None or "folder" not in robots.column_names:
+        return robots
+    last = populations.group_by("folder").aggregate([("births", "max")])
+    ends = dict(
+        zip(*(last[name].to_pylist() for name in last.schema.names), strict=True)
+    )
+    outcomes = tables["outcomes"].select(["folder", "births"]).to_pylist()
+    equal = [row["folder"] for row in outcomes if ends[row["folder"]] == row["births"]]
+    return robots.filter(pc.is_in(robots["folder"], pa.array(equal, pa.string())))
 
 
 def _summaries(runs: Any) -> list[Any]:  # noqa: ANN401 - pandas

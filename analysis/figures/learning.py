@@ -98,9 +98,10 @@ def bodies_saved(tables: Tables) -> p9.ggplot:
         NothingToDraw: no robot that learns was born after the founders.
     """
     frame = _frame(tables, "learning")
-    frame = _binned(frame[frame["kept"].notna()])
+    frame = frame[frame["kept"].notna()]
     if frame.empty:
         raise NothingToDraw("no robot that learns was born after the founders")
+    frame = _binned(frame)
     saved = frame["saved"].astype(float)
     kept = frame["kept"].astype(float) - saved
     frame = frame.assign(**{_SAVED: saved, _KEPT: kept})

@@ -107,22 +107,35 @@ def sweep_map(tables: Tables, experiment: str) -> Figure:
 def sweep_caption(tables: Tables, experiment: str) -> str:
     """Return what the map shows, and the two settings with the highest mean fitness."""
     runs = sweep_runs(tables, experiment)
+    frame = runs.frame
+    if "fitness" not in runs.measures:
+        frame = frame.assign(fitness=np.nan)
     points = [
         (values, group.to_numpy(np.float64))
-        for values, group in runs.frame.groupby(runs.settings)["fitness"]
+        for values, group in frame.groupby(runs.settings)["fitness"]
     ]
     has_means = any(len(fitness) > 1 for _, fitness in points)
+    known = [(values, fitness[~np.isnan(fitness)]) for values, fitness in points]
+    known = [point for point in known if len(point[1])]
     few = "Means over finished runs" if has_means else "Finished runs"
     line = "; the line joins means over runs" * has_means
     kind = "" if _is_map(runs) else f" Each point is a run{line}."
     return (
         f"{few} at each point of the sweep ({len(runs.frame)} runs at {len(points)} "
-        f"points).{kind} {_best_points(runs.settings, points)}"
+        f"points).{kind}{_best_points(runs.settings, known)}"
     )
 
 
 def _best_points(settings: Sequence[str], points: Sequence[tuple[Any, Numbers]]) -> str:
-    """Return which point has the highest mean fitness, and how sure this is."""
+    """Return which point has the highest mean fitness, and how sure this is.
+
+    Args:
+        settings: that are swept.
+        points: values of the settings, and fitness of the runs, of each point that
+            has any.
+    """
+    if not points:
+        return ""
 
     def text(values: Any, fitness: Numbers) -> str:  # noqa: ANN401 - of any settings
         pairs = zip(settings, values, strict=True)
@@ -131,7 +144,7 @@ def _best_points(settings: Sequence[str], points: Sequence[tuple[Any, Numbers]])
         return f"{at}: {fitness.mean():.3g}{spread}"
 
     ordered = sorted(points, key=lambda point: -point[1].mean())
-    best = f"Mean fitness is highest at {text(*ordered[0])}"
+    best = f" Mean fitness is highest at {text(*ordered[0])}"
     if len(ordered) == 1:
         return f"{best}."
     best += f", then at {text(*ordered[1])}."
@@ -139,6 +152,8 @@ def _best_points(settings: Sequence[str], points: Sequence[tuple[Any, Numbers]])
     if min(len(first), len(second)) == 1:
         return f"{best} One run at a point has no spread; --repeats adds runs."
     difference, low, high = mean_difference(first, second)
+    if np.isnan(low):
+        return f"{best} All runs of a point are equal: no interval of the difference."
     verdict = "is shown" if low > 0 else "is not shown"
     return (
         f"{best} The difference of these two, {difference:.2g} (95 % interval "

@@ -15,8 +15,8 @@ _Row = tuple[int, int, str, float, int]
 def named_measures(run: RunTables) -> pa.Table:
     """Return the mean of each measure over the judged robots of each population.
 
-    Off-line each robot counts with its last evaluation; on-line with each sample that
-    was taken at that number of births while it was mature.
+    Off-line each robot counts with its last evaluation on the island; on-line with each
+    sample that was taken at that number of births while it was mature.
 
     Returns:
         One row per island, number of births and measure, with the columns of
@@ -40,13 +40,17 @@ def named_measures(run: RunTables) -> pa.Table:
 def _off_line(run: RunTables) -> list[_Row]:
     evaluations, table = run.tables["evaluations"], run.population_table
     rows = rows_of(individual_ids(evaluations), run.births).tolist()
+    islands = np.asarray(evaluations["island"], np.int64)
+    # Each island judges a migrant by its own evaluation.
+    count = 1 + max(islands.max(initial=0), table.islands.max(initial=0))
     values: dict[str, Numbers] = defaultdict(
-        lambda: np.full(run.births.num_rows, np.nan)
+        lambda: np.full((count, run.births.num_rows), np.nan)
     )
-    for row, found in zip(rows, evaluations["measures"].to_pylist(), strict=True):
+    measures = evaluations["measures"].to_pylist()
+    for island, row, found in zip(islands.tolist(), rows, measures, strict=True):
         for name, value in found or ():
             if row >= 0:
-                values[name][row] = value
+                values[name][island, row] = value
     is_online = np.isin(table.islands, np.asarray(run.tables["fitness"]["island"]))
     places = zip(table.islands.tolist(), table.births.tolist(), strict=True)
     groups = [
@@ -54,7 +58,8 @@ def _off_line(run: RunTables) -> list[_Row]:
     ]
     found_rows: list[_Row] = []
     for name, of_births in values.items():
-        judged = np.where(table.is_judged, of_births[table.members], np.nan)
+        own = of_births[table.islands[table.group_of], table.members]
+        judged = np.where(table.is_judged, own, np.nan)
         means, counts = table.mean(judged), table.sum(1.0 - np.isnan(judged))
         found_rows += [
             (island, births, name, float(means[number]), int(counts[number]))

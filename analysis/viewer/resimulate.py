@@ -3,6 +3,7 @@
 The simulators are passed in, because rooms do not import each other.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,12 +100,14 @@ def resimulate(
 
 
 def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) -> Motion:
-    """Return the motion of a robot that was evaluated alone on its island."""
+    """Return the motion of a robot alone on its island, in its fittest evaluation."""
     settings = read_evaluation_settings(evaluation_settings(own))
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {name_of(birth)}: no evaluation is recorded")
-    recorded = rows[0]
+    fitness = [-math.inf if f is None else f for f in (r["fitness"] for r in rows)]
+    number = fitness.index(max(fitness))
+    recorded = rows[number]
     if recorded["simulated_s"] is not None:
         steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
         settings = lasting(settings, steps)
@@ -119,7 +122,10 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
         for name in _COMPARED
         if recorded[name] != getattr(evaluation, name)
     ]
-    return Motion(birth, poses, _verdict(birth, differing, recorded["platform"]))
+    name = name_of(birth)
+    if len(rows) > 1:
+        name += f", evaluation {number + 1} of {len(rows)}, the fittest"
+    return Motion(birth, poses, _verdict(name, differing, recorded["platform"]))
 
 
 def _in_arena(
@@ -153,7 +159,7 @@ def _in_arena(
     motions = {}
     for birth, rows in recorded.items():
         differing = _differences(rows, _only(replayed, birth), is_equal=is_equal)
-        verdict = _verdict(birth, differing, platform)
+        verdict = _verdict(name_of(birth), differing, platform)
         motions[birth] = Motion(birth, _only(frames, birth), verdict)
     return motions
 
@@ -187,13 +193,13 @@ def _only(poses: pa.Table, birth: BirthId) -> pa.Table:
     return poses.filter(is_island & (pc.field("birth") == birth.number))
 
 
-def _verdict(birth: BirthId, differing: list[str], platform: str) -> str:
+def _verdict(name: str, differing: list[str], platform: str) -> str:
     """Return a line of text that says whether a robot moves as recorded."""
     if not differing:
-        return f"{name_of(birth)}: moves as recorded, equal to the last bit"
+        return f"{name}: moves as recorded, equal to the last bit"
     here = platform_tag()
     where = f"same platform, {here}"
     if platform != here:
         where = f"recorded on {platform or 'an unknown platform'}, this is {here}"
     what = "; ".join(differing)
-    return f"{name_of(birth)}: DIFFERS from the record: {what} ({where})"
+    return f"{name}: DIFFERS from the record: {what} ({where})"

@@ -83,6 +83,23 @@ def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
     figure.draw()
 
 
+def test_violins_show_no_robots_of_later_births() -> None:
+    """Of run 0 the outcome is at 60 of 90 births; run 2 is not finished."""
+    found = [{**row, "folder": f"a-{n}"} for n in range(3) for row in
+             robots("a", 1.0 + n, 1.5 + n)]  # fmt: skip
+    populations = [
+        {"experiment": "a", "folder": f"a-{n}", "births": births}
+        for n, births in ((0, 60), (0, 90), (1, 30), (1, 60), (2, 60))
+    ]
+    tables = {
+        "outcomes": table("outcomes", outcomes("a", 0.1, 0.4)),
+        "robots": table("robots", found),
+        "populations": table("populations", populations),
+    }
+    shown = layers(over_runs(tables, FITNESS))
+    assert shown["geom_violin"]["value"] == [2.0, 2.5]
+
+
 def test_panels_keep_their_given_order() -> None:
     panels = {"parts": "z", "hidden": "a"}
     rows = [{"experiment": "x", "parts": 7.0, "hidden": 1.0}]

@@ -45,8 +45,8 @@ def test_a_grid_of_two_settings_is_a_map_of_means_over_runs() -> None:
     assert sweep_caption(_tables(GRID), "e") == (
         "Means over finished runs at each point of the sweep (8 runs at 4 points). "
         "Mean fitness is highest at a.b = 2, c = 30: 32 (sd 0), then at a.b = 1, "
-        "c = 30: 31 (sd 0). The difference of these two, 1 (95 % interval 1 to 1, "
-        "Welch's t), is shown; the best of many points is often best by chance."
+        "c = 30: 31 (sd 0). All runs of a point are equal: no interval of the "
+        "difference."
     )
 
 
@@ -67,6 +67,18 @@ def test_a_caption_says_how_sure_the_best_point_is() -> None:
         "Each point is a run. Mean fitness is highest at a = 2: 2, then at a = 1: 1. "
         "One run at a point has no spread; --repeats adds runs."
     )
+
+
+def test_a_caption_names_no_best_point_among_those_without_fitness() -> None:
+    tables = _tables([{"a": 1.0}, {"a": 2.0}, {"a": 3.0}])
+    at = tables["outcomes"].schema.get_field_index("fitness")
+    one = "One run at a point has no spread; --repeats adds runs."
+    best = f"highest at a = 1: 1.5, then at a = 3: 0.5. {one}"
+    none = "(3 runs at 3 points). Each point is a run."
+    for fitness, end in (([1.5, None, 0.5], best), ([None] * 3, none)):
+        values = pa.array(fitness, pa.float64())
+        tables["outcomes"] = tables["outcomes"].set_column(at, "fitness", values)
+        assert sweep_caption(tables, "e").endswith(end)
 
 
 def test_scattered_settings_have_a_panel_each() -> None:

@@ -135,6 +135,12 @@ def test_figures_are_drawn_without_a_warning() -> None:
         assert len(axes) == (1 if draw is figures.learning_curves else len(experiments))
 
 
+def test_founders_alone_have_no_bodies_saved() -> None:
+    tables = {"learning": named(learning(TABLES).slice(0, 2), ("a",))}
+    with pytest.raises(NothingToDraw, match="no robot that learns was born after the"):
+        figures.bodies_saved(tables)
+
+
 def test_one_point_is_no_line() -> None:
     tables = {
         "learning": named(learning(TABLES), ("a",)),

@@ -43,6 +43,29 @@ def test_off_line_each_robot_counts_with_its_last_evaluation() -> None:
     ]
 
 
+def test_each_island_judges_a_migrant_by_its_own_evaluation() -> None:
+    migrant = {"island": 1, "birth_island": 0, "birth": 0, "trial": 0}
+    tables = run(
+        births=births(((0, 0), []), ((1, 0), [])),
+        population=population(
+            (0, 1, {(0, 0): 0.5}), (1, 1, {(0, 0): 0.25, (1, 0): 0.5})
+        ),
+        evaluations=table(
+            "evaluations",
+            [
+                evaluation(0, ("height", 1.0)),
+                {**migrant, "measures": [("height", 3.0)]},
+                {**evaluation(0, ("height", 5.0)), "island": 1},
+            ],
+        ),
+    )
+    found = {
+        row["island"]: row["mean"]
+        for row in named_measures(RunTables(tables)).to_pylist()
+    }
+    assert found == {0: 1.0, 1: 4.0}
+
+
 def test_on_line_the_samples_of_mature_robots_count() -> None:
     def sample(birth: int, count: int, height: float | None, **more: bool) -> Any:  # noqa: ANN401
         values = None if height is None else [("height", height)]
