@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 from itertools import islice
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 import msgspec
 
@@ -275,7 +275,10 @@ class Fleet:
     def _in_order(self, futures: Iterator["Future[T]"]) -> Iterator[T]:
         """Return results in the order of futures, with some of them ahead."""
         ahead = max(_LEAST_AHEAD, _AHEAD_PER_WORKER * self._count)
-        return _results(deque(islice(futures, ahead)), futures)
+        results = _results(deque(islice(futures, ahead)), futures)
+        # A generator that has not begun would cancel nothing when it is closed.
+        next(results)
+        return results
 
     def _start_workers(self) -> None:
         """Start the workers, or replace them by some that may import more plug-ins."""
@@ -303,8 +306,9 @@ class Fleet:
 def _results(
     waiting: "deque[Future[T]]", futures: Iterator["Future[T]"]
 ) -> Iterator[T]:
-    """Yield the results of futures in order; cancel the rest when closed."""
+    """Yield nothing, then the results of futures in order; cancel the rest at last."""
     try:
+        yield cast("T", None)
         while waiting:
             yield waiting[0].result()
             waiting.popleft()

@@ -14,7 +14,7 @@ from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError, rounded
-from schema.experiment.document import island_experiment
+from schema.experiment.document import island_count, island_experiment
 from schema.experiment.file import own_experiment
 from schema.robot.ids import BirthId
 from schema.tables.description import (
@@ -200,13 +200,7 @@ class Run:
         Raises:
             RunFolderError: a table is damaged.
         """
-        columns = ["island", "birth_island", "birth", "fitness"]
-        samples = self.fitness.filter(pc.field("is_mature"))
-        found = pa.concat_tables(
-            [self.evaluations.select(columns), samples.select(columns)],
-            promote_options="default",  # the fitness of a sample is never null
-        )
-        found = found.filter(pc.is_valid(found["fitness"]))
+        found = self._judged()
         order = pc.sort_indices(found, [("fitness", "descending")])
         best: dict[BirthId, int] = {}
         for row in found.take(order).to_pylist():
@@ -219,19 +213,34 @@ class Run:
             for robot in self._robots(self._birth(birth), [island])
         ]
 
+    def _judged(self) -> pa.Table:
+        """Return all evaluations and samples of mature robots that have a fitness."""
+        columns = ["island", "birth_island", "birth", "fitness"]
+        samples = self.fitness.filter(pc.field("is_mature"))
+        found = pa.concat_tables(
+            [self.evaluations.select(columns), samples.select(columns)],
+            promote_options="default",  # the fitness of a sample is never null
+        )
+        return found.filter(pc.is_valid(found["fitness"]))
+
     def __repr__(self) -> str:
         return f"<Run {self.name}, seed {self.seed}: {self.state}, {self.folder}>"
 
     def _repr_html_(self) -> str:
         """Return the summary that a notebook shows."""
-        fitness = pc.max(self.evaluations["fitness"]).as_py()
+        fitness = pc.max(self._judged()["fitness"]).as_py()
+        document = document_of(self.experiment)
+        planned = sum(
+            island_experiment(document, island).births
+            for island in range(island_count(document))
+        )
         rows: dict[str, Any] = {
             "folder": self.folder,
             "experiment": self.name,
             "repeat": self.number,
             "seed": self.seed,
             "state": self.state,
-            "births": f"{self.births.num_rows} of {self.experiment.births} per island",
+            "births": f"{self.births.num_rows} of {planned}",
             "best fitness": "-" if fitness is None else rounded(fitness),
         }
         cells = (

@@ -98,7 +98,7 @@ def _chosen(run: Run) -> pa.Table:
         {
             "setting": setting,
             "value": json.dumps(value),
-            "number": value if isinstance(value, int | float) else None,
+            "number": value if type(value) in {int, float} else None,  # no bool
         }
         for setting, value in run.point.items()
     ]

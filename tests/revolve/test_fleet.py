@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -79,9 +80,12 @@ def test_submit_returns_a_future(fleet: rv.Fleet) -> None:
     assert future.done()
 
 
-def test_rest_is_dropped_when_the_iterator_is_closed(fleet: rv.Fleet) -> None:
+@pytest.mark.parametrize("taken", [0, 1])
+def test_rest_is_dropped_when_the_iterator_is_closed(
+    fleet: rv.Fleet, taken: int
+) -> None:
     found = fleet.evaluate(robots(40), SHORT)
-    next(found)
+    assert len(list(islice(found, taken))) == taken
     assert fleet._engine is not None
     until(lambda: len(fleet._engine._open) > 10)  # type: ignore[union-attr]
     found.close()  # type: ignore[attr-defined]

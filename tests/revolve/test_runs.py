@@ -66,8 +66,20 @@ def test_best_robot_of_an_arena_has_the_best_mature_sample(tmp_path: Path) -> No
 
 def test_notebook_gets_a_table(done: rv.Run) -> None:
     shown = done._repr_html_()
-    assert f"<td>{BIRTHS} of {BIRTHS} per island</td>" in shown
+    assert f"<td>{BIRTHS} of {BIRTHS}</td>" in shown
     assert html.escape(str(done.folder)) in shown
+
+
+@pytest.mark.parametrize("name", ["arena", "archipelago"])
+def test_notebook_gets_births_of_all_islands_and_the_best_sample(
+    tmp_path: Path, name: str
+) -> None:
+    with ZipFile(OLD / f"{name}.zip") as archive:
+        archive.extractall(tmp_path)
+    shown = rv.read(tmp_path / "undisturbed")._repr_html_()
+    births = rv.read(tmp_path / "undisturbed").births.num_rows
+    assert f"<td>{births} of {births}</td>" in shown
+    assert "<th>best fitness</th><td>0." in shown
 
 
 def test_used_and_missing_folders_raise_the_line_of_the_command(
