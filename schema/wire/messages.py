@@ -67,7 +67,8 @@ def body_from_message(message: pb.Robot) -> tuple[Part, ...]:
         MalformedMessage: parts that are not a tree, or too many.
     """
     require_most(len(message.parts), MOST_PARTS, "Robot.parts")
-    parts = tuple(map(_part_from_message, message.parts))
+    # Of a list: one of an iterator is resized, and Python then keeps thousands of them.
+    parts = tuple([_part_from_message(part) for part in message.parts])
     _require_tree(parts, "Robot")
     return parts
 
@@ -99,12 +100,18 @@ def read_brain(message: pb.Robot | pb.BrainChange, part_count: int) -> Brain:
     require_most(len(message.connections), MOST_CONNECTIONS, "connections")
     brain = Brain(
         neurons=tuple(
-            Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters[:]))
-            for item in message.neurons
+            [
+                Neuron(
+                    _layer(item.layer), item.kind, item.part, tuple(item.parameters[:])
+                )
+                for item in message.neurons
+            ]
         ),
         connections=tuple(
-            Connection(item.source, item.target, item.weight)
-            for item in message.connections
+            [
+                Connection(item.source, item.target, item.weight)
+                for item in message.connections
+            ]
         ),
     )
     try:
