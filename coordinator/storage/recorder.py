@@ -306,14 +306,18 @@ class TableFile:
         with pa.parquet.ParquetWriter(
             path, self._schema, compression="zstd", write_page_checksum=True
         ) as file:
-            rows = self._schema.empty_table()
+            waiting: list[pa.RecordBatch] = []
+            rows = 0
             for batch in batches_by_island(self._folder, self._name):
-                rows = pa.concat_tables([rows, pa.Table.from_batches([batch])])
-                while rows.num_rows >= ROW_GROUP:
-                    file.write_table(rows.slice(0, ROW_GROUP))
-                    rows = rows.slice(ROW_GROUP)
-            if rows.num_rows:
-                file.write_table(rows)
+                waiting.append(batch)
+                rows += batch.num_rows
+                while rows >= ROW_GROUP:
+                    table = pa.Table.from_batches(waiting)
+                    file.write_table(table.slice(0, ROW_GROUP).combine_chunks())
+                    waiting = table.slice(ROW_GROUP).to_batches()
+                    rows -= ROW_GROUP
+            if rows:
+                file.write_table(pa.Table.from_batches(waiting).combine_chunks())
 
     def _write(self, batch: pa.RecordBatch) -> None:
         """Append a batch to the segment, all or nothing."""

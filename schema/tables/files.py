@@ -7,7 +7,8 @@ partitioning), so that one call reads a campaign, such as DuckDB's
 ``read_parquet('runs/**/births.parquet', hive_partitioning = true)``.
 """
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from functools import reduce
 from operator import and_
 from pathlib import Path
@@ -33,6 +34,9 @@ from schema.tables.segments import (
     segments_of,
     warn_once,
 )
+
+ROWS_AT_ONCE = 50_000
+"""Rows of several islands that are sorted in memory together."""
 
 
 class Stored(NamedTuple):
@@ -83,24 +87,63 @@ def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
     """Yield these rows sorted by island, with new record numbers.
 
+    At most ``ROWS_AT_ONCE`` rows, or one batch, are in memory at a time. No batch is
+    empty.
+
     Raises:
         RunFolderError: a segment of another version.
     """
-    islands: set[int] = set()
+    counts: Counter[int] = Counter()
     if "island" in TABLES[table].names:
         for batch in stored_batches(folder, table):
-            islands.update(pc.unique(batch["island"]).to_pylist())
-    if len(islands) <= 1:
-        yield from stored_batches(folder, table)
+            for each in pc.value_counts(batch["island"]).to_pylist():
+                counts[each["values"]] += each["counts"]
+    if len(counts) <= 1:
+        yield from filter(len, stored_batches(folder, table))
         return
     rows = 0
-    for island in sorted(islands):
-        for batch in stored_batches(folder, table):
-            own = batch.filter(pc.equal(batch["island"], island))
+    for islands in _read_together(counts):
+        for own in _of_islands(folder, table, islands):
             numbers = pa.array(range(rows, rows + own.num_rows), pa.int64())
             rows += own.num_rows
             columns = [numbers, *own.columns[1:]]
             yield pa.RecordBatch.from_arrays(columns, schema=TABLES[table])
+
+
+def _read_together(counts: Mapping[int, int]) -> Iterator[list[int]]:
+    """Yield all islands in order, in groups that are read in one pass.
+
+    Args:
+        counts: number of rows by island. A group with more than ``ROWS_AT_ONCE`` rows
+            has one island.
+    """
+    group: list[int] = []
+    rows = 0
+    for island in sorted(counts):
+        if group and rows + counts[island] > ROWS_AT_ONCE:
+            yield group
+            group, rows = [], 0
+        group.append(island)
+        rows += counts[island]
+    yield group
+
+
+def _of_islands(
+    folder: Path, table: str, islands: list[int]
+) -> Iterator[pa.RecordBatch]:
+    """Yield the rows of some islands, sorted by island; no batch is empty."""
+    wanted = pa.array(islands, TABLES[table].field("island").type)
+    parts = (
+        batch.filter(pc.is_in(batch["island"], wanted))
+        for batch in stored_batches(folder, table)
+    )
+    own = filter(len, parts)
+    if len(islands) == 1:
+        yield from own
+        return
+    rows = pa.Table.from_batches(own, TABLES[table]).combine_chunks()
+    # The sort is stable: rows of an island keep their order.
+    yield from rows.take(pc.sort_indices(rows["island"])).to_batches()
 
 
 def stored_rows(folder: Path, table: str) -> Stored:

@@ -7,13 +7,15 @@ from typing import Any
 
 import duckdb
 import polars as pl
+import pyarrow as pa
 import pytest
+from pyarrow.parquet import ParquetFile, ParquetWriter
 
 from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
-from schema.tables.files import campaign, read_table
+from schema.tables.files import campaign, parquet_path, read_table
 
 DETAILS = RunDetails("a/b c", 2, 1, "{}")
 Make = Callable[..., list[Record]]
@@ -82,6 +84,35 @@ def test_the_end_may_be_interrupted_at_any_step(
             break
     # Four tables to sync, rename and sync; at least four segments to remove.
     assert interrupted >= 4 * 3 + 4
+
+
+@pytest.mark.parametrize("every", [1, 25, 1000])
+def test_row_groups_are_full_and_written_in_one_piece(
+    tmp_path: Path,
+    make_records: Make,
+    feed_rows: Feed,
+    monkeypatch: pytest.MonkeyPatch,
+    every: int,
+) -> None:
+    """Columns in many chunks take time quadratic in their number."""
+    chunks = []
+    real = ParquetWriter.write_table
+
+    def write(self: ParquetWriter, table: pa.Table) -> None:
+        chunks.append(table["record"].num_chunks)
+        real(self, table)
+
+    monkeypatch.setattr(ParquetWriter, "write_table", write)
+    monkeypatch.setattr("coordinator.storage.recorder.ROW_GROUP", 10)
+    recorder = feed_rows(tmp_path, make_records(24), every=every)
+    recorder.flush()
+    rows = read_table(tmp_path, "births")
+    recorder.finish()
+    assert read_table(tmp_path, "births").equals(rows)
+    about = ParquetFile(parquet_path(tmp_path, "a/b c", 2, "births")).metadata
+    sizes = [about.row_group(each).num_rows for each in range(about.num_row_groups)]
+    assert sizes == [10, 10, 4]
+    assert set(chunks) == {1}
 
 
 def test_rows_after_the_end_are_refused(

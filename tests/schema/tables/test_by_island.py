@@ -1,0 +1,66 @@
+"""Rows of several islands: sorted by island, in few passes over the segments."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from schema.tables import files
+from schema.tables.columns import EVALUATIONS
+from schema.tables.files import batches_by_island, read_table, stored_batches
+from schema.tables.segments import segment_path
+from tests.schema.tables.test_files import ROW
+
+ISLANDS = 12
+ROWS = 100
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a run whose rows of all islands are mixed, in batches of 1 to 4 rows."""
+    rng = np.random.default_rng(3)
+    rows = [
+        {**ROW, "record": number, "island": int(island), "birth": 1000 + number}
+        for number, island in enumerate(rng.integers(0, ISLANDS, ROWS))
+    ]
+    path = segment_path(tmp_path, "evaluations", 0)
+    path.parent.mkdir()
+    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_stream(file, EVALUATIONS) as to:
+        while rows:
+            size = int(rng.integers(1, 5))
+            to.write_batch(pa.RecordBatch.from_pylist(rows[:size], EVALUATIONS))
+            rows = rows[size:]
+    return tmp_path
+
+
+def count_passes(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return a list that gets the table's name at each reading of its segments."""
+    passes: list[str] = []
+
+    def counted(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
+        passes.append(table)
+        return stored_batches(folder, table)
+
+    monkeypatch.setattr(files, "stored_batches", counted)
+    return passes
+
+
+@pytest.mark.parametrize(
+    ("at_once", "most"), [(1, 1 + ISLANDS), (30, 1 + ISLANDS // 2), (ROWS, 2)]
+)
+def test_rows_are_sorted_by_island_and_numbered_anew(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, at_once: int, most: int
+) -> None:
+    """The first pass counts the rows of each island."""
+    monkeypatch.setattr(files, "ROWS_AT_ONCE", at_once)
+    rows = pa.Table.from_batches(stored_batches(folder, "evaluations")).to_pylist()
+    rows.sort(key=lambda row: row["island"])
+    passes = count_passes(monkeypatch)
+    found = list(batches_by_island(folder, "evaluations"))
+    assert len(passes) <= most
+    assert all(batch.num_rows for batch in found)
+    expected = [{**row, "record": number} for number, row in enumerate(rows)]
+    assert pa.Table.from_batches(found, EVALUATIONS).to_pylist() == expected
+    assert read_table(folder, "evaluations").to_pylist() == expected
