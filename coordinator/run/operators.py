@@ -4,11 +4,13 @@ An order takes effect at the arena's next decision. The journal holds the order 
 that step before the operator gets a reply, so that a replay carries it out too.
 """
 
+import math
 import time
-from math import hypot
+from dataclasses import replace
 
 from coordinator.arena.arena import Arena
 from coordinator.arena.orders import check_order
+from coordinator.evolution.encodings import outside_limits
 from coordinator.islands.events import (
     Commanded,
     Insert,
@@ -22,10 +24,9 @@ from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
-from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment
 from schema.limits import LONGEST_REASON, printable
-from schema.robot.brain import check_neurons
+from schema.robot.robot import Robot
 from schema.wire.codec import decode_robot
 from schema.wire.operator import (
     GetStatus,
@@ -41,6 +42,12 @@ from schema.wire.operator import (
     decode_operator_request,
     encode_operator_reply,
 )
+
+FARTHEST_PLACE_M = 1e6
+"""Distance from the centre at which no robot is inserted [m].
+
+Much farther away, a robot's motion is smaller than the precision of its position.
+"""
 
 
 class Refused(RevolveError):  # noqa: N818 - reads as what it says
@@ -93,11 +100,10 @@ def _order(
 
     Raises:
         Refused: no living robot has the given birth number.
+        Refused: a robot outside the limits of ``[space]``, or a place too far away.
         InvalidRobot: a robot that breaks the rules of the experiment, or that its
             encoding cannot describe.
     """
-    space = arena.experiment.space
-    kinds = neuron_kinds(arena.experiment.brain, space)
     match action:
         case PauseArena():
             return Pause()
@@ -107,30 +113,48 @@ def _order(
             _check_place(action.place, arena.experiment)
             robot = decode_robot(action.robot)
             encoding = arena.encoding
-            encoding.check(robot)
+            _check_robot(robot, arena)
             genome = encoding.to_bytes(encoding.from_robot(robot))
             insert = Insert(genome, action.place)
             check_order(insert, arena.experiment)
             return insert
-    living = [one.birth for one in arena.population]
-    if action.birth not in living:
-        alive = ", ".join(str(each.number) for each in living) or "none"
-        number = action.birth.number
+    living = arena.robot(action.birth)
+    if living is None:
+        births = [str(one.birth.number) for one in arena.population]
+        alive, number = ", ".join(births) or "none", action.birth.number
         raise Refused(f"birth {number}: is not alive; alive are {alive}")
     if isinstance(action, RemoveRobot):
         return Remove(action.birth)
     brain = decode_robot(action.robot).brain
-    check_neurons(brain, kinds)
+    _check_robot(replace(living, brain=brain), arena)
     return ReplaceBrain(action.birth, brain)
 
 
+def _check_robot(robot: Robot, arena: Arena) -> None:
+    """Raise unless a robot may live in an arena.
+
+    Orders in the journal are not checked for the limits of ``[space]``: earlier
+    versions accepted them.
+
+    Raises:
+        InvalidRobot: other part types or another brain than the experiment's.
+        Refused: a limit of ``[space]``.
+    """
+    encoding = arena.encoding
+    encoding.check(robot)
+    if problem := outside_limits(robot, arena.experiment.space, encoding.types):
+        raise Refused(f"robot: {problem}")
+
+
 def _check_place(place: tuple[float, float] | None, experiment: Experiment) -> None:
-    """Raise unless a place is inside the wall of an arena, if there is one."""
+    """Raise unless a place is inside the wall of an arena, or near if it has none."""
     assert experiment.arena is not None
     radius_m = experiment.arena.wall_diameter_m / 2.0
-    if place is not None and radius_m and hypot(*place) >= radius_m:
+    limit_m = min(radius_m or math.inf, FARTHEST_PLACE_M)
+    if place is not None and math.hypot(*place) >= limit_m:
+        within = "inside the wall, " if limit_m == radius_m else ""
         raise Refused(
-            f"place: must be inside the wall, < {radius_m:g} m from the centre, got "
+            f"place: must be {within}< {limit_m:g} m from the centre, got "
             f"{place[0]:g} {place[1]:g}"
         )
 

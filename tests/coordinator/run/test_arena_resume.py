@@ -32,6 +32,7 @@ from schema.errors import JobRefused, RunFolderError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_text
 from schema.experiment.learning import Learning
+from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
@@ -45,6 +46,7 @@ from schema.wire.operator import (
     RemoveRobot,
     ResumeArena,
     SaveSnapshot,
+    SetBrain,
 )
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
@@ -351,6 +353,39 @@ def test_invalid_orders_are_refused_and_not_journalled(
         assert why in one.ask(action)
         assert one.ask(action).startswith("refused")
         assert (tmp_path / "run" / NAME).stat().st_size == before
+
+
+def test_orders_that_stop_the_run_or_have_no_effect_are_refused(
+    tmp_path: Path,
+) -> None:
+    """A robot outside ``[space]``, a place too far away, the brain of another body."""
+    with ExitStack() as stack:
+        one = Run(tmp_path / "run", stack, lambda _: None, document=experiment(30))
+        while len(one.arena.population) < 5:
+            one.turn(0.0)
+        births = [each.birth for each in one.arena.population]
+        living = [robot for each in births if (robot := one.arena.robot(each))]
+        first = living[0]
+        other = next(
+            each for each in living if each.brain.neurons != first.brain.neurons
+        )
+        output = next(each for each in first.brain.neurons if each.layer == "output")
+        hidden = Neuron("hidden", output.kind, 0, output.parameters)
+        least = [each for each in first.brain.neurons if each.layer != "hidden"]
+        fat = Robot(first.parts, Brain((*least, *[hidden] * 11)))
+        before = (tmp_path / "run" / NAME).stat().st_size
+        most = "refused: robot: the robot has 11 hidden, outside space.max_hidden = 10"
+        assert one.ask(InsertRobot(encode_robot(fat))) == most
+        assert one.ask(SetBrain(births[0], encode_robot(fat))) == most
+        far = "refused: place: must be < 1e+06 m from the centre, got 1e+11 0"
+        assert one.ask(InsertRobot(encode_robot(first), (1e11, 0.0))) == far
+        misfit = one.ask(SetBrain(births[0], encode_robot(other)))
+        assert misfit.startswith("refused: brain: ")
+        assert (tmp_path / "run" / NAME).stat().st_size == before
+        near = InsertRobot(encode_robot(first), (9e5, 0.0))
+        assert one.ask(near, "near").startswith("takes effect")
+        brain = SetBrain(births[0], encode_robot(first))
+        assert one.ask(brain, "brain").startswith("takes effect")
 
 
 def test_orders_for_other_islands_are_refused(tmp_path: Path) -> None:
