@@ -178,7 +178,8 @@ class Display:
 
     def _warn(self, line: str) -> None:
         if self._has_bars and not self._quiet:
-            self._console.print(line, soft_wrap=True)
+            # Names and platforms are texts of others: brackets are no markup.
+            self._console.print(line, soft_wrap=True, markup=False, highlight=False)
         else:
             warn_user(line)
 
@@ -238,7 +239,7 @@ def _columns(width: int) -> list[ProgressColumn]:
     bar = [BarColumn(bar_width=width // 8)] if width >= _LEAST_FOR_BAR else []
     return [
         MofNCompleteColumn(table_column=Column(no_wrap=True, justify="right")),
-        TextColumn("{task.description}", table_column=name),
+        TextColumn("{task.description}", markup=False, table_column=name),
         *bar,
-        TextColumn("{task.fields[about]}", table_column=rest),
+        TextColumn("{task.fields[about]}", markup=False, table_column=rest),
     ]

@@ -139,3 +139,21 @@ def test_a_run_that_misses_others_than_before_says_so_again(
         f"analyzers: {how}{analyzer}",
         f"workers: {unfit}revolve worker --connect runs/a",
     ]
+
+
+def test_brackets_in_names_and_platforms_are_shown_as_they_are() -> None:
+    """Rich reads "[/x]" as the end of a style, and fails without its start."""
+    status = one_run("a[/x]", _ISLAND)
+    assert "a[/x]" in shown(status, 80)[0]
+    run = SimpleNamespace(
+        lacking=[],
+        held=SimpleNamespace(path=Path("runs/a[b]")),
+        waiting={0: "evil [/x]"},
+        recovery=None,
+    )
+    scheduler: Any = SimpleNamespace(active=[run], status=lambda _now_s: status)
+    console = Console(file=io.StringIO(), width=200, force_terminal=True)
+    with Display(scheduler, quiet=False, console=console) as display:
+        display.update(1.0)
+    file: Any = console.file
+    assert "arena 0 of a[b] needs a worker of platform evil [/x];" in file.getvalue()
