@@ -316,13 +316,12 @@ class Network:
         events: list[DispatchEvent] = []
         time.sleep(pause_s)
         try:
-            news = self._inbox.get(timeout_s)
             # Limited: the runs must act even if messages never stop coming.
-            for _ in range(_MOST_NEWS):
+            for turn in range(_MOST_NEWS):
+                news = self._inbox.get_nowait() if turn else self._inbox.get(timeout_s)
                 events += [] if news is None else self._understand(news)
                 if len(events) >= _MOST_EVENTS:
                     break
-                news = self._inbox.get_nowait()
         except Empty:
             pass
         return events

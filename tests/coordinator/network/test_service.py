@@ -351,6 +351,18 @@ def test_job_for_an_agent_that_left_is_lost(network: Network) -> None:
     assert until(network, has(1)) == [Returned(7, "nobody", "lost")]
 
 
+@pytest.mark.parametrize("others", range(8))
+def test_no_message_is_dropped_behind_many_without_an_event(
+    network: Network, monkeypatch: pytest.MonkeyPatch, others: int
+) -> None:
+    monkeypatch.setattr("coordinator.network.service._MOST_NEWS", 3)
+    for _ in range(others):
+        network.wake()
+    network.send(7, "nobody", request(7), WAIT_S)
+    found = [event for _ in range(4) for event in network.receive(0.0)]
+    assert found == [Returned(7, "nobody", "lost")]
+
+
 def test_an_agent_of_another_version_is_refused(network: Network) -> None:
     with agent(network, "a", "old"):
         until(network, lambda _: bool(network.refused))
