@@ -66,11 +66,16 @@ class FolderLock:
 
 
 def read_holder(folder: Path) -> str:
-    """Return the holder of a folder's lock, "process PID on HOST"; "" if it is free."""
+    """Return the holder of a folder's lock, "process PID on HOST"; "" if it is free.
+
+    A lock that this user may not read counts as held: whether it is free is unknown.
+    """
     try:
-        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CLOEXEC)
-    except OSError:
+        descriptor = os.open(folder / LOCK, os.O_RDONLY | os.O_CLOEXEC)
+    except (FileNotFoundError, NotADirectoryError):
         return ""
+    except OSError as error:
+        return f"another process, perhaps ({LOCK}: {error.strerror})"
     try:
         # Shared: two processes that look at the same time do not see each other.
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)

@@ -198,7 +198,7 @@ def read_address(folder: Path) -> str:
             f"{file}: damaged ({error}): give the address itself to --connect"
         ) from None
     is_here = [
-        parts.protocol != UNIX or Path(parts.host).is_socket() for _, parts in addresses
+        parts.protocol != UNIX or _is_socket(parts.host) for _, parts in addresses
     ]
     here = [
         address for (address, _), yes in zip(addresses, is_here, strict=True) if yes
@@ -206,3 +206,11 @@ def read_address(folder: Path) -> str:
     if not here:
         raise NetworkError(f"{file}: no address that this machine can reach")
     return min(here, key=lambda address: not address.startswith(UNIX))
+
+
+def _is_socket(path: str) -> bool:
+    """Return whether a path is a socket in a directory that this user can enter."""
+    try:
+        return Path(path).is_socket()
+    except OSError:
+        return False

@@ -1,5 +1,6 @@
 """Run folders: lock, description, epoch, state."""
 
+import errno
 import fcntl
 import json
 import os
@@ -205,6 +206,24 @@ def test_reading_the_holder_does_not_refuse_a_coordinator(tmp_path: Path) -> Non
         with RunFolder(path) as folder:
             assert folder.epoch == 2
         end.join()
+
+
+@pytest.mark.parametrize("may_read", [True, False])
+def test_a_lock_of_another_user_is_not_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, may_read: bool
+) -> None:
+    real = os.open
+
+    def open_as_other(path: Path, flags: int) -> int:
+        if flags & os.O_ACCMODE != os.O_RDONLY or not may_read:
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return real(path, flags)
+
+    with RunFolder(tmp_path, DETAILS):
+        holder = read_holder(tmp_path)
+        monkeypatch.setattr(os, "open", open_as_other)
+        unknown = "another process, perhaps (lock: Permission denied)"
+        assert read_holder(tmp_path) == (holder if may_read else unknown)
 
 
 def test_a_child_process_does_not_keep_the_lock(tmp_path: Path) -> None:

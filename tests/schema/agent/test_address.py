@@ -130,6 +130,24 @@ def test_address_file_without_reachable_address_is_refused(
         read_address(tmp_path)
 
 
+def test_socket_in_a_directory_of_another_user_is_not_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before Python 3.14, ``is_socket`` raises there."""
+
+    def is_socket(path: Path) -> bool:
+        raise PermissionError(path)
+
+    monkeypatch.setattr(Path, "is_socket", is_socket)
+    (tmp_path / "address").write_text(
+        "unixsock-stream//tmp/other\ntcp/127.0.0.1:7447\n"
+    )
+    assert read_address(tmp_path) == "tcp/127.0.0.1:7447"
+    (tmp_path / "address").write_text("unixsock-stream//tmp/other\n")
+    with pytest.raises(NetworkError, match="no address that this machine can reach"):
+        read_address(tmp_path)
+
+
 def test_neither_address_nor_folder_is_refused() -> None:
     with pytest.raises(NetworkError, match="active run; no such folder: 'nowhere'"):
         hub_of("nowhere")
