@@ -19,7 +19,6 @@ from schema.errors import counted, rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import (
     Experiment,
-    Simulation,
     body_space,
     island_count,
     island_experiment,
@@ -103,8 +102,9 @@ def _results(run: RunSession) -> list[str]:
         *_best_robot(run, best),
     ]
     lines[1:1] = [*_counted_as_zero(run, last), *judged_apart(run.experiment)]
-    if any(isinstance(island, Arena) for island in islands.values()):
-        lines[-1:-1] = _windows(folder, run.experiment.simulation)
+    arenas = [one.experiment for one in islands.values() if isinstance(one, Arena)]
+    if arenas:
+        lines[-1:-1] = _windows(folder, arenas)
     return lines
 
 
@@ -179,12 +179,19 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
     ]
 
 
-def _windows(folder: Path, simulation: Simulation) -> list[str]:
-    """Return a line about the windows in which robots of arenas were judged."""
+def _windows(folder: Path, arenas: Sequence[Experiment]) -> list[str]:
+    """Return a line about the windows in which robots of arenas were judged.
+
+    Args:
+        folder: of the run.
+        arenas: settings of each arena.
+    """
     windows = read_table(folder, "fitness")
     best = windows.filter(windows["is_mature"]).sort_by([("fitness", "descending")])
-    window_s = simulation.window_steps * simulation.timestep_s
-    what = f"a robot's last {window_s:g} s before the last birth"
+    clocks = [each.simulation for each in arenas]
+    seconds = sorted({each.window_steps * each.timestep_s for each in clocks})
+    lasts = " or ".join(f"{each:g}" for each in seconds)
+    what = f"a robot's last {lasts} s before the last birth"
     line = f"in arenas fitness is that of {what}"
     if not best.num_rows:
         return [line]

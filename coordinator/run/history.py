@@ -47,7 +47,8 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     context = RunContext.of(str(folder), 0, experiment, details.origin)
     if island not in context.arena:
         raise RunFolderError(f"{folder}: island {island} has no arena")
-    store = Snapshots(folder, until=steps_of(from_s, experiment.simulation))
+    until = steps_of(from_s, context.experiments[island].simulation)
+    store = Snapshots(folder, until=until)
     with tempfile.TemporaryDirectory() as place:
         # A copy: opening a journal repairs it, and its run may be active.
         shutil.copy(folder / NAME, place)

@@ -262,8 +262,10 @@ class Loop:
     def _advance(self, command: AdvanceShard) -> None:
         """Request an advance, now or when it is due."""
         if self.throttle is not None:
-            step = self.shard_requests.step(command.island)
-            if self.throttle.holds_back(command, step, self._now_s):
+            island = self.islands[command.island]
+            assert isinstance(island, Arena)
+            begin_s = island.clock.seconds(self.shard_requests.step(command.island))
+            if self.throttle.holds_back(command, begin_s, self._now_s):
                 return
         self.shard_requests.send(command)
 

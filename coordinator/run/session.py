@@ -123,7 +123,6 @@ class RunSession:
             self.recovery: PoseRecovery | None = None
             self._events: Sequence[JournalledEvent] = ()
             self._fleet = fleet
-            timestep_s = self.experiment.simulation.timestep_s
             self._context = RunContext.of(
                 held.name, held.epoch, self.experiment, details.origin
             )
@@ -134,7 +133,7 @@ class RunSession:
                 log=self._journal,
                 rows=self._recorder,
                 snapshot_store=Snapshots(held.path),
-                throttle=RealTimeThrottle(speed, timestep_s) if speed else None,
+                throttle=RealTimeThrottle(speed) if speed else None,
                 checks=checks,
                 confirm=held.confirm,
                 watch=self.feed.unread.append if self.feed else lambda _record: None,

@@ -12,15 +12,14 @@ from coordinator.islands.events import AdvanceShard
 class RealTimeThrottle:
     """Limit of the speed at which arenas advance."""
 
-    def __init__(self, speed: float, timestep_s: float) -> None:
+    def __init__(self, speed: float) -> None:
         """Initialise the throttle.
 
         Args:
             speed: simulated seconds per second; > 0.
-            timestep_s: of the physics [s].
         """
-        self._step_s = timestep_s / speed
-        self._last: dict[int, tuple[int, float]] = {}
+        self._speed = speed
+        self._last: dict[int, tuple[float, float]] = {}
         self._held_back: list[tuple[float, int, AdvanceShard]] = []
 
     @property
@@ -28,18 +27,18 @@ class RealTimeThrottle:
         """Time at which the next delayed advance may start [s]."""
         return self._held_back[0][0] if self._held_back else inf
 
-    def holds_back(self, command: AdvanceShard, step: int, now_s: float) -> bool:
+    def holds_back(self, command: AdvanceShard, begin_s: float, now_s: float) -> bool:
         """Return whether an advance has to wait; if so, ``due`` returns it later.
 
         Args:
             command: requests the advance.
-            step: at which it begins; each step is passed once.
+            begin_s: simulated time at which it begins; each is passed once [s].
             now_s: the time; an arena that is late does not catch up [s].
         """
         shard = command.island
-        last_step, last_s = self._last.get(shard, (step, now_s))
-        due_s = max(now_s, last_s + (step - last_step) * self._step_s)
-        self._last[shard] = (step, due_s)
+        last_begin_s, last_s = self._last.get(shard, (begin_s, now_s))
+        due_s = max(now_s, last_s + (begin_s - last_begin_s) / self._speed)
+        self._last[shard] = (begin_s, due_s)
         if due_s > now_s:
             heappush(self._held_back, (due_s, shard, command))
         return due_s > now_s

@@ -5,7 +5,14 @@ from pathlib import Path
 import pytest
 
 from coordinator.cli import summary
-from schema.experiment.document import Arena, Experiment, Fitness, Islands
+from schema.experiment.document import (
+    Arena,
+    Experiment,
+    Fitness,
+    Islands,
+    Simulation,
+    island_experiment,
+)
 from schema.formats.files import BEST
 
 
@@ -37,3 +44,15 @@ def test_islands_that_judge_in_other_ways_are_said() -> None:
         "fitness of different islands is not comparable: locomotion on islands 0, 1, "
         "2; locomotion (limit = 0.5) on island 3; locomotion in an arena on island 4"
     )
+
+
+def test_windows_of_all_arenas_are_said(tmp_path: Path) -> None:
+    slow = Simulation(timestep_s=0.01, window_steps=600)
+    own = Islands(arena=Arena(), simulation=slow)
+    experiment = Experiment("e", arena=Arena(), islands=(Islands(), own))
+    arenas = [island_experiment(experiment, number) for number in range(2)]
+    (line,) = summary._windows(tmp_path, arenas)
+    what = "a robot's last 6 or 12 s before the last birth"
+    assert line == f"in arenas fitness is that of {what}"
+    (line,) = summary._windows(tmp_path, arenas[1:])
+    assert "last 6 s before" in line
