@@ -21,6 +21,7 @@ from schema.agent.flags import (
     whole_number,
 )
 from schema.agent.network import DEFAULT_FLEET
+from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S
 from schema.experiment.file import shipped_experiments
 
 _COMMANDS = {
@@ -92,7 +93,7 @@ def parser(command: str) -> Flags:
 
 
 def resume_flags(options: argparse.Namespace) -> list[str]:
-    """Return the flags with which ``revolve resume`` has the same agents and speed.
+    """Return the flags with which ``revolve resume`` has the same agents and limits.
 
     Args:
         options: of ``run``, ``coordinator`` or ``resume``.
@@ -107,16 +108,34 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
         "--tls-certificate": options.tls_certificate,
         "--tls-key": options.tls_key,
         "--speed": None if options.speed is None else f"{options.speed:g}",
+        "--threads": options.threads,
+        "--cpu-limit": _changed(options.cpu_limit, CPU_LIMIT_S),
+        "--wait-limit": _changed(options.wait_limit, WAIT_LIMIT_S),
     }
-    if options.command == "coordinator" and not options.connect:
-        given["--listen"] = options.listen or HUB
+    switches = {
+        "--in-process": options.in_process,
+        "--allow-drift": options.allow_drift,
+        "--fsync": options.fsync,
+    }
+    if options.command == "coordinator":
+        # It starts no workers and has no flags for them.
+        given["--threads"] = None
+        if not options.connect:
+            given["--listen"] = options.listen or HUB
+    else:
+        switches["--oversubscribe"] = options.oversubscribe
     words = [
         str(word)
         for flag, value in given.items()
         if value is not None
         for word in (flag, value)
     ]
-    return [*words, *(["--in-process"] if options.in_process else [])]
+    return [*words, *(flag for flag, is_on in switches.items() if is_on)]
+
+
+def _changed(value: float, default: float) -> str | None:
+    """Return the text of a number; None if it is the default."""
+    return None if value == default else f"{value:.12g}"
 
 
 def _add_bench(flags: argparse.ArgumentParser) -> None:

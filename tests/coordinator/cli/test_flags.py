@@ -3,6 +3,7 @@
 import pytest
 
 from coordinator.cli.flags import parser, resume_flags
+from schema.agent.command import check_load
 
 
 @pytest.fixture(autouse=True)
@@ -25,11 +26,26 @@ def _no_certificates(monkeypatch: pytest.MonkeyPatch) -> None:
             "--workers 0 --listen tcp/0.0.0.0:7447 --access access.json",
         ),
         ("coordinator scenario1 --connect hub", "--workers 0 --connect hub"),
+        (
+            "coordinator scenario1 --wait-limit 1234567.5 --fsync",
+            "--workers 0 --listen hub --wait-limit 1234567.5 --fsync",
+        ),
+        (
+            "run scenario3 --workers 9999 --oversubscribe --threads 2 --allow-drift",
+            "--workers 9999 --threads 2 --allow-drift --oversubscribe",
+        ),
+        (
+            "resume runs/a --cpu-limit 7200 --wait-limit 0.5 --fsync --in-process",
+            "--cpu-limit 7200 --wait-limit 0.5 --in-process --fsync",
+        ),
     ],
 )
-def test_resumed_run_has_the_same_agents(line: str, expected: str) -> None:
+def test_resumed_run_has_the_same_agents_and_limits(line: str, expected: str) -> None:
     command, *words = line.split()
     flags = resume_flags(parser(command).parse_args(words))
     assert " ".join(flags) == expected
-    # The advice can be followed.
-    parser("resume").parse_args(["runs/a", *flags])
+    # The advice can be followed, and gives the same advice again.
+    resume = parser("resume")
+    options = resume.parse_args(["runs/a", *flags])
+    check_load(resume, "--workers", options.workers or 0, options)
+    assert resume_flags(options) == flags
