@@ -15,8 +15,9 @@ from typing import Any, Self, TypeVar, cast
 import msgspec
 
 from coordinator.dispatch.events import Deliver
+from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
-from coordinator.run.requests import QUARANTINED, read_evaluation
+from coordinator.run.requests import read_evaluation
 from revolve.children import plugins as allowed_plugins
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for

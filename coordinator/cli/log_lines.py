@@ -129,8 +129,9 @@ def _answer(event: Answered) -> Fields:
 
 def _audit(event: Audited) -> Fields:
     both = (event.first, event.second)
+    verdict = "both quarantined" if event.is_settled else "results differ"
     return {
-        "verdict": "results agree" if event.agrees else "results differ",
+        "verdict": "results agree" if event.agrees else verdict,
         "outcomes": [
             one.evaluation.fitness if one.evaluation else one.reason for one in both
         ],

@@ -16,6 +16,9 @@ from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance, Changes
 
+QUARANTINED = "quarantined: "
+"""Begin of the reason of a failed evaluation that crashed its workers' processes."""
+
 
 class Message(Struct, frozen=True):
     """Base of all events and commands: immutable, compared by its fields."""
@@ -71,6 +74,7 @@ class Evaluated(Message, frozen=True):
     trial: int = 0
     requester: int | None = None
     reason: ClassVar[str] = ""
+    is_quarantined: ClassVar[bool] = False
 
 
 class EvaluationFailed(Message, frozen=True):
@@ -89,6 +93,11 @@ class EvaluationFailed(Message, frozen=True):
     trial: int = 0
     requester: int | None = None
     evaluation: ClassVar[None] = None
+
+    @property
+    def is_quarantined(self) -> bool:
+        """The robot has no evaluation because it crashes its processes."""
+        return self.reason.startswith(QUARANTINED)
 
 
 Outcome = Evaluated | EvaluationFailed
@@ -224,6 +233,15 @@ class Audited(Message, frozen=True):
         """Both outcomes are equal to the last bit."""
         one, other = self.first, self.second
         return (one.evaluation, one.reason) == (other.evaluation, other.reason)
+
+    @property
+    def is_settled(self) -> bool:
+        """The first outcome counts: both are equal, or both crashed their processes.
+
+        What ends a process may differ between machines, and from time to time.
+        """
+        are_quarantined = self.first.is_quarantined and self.second.is_quarantined
+        return self.agrees or are_quarantined
 
 
 Answered = Verdict | Outcome | Asked

@@ -64,7 +64,7 @@ class CrossChecks:
 
         Returns:
             The outcome, if the job is not one of a pair; for a pair nothing at the
-            first, and at the second the check and, if they agree, the outcome.
+            first, and at the second the check and, if it is settled, the outcome.
         """
         if not isinstance(outcome, Outcome):
             return [outcome]
@@ -77,7 +77,7 @@ class CrossChecks:
         found = {number: outcome, other: self._outcomes.pop(other)}
         first, second = (found[each] for each in sorted(found))
         audited = Audited(first, second)
-        return [audited, first] if audited.agrees else [audited]
+        return [audited, first] if audited.is_settled else [audited]
 
 
 def describe(event: Audited) -> str:

@@ -44,7 +44,6 @@ from coordinator.run.learners import Learners
 from coordinator.run.requests import (
     Key,
     Requests,
-    is_quarantined,
     island_of,
     key_of,
 )
@@ -250,9 +249,9 @@ class Loop:
                 user wanted the run to stop then.
         """
         for event in events:
-            if isinstance(event, Audited) and not event.agrees:
+            if isinstance(event, Audited) and not event.is_settled:
                 raise RunPaused(describe(event))
-            if isinstance(event, EvaluationFailed) and is_quarantined(event):
+            if isinstance(event, EvaluationFailed) and event.is_quarantined:
                 birth = event.birth
                 line = f"birth {birth.number} of island {birth.island}: {event.reason}"
                 if self.checks.pauses:

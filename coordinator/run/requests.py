@@ -13,6 +13,7 @@ from msgspec import structs
 from coordinator.dispatch.events import Deliver, Job, JobKind, Read
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import (
+    QUARANTINED,
     Advanced,
     Answered,
     Ask,
@@ -46,8 +47,6 @@ from schema.wire.codec import (
     encode_robot,
 )
 
-QUARANTINED = "quarantined: "
-"""Prefix of the reason why a robot that crashes its processes has no evaluation."""
 REMEMBERED = 256
 """Number of vetted bodies whose bytes are kept for the robot's evaluation."""
 _ROUNDING = 1e-9
@@ -192,11 +191,6 @@ def key_of(about: Vet | Evaluate | Ask | Answered) -> Key:
     return ("evaluate", requester_of(about), about.birth, about.trial)
 
 
-def is_quarantined(event: EvaluationFailed) -> bool:
-    """Return whether a robot has no evaluation because it crashes its processes."""
-    return event.reason.startswith(QUARANTINED)
-
-
 def read_vetting(
     data: bytes, *, expected: Expected, robot: Robot, space: BodySpace
 ) -> Answer:
@@ -324,6 +318,9 @@ def _event(end: Deliver) -> Answered:
     if isinstance(result, Evaluation):
         return Evaluated(birth, result, provenance, trial, requester)
     why = f"{QUARANTINED}{reason}" if reason else str(result)
+    if not reason and why.startswith(QUARANTINED):
+        # Only the coordinator knows that: it counts the deaths.
+        why = f"failed: {why}"
     return EvaluationFailed(birth, why, provenance, trial, requester)
 
 

@@ -6,6 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.islands.events import (
+    QUARANTINED,
     Audited,
     Evaluate,
     Evaluated,
@@ -77,6 +78,21 @@ def _far() -> Evaluation:
 def test_equal_failures_agree() -> None:
     assert Audited(FAILED, replace(FAILED, provenance=Provenance("d"))).agrees
     assert not Audited(FAILED, replace(FAILED, reason="fell")).agrees
+
+
+def test_two_quarantines_settle_an_audit_whatever_ended_the_processes() -> None:
+    """The table says that the answers are not equal; the run goes on."""
+    first, second = (
+        EvaluationFailed(BIRTH, f"{QUARANTINED}by {cause}", Provenance(worker))
+        for worker, cause in (("a", "CPU limit"), ("b", "SIGSEGV"))
+    )
+    audits = CrossChecks(1.0)
+    audits.pair(4, 5)
+    assert audits.settle(5, second) == []
+    assert audits.settle(4, first) == [Audited(first, second), first]
+    assert not Audited(first, second).agrees
+    assert not Audited(first, FAILED).is_settled
+    assert not Audited(ONE, second).is_settled
 
 
 def test_outcome_of_a_single_job_passes_unchanged() -> None:

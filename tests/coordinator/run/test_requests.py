@@ -13,6 +13,7 @@ from coordinator.dispatch.events import (
     Returned,
 )
 from coordinator.islands.events import (
+    QUARANTINED,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -20,7 +21,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.run.requests import QUARANTINED, REMEMBERED
+from coordinator.run.requests import REMEMBERED
 from schema.errors import JobRefused
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.robot.brain import Brain
@@ -188,6 +189,15 @@ def test_a_failed_simulation_is_a_result(sent_requests: SentRequests) -> None:
     (event,) = sent_requests.tell(sent_requests.reply("diverged"))
     assert isinstance(event, EvaluationFailed)
     assert event.reason == "diverged"
+
+
+def test_a_worker_cannot_report_a_quarantine(sent_requests: SentRequests) -> None:
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    told = f"{QUARANTINED}ended its own process 3 times, by SIGSEGV"
+    (event,) = sent_requests.tell(sent_requests.reply(told))
+    assert isinstance(event, EvaluationFailed)
+    assert event.reason == f"failed: {told}"
+    assert not event.is_quarantined
 
 
 def test_vetting_gives_a_report_or_a_failed_attempt(
