@@ -227,12 +227,17 @@ def _run(name: str, scheduler: RunScheduler) -> RunSession:
     runs = [
         run
         for run in scheduler.active
-        if run.held.path.name.endswith(name)
+        if _name(run).endswith(name)
         and any(isinstance(each, Arena) for each in run.loop.islands.values())
     ]
     if len(runs) == 1:
         return runs[0]
-    names = ", ".join(sorted(run.held.path.name for run in runs)) or "none"
+    names = ", ".join(sorted(map(_name, runs))) or "none"
     raise Refused(
         f"the name must match one running run with an arena; matching: {names}"
     )
+
+
+def _name(run: RunSession) -> str:
+    """Return the name of a run's folder, as its status has it: without links."""
+    return run.held.path.resolve().name
