@@ -43,8 +43,9 @@ class LiveServer:
         self._fleet = fleet
         self._network = network
         self._update_s = self._whole_s = -1e9
-        self._waiting: list[Order] = []
-        self._replies: SimpleQueue[tuple[Order, bytes] | None] = SimpleQueue()
+        self._replies: SimpleQueue[tuple[list[Order], bytes] | None] = SimpleQueue()
+        self._is_idle = threading.Event()
+        self._is_idle.set()
         threading.Thread(target=self._reply, daemon=True).start()
 
     def serve(self, now_s: float) -> None:
@@ -53,20 +54,21 @@ class LiveServer:
         Args:
             now_s: the time, of any clock that only goes forward [s].
         """
-        self._waiting += self._network.queries.onlookers()
-        is_whole_due = self._waiting and now_s - self._whole_s >= _WHOLE_S
-        if now_s - self._update_s < _UPDATE_S and not is_whole_due:
+        # While a connection blocks, at most one encoding is in memory; the queries
+        # wait in the network, which limits their number.
+        may_reply = self._is_idle.is_set() or now_s == inf
+        is_whole_due = may_reply and now_s - self._whole_s >= _WHOLE_S
+        waiting = self._network.queries.onlookers() if is_whole_due else []
+        if now_s - self._update_s < _UPDATE_S and not waiting:
             return
         self._update_s = now_s
         update = self._feed.update(self._workers())
         if update is not None and self._network.has_viewers:
             self._network.tell(encode_update(update))
-        if is_whole_due:
+        if waiting:
             self._whole_s = now_s
-            data = encode_update(self._feed.whole())
-            for order in self._waiting:
-                self._replies.put((order, data))
-            self._waiting = []
+            self._is_idle.clear()
+            self._replies.put((waiting, encode_update(self._feed.whole())))
 
     def close(self) -> None:
         """Send what is left, and stop."""
@@ -87,8 +89,10 @@ class LiveServer:
     def _reply(self) -> None:
         """Send replies until closed."""
         while (reply := self._replies.get()) is not None:
-            order, data = reply
-            order.reply(data)
+            orders, data = reply
+            for order in orders:
+                order.reply(data)
+            self._is_idle.set()
 
 
 def open_viewer(address: str, fleet: str, tls: Tls | None) -> None:
