@@ -92,10 +92,11 @@ class ArenaRobot:
     Attributes:
         birth: its name.
         body: its engine models.
+        robot: its parts and its present brain.
         view: its present slice of the engine's state.
         window: its latest positions.
         place: of the core's centre at the last sample, world frame [m].
-        encoded: bytes of its body and present brain, for snapshots.
+        encoded: bytes of ``robot``, for snapshots.
         packed: its brain in the form of its brain type.
         states: (K,) of its brain after the last tick; a row of the batch.
         brain_start: step from which the age of its brain counts.
@@ -131,7 +132,8 @@ class ArenaRobot:
             start: step of its first tick, until which commands are held and from
                 which its age counts.
         """
-        self.encoded = encode_robot(Robot(self.body.robot.parts, brain))
+        self.robot = Robot(self.body.robot.parts, brain)
+        self.encoded = encode_robot(self.robot)
         self.packed = controls.pack(brain)
         self.states = controls.rest()
         self.brain_start = start
@@ -154,7 +156,7 @@ class ArenaRobot:
         if self.window.has_fitness:
             track = self.window.track()
             trace = self.body.channels.trace(
-                track.interval_s, track.core_position, self.window.rows
+                self.robot, track.interval_s, track.core_position, self.window.rows
             )
             try:
                 functions = functions_of(settings)

@@ -204,6 +204,7 @@ class _ControlLoop:
         identity: Identity,
     ) -> None:
         types, simulation = body_space(settings.space), settings.simulation
+        self._robot = robot
         self._model, self.data = model, mujoco.MjData(model)
         self._velocities = self.data.qvel.data
         self._simulation = simulation
@@ -289,6 +290,7 @@ class _ControlLoop:
         ):
             _raise_diverged(data, end * simulation.timestep_s)
         return self._channels.trace(
+            self._robot,
             simulation.pose_steps * simulation.timestep_s,
             np.array(positions).reshape(-1, 3),
             recorder.rows if recorder is not None else (),

@@ -85,7 +85,6 @@ class Channels:
         self.has_work = "energy" in wanted
         self._constants: dict[str, Any] = {
             "light": settings.light,
-            "robot": robot,
             "mass": float(model.body_subtreemass[model.jnt_bodyid[free]]),
             "gravity": settings.simulation.gravity,
         }
@@ -136,17 +135,23 @@ class Channels:
         return slice(1, first) if name == "joint_torque" else slice(first, None)
 
     def trace(
-        self, interval_s: float, positions: Floats, rows: Iterable[Floats]
+        self,
+        robot: Robot,
+        interval_s: float,
+        positions: Floats,
+        rows: Iterable[Floats],
     ) -> Trace:
         """Return the trace of some samples.
 
         Args:
+            robot: the robot with its present brain.
             interval_s: between two samples [s].
             positions: (T, 3) of the core [m].
             rows: of the samples, T of them; none if no channel is recorded.
         """
+        constants = self._constants | {"robot": robot}
         if not self.names:
-            return Trace(interval_s, positions, self._constants)
+            return Trace(interval_s, positions, constants)
         table = np.array(list(rows)).reshape(len(positions), self.width)
         found: dict[str, Any] = {n: table[:, span] for n, span in self._spans.items()}
         if "energy" in found:
@@ -155,7 +160,7 @@ class Channels:
             found["contact"] = found["contact"] != 0.0
         if "neighbours" in found:
             found["neighbours"] = found["neighbours"][:, 0].astype(np.int64)
-        return Trace(interval_s, positions, found | self._constants)
+        return Trace(interval_s, positions, found | constants)
 
 
 class Probe:

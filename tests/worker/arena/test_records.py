@@ -16,10 +16,11 @@ from schema.experiment.settings import (
     arena_settings_of,
 )
 from schema.plugins.needs import needs
+from schema.robot.brain import Brain, Connection
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
-from schema.wire.arena import Advance, Casualty, Changes, Insertion
+from schema.wire.arena import Advance, BrainChange, Casualty, Changes, Insertion
 from worker.arena.world import World
 from worker.measures import functions
 from worker.measures.functions import BUILT_IN
@@ -140,6 +141,20 @@ def test_restored_arena_answers_equally(turtle: Robot, stops: tuple[int, ...]) -
         assert world.digest() == expected.digest
     assert all(len(one.measures) == len(NAMES) for one in steady[-1].judgements)
     assert whole.population.merges > 0
+
+
+def test_trace_has_the_present_brain_before_and_after_a_restore(
+    turtle: Robot, recorded: tuple[ArenaSettings, list[Trace]]
+) -> None:
+    own, traces = recorded
+    learnt = Brain(turtle.brain.neurons, (Connection(0, 8, 0.5),))
+    world = World(own)
+    inserted(world, turtle, (0.0, 0.0))
+    world.advance(400)
+    world.apply(Changes(brains=(BrainChange(BirthId(0, 0), learnt),)))
+    World.restore(own, world.snapshot()).advance(800)
+    world.advance(800)
+    assert [trace.robot.brain for trace in traces] == [turtle.brain, learnt, learnt]
 
 
 def test_measures_do_not_change_the_arena(turtle: Robot) -> None:
