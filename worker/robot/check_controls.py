@@ -46,8 +46,9 @@ def check_controls(controls: Controls, place: str) -> None:
 
     Raises:
         ExperimentError: code that raises; states or outputs of a wrong shape or not
-            finite; a robot that moves differently a second time, alone, in another
-            row, or after its states were saved and restored.
+            finite; states that are not changed in place; a robot that moves differently
+            a second time, alone, in another row, or after its states were saved and
+            restored.
     """
     everybody = list(range(_ROBOTS))
     expected = _guarded(partial(_run, controls, everybody), place)
@@ -82,7 +83,13 @@ def _run(
             states = bank.states.copy()
             bank = controls.bank(packed)
             bank.states[...] = states
+        states = bank.states
         outputs = bank.step(readings[tick, rows], float(tick))
+        # An arena keeps views of the rows, from which robots are saved and moved.
+        if states.size and not np.shares_memory(states, bank.states):
+            raise ValueError(
+                "`states` is another array after a step: change it in place"
+            )
         _require("outputs", outputs, (len(rows), controls.width.outputs))
         _require("states", bank.states, (len(rows), kept))
         found.append(np.hstack([outputs, bank.states]))

@@ -48,6 +48,12 @@ class Broken:
         return Leaking(len(packed), self._change)
 
 
+def replaces(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
+    del readings
+    bank.states = 0.9 * bank.states
+    return outputs
+
+
 def raises(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
     del bank, readings
     raise KeyError(f"{outputs.shape[1]} motors")
@@ -66,6 +72,7 @@ CASES: dict[str, tuple[Change, str]] = {
         lambda _, __, outputs: outputs + np.random.default_rng().random(),
         "a second time",
     ),
+    "other array": (replaces, "`states` is another array after a step"),
     "raises": (raises, "got KeyError: '10 motors'"),
 }
 
