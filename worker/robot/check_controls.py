@@ -46,9 +46,9 @@ def check_controls(controls: Controls, place: str) -> None:
 
     Raises:
         ExperimentError: code that raises; states or outputs of a wrong shape or not
-            finite; states that are not changed in place; a robot that moves differently
-            a second time, alone, in another row, or after its states were saved and
-            restored.
+            finite; outputs that are no array of float64; states that are not changed
+            in place; a robot that moves differently a second time, alone, in another
+            row, or after its states were saved and restored.
     """
     everybody = list(range(_ROBOTS))
     expected = _guarded(partial(_run, controls, everybody), place)
@@ -90,10 +90,22 @@ def _run(
             raise ValueError(
                 "`states` is another array after a step: change it in place"
             )
+        _require_floats(outputs)
         _require("outputs", outputs, (len(rows), controls.width.outputs))
         _require("states", bank.states, (len(rows), kept))
         found.append(np.hstack([outputs, bank.states]))
     return found
+
+
+def _require_floats(outputs: object) -> None:
+    """Raise unless outputs are an array of float64, as arenas compute with them."""
+    if not isinstance(outputs, np.ndarray):
+        kind = f"a {type(outputs).__name__}"
+    elif outputs.dtype != np.float64:
+        kind = f"one of {outputs.dtype}"
+    else:
+        return
+    raise TypeError(f"outputs must be an array of float64, got {kind}")
 
 
 def _require(what: str, array: Floats, shape: tuple[int, int]) -> None:

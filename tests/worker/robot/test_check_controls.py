@@ -61,6 +61,11 @@ def raises(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
 
 CASES: dict[str, tuple[Change, str]] = {
     "shape": (lambda _, __, outputs: outputs[:, :3], "outputs of shape"),
+    "whole numbers": (
+        lambda _, __, outputs: (outputs > 0.0).astype(np.int64),
+        "outputs must be an array of float64, got one of int64",
+    ),
+    "list": (lambda _, __, outputs: outputs.tolist(), "of float64, got a list"),
     "not finite": (lambda _, __, outputs: outputs / 0.0, "outputs that are not finite"),
     "other robots": (lambda _, readings, outputs: outputs + readings.max(), "alone"),
     "row": (
