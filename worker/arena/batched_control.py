@@ -14,6 +14,7 @@ from schema.parts import Vector
 from schema.plugins.protocols import Bank
 from schema.robot.brain import Widths
 from schema.robot.results import Floats
+from worker.arena.guarded_bank import GuardedBank
 from worker.clusters.cluster import EngineView
 from worker.clusters.models import Indices
 from worker.clusters.robot import ArenaRobot
@@ -21,6 +22,8 @@ from worker.clusters.states import Layout
 from worker.robot.brains import Controls
 from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
 from worker.robot.noise import Noise, NoiseSource
+
+_DIVERGED = "brain diverged: state not finite"
 
 
 class BatchedControllers:
@@ -30,7 +33,7 @@ class BatchedControllers:
     arena, so from then on all brains tick together.
 
     Attributes:
-        broken: rows of robots whose brain is no longer finite after the last tick;
+        broken: why the brain of a robot broke at the last tick, by row, ascending;
             only code of users can do that.
     """
 
@@ -46,7 +49,7 @@ class BatchedControllers:
         self._controls = controls
         self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
         self._tick_steps = simulation.brain_steps
-        self.broken: list[int] = []
+        self.broken: dict[int, str] = {}
         self.gather(())
 
     def gather(self, robots: Sequence[ArenaRobot]) -> None:
@@ -70,10 +73,10 @@ class BatchedControllers:
         """
         ages = (step - self._starts) // self._tick_steps
         outputs = self._outputs(self._bank, self._noise, step, readings, ages)
-        self.broken = self._not_finite(self._bank, outputs)
+        self.broken = _broken(self._bank, outputs)
         return outputs
 
-    def first_tick(self, step: int, robot: ArenaRobot) -> bool:
+    def first_tick(self, step: int, robot: ArenaRobot) -> str:
         """Update a newborn's brain alone and command its motors.
 
         Args:
@@ -81,26 +84,23 @@ class BatchedControllers:
             robot: the newborn, not yet in the bank.
 
         Returns:
-            Whether its brain is finite.
+            Why its brain broke; empty if it did not.
         """
         bank, noise = self._rows_of([robot])
         readings = robot.view.sensors.readings
         outputs = self._outputs(bank, noise, step, readings, 0.0)
         robot.view.servos.drive(outputs[0])
         robot.states = bank.states[0]
-        return not self._not_finite(bank, outputs)
-
-    def _not_finite(self, bank: Bank, outputs: Floats) -> list[int]:
-        """Return the rows with a state or output that is not finite."""
-        if not self._controls.is_checked:
-            return []
-        is_finite = np.isfinite(bank.states).all(axis=1)
-        is_finite &= np.isfinite(outputs).all(axis=1)
-        return np.flatnonzero(~is_finite).tolist()
+        return _broken(bank, outputs).get(0, "")
 
     def _rows_of(self, robots: Sequence[ArenaRobot]) -> tuple[Bank, Noise | None]:
         """Return a bank at rest and the noise of some robots."""
-        bank = self._controls.bank([robot.packed for robot in robots])
+        packed, controls = [robot.packed for robot in robots], self._controls
+        bank: Bank = (
+            GuardedBank(controls, packed)
+            if controls.is_checked
+            else controls.bank(packed)
+        )
         if not self._is_noisy:
             return bank, None
         return bank, Noise(self._source, [robot.birth for robot in robots])
@@ -118,6 +118,16 @@ class BatchedControllers:
         tick = step // self._tick_steps
         outputs = bank.step(noise.perturb_readings(tick, readings), ages)
         return noise.perturb_outputs(tick, outputs)
+
+
+def _broken(bank: Bank, outputs: Floats) -> dict[int, str]:
+    """Return why brains failed, or are no longer finite, by row, ascending."""
+    if not isinstance(bank, GuardedBank):
+        return {}
+    is_finite = np.isfinite(bank.states).all(axis=1)
+    is_finite &= np.isfinite(outputs).all(axis=1)
+    diverged = dict.fromkeys(np.flatnonzero(~is_finite).tolist(), _DIVERGED)
+    return dict(sorted((diverged | bank.failed).items()))
 
 
 class BatchedIO:

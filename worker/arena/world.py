@@ -219,9 +219,9 @@ class World:
             state = rollout.state
         outputs = self._controllers.tick(self.step, self._io.readings)
         self._io.drive(state, outputs)
-        if self._controllers.broken:
-            robots = self.population.robots
-            self._remove_broken([robots[row] for row in self._controllers.broken])
+        robots = self.population.robots
+        broken = self._controllers.broken.items()
+        self._remove_broken([(robots[row], reason) for row, reason in broken])
 
     def _read_light(self, robots: Sequence[ArenaRobot]) -> None:
         if self._settings.light is not None:
@@ -252,7 +252,8 @@ class World:
             self.population.remove([each.birth for each in failed])
             robots = [robot for robot in robots if robot.birth in self.population]
         first_tick = partial(self._controllers.first_tick, self.step)
-        self._remove_broken([robot for robot in robots if not first_tick(robot)])
+        begun = [(robot, first_tick(robot)) for robot in robots]
+        self._remove_broken([each for each in begun if each[1]])
         for robot in robots:
             if robot.birth in self.population:
                 self._samples.first(self.step, robot)
@@ -266,9 +267,9 @@ class World:
             self.population.remove([casualty.birth for casualty in casualties])
             self._controllers.gather(self.population.robots)
 
-    def _remove_broken(self, robots: Sequence[ArenaRobot]) -> None:
-        reason = "brain diverged: state not finite"
-        self._remove([Casualty(r.birth, self.step, reason, r.place) for r in robots])
+    def _remove_broken(self, broken: Sequence[tuple[ArenaRobot, str]]) -> None:
+        """Remove robots whose brains broke, each with the reason."""
+        self._remove([Casualty(r.birth, self.step, why, r.place) for r, why in broken])
 
     def _report(self) -> Advance:
         found = [r.judgement(self.step, self._settings) for r in self.population.robots]

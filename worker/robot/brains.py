@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from schema.errors import SimulationDiverged
+from schema.errors import SimulationDiverged, cut, one_line
 from schema.experiment.brains import NoParameters, brain_half, kinds_of, widths
 from schema.experiment.document import BrainSection, Space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
@@ -274,15 +274,28 @@ class SoloBank:
         """Update the brain and return its outputs, (O,), not clipped.
 
         Raises:
-            SimulationDiverged: a state or output that is not finite.
+            SimulationDiverged: code of a user that raised, or a state or output that
+                is not finite.
         """
-        outputs = np.asarray(self._bank.step(self.readings, float(tick)))
+        try:
+            outputs = np.asarray(self._bank.step(self.readings, float(tick)))
+        except Exception as error:
+            raise SimulationDiverged(
+                f"brain failed by {tick * self._tick_s:.3f} s: {story_of(error)}"
+            ) from error
         if not (np.isfinite(self._bank.states).all() and np.isfinite(outputs).all()):
             raise SimulationDiverged(
                 f"brain diverged by {tick * self._tick_s:.3f} s: state not finite"
             )
         found: Floats = outputs[0]
         return found
+
+
+def story_of(error: Exception) -> str:
+    """Return why a user's brain failed, as the end of a message of one line."""
+    if isinstance(error, SimulationDiverged):
+        return str(error)
+    return cut(f"{type(error).__name__}: {one_line(error)}")
 
 
 Solo = SoloNetwork | SoloBank

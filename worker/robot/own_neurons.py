@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from schema.errors import SimulationDiverged, cut, one_line
 from schema.plugins.protocols import NeuronType
 from schema.robot.neurons import Tick
 from schema.robot.results import Floats
@@ -82,19 +83,23 @@ class OwnNeurons:
             states: (R, K S) previous states.
             age_ticks: (R, 1) ticks since each robot's birth, or one number.
             tick_s: time between two ticks [s].
+
+        Raises:
+            SimulationDiverged: the code of a type raised.
         """
         ages = np.broadcast_to(np.asarray(age_ticks) * tick_s, (len(sums), 1))[:, 0]
-        self._results = [
-            np.asarray(
-                kind.step(
-                    states[robots, places],
-                    sums[robots, places[0]],
-                    parameters,
-                    Tick(ages[robots], tick_s),
-                )
-            )
-            for kind, robots, places, parameters in self._groups
-        ]
+        self._results = []
+        for kind, robots, places, parameters in self._groups:
+            tick = Tick(ages[robots], tick_s)
+            mine, inputs = states[robots, places], sums[robots, places[0]]
+            try:
+                result = np.asarray(kind.step(mine, inputs, parameters, tick))
+            except Exception as error:
+                story = cut(f"{type(error).__name__}: {one_line(error)}")
+                raise SimulationDiverged(
+                    f"neuron type {kind.name} raised {story}"
+                ) from error
+            self._results.append(result)
 
     def write(self, outputs: Floats, states: Floats) -> None:
         """Store the computed states.

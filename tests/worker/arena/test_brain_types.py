@@ -18,7 +18,7 @@ from schema.robot.ids import BirthId
 from schema.robot.neurons import Tick
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from schema.wire.arena import Insertion
+from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import SETTINGS, populated, seconds, state_of
 from worker.arena.world import World
 from worker.robot.evaluation import simulate
@@ -109,11 +109,37 @@ class Breaking:
         return np.where((tick.age_s > 1.0) & (inputs > 1.0), np.nan, 0.5 + 0.0 * state)
 
 
-BREAKING = {"test:Breaking": Breaking()}
+class Picky:
+    """Neuron type that raises after a second if an input is above 1."""
+
+    name = "Breaking"
+    parameters: tuple[Parameter, ...] = ()
+    states = 1
+
+    def step(
+        self, state: Floats, inputs: Floats, parameters: Floats, tick: Tick
+    ) -> Floats:
+        del parameters
+        if ((tick.age_s > 1.0) & (inputs > 1.0)).any():
+            raise ValueError("input too great")
+        return 0.5 + 0.9 * state
 
 
+BREAKING = {"test:Breaking": Breaking(), "test:Picky": Picky()}
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [
+        ("Breaking", "brain diverged: state not finite"),
+        (
+            "Picky",
+            "brain failed: neuron type Breaking raised ValueError: input too great",
+        ),
+    ],
+)
 def test_robot_whose_brain_breaks_is_a_casualty_and_its_neighbour_lives_on(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch, kind: str, reason: str
 ) -> None:
     real = load._load
     monkeypatch.setattr(
@@ -121,7 +147,7 @@ def test_robot_whose_brain_breaks_is_a_casualty_and_its_neighbour_lives_on(
     )
     monkeypatch.setattr("schema.experiment.brains.check_neuron_type", lambda *_: None)
     monkeypatch.setattr("worker.robot.brains.check_controls", lambda *_: None)
-    space = replace(SETTINGS.space, neuron_types=("test:Breaking", "Simple"))
+    space = replace(SETTINGS.space, neuron_types=(f"test:{kind}", "Simple"))
     settings = replace(SETTINGS, space=space)
     inputs = tuple(n for n in turtle.brain.neurons if n.layer == "input")
     motors = (Neuron("output", "Breaking", 1), Neuron("output", "Breaking", 3))
@@ -136,10 +162,33 @@ def test_robot_whose_brain_breaks_is_a_casualty_and_its_neighbour_lives_on(
     )
     found = seconds(world, 2.0)
     assert [(one.birth, one.step, one.reason) for one in found.casualties] == [
-        (a, 225, "brain diverged: state not finite")
+        (a, 225, reason)
     ]
     assert world.births == (b,)
     assert np.isfinite(world.population.find(b).view.qpos).all()
+    # The neighbour's brain went on as in a world of its own.
+    alone = populated(settings, [Insertion(b, well, (0.35, 0.0), 0.0)])
+    seconds(alone, 2.0)
+    states = [each.population.find(b).states for each in (world, alone)]
+    assert states[0].tobytes() == states[1].tobytes()
+
+
+@pytest.mark.usefixtures("_own_brains")
+def test_robot_whose_brain_raises_at_birth_is_a_casualty(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> Floats:
+        raise KeyError("gone")
+
+    settings, make = OSCILLATING["brain"]
+    world = World(settings)
+    bank = world.population.model_cache.controls.bank(())
+    monkeypatch.setattr(type(bank), "step", fail)
+    newborn = Insertion(BirthId(0, 0), robots(turtle, make)[0], (0.0, 0.0))
+    world.apply(Changes(insertions=(newborn,)))
+    assert world.births == ()
+    (casualty,) = seconds(world, 1.0).casualties
+    assert casualty.reason == "brain failed: KeyError: 'gone'"
 
 
 def test_snapshot_with_a_brain_of_another_type_is_refused(turtle: Robot) -> None:

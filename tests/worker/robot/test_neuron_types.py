@@ -165,6 +165,38 @@ def test_off_line_a_state_that_is_not_finite_is_a_failed_result() -> None:
         solo.step(9)
 
 
+class Picky:
+    """Neuron that raises for a great input."""
+
+    name = "Picky"
+    parameters: tuple[Parameter, ...] = ()
+    states = 1
+
+    def step(
+        self, state: Floats, inputs: Floats, parameters: Floats, tick: Tick
+    ) -> Floats:
+        del parameters, tick
+        if inputs.max() > 1.0:
+            raise ValueError("input of\na neuron too great")
+        return state + 0.5
+
+
+def test_off_line_a_type_that_raises_is_a_failed_result_in_one_line() -> None:
+    control = NetworkControl(NoParameters(), (Picky(),))
+    neurons = (Neuron("input", INPUT, 0), Neuron("output", "Picky", 0))
+    brain = Brain(neurons, (Connection(0, 1, 1.0),))
+    bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
+    solo = SoloBank(bank, 10, TICK_S)
+    assert solo.step(0)[0] == 0.5
+    solo.readings[0, 0] = 2.0
+    with pytest.raises(SimulationDiverged) as caught:
+        solo.step(1)
+    assert str(caught.value) == (
+        "brain failed by 0.125 s: neuron type Picky raised ValueError: input of a "
+        "neuron too great"
+    )
+
+
 @own
 def test_controls_of_a_broken_section_name_the_key() -> None:
     with pytest.raises(
