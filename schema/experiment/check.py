@@ -18,12 +18,14 @@ from schema.experiment.document import (
     Simulation,
     body_space,
     island_experiment,
+    light_of,
     steps_of,
 )
 from schema.experiment.learning import learning_problems
 from schema.experiment.robust import robust_problems
 from schema.experiment.selection_rules import rule_problems
 from schema.experiment.sweep import sweep_problems
+from schema.parts import BodySpace, Sensor
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
 _LONGEST_NAME = 200
@@ -41,7 +43,8 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             migration that can never happen; measures that are named twice, or
             parameters of a measure that is not named; a range that ends before it
             begins; a calibration of an unknown part type, or with a delay between two
-            ticks; disturbances or calibrations in an arena; an unknown learner,
+            ticks; light sensors or a fitness that need a light that is not there;
+            disturbances or calibrations in an arena; an unknown learner,
             learning with re-evaluations, or in an arena with windows that end between
             two ticks.
     """
@@ -77,9 +80,35 @@ def _problems(experiment: Experiment) -> Iterator[str]:
         )
     if not any(kind.outputs for kind in types.values()):
         yield "space.part_types: at least one type must have a motor"
+    yield from _light_sensor_problems(experiment, types)
     yield from calibration_problems(experiment.calibration, types)
     # Loads and checks both; raises what is wrong.
     neuron_kinds(experiment.brain, experiment.space)
+
+
+def _light_sensor_problems(experiment: Experiment, types: BodySpace) -> Iterator[str]:
+    """Yield the islands on which robots may have light sensors, but no light is."""
+    sensing = [
+        name
+        for name, kind in types.items()
+        if any(isinstance(s, Sensor) and s.kind == "light" for s in kind.sensors)
+    ]
+    if not sensing:
+        return
+    problem = (
+        f"space.part_types: the light sensor of {shown(sensing[0])} needs "
+        "environment.light = [x, y, z], got none"
+    )
+    if not experiment.islands:
+        if not light_of(experiment.environment, experiment.arena):
+            yield problem
+        return
+    first = 0
+    for index, islands in enumerate(experiment.islands):
+        own = island_experiment(experiment, first)
+        if not light_of(own.environment, own.arena):
+            yield f"islands[{index}]: {problem}"
+        first += islands.count
 
 
 def _island_problems(experiment: Experiment) -> Iterator[str]:

@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from math import isclose
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, shown
 from schema.experiment.document import Experiment, light_of, start_problems
 from schema.experiment.environment import arena_problems, ground_problems
+from schema.experiment.settings import FITNESS
 
 
 def world_problems(experiment: Experiment) -> Iterator[str]:
@@ -50,10 +51,13 @@ def _push_problems(experiment: Experiment) -> Iterator[str]:
 
 def _light_problems(experiment: Experiment) -> Iterator[str]:
     arena, there = experiment.arena, experiment.environment.light
-    if experiment.fitness.function == "light" and not light_of(
-        experiment.environment, arena
-    ):
-        yield "fitness.function: 'light' needs environment.light = [x, y, z], got none"
+    function = experiment.fitness.function
+    needs_light = function in ("light", FITNESS["light"])
+    if needs_light and not light_of(experiment.environment, arena):
+        yield (
+            f"fitness.function: {shown(function)} needs environment.light = [x, y, z], "
+            "got none"
+        )
     here = None if arena is None else arena.light
     if here and there and here != there:
         yield (

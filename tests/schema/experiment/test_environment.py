@@ -9,7 +9,7 @@ import pytest
 from msgspec import structs
 
 from schema.errors import ExperimentError
-from schema.experiment.document import island_experiment
+from schema.experiment.document import Space, island_experiment
 from schema.experiment.environment import FLAT, Environment, gravity_vector, relief
 from schema.experiment.file import (
     experiment_from_text,
@@ -72,15 +72,32 @@ def test_a_robot_of_an_arena_has_its_light_when_it_is_evaluated_alone() -> None:
     assert read_evaluation_settings(evaluation_settings(dark)).environment == FLAT
 
 
-def test_the_task_light_needs_a_light() -> None:
-    text = '[fitness]\nfunction = "light"\n'
+@pytest.mark.parametrize("function", ["light", "worker.tasks:light"])
+def test_the_task_light_needs_a_light(function: str) -> None:
+    text = f'[fitness]\nfunction = "{function}"\n'
     assert refused(text) == (
-        "mine.toml: fitness.function: 'light' needs environment.light = [x, y, z], got "
-        "none"
+        f"mine.toml: fitness.function: '{function}' needs environment.light = "
+        "[x, y, z], got none"
     )
     for table in ("environment", "arena"):
         lit = f"{text}[{table}]\nlight = [1.0, 0.0, 0.5]\n"
-        assert parse_experiment(HEAD + lit, "it").fitness.function == "light"
+        assert parse_experiment(HEAD + lit, "it").fitness.function == function
+
+
+def test_a_light_sensor_needs_a_light_on_each_island() -> None:
+    types = [*Space().part_types, "schema.parts:LIGHT_SENSOR"]
+    text = f"[space]\npart_types = {types}\n"
+    problem = (
+        "space.part_types: the light sensor of 'LightSensor' needs environment.light = "
+        "[x, y, z], got none"
+    )
+    assert refused(text) == f"mine.toml: {problem}"
+    lit, dark = ("environment = {light = [1.0, 0.0, 0.5]}", "arena = {}")
+    islands = [f"[[islands]]\n{each}\n" for each in (lit, dark)]
+    assert refused(text + "".join(islands)) == f"mine.toml: islands[1]: {problem}"
+    for table in ("environment", "arena"):
+        found = parse_experiment(f"{HEAD}{text}[{table}]\nlight = [1, 0, 0.5]\n", "it")
+        assert list(found.space.part_types) == types
 
 
 def test_pushes_are_off_line_and_begin_at_ticks() -> None:
