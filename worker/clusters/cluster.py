@@ -5,7 +5,7 @@ that is compiled when they meet. Clusters do not interact, so each is stepped th
 an interval independently and keeps its states at the interval's moments.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -104,6 +104,17 @@ class EngineView:
         self.sensors.velocities = list(other.sensors.velocities)
         if self.probe is not None and other.probe is not None:
             self.probe.numbers[:] = other.probe.numbers
+
+    def touched_of(self, other: "EngineView", touched: Iterable[int]) -> set[int]:
+        """Return which of the robot's geoms are in contact in another cluster.
+
+        Args:
+            other: its view of that cluster.
+            touched: geoms in contact there.
+        """
+        first, end = other.geoms
+        shift = self.geoms[0] - first
+        return {geom + shift for geom in touched if first <= geom < end}
 
 
 class StateHistory:
@@ -243,7 +254,7 @@ class Cluster:
             except mujoco.FatalError as error:
                 self.failure, self.failed_at = one_line(error), moment
                 self.keep(range(moment, len(plan)))
-                return
+                break
             keep(moment)
             if self.probes:
                 for probe in self.probes:
@@ -251,7 +262,9 @@ class Cluster:
                 self._keep_probed(moment)
             if self._records_contacts:
                 self.history.touching[moment] = self.touching()
-        self._read_touched()
+        # A cluster formed at the last moment has its members' earlier contacts.
+        if first < len(plan):
+            self._read_touched()
 
     def keep(self, moments: range) -> None:
         """Copy the present state to the rows of some moments."""
@@ -259,7 +272,6 @@ class Cluster:
             self.history.keep(moment)
             self._keep_probed(moment)
             self.history.touching[moment] = self.touching()
-        self._read_touched()
 
     def drop_history(self) -> None:
         """Forget the history, as the array of all clusters may be large."""

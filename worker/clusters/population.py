@@ -189,9 +189,13 @@ class ArenaPopulation:
             for birth in births:
                 self.cluster_of[birth].rewind(self.rollout.moment)
         cluster = self.model_cache.cluster(births, [robot.body for robot in robots])
+        touched: set[int] = set()
         for robot, view in zip(robots, cluster.views, strict=True):
+            before = self.cluster_of[robot.birth].touched
+            touched |= view.touched_of(robot.view, before)
             view.copy_from(robot.view)
             robot.view = view
+        cluster.touched = frozenset(touched)
         return cluster
 
     def _settle(self, clusters: Sequence[Cluster]) -> None:

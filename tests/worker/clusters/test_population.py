@@ -6,8 +6,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
+from schema.robot.results import Floats
+from schema.robot.robot import Part, Robot
 from schema.wire.arena import Casualty, Changes, Insertion
 from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of
 from tests.worker.arena_oracle import Oracle
@@ -108,3 +110,36 @@ def test_separated_robots_are_split(turtle: Robot) -> None:
     assert sizes[-1] == 2
     assert first.view is first.body.solo.views[0]
     assert (world.population.merges, world.population.splits) == (1, 1)
+
+
+def test_touch_sensors_of_survivors_keep_their_contacts() -> None:
+    """One of two robots of a cluster dies at a tick, the other lies on its sensor."""
+    robot = on_its_sensor()
+    first, second = BirthId(0, 0), BirthId(0, 1)
+    found: list[Floats] = []
+    for velocity in (None, 1e3):
+        world = populated(
+            settings_of(drop_m=0.0),
+            [Insertion(first, robot, (0.0, 0.0)), Insertion(second, robot, (0.12, 0))],
+        )
+        world.advance(1024)
+        assert [each.members for each in world.population.clusters] == [(first, second)]
+        if velocity is not None:
+            world.population.find(second).view.qvel[0] = velocity
+        gone = world.advance(1025).casualties
+        assert [each.birth for each in gone] == [second] * (velocity is not None)
+        found.append(world.population.find(first).view.sensors.readings[0, 6:8].copy())
+    assert found[0].any()
+    assert found[0].tolist() == found[1].tolist()
+
+
+def on_its_sensor() -> Robot:
+    """Return a core that turns a touch sensor to the ground."""
+    grey = (0.5, 0.5, 0.5)
+    parts = (
+        Part("Core", -1, -1, -1, 0, grey),
+        Part("ActiveHinge", 0, 0, 0, 0, grey),
+        Part("TouchSensor", 1, 1, 0, 0, grey),
+    )
+    inputs = [Neuron("input", INPUT, part) for part in (0,) * 6 + (2,) * 2]
+    return Robot(parts, Brain((*inputs, Neuron("output", "Simple", 1, (1.0, 1.0)))))
