@@ -280,11 +280,7 @@ class _ControlLoop:
                 recorder.step(until - step)
             step = until
         if recorder is not None:
-            self._sensors.read(self._tick_s)
-            self._read_light()
-            self._read_own(end)
-            recorder.readings = self._sensors.readings
-            recorder.sample()
+            self._sample_end(recorder, end, is_tick=end == next_tick)
         if data.warning.number.any() or not math.isfinite(
             data.qvel.sum() + data.qpos.sum()
         ):
@@ -295,6 +291,18 @@ class _ControlLoop:
             np.array(positions).reshape(-1, 3),
             recorder.rows if recorder is not None else (),
         )
+
+    def _sample_end(self, recorder: Recorder, end: int, *, is_tick: bool) -> None:
+        """Add the last sample, with readings that the controller does not see.
+
+        Between two ticks, it has the readings of the last one, as in an arena.
+        """
+        if is_tick:
+            self._sensors.read(self._tick_s)
+            self._read_light()
+            self._read_own(end)
+            recorder.readings = self._sensors.readings
+        recorder.sample()
 
     def _tick(self, step: int) -> None:
         """Read sensors, update the controller and command the motors."""

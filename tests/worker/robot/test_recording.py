@@ -81,6 +81,22 @@ def test_shapes_and_states_of_all_channels(
     assert checked >= 2
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_last_readings_are_those_of_the_last_tick(
+    turtle: Robot, everything: EvaluationSettings, noise: float
+) -> None:
+    """120 steps end between the ticks of steps 100 and 125."""
+    clock = replace(CLOCK, warmup_steps=0, sensor_noise=noise)
+    whole, part = (
+        simulate(turtle, replace(everything, simulation=replace(clock, window_steps=n)))
+        for n in (200, 120)
+    )
+    samples = 120 // CLOCK.pose_steps + 1
+    assert CLOCK.brain_steps == 25
+    np.testing.assert_array_equal(part.readings, whole.readings[:samples])
+    assert not np.array_equal(part.readings[0], part.readings[-1])
+
+
 def test_recording_changes_no_result(
     turtle: Robot, everything: EvaluationSettings
 ) -> None:
