@@ -4,7 +4,9 @@ The digest covers the source files of a plug-in's top-level module or package. T
 packages of this project are not plug-ins; their version identifies them.
 """
 
+import json
 import re
+from collections.abc import Iterator
 from functools import lru_cache
 from hashlib import sha256
 
@@ -17,7 +19,9 @@ from schema.plugins.permission import (
     source_of,
 )
 
-_PATH = re.compile(r'"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"')
+_PATH = re.compile(r"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+_PARAMETERS = re.compile(r"(?:.*[._])?parameters(?:\..*)?", re.DOTALL)
+"""Keys of parameters of plug-ins, those of a sweep included."""
 _DIGITS = 12
 
 
@@ -26,7 +30,7 @@ def plugins_of(settings: bytes) -> str:
     """Return the plug-ins that settings name, with their digests on this machine.
 
     Args:
-        settings: JSON; every text in it like ``module:attribute`` names a plug-in.
+        settings: JSON, as for ``modules_named``.
 
     Returns:
         ``module=digest`` for each top-level module, by name, with a space between.
@@ -35,9 +39,32 @@ def plugins_of(settings: bytes) -> str:
 
 
 def modules_named(document: bytes) -> list[str]:
-    """Return the top-level modules of the plug-ins that JSON names, sorted."""
-    named = set(_PATH.findall(document.decode(errors="replace")))
-    return sorted(named.difference(ROOMS))
+    """Return the top-level modules of the plug-ins that JSON names, sorted.
+
+    Args:
+        document: JSON; every text in it like ``module:attribute`` names a plug-in, but
+            for parameters of plug-ins, which may be any text.
+
+    Raises:
+        ValueError: the document is not JSON.
+    """
+    found = (_PATH.fullmatch(text) for text in _texts(json.loads(document)))
+    return sorted({each[1] for each in found if each}.difference(ROOMS))
+
+
+def _texts(document: object) -> Iterator[str]:
+    """Yield the texts and keys of JSON, without parameters of plug-ins."""
+    left = [document]
+    while left:
+        value = left.pop()
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, list):
+            left += value
+        elif isinstance(value, dict):
+            for key, inner in value.items():
+                if not _PARAMETERS.fullmatch(key):
+                    left += key, inner
 
 
 @lru_cache(maxsize=64)
