@@ -45,7 +45,7 @@ from schema.experiment.kinds import Kind, Use, check_use, kind_of
 from schema.parts import PartType
 from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
-from schema.plugins.part_checks import check_slot_directions
+from schema.plugins.part_checks import check_sensed_boxes, check_slot_directions
 from schema.plugins.permission import FLAG, allow, allow_references, allowed, is_own
 from schema.tables.description import allow_plugins_of
 
@@ -280,6 +280,7 @@ def _check_plugin(
         plugin = use.load()
         if isinstance(plugin, PartType) and not _is_folder(Path(word)):
             check_slot_directions(plugin, use.key)
+            check_sensed_boxes(plugin, use.key)
         warning = use.advise(plugin)
     except ExperimentError as error:
         raise _placed(error, word, use) from error

@@ -78,6 +78,30 @@ def check_slot_directions(kind: PartType, where: str = "part type") -> None:
                 raise _refusal(kind, where, problem)
 
 
+def check_sensed_boxes(kind: PartType, where: str = "part type") -> None:
+    """Raise if a model cannot hold the sensors of a consistent part type.
+
+    It is not part of ``check_part_type``, as ``check_slot_directions``.
+
+    Args:
+        kind: the part type.
+        where: the key that names it, for messages.
+
+    Raises:
+        ExperimentError: imus on two boxes, as a part has one site for them; a touch
+            sensor of a box whose name MJCF files cannot hold.
+    """
+    sensors = [sensor for sensor in kind.sensors if isinstance(sensor, Sensor)]
+    imus = sorted({sensor.box for sensor in sensors if sensor.kind == "imu"})
+    if len(imus) > 1:
+        boxes = ", ".join(map(shown, imus))
+        raise _refusal(kind, where, f"sensors: imus must be on one box, got {boxes}")
+    for sensor in sensors:
+        if sensor.kind == "touch" and "/" in sensor.box:
+            problem = f"a box with a touch sensor must have no '/', got {sensor.box!r}"
+            raise _refusal(kind, where, f"boxes: the name of {problem}")
+
+
 def advise_shape(kind: PartType) -> str:
     """Return a warning about the shape of a part, or nothing.
 

@@ -79,6 +79,18 @@ def test_a_part_type_is_recognised() -> None:
     assert re.search(r"part-type at parts\.py:\d+: in order", text)
 
 
+def test_a_part_type_with_two_imus_is_refused(lab: Callable[[str], Path]) -> None:
+    file = lab("""
+from dataclasses import replace
+
+from schema.parts import TOUCH_SENSOR, Sensor
+
+PAIR = replace(TOUCH_SENSOR, sensors=(Sensor("imu", "left"), Sensor("imu", "right")))
+""")
+    ((_, fault),) = [each for each in checked(f"{file}:PAIR") if each[0] == "fault"]
+    assert fault.endswith("sensors: imus must be on one box, got 'left', 'right'")
+
+
 def test_neuron_and_brain_types_are_recognised(tmp_path: Path) -> None:
     file = write_module(tmp_path)
     found = checked(f"{file}:Adapting", f"{file}:Wave")

@@ -26,6 +26,7 @@ from schema.parts import (
 from schema.plugins.part_checks import (
     advise_shape,
     check_part_type,
+    check_sensed_boxes,
     check_slot_directions,
 )
 from schema.plugins.sensor_checks import check_sensor
@@ -192,6 +193,7 @@ WRONG = {
 def test_built_in_part_types_pass(kind: PartType) -> None:
     check_part_type(kind)
     check_slot_directions(kind)
+    check_sensed_boxes(kind)
     assert advise_shape(kind) == ""
 
 
@@ -201,6 +203,26 @@ def test_a_slot_into_its_own_box_is_refused_by_a_check_of_its_own() -> None:
     message = r"x: .*slots\[1\].normal: .* points into its box 'body', 41 mm deep"
     with pytest.raises(ExperimentError, match=message):
         check_slot_directions(kind, "x")
+
+
+def test_imus_on_two_boxes_are_refused_by_a_check_of_its_own() -> None:
+    pair = Sensor("imu", "left"), Sensor("imu", "right")
+    kind = replace(TOUCH_SENSOR, sensors=pair)
+    check_part_type(kind)
+    message = r"x: .*'TouchSensor': sensors: imus must be on one box, got 'left', 'ri"
+    with pytest.raises(ExperimentError, match=message):
+        check_sensed_boxes(kind, "x")
+    check_sensed_boxes(replace(kind, sensors=(*pair[:1] * 2, Sensor("touch", "left"))))
+
+
+def test_a_touch_sensor_of_a_box_with_a_slash_is_refused() -> None:
+    box = boxed(name="pad/left")
+    kind = replace(box, sensors=(Sensor("touch", "pad/left"),))
+    check_part_type(kind)
+    message = "boxes: the name of a box with a touch sensor must have no '/', got 'pad/"
+    with pytest.raises(ExperimentError, match=message):
+        check_sensed_boxes(kind)
+    check_sensed_boxes(replace(box, sensors=(Sensor("imu", "pad/left"),)))
 
 
 @pytest.mark.parametrize(("y", "away"), [(0.0305, "10"), (0.0105, "10")])
