@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import isclose
 
 from schema.errors import ExperimentError, shown
-from schema.experiment.document import Experiment, light_of, start_problems
+from schema.experiment.document import Experiment, light_of, start_problems, steps_of
 from schema.experiment.environment import arena_problems, ground_problems
 from schema.experiment.settings import FITNESS
 
@@ -37,7 +37,7 @@ def _scenery_problems(experiment: Experiment) -> Iterator[str]:
 
 
 def _push_problems(experiment: Experiment) -> Iterator[str]:
-    """Yield whether pushes do not begin at a tick."""
+    """Yield whether pushes do not begin at a tick, or never begin."""
     world, clock = experiment.environment, experiment.simulation
     tick_s = clock.brain_steps * clock.timestep_s
     ticks = max(1, round(world.push_interval_s / tick_s))
@@ -46,6 +46,16 @@ def _push_problems(experiment: Experiment) -> Iterator[str]:
         yield (
             f"environment.push_interval_s: must be a whole multiple of {tick_s:g} s, "
             f"the time between brain ticks, got {world.push_interval_s:g}"
+        )
+    steps = clock.warmup_steps + clock.window_steps
+    if clock.evaluation_s is not None:
+        steps = steps_of(clock.evaluation_s[1], clock)
+    is_never = experiment.arena is None and ticks * clock.brain_steps >= steps
+    if world.push_impulse and is_never:
+        yield (
+            f"environment.push_interval_s: must be < {steps * clock.timestep_s:g} s, "
+            "the longest evaluation, or there is no push, got "
+            f"{world.push_interval_s:g}"
         )
 
 

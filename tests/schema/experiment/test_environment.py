@@ -119,6 +119,19 @@ def test_pushes_are_off_line_and_begin_at_ticks() -> None:
         read_arena_settings(arena_settings(pushed, Origin()))
 
 
+@pytest.mark.parametrize(
+    ("clock", "longest"),
+    [("", 12), ("warmup_steps = 400\n", 14), ("evaluation_s = [12.0, 15.0]\n", 15)],
+)
+def test_there_is_a_push_in_the_longest_evaluation(clock: str, longest: int) -> None:
+    text = f"[simulation]\n{clock}[environment]\npush_impulse = 0.1\npush_interval_s = "
+    parse_experiment(f"{HEAD}{text}{longest - 0.125}\n", "it")
+    assert refused(f"{text}{longest}.0\n") == (
+        f"mine.toml: environment.push_interval_s: must be < {longest} s, the longest "
+        f"evaluation, or there is no push, got {longest}"
+    )
+
+
 def test_later_keys_count_in_stable_json_only_if_they_are_set() -> None:
     plain = msgspec.json.decode(stable_json(FLAT))
     assert plain == {
