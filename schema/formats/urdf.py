@@ -27,7 +27,7 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
     Args:
         robot: the robot.
         space: its part types.
-        simulation: gives the damping of the joints.
+        simulation: gives the masses, the damping of the joints and the torques.
 
     Raises:
         InvalidRobot: the body is not well formed in this body space.
@@ -41,8 +41,11 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
     for joint in range(1, model.njnt):
         part = int(model.joint(joint).name.removeprefix("joint"))
         motor = space[robot.parts[part].kind].motor
-        drive = (motor.max_torque, motor.max_velocity) if motor else _FREE
-        root.append(_joint(model, joint, *drive))
+        effort, velocity = _FREE
+        if motor is not None:
+            effort = motor.max_torque * simulation.torque_factor
+            velocity = motor.max_velocity
+        root.append(_joint(model, joint, effort, velocity))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 

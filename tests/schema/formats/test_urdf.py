@@ -123,6 +123,8 @@ def test_limits_of_driven_and_free_hinges() -> None:
     assert 'effort="0.17658" velocity="5.236"' in text
     assert 'lower="-1.047197' in text
     assert 'effort="0.0"' in text
+    weak = robot_to_urdf(robot, BUILT_IN, changed(SIMULATION, torque_factor=0.5))
+    assert 'effort="0.08829" velocity="5.236"' in weak
 
 
 def test_urdf_is_not_read(tmp_path: Path) -> None:
