@@ -149,6 +149,7 @@ def _add_object(
     made.explicitinertial = 1
     made.mass, made.inertia = model.body_mass[body], model.body_inertia[body]
     made.ipos, made.iquat = model.body_ipos[body], model.body_iquat[body]
+    made.gravcomp = model.body_gravcomp[body]
     return made
 
 

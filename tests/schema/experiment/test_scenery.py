@@ -112,6 +112,20 @@ def test_a_body_with_a_free_joint_becomes_an_object_after_the_robot() -> None:
     assert data.geom("scenery/0").xpos.tolist() == [3.0, 0.0, 0.1]
 
 
+def test_an_object_keeps_its_compensation_of_gravity() -> None:
+    bodies = "".join(
+        f'<body pos="{x} 0 9" gravcomp="{share}"><freejoint/>{BOX}</body>'
+        for x, share in ((5, 0), (10, 1), (15, 2))
+    )
+    environment = Environment(scenery=scene(bodies))
+    model = solo_spec(CORE, BUILT_IN, Simulation(), environment).compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 10)
+    speeds = [data.joint(f"scenery/{body}").qvel[2] for body in (1, 2, 3)]
+    fall = 9.81 * 10 * model.opt.timestep
+    assert speeds == pytest.approx([-fall, 0.0, fall])
+
+
 def test_objects_are_refused_in_arenas() -> None:
     document = f"name = 'mine'\n[environment]\nscenery = '''{OBJECTS}'''\n"
     assert parse_experiment(document, "mine.toml").arena is None
