@@ -5,8 +5,11 @@ from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.errors import RevolveError, counted
-from schema.formats.files import read_robot, settings_of, write_robot
-from schema.formats.run_settings import experiment_of, types_of
+from schema.experiment.brains import neuron_kinds
+from schema.experiment.document import body_space
+from schema.experiment.settings import EvaluationSettings
+from schema.formats.files import MJCF_ENDING, read_robot, settings_of, write_robot
+from schema.formats.run_settings import allow_run_of, experiment_of, types_of
 from schema.parts import BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import NeuronKinds, neuron_names
@@ -28,13 +31,13 @@ def main(argv: list[str] | None = None) -> int:
     words = ["robot", *sys.argv[1:]] if argv is None else argv
     options = parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
     allow(options.plugins)
-    experiment = experiment_of(options.file, options.experiment, options.island)
-    space, kinds = types_of(experiment)
-    robot = read_robot(options.file, space, kinds)
+    robot, settings, (space, kinds) = _read(
+        options.file, options.experiment, options.island
+    )
     if options.command == "check":
         print(f"{options.file}: well formed; {_summary(robot)}")
     elif options.command == "convert":
-        write_robot(robot, options.output, space, settings_of(experiment), kinds)
+        write_robot(robot, options.output, space, settings, kinds)
         print(f"{options.output}: written")
     else:
         _show(robot, space, kinds, options.file.name)
@@ -77,11 +80,31 @@ def parser(_command: str = "robot") -> Flags:
             )
         add_settings(
             command,
-            "that of the run folder that holds the file, else all built-in part types "
-            "and the default world",
+            "that in an MJCF file, else that of the run folder that holds the file, "
+            "else all built-in part types and the default world",
         )
         add_plugins(command)
     return flags
+
+
+def _read(
+    path: Path, named: str | None, island: int | None
+) -> tuple[Robot, EvaluationSettings, tuple[BodySpace, NeuronKinds]]:
+    """Return a file's robot, its settings, and the part types and neuron types.
+
+    Those in an MJCF file are the default.
+    """
+    if path.suffix.lower() == MJCF_ENDING and named is None and island is None:
+        # MuJoCo is imported only if needed: it is slow to load.
+        from schema.formats.mjcf import read_mjcf
+
+        allow_run_of(path)
+        robot, settings = read_mjcf(path)
+        kinds = neuron_kinds(settings.brain, settings.space)
+        return robot, settings, (body_space(settings.space), kinds)
+    experiment = experiment_of(path, named, island)
+    types = types_of(experiment)
+    return read_robot(path, *types), settings_of(experiment), types
 
 
 def _summary(robot: Robot) -> str:

@@ -82,6 +82,18 @@ def experiment_of(
     return own
 
 
+def allow_run_of(file: Path) -> None:
+    """Allow the plug-ins of the run whose folder holds a robot file, if one does.
+
+    Raises:
+        ExperimentError: a plug-in of the run that is missing or not the user's own.
+        RunFolderError: the description of the run is damaged.
+    """
+    if (file.parent / DETAILS).is_file():
+        allow_plugins_of(file.parent)
+        own_experiment(read_description(file.parent).document)
+
+
 def _differs(experiment: Experiment) -> bool:
     """Return whether robots are evaluated in different ways on two islands."""
     each = [

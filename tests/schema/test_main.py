@@ -7,6 +7,7 @@ import pytest
 from schema.__main__ import main
 from schema.errors import InvalidRobot
 from schema.formats.files import read_robot
+from schema.formats.mjcf import read_mjcf
 
 TEXT = """\
 body:
@@ -45,6 +46,25 @@ def test_convert_round_trip(path: Path) -> None:
     assert main(["robot", "convert", str(path), str(there)]) == 0
     assert main(["robot", "convert", str(there), str(back)]) == 0
     assert read_robot(path) == read_robot(there) == read_robot(back)
+
+
+def test_mjcf_keeps_its_settings_and_part_types(path: Path, tmp_path: Path) -> None:
+    experiment = tmp_path / "mine.toml"
+    experiment.write_text(
+        'name = "mine"\n[space]\npart_types = ["schema.parts:CORE", '
+        '"schema.robogen_parts:ACTIVE_WHEEL"]\n[simulation]\ngravity = 3.0'
+    )
+    path.write_text("body: {type: Core, children: {1: {slot: 0, type: ActiveWheel}}}")
+    there, again = tmp_path / "robot.xml", tmp_path / "again.xml"
+    words = [str(path), str(there), "--experiment", str(experiment)]
+    assert main(["robot", "convert", *words]) == 0
+    assert main(["robot", "convert", str(there), str(again)]) == 0
+    assert read_mjcf(again) == read_mjcf(there)
+    assert read_mjcf(again)[1].simulation.gravity == 3.0
+    assert main(["robot", "check", str(again)]) == 0
+    named = ["--experiment", "scenario1"]
+    with pytest.raises(InvalidRobot, match=r"must be one of .*, got 'ActiveWheel'"):
+        main(["robot", "check", str(again), *named])
 
 
 def test_show(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
