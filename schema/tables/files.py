@@ -35,8 +35,8 @@ from schema.tables.segments import (
     warn_once,
 )
 
-ROWS_AT_ONCE = 50_000
-"""Rows of several islands that are sorted in memory together."""
+BYTES_AT_ONCE = 64 * 2**20
+"""Size of the rows of several islands that are sorted in memory together, about."""
 
 
 class Stored(NamedTuple):
@@ -87,22 +87,24 @@ def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
     """Yield these rows sorted by island, with new record numbers.
 
-    At most ``ROWS_AT_ONCE`` rows, or one batch, are in memory at a time. No batch is
+    Rows of about ``BYTES_AT_ONCE``, or one batch, are in memory at a time. No batch is
     empty.
 
     Raises:
         RunFolderError: a segment of another version.
     """
     counts: Counter[int] = Counter()
+    size = 0
     if "island" in TABLES[table].names:
         for batch in stored_batches(folder, table):
+            size += batch.nbytes
             for each in pc.value_counts(batch["island"]).to_pylist():
                 counts[each["values"]] += each["counts"]
     if len(counts) <= 1:
         yield from filter(len, stored_batches(folder, table))
         return
     rows = 0
-    for islands in _read_together(counts):
+    for islands in _read_together(counts, BYTES_AT_ONCE * counts.total() // size):
         for own in _of_islands(folder, table, islands):
             numbers = pa.array(range(rows, rows + own.num_rows), pa.int64())
             rows += own.num_rows
@@ -110,17 +112,17 @@ def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
             yield pa.RecordBatch.from_arrays(columns, schema=TABLES[table])
 
 
-def _read_together(counts: Mapping[int, int]) -> Iterator[list[int]]:
+def _read_together(counts: Mapping[int, int], most: int) -> Iterator[list[int]]:
     """Yield all islands in order, in groups that are read in one pass.
 
     Args:
-        counts: number of rows by island. A group with more than ``ROWS_AT_ONCE`` rows
-            has one island.
+        counts: number of rows by island.
+        most: rows of a group of several islands.
     """
     group: list[int] = []
     rows = 0
     for island in sorted(counts):
-        if group and rows + counts[island] > ROWS_AT_ONCE:
+        if group and rows + counts[island] > most:
             yield group
             group, rows = [], 0
         group.append(island)

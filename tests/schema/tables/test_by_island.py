@@ -48,14 +48,16 @@ def count_passes(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("at_once", "most"), [(1, 1 + ISLANDS), (30, 1 + ISLANDS // 2), (ROWS, 2)]
+    ("share", "most"), [(0.0, 1 + ISLANDS), (0.3, 1 + ISLANDS // 2), (1.0, 2)]
 )
 def test_rows_are_sorted_by_island_and_numbered_anew(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, at_once: int, most: int
+    folder: Path, monkeypatch: pytest.MonkeyPatch, share: float, most: int
 ) -> None:
     """The first pass counts the rows of each island."""
-    monkeypatch.setattr(files, "ROWS_AT_ONCE", at_once)
-    rows = pa.Table.from_batches(stored_batches(folder, "evaluations")).to_pylist()
+    batches = list(stored_batches(folder, "evaluations"))
+    size = int(share * sum(batch.nbytes for batch in batches))
+    monkeypatch.setattr(files, "BYTES_AT_ONCE", size)
+    rows = pa.Table.from_batches(batches).to_pylist()
     rows.sort(key=lambda row: row["island"])
     passes = count_passes(monkeypatch)
     found = list(batches_by_island(folder, "evaluations"))
