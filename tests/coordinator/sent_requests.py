@@ -46,7 +46,7 @@ VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
 class SentRequests:
     """Requests whose jobs are recorded, with two workers and an analyzer."""
 
-    def __init__(self, evaluation: bytes = b"evaluation", audit: float = 0.0) -> None:
+    def __init__(self, evaluation: bytes = b'"evaluation"', audit: float = 0.0) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[int, str]] = []
         self.fleet = Fleet(self)
@@ -55,7 +55,7 @@ class SentRequests:
         context = RunContext(
             CLIENT,
             ORIGIN,
-            b"vetting",
+            b'"vetting"',
             {0: evaluation, 2: evaluation},
             {},
             {0: experiment, 2: experiment},

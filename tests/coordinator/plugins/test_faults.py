@@ -184,7 +184,7 @@ EXPECTED = {
     "missing": "has no 'Nobody'$",
     "misspelt": "did you mean '.*'",
     "arity": "arguments?\\b",
-    "type": "must return|expected step to return|outputs of shape",
+    "type": "must return|expected step to return|outputs (of shape|must be)",
     "finite": "finite|different whole numbers",
     "repeatable": "the same|expected equal|must be equal",
     "exit": "SystemExit: 3$",

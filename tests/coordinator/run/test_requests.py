@@ -63,9 +63,9 @@ def test_a_request_carries_the_run_its_settings_and_the_robot(
     assert (judge, worker) == ("judge", "one")
     asked = decode_request(vetting, decode_body)
     assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, vet)
-    assert (asked.settings, asked.robot) == (b"vetting", Robot(ROBOT.parts))
+    assert (asked.settings, asked.robot) == (b'"vetting"', Robot(ROBOT.parts))
     asked = decode_request(evaluation)
-    assert (asked.settings, asked.robot) == (b"evaluation", ROBOT)
+    assert (asked.settings, asked.robot) == (b'"evaluation"', ROBOT)
 
 
 def test_vetting_sends_the_body_and_evaluation_the_whole_robot(
