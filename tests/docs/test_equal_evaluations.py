@@ -15,9 +15,9 @@ ROWS = [
     row("robust", 0.1, 0.2, 0.19),
     row("robust", 0.3, 0.4, 0.40),
     row("robust", 0.2, 0.3, 0.15),
+    row("scenario1", 0.4, 0.6, 0.30),
     row("scenario1", 0.5, 0.6, 0.30),
-    row("scenario1", 0.5, 0.6, 0.30),
-    row("scenario1", 0.5, 0.6, 0.30),
+    row("scenario1", 0.6, 0.6, 0.30),
 ]
 
 
@@ -26,10 +26,10 @@ def test_tables_of_the_pages_are_those_of_the_rows() -> None:
 
 
 def test_difference_by_hand() -> None:
-    # Student's t with 2 degrees of freedom: 4.303 * 0.1 / sqrt(3) = 0.2484.
+    # Student's t with 4 degrees of freedom: 2.776 * 0.1 * sqrt(2 / 3) = 0.2267.
     # Rank sums: one of 20 ways is as extreme, on each side; ties change nothing.
     *_, difference = compared("robust", ROWS)
-    assert "-0.3000 (-0.5484 to -0.0516), p = 0.1" in difference
+    assert "-0.3000 (-0.5267 to -0.0733), p = 0.1" in difference
 
 
 def test_shares_of_winners_by_hand() -> None:
