@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from schema.experiment.document import Space
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
 from schema.robot.ids import BirthId
 
 
@@ -94,9 +94,8 @@ def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
 def to_branches(genome: Genome, space: BodySpace) -> list[MutableGenome]:
     """Return the branches of a genome's mutable tree, depth first."""
     branches: list[MutableGenome] = []
-    stack: list[tuple[Node, MutableGenome | None, int]] = [(genome, None, -1)]
-    while stack:
-        node, parent, slot = stack.pop()
+    for node, parent, slot in walk(genome):
+        above = branches[parent] if parent >= 0 else None
         branch = MutableGenome(
             space[node.kind],
             node.slot,
@@ -106,14 +105,12 @@ def to_branches(genome: Genome, space: BodySpace) -> list[MutableGenome]:
             node.outputs,
             node.hidden,
             node.connections,
-            parent,
+            above,
             slot,
         )
         branches.append(branch)
-        if parent is not None:
-            parent.children[slot] = branch
-        if node.children:
-            stack += [(child, branch, own) for own, child in reversed(node.children)]
+        if above is not None:
+            above.children[slot] = branch
     return branches
 
 

@@ -61,13 +61,9 @@ def _problems(experiment: Experiment) -> Iterator[str]:
                 "sweep: stands for several experiments; only revolve run and "
                 "revolve check take all of them"
             )
-    first = 0
-    for index, islands in enumerate(experiment.islands):
-        for problem in _island_problems(island_experiment(experiment, first)):
-            yield f"islands[{index}]: {problem}"
-        first += islands.count
-    if not experiment.islands:
-        yield from _island_problems(experiment)
+    for where, own in _each_island(experiment):
+        for problem in _island_problems(own):
+            yield f"{where}{problem}"
     yield from _name_problems(experiment.name)
     yield from migration_problems(experiment)
     yield from _measures_problems(experiment.measures)
@@ -99,15 +95,18 @@ def _light_sensor_problems(experiment: Experiment, types: BodySpace) -> Iterator
         f"space.part_types: the light sensor of {shown(sensing[0])} needs "
         "environment.light = [x, y, z], got none"
     )
+    for where, own in _each_island(experiment):
+        if not light_of(own.environment, own.arena):
+            yield f"{where}{problem}"
+
+
+def _each_island(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
+    """Yield where the settings of equal islands stand, and these settings."""
     if not experiment.islands:
-        if not light_of(experiment.environment, experiment.arena):
-            yield problem
-        return
+        yield "", experiment
     first = 0
     for index, islands in enumerate(experiment.islands):
-        own = island_experiment(experiment, first)
-        if not light_of(own.environment, own.arena):
-            yield f"islands[{index}]: {problem}"
+        yield f"islands[{index}]: ", island_experiment(experiment, first)
         first += islands.count
 
 

@@ -109,12 +109,8 @@ class Breaking:
         return np.where((tick.age_s > 1.0) & (inputs > 1.0), np.nan, 0.5 + 0.0 * state)
 
 
-class Picky:
+class Picky(Breaking):
     """Neuron type that raises after a second if an input is above 1."""
-
-    name = "Breaking"
-    parameters: tuple[Parameter, ...] = ()
-    states = 1
 
     def step(
         self, state: Floats, inputs: Floats, parameters: Floats, tick: Tick
