@@ -106,6 +106,11 @@ def one_line(error: BaseException) -> str:
     return " ".join(str(error).split())
 
 
+def error_text(error: BaseException) -> str:
+    """Return the type and the message of an error as one line."""
+    return f"{type(error).__name__}: {one_line(error)}"
+
+
 def shown(value: object) -> str:
     """Return a value for a message: as in Python, cut if it is long."""
     try:

@@ -7,7 +7,7 @@ import numpy as np
 
 from coordinator.evolution.brains import brain_genes
 from coordinator.evolution.revolve_angle import RevolveAngle
-from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line
+from schema.errors import ExperimentError, InvalidRobot, RevolveError, error_text
 from schema.experiment.brains import widths
 from schema.experiment.document import Experiment, body_space
 from schema.plugins.origin import where_defined
@@ -49,7 +49,7 @@ def check_brain_genes(experiment: Experiment) -> None:
     except Exception as error:
         raise ExperimentError(
             f"{place}: expected outputs, grow, prune and vary to make genes, got "
-            f"{type(error).__name__}: {one_line(error)}"
+            f"{error_text(error)}"
         ) from error
     if first != second:
         raise ExperimentError(

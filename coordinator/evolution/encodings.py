@@ -11,7 +11,14 @@ import numpy as np
 
 from coordinator.evolution.cppn.encoding import Cppn
 from coordinator.evolution.revolve_angle import RevolveAngle
-from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line, shown
+from schema.errors import (
+    ExperimentError,
+    InvalidRobot,
+    RevolveError,
+    error_text,
+    one_line,
+    shown,
+)
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import (
     REVOLVE_ANGLE,
@@ -288,5 +295,5 @@ class _Guard:
             file = frame.filename.replace("\\", "/").rpartition("/")[2]
             raise ExperimentError(
                 f"{WHERE}: {self._name!r}: {self._method} failed in "
-                f"{file}:{frame.lineno}: {type(error).__name__}: {one_line(error)}"
+                f"{file}:{frame.lineno}: {error_text(error)}"
             ) from error

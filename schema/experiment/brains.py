@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 from msgspec import Struct
 
-from schema.errors import ExperimentError, one_line
+from schema.errors import ExperimentError, error_text
 from schema.experiment.document import BrainSection, Space
 from schema.plugins.check_neuron_type import check_neuron_type
 from schema.plugins.load import load_object
@@ -147,7 +147,7 @@ def _made(kind: type[T], where: str, *arguments: object) -> T:
     except Exception as error:
         raise ExperimentError(
             f"{where}: {where_defined(kind)}: expected a class of "
-            f"{len(arguments)} arguments, got {type(error).__name__}: {one_line(error)}"
+            f"{len(arguments)} arguments, got {error_text(error)}"
         ) from error
 
 

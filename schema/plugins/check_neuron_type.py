@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from schema.errors import ExperimentError, one_line
+from schema.errors import ExperimentError, error_text
 from schema.limits import MOST_NEURON_PARAMETERS, MOST_NEURON_STATES
 from schema.parts import Parameter
 from schema.plugins.origin import where_defined
@@ -102,7 +102,7 @@ def _states(
         except Exception as error:
             raise ExperimentError(
                 f"{place}: expected step(state, inputs, parameters, tick), got "
-                f"{type(error).__name__}: {one_line(error)}"
+                f"{error_text(error)}"
             ) from error
         if after.shape != state.shape or after.dtype != np.float64:
             raise ExperimentError(

@@ -8,7 +8,7 @@ from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
 
-from schema.errors import one_line
+from schema.errors import error_text
 
 _CONSTANTS = (bool, int, float, complex, str, bytes, tuple, frozenset, type(None))
 
@@ -87,7 +87,7 @@ def raised_by(plugin: object, error: BaseException) -> str:
     """
     where = where_defined(plugin)
     line = where_raised(error, where.partition(":")[0])
-    text = f"{where}: raised {type(error).__name__}: {one_line(error)}"
+    text = f"{where}: raised {error_text(error)}"
     return f"{text} ({line})" if line else text
 
 

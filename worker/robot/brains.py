@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from schema.errors import SimulationDiverged, cut, one_line
+from schema.errors import SimulationDiverged, cut, error_text
 from schema.experiment.brains import NoParameters, brain_half, kinds_of, widths
 from schema.experiment.document import BrainSection, Space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
@@ -295,7 +295,7 @@ def story_of(error: Exception) -> str:
     """Return why a user's brain failed, as the end of a message of one line."""
     if isinstance(error, SimulationDiverged):
         return str(error)
-    return cut(f"{type(error).__name__}: {one_line(error)}")
+    return cut(error_text(error))
 
 
 Solo = SoloNetwork | SoloBank

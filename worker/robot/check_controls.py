@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from schema.errors import ExperimentError, one_line
+from schema.errors import ExperimentError, error_text
 from schema.plugins.protocols import Bank
 from schema.robot.brain import (
     INPUT,
@@ -123,7 +123,7 @@ def _guarded(compute: Callable[[], list[Floats]], place: str) -> list[Floats]:
     except Exception as error:
         raise ExperimentError(
             f"{place}: expected pack, bank and step as in BrainControl, got "
-            f"{type(error).__name__}: {one_line(error)}"
+            f"{error_text(error)}"
         ) from error
 
 

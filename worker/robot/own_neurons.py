@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from schema.errors import SimulationDiverged, cut, one_line
+from schema.errors import SimulationDiverged, cut, error_text
 from schema.plugins.protocols import NeuronType
 from schema.robot.neurons import Tick
 from schema.robot.results import Floats
@@ -95,7 +95,7 @@ class OwnNeurons:
             try:
                 result = np.asarray(kind.step(mine, inputs, parameters, tick))
             except Exception as error:
-                story = cut(f"{type(error).__name__}: {one_line(error)}")
+                story = cut(error_text(error))
                 raise SimulationDiverged(
                     f"neuron type {kind.name} raised {story}"
                 ) from error

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from schema.errors import SensorFailed, cut, one_line
+from schema.errors import SensorFailed, cut, error_text
 from schema.parts import OwnSensor, Vector
 from schema.plugins.protocols import SensorView
 from schema.plugins.sensor_checks import ray_problem, values_of
@@ -171,7 +171,7 @@ class OwnSensors:
             try:
                 values = values_of(sensor, sensor.read(seen))
             except Exception as error:
-                story = cut(f"{type(error).__name__}: {one_line(error)}")
+                story = cut(error_text(error))
                 raise SensorFailed(
                     f"sensor {type(sensor).__name__} of {where}: {story}"
                 ) from error
