@@ -58,7 +58,7 @@ class Robot:
             path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
             experiment: whose part types are allowed, and whose simulation and fitness
                 apply; None: the built-in part types, and those of ``scenario1``, also
-                if the file lies in a run folder.
+                if the file lies in a run folder or holds settings (MJCF).
 
         Raises:
             InvalidRobot: the file holds no robot that is well formed.

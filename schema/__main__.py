@@ -7,9 +7,8 @@ from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.errors import RevolveError, counted
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
-from schema.experiment.settings import EvaluationSettings
-from schema.formats.files import MJCF_ENDING, read_robot, settings_of, write_robot
-from schema.formats.run_settings import allow_run_of, experiment_of, types_of
+from schema.formats.files import write_robot
+from schema.formats.run_settings import read_with_settings
 from schema.parts import BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import NeuronKinds, neuron_names
@@ -31,9 +30,11 @@ def main(argv: list[str] | None = None) -> int:
     words = ["robot", *sys.argv[1:]] if argv is None else argv
     options = parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
     allow(options.plugins)
-    robot, settings, (space, kinds) = _read(
+    robot, settings, _ = read_with_settings(
         options.file, options.experiment, options.island
     )
+    space = body_space(settings.space)
+    kinds = neuron_kinds(settings.brain, settings.space)
     if options.command == "check":
         print(f"{options.file}: well formed; {_summary(robot)}")
     elif options.command == "convert":
@@ -85,26 +86,6 @@ def parser(_command: str = "robot") -> Flags:
         )
         add_plugins(command)
     return flags
-
-
-def _read(
-    path: Path, named: str | None, island: int | None
-) -> tuple[Robot, EvaluationSettings, tuple[BodySpace, NeuronKinds]]:
-    """Return a file's robot, its settings, and the part types and neuron types.
-
-    Those in an MJCF file are the default.
-    """
-    if path.suffix.lower() == MJCF_ENDING and named is None and island is None:
-        # MuJoCo is imported only if needed: it is slow to load.
-        from schema.formats.mjcf import read_mjcf
-
-        allow_run_of(path)
-        robot, settings = read_mjcf(path)
-        kinds = neuron_kinds(settings.brain, settings.space)
-        return robot, settings, (body_space(settings.space), kinds)
-    experiment = experiment_of(path, named, island)
-    types = types_of(experiment)
-    return read_robot(path, *types), settings_of(experiment), types
 
 
 def _summary(robot: Robot) -> str:

@@ -7,12 +7,8 @@ from msgspec.structs import replace
 
 from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.errors import rounded
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
-from schema.formats.files import MJCF_ENDING, read_robot, settings_of
-from schema.formats.mjcf import read_mjcf
-from schema.formats.run_settings import experiment_of, tell
+from schema.formats.run_settings import read_with_settings, tell
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
@@ -82,11 +78,10 @@ def _share(found: float | None, fitness: float) -> str:
 def _read(
     path: Path, experiment: str | None, island: int | None
 ) -> tuple[Robot, EvaluationSettings]:
-    """Return a file's robot and its settings; those of an MJCF file are the default."""
-    if path.suffix.lower() == MJCF_ENDING and experiment is None and island is None:
-        return read_mjcf(path)
-    found = experiment_of(path, experiment, island, tells_default=True)
-    settings = settings_of(found)
+    """Return a file's robot and its settings; say how its evolution differs."""
+    robot, settings, found = read_with_settings(
+        path, experiment, island, tells_default=True
+    )
     if found is not None and found.arena is not None:
         tell(
             "simulated alone; in an arena, fitness is that of a window of a robot's "
@@ -100,8 +95,7 @@ def _read(
     )
     if any(draws):
         tell("noise, pushes and [robust] use other random numbers than the run")
-    kinds = neuron_kinds(settings.brain, settings.space)
-    return read_robot(path, body_space(settings.space), kinds), settings
+    return robot, settings
 
 
 def parser(_command: str = "robot simulate") -> Flags:

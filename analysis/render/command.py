@@ -15,12 +15,9 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import Simulation, body_space
-from schema.formats.files import read_robot, settings_of
-from schema.formats.run_settings import experiment_of
+from schema.experiment.document import Simulation
+from schema.formats.run_settings import read_with_settings
 from schema.plugins.permission import allow
-from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.results import Floats
 
 FILM_ENDING = ".gif"
@@ -53,14 +50,11 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
     if is_film and options.gait:
         raise NoPictures(f"{out}: --gait needs a {PICTURE_ENDING} file")
     named, island = options.experiment, options.island
-    experiment = experiment_of(options.file, named, island, tells_default=True)
-    settings = settings_of(experiment)
+    robot, settings, _ = read_with_settings(
+        options.file, named, island, tells_default=True
+    )
     world = settings.simulation
     _check_gait(options.gait, world)
-    kinds = BUILT_IN_KINDS
-    if experiment:
-        kinds = neuron_kinds(settings.brain, settings.space)
-    robot = read_robot(options.file, body_space(settings.space), kinds)
     size = (options.width, options.width * 3 // 4)
     with RobotRenderer(robot, settings, size=size) as renderer:
         if not is_film and not options.gait:

@@ -12,11 +12,12 @@ from schema.experiment.document import (
     island_experiment,
 )
 from schema.experiment.file import own_experiment, read_experiment
-from schema.experiment.settings import evaluation_settings_of
-from schema.formats.files import BEST
+from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.formats.files import BEST, MJCF_ENDING, read_robot, settings_of
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS
+from schema.robot.robot import Robot
 from schema.tables.description import DETAILS, allow_plugins_of, read_description
 from schema.tables.last_populations import best_of, last_populations
 
@@ -82,13 +83,45 @@ def experiment_of(
     return own
 
 
-def allow_run_of(file: Path) -> None:
-    """Allow the plug-ins of the run whose folder holds a robot file, if one does.
+def read_with_settings(
+    file: Path,
+    named: str | None,
+    island: int | None = None,
+    *,
+    tells_default: bool = False,
+) -> tuple[Robot, EvaluationSettings, Experiment | None]:
+    """Return a file's robot, its evaluation settings and their experiment.
+
+    An MJCF file holds its settings: they apply unless the user names others.
+
+    Args:
+        file: as of ``experiment_of``.
+        named: as of ``experiment_of``.
+        island: as of ``experiment_of``.
+        tells_default: as of ``experiment_of``.
+
+    Returns:
+        The robot, the settings and the experiment; of an MJCF file's own settings and
+        of the default ones, the experiment is None.
 
     Raises:
-        ExperimentError: a plug-in of the run that is missing or not the user's own.
-        RunFolderError: the description of the run is damaged.
+        InvalidRobot: the file holds no robot that is well formed.
+        MalformedMessage: a .pb file that does not hold a robot.
+        ExperimentError: as of ``experiment_of``.
+        RunFolderError: as of ``experiment_of``.
     """
+    if file.suffix.lower() == MJCF_ENDING and named is None and island is None:
+        # MuJoCo is imported only if needed: it is slow to load.
+        from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
+
+        _allow_run_of(file)
+        return (*read_mjcf(file), None)
+    found = experiment_of(file, named, island, tells_default=tells_default)
+    return read_robot(file, *types_of(found)), settings_of(found), found
+
+
+def _allow_run_of(file: Path) -> None:
+    """Allow the plug-ins of the run whose folder holds a robot file, if one does."""
     if (file.parent / DETAILS).is_file():
         allow_plugins_of(file.parent)
         own_experiment(read_description(file.parent).document)

@@ -12,7 +12,7 @@ from schema.errors import ExperimentError, InvalidRobot, RunFolderError
 from schema.experiment.file import experiment_text, parse_experiment, read_experiment
 from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import settings_of
-from schema.formats.run_settings import experiment_of
+from schema.formats.run_settings import experiment_of, read_with_settings
 from schema.plugins import permission
 from schema.plugins.kept import kept_file, plugins_to_keep
 from schema.tables.description import Description, description_text
@@ -166,6 +166,20 @@ def test_own_part_types_of_the_run_are_known(
 ) -> None:
     assert main(["robot", "show", str(paddle)]) == 0
     assert "part-1 Paddle" in capsys.readouterr().out
+
+
+def test_mjcf_file_of_the_run_has_its_own_settings_and_the_runs_part_types(
+    paddle: Path,
+) -> None:
+    mjcf = paddle.with_suffix(".xml")
+    assert main(["robot", "convert", str(paddle), str(mjcf)]) == 0
+    own = experiment_of(paddle, None)
+    permission._allowed.clear()
+    robot, settings, found = read_with_settings(mjcf, None, tells_default=True)
+    assert ([part.kind for part in robot.parts], found) == (["Core", "Paddle"], None)
+    assert settings == settings_of(own)
+    with pytest.raises(InvalidRobot, match=r"must be one of .*, got 'Paddle'"):
+        read_with_settings(mjcf, "scenario1")
 
 
 def test_plug_in_of_another_user_is_not_imported(
