@@ -42,7 +42,8 @@ _WAIT_GROWTH = 10.0
 """Growth of that time with every reply that did not come."""
 LOOK_S = 0.25
 """Interval between checks for late jobs [s]."""
-_MOST_DOUBLINGS = 16
+_MOST_GROWTHS = 16
+"""A time that grows with each failure is constant after this number of them."""
 _PROVIDED = 1e6
 """Above the load of any agent that needs jobs."""
 
@@ -376,7 +377,7 @@ class Deadlines:
         first_s = FIRST_S
         if typical_s is not None:
             first_s = max(self._least_s, PATIENCE * typical_s)
-        return first_s * float(2 ** min(misses, _MOST_DOUBLINGS))
+        return first_s * float(2 ** min(misses, _MOST_GROWTHS))
 
     def wait_s(self, kind: Hashable, lost: int) -> float:
         """Return the time without a reply after which a job counts as lost [s].
@@ -392,4 +393,4 @@ class Deadlines:
         if typical_s is None:
             return LONGEST_WAIT_S
         wait_s = max(LEAST_WAIT_S, _WAIT * typical_s)
-        return min(LONGEST_WAIT_S, wait_s * _WAIT_GROWTH ** min(lost, _MOST_DOUBLINGS))
+        return min(LONGEST_WAIT_S, wait_s * _WAIT_GROWTH ** min(lost, _MOST_GROWTHS))
