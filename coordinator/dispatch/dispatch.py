@@ -43,6 +43,7 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     FIRST_S,
+    LONGEST_WAIT_S,
     LOOK_S,
     REPLY_S,
     AgentState,
@@ -152,9 +153,15 @@ class Dispatch:
         return self._pools[kind].agents[agent].joined.platform if kind else ""
 
     def wait_s(self, job: Job) -> float:
-        """Return the time without a reply after which a pending job is lost [s]."""
-        lost = self._jobs[job.number].lost.total()
-        return self._deadlines.wait_s(job.kind, lost)
+        """Return for how long the network waits for the reply to a job [s]."""
+        # Calls take as long as the user's functions do, which differ.
+        is_call = job.kind == "call"
+        return LONGEST_WAIT_S if is_call else self._deadlines.wait_s(job.kind)
+
+    def payload(self, number: int, agent: str) -> bytes | None:
+        """Return the request of a job that an agent has; None: it has no such job."""
+        pending = self._jobs.get(number)
+        return pending.job.payload if pending and agent in pending.holders else None
 
     @property
     def pause_s(self) -> float:

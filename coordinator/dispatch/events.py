@@ -111,16 +111,17 @@ class Returned:
         agent: that had it.
         outcome: "ok" with an answer, "error" with a reason (the agent could not
             do it), "unfit" with a reason (it cannot do any job of this client),
-            "lost" (no reply: the agent died, froze or was cut off), "fenced" (it
-            knows a later coordinator of the run) or "cancelled".
+            "lost" (no reply: the agent died, froze or was cut off), "expired" (no
+            reply in the time that the network waits for one), "fenced" (it knows a
+            later coordinator of the run) or "cancelled".
         answer: encoded answer; empty unless ok.
-        reason: of the agent; empty if ok or lost.
-        took_s: time from sending the job to its answer [s]; None: not measured.
+        reason: of the agent; empty if ok, lost or expired.
+        took_s: time from sending the job to its answer or end [s]; None: not measured.
     """
 
     number: int
     agent: str
-    outcome: Literal["ok", "error", "unfit", "lost", "fenced", "cancelled"]
+    outcome: Literal["ok", "error", "unfit", "lost", "expired", "fenced", "cancelled"]
     answer: bytes = b""
     reason: str = ""
     took_s: float | None = None
@@ -272,13 +273,15 @@ class ShardReturned:
         outcome: "done"; "stateless" (the worker does not have the state); "error"
             with a reason; "unfit" (it cannot do any job of the shard's client);
             "malformed" (an answer that is not believed) with a reason; "lost" (no
-            reply).
-        reason: empty unless error or malformed.
+            reply); "unsent" with a reason (its request could not be made).
+        reason: empty unless error, malformed or unsent.
         answer: decoded; None unless done.
     """
 
     number: int
-    outcome: Literal["done", "stateless", "error", "unfit", "malformed", "lost"]
+    outcome: Literal[
+        "done", "stateless", "error", "unfit", "malformed", "lost", "unsent"
+    ]
     reason: str = ""
     answer: object = None
 
@@ -353,7 +356,13 @@ class ShardDone:
 
 @dataclass(frozen=True, slots=True)
 class ShardFailed:
-    """The advance of a shard is given up, last tried by an agent."""
+    """The advance of a shard is given up.
+
+    Attributes:
+        shard: number of the shard.
+        agent: the last that tried; empty if the request could not be made.
+        reason: of the last failure.
+    """
 
     shard: int
     agent: str

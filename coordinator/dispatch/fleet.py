@@ -6,7 +6,7 @@ An answer is returned to the client that requested the job, which interprets it.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Literal, Protocol
 
@@ -43,9 +43,9 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.faults import PeerFaults
-from coordinator.dispatch.pool import LONGEST_WAIT_S
+from coordinator.dispatch.pool import longer_s
 from coordinator.dispatch.shards import ShardDispatch
-from schema.errors import MalformedMessage
+from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.decoding import fingerprint
 
 
@@ -59,7 +59,7 @@ class Agents(Protocol):
             number: of the job.
             agent: that gets it.
             payload: an encoded request.
-            wait_s: time without a reply after which the job is lost [s].
+            wait_s: time without a reply after which its outcome is "expired" [s].
         """
 
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
@@ -75,7 +75,10 @@ class Agents(Protocol):
 
 
 Encode = Callable[[AssignShard], tuple[bytes, Read]]
-"""Returns the request of an advance, and what decodes and checks its answer."""
+"""Returns the request of an advance, and what decodes and checks its answer.
+
+It raises ``RunFolderError`` if a state that the request needs cannot be read.
+"""
 
 End = Deliver | ShardDone | ShardFailed
 """Result of a job or an advance, as its client receives it."""
@@ -213,6 +216,10 @@ class Fleet:
 
     def tell(self, event: DispatchEvent) -> None:
         """Handle an event of agents, of jobs or of time."""
+        if isinstance(event, Returned) and event.outcome == "expired":
+            if self._send_again(event):
+                return
+            event = replace(event, outcome="lost")
         if isinstance(event, Returned) and event.outcome in ("fenced", "cancelled"):
             self._note_declined(event)
         if isinstance(event, Died):
@@ -232,6 +239,23 @@ class Fleet:
             self._shard_clients and isinstance(event, Ticked)
         ):
             self._move(event)
+
+    def _send_again(self, event: Returned) -> bool:
+        """Send a job again to the agent that has it; return whether it has it.
+
+        An agent keeps what it works at, however long that takes. It answers a request
+        that comes again from memory if the job took long.
+        """
+        number, agent = event.number, event.agent
+        shard = self.shards.shard_of(number)
+        if shard is None:
+            payload = self.dispatch.payload(number, agent)
+        else:
+            payload = self._advances[number][1]
+        if payload is None:
+            return False
+        self._agents.send(number, agent, payload, longer_s(event.took_s or 0.0))
+        return True
 
     def _advance_killed(self, event: Died, shard: int) -> None:
         """Pass on that an advance crashed its worker, if it was this client's."""
@@ -292,12 +316,8 @@ class Fleet:
                     self._agents.cancel(agent, job.payload)
                 case Deliver(job):
                     self._ends.setdefault(job.client, []).append(command)
-                case AssignShard(number, shard, agent):
-                    payload, read = self._shard_clients[shard][1](command)
-                    self._advance_reads[number] = read
-                    self._advances[number] = (shard, payload)
-                    # A rebuild may take very much longer than an advance.
-                    self._agents.send(number, agent, payload, LONGEST_WAIT_S)
+                case AssignShard():
+                    self._assign_advance(command)
                 case CancelShard(number, _, agent):
                     self._agents.cancel(agent, self._advances[number][1])
                 case ShardDone(shard) | ShardFailed(shard):
@@ -309,6 +329,20 @@ class Fleet:
                     self._agents.ask(agent)
                 case Crowded() | Overdue():
                     self._warn(_line(command))
+
+    def _assign_advance(self, command: AssignShard) -> None:
+        """Send an advance to a worker, or give it up if its request cannot be made."""
+        number, shard, agent = command.number, command.shard, command.agent
+        try:
+            payload, read = self._shard_clients[shard][1](command)
+        except RunFolderError as error:
+            self._move(ShardReturned(number, "unsent", str(error)))
+            # Its worker is free again.
+            self._obey(self.dispatch.handle(Returned(number, agent, "lost")))
+            return
+        self._advance_reads[number] = read
+        self._advances[number] = (shard, payload)
+        self._agents.send(number, agent, payload, self.shards.wait_s(command))
 
     def _move(self, event: ShardEvent) -> None:
         """Pass an event to ``shards``, and carry out its commands."""

@@ -35,15 +35,14 @@ FIRST_S = 60.0
 LONGEST_WAIT_S = 7 * 24 * 3600.0
 """Effectively no limit: a week is longer than any job [s]."""
 LEAST_WAIT_S = 300.0
-"""A job without a reply never counts as lost before this time [s]."""
+"""Least time for which the network waits for a reply [s]."""
 _WAIT = 100.0
-"""A job without a reply is lost after this multiple of the typical duration."""
+"""That time as a multiple of the typical duration."""
 _WAIT_GROWTH = 10.0
-"""Growth of that time with every reply that did not come."""
+"""Growth of that time with each request that is sent again."""
 LOOK_S = 0.25
 """Interval between checks for late jobs [s]."""
-_MOST_GROWTHS = 16
-"""A time that grows with each failure is constant after this number of them."""
+_MOST_DOUBLINGS = 16
 _PROVIDED = 1e6
 """Above the load of any agent that needs jobs."""
 
@@ -377,20 +376,21 @@ class Deadlines:
         first_s = FIRST_S
         if typical_s is not None:
             first_s = max(self._least_s, PATIENCE * typical_s)
-        return first_s * float(2 ** min(misses, _MOST_GROWTHS))
+        return first_s * float(2 ** min(misses, _MOST_DOUBLINGS))
 
-    def wait_s(self, kind: Hashable, lost: int) -> float:
-        """Return the time without a reply after which a job counts as lost [s].
+    def wait_s(self, kind: Hashable) -> float:
+        """Return for how long the network waits for a reply [s].
 
         The network holds some memory of each request until this time is over, even if
-        the reply came long ago: half a kilobyte, three times per birth.
-
-        Args:
-            kind: of the job.
-            lost: how many times its reply did not come.
+        the reply came long ago: half a kilobyte, three times per birth. A request whose
+        time is over is sent again, see ``longer_s``.
         """
         typical_s = self._typical_s.get(kind)
         if typical_s is None:
             return LONGEST_WAIT_S
-        wait_s = max(LEAST_WAIT_S, _WAIT * typical_s)
-        return min(LONGEST_WAIT_S, wait_s * _WAIT_GROWTH ** min(lost, _MOST_GROWTHS))
+        return min(LONGEST_WAIT_S, max(LEAST_WAIT_S, _WAIT * typical_s))
+
+
+def longer_s(wait_s: float) -> float:
+    """Return for how long to wait for a reply that did not come in some time [s]."""
+    return min(LONGEST_WAIT_S, _WAIT_GROWTH * wait_s)

@@ -36,7 +36,7 @@ from coordinator.dispatch.events import (
     ShardSeen,
     Ticked,
 )
-from coordinator.dispatch.pool import FIRST_S, LOOK_S, Deadlines, Pool
+from coordinator.dispatch.pool import FIRST_S, LONGEST_WAIT_S, LOOK_S, Deadlines, Pool
 from schema.errors import UnexpectedEvent
 
 MAX_ERRORS = 3
@@ -155,6 +155,11 @@ class ShardDispatch:
     def shard_of(self, number: int) -> int | None:
         """Return the shard that a job advances at present."""
         return self._out.get(number)
+
+    def wait_s(self, job: AssignShard) -> float:
+        """Return for how long the network waits for the reply to an advance [s]."""
+        # A rebuild may take very much longer than an advance.
+        return LONGEST_WAIT_S if job.is_whole else self._deadlines.wait_s(job.shard)
 
     def shard_that_lost(self, number: int) -> int | None:
         """Return the shard whose present advance lost a job without reply."""
@@ -321,6 +326,15 @@ class ShardDispatch:
             shard.has_state = False
             return []
         self._unbind(shard)
+        if event.outcome == "unsent":
+            return self._give_up(number, "", event.reason)
+        return self._failed(number, agent, event)
+
+    def _failed(
+        self, number: int, agent: str, event: ShardReturned
+    ) -> list[ShardCommand]:
+        """Note that a worker did not make an advance."""
+        shard = self._shards[number]
         if event.outcome == "unfit":
             self._workers.agents[agent].unfit_for.add(shard.client)
             return []

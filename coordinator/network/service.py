@@ -56,6 +56,7 @@ _NOW = zenoh.ConsolidationMode.NONE
 _MOST_EVENTS = 1000
 _MOST_NEWS = 10_000
 _LOOK_S = 1.0
+_NEARLY = 0.99
 # Properties that are malformed are hardly better after a second.
 _MALFORMED_SILENCES = 5
 _THREAD = threading.local()
@@ -98,7 +99,14 @@ class _Asked:
     def end(self) -> None:
         """End the query; called exactly once, with a reply or without."""
         if self.reply is None:
+            self.took_s = time.monotonic() - self.asked_s
             self.inbox.put(self)
+
+    @property
+    def is_expired(self) -> bool:
+        """Whether it ended without a reply because its time was over."""
+        # The hub measures the time by itself.
+        return self.reply is None and self.took_s >= _NEARLY * self.wait_s
 
     def _pass_on(self, kind: FaultKind) -> None:
         """Report a reply that does not count, once for each query."""
@@ -260,7 +268,7 @@ class Network:
             number: of the job.
             agent: that has joined; if it has left since, the job is lost.
             payload: an encoded request.
-            wait_s: time without a reply after which the job is lost [s].
+            wait_s: time without a reply after which its outcome is "expired" [s].
         """
         if member := self._membership.joined.get(agent):
             asked = _Asked(member, number, self._inbox, wait_s)
@@ -412,6 +420,8 @@ class Network:
                 # It may be gone although its token is not: another process can
                 # declare the same one.
                 self._info_queue.add(asked.member)
+            if asked.is_expired:
+                return [Returned(number, agent, "expired", took_s=asked.took_s)]
             return [Returned(number, agent, "lost")]
         if reply.ok is not None:
             answer = reply.ok.payload.to_bytes()

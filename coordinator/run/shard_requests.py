@@ -26,7 +26,12 @@ from coordinator.run.advance_checks import (
 )
 from coordinator.run.drift import Drift, with_losses
 from coordinator.run.run_context import RunContext
-from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
+from schema.errors import (
+    JobRefused,
+    MalformedMessage,
+    RunFolderError,
+    UnexpectedEvent,
+)
 from schema.experiment.document import body_space
 from schema.parts import BodySpace, Vector
 from schema.plugins.source import plugins_of
@@ -262,8 +267,10 @@ class ShardRequests:
         past.may_be_kept = True
         return drift
 
-    def refusal(self, end: ShardFailed) -> JobRefused:
+    def refusal(self, end: ShardFailed) -> JobRefused | RunFolderError:
         """Return the error that stops a run whose arena cannot be advanced."""
+        if not end.agent:
+            return RunFolderError(end.reason)
         return JobRefused(
             f"arena {self._islands[end.shard]}: several workers cannot advance it, the "
             f"last of them {end.agent}: {end.reason}; fix that and resume"

@@ -61,6 +61,10 @@ class Snapshots:
         path = self._path(shard, step)
         try:
             return path.read_bytes()
+        except FileNotFoundError:
+            raise RunFolderError(
+                f"{path}: is missing: resume; its state is computed again"
+            ) from None
         except OSError as error:
             raise RunFolderError(
                 f"{path}: {unreadable(error)}: remove it and resume; "

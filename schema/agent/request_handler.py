@@ -10,6 +10,7 @@ that was not repeats the job.
 """
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -32,6 +33,9 @@ from schema.wire import revolve_pb2 as pb
 from schema.wire.decoding import fingerprint, parsed, require_most
 
 _MOST_REMEMBERED = 1000
+LONG_S = 60.0
+"""Answers to jobs that took as long are kept: their requests may come again [s]."""
+_MOST_LONG = 32
 _CANCELLED_S = 10.0
 """Time after which a cancelled job that waits loses its process [s]."""
 
@@ -185,6 +189,7 @@ class Server:
     _fenced: dict[tuple[str, int], None] = field(default_factory=dict)
     _cancelled: dict[Task, None] = field(default_factory=dict)
     _skipped: dict[Task, None] = field(default_factory=dict)
+    _answers: dict[Task, bytes] = field(default_factory=dict)
 
     @property
     def info(self) -> bytes:
@@ -230,11 +235,14 @@ class Server:
         try:
             request = self._checked(data)
             task = self._task(request, data)
+            if task in self._answers:
+                return Reply(self._answers[task])
             # A job that comes again is wanted, whatever cancelled it before.
             if task in self._cancelled and task not in self._skipped:
                 _remember(task, None, self._skipped)
                 self.counts.skipped += 1
                 return Reply(reason=CANCELLED)
+            began_s = time.monotonic()
             self.watch.begin(task)
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
@@ -252,6 +260,8 @@ class Server:
         finally:
             self.watch.end()
         self.counts.answered += 1
+        if time.monotonic() - began_s >= LONG_S:
+            _remember(task, answer, self._answers, _MOST_LONG)
         return Reply(answer)
 
     def look(self) -> None:
@@ -310,8 +320,10 @@ def _parsed(data: bytes) -> pb.Request:
     return request
 
 
-def _remember(key: K, value: V, known: dict[K, V]) -> None:
+def _remember(
+    key: K, value: V, known: dict[K, V], most: int = _MOST_REMEMBERED
+) -> None:
     """Add an entry to a limited number of them; the oldest is forgotten."""
     known[key] = value
-    if len(known) > _MOST_REMEMBERED:
+    if len(known) > most:
         del known[next(iter(known))]

@@ -47,6 +47,7 @@ from coordinator.dispatch.pool import (
     PATIENCE,
     PAUSE_S,
     REPLY_S,
+    longer_s,
 )
 from schema.errors import UnexpectedEvent
 from schema.wire.decoding import fingerprint
@@ -292,22 +293,19 @@ def test_lost_jobs_are_never_given_up() -> None:
         assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(0, "a")]
 
 
-def test_a_reply_has_ever_more_time_after_each_loss() -> None:
+def test_the_network_waits_for_a_multiple_of_the_typical_duration() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     assert dispatch.wait_s(job(0)) == LONGEST_WAIT_S
     dispatch.handle(replace(ok(0, "a"), took_s=20.0))
-    dispatch.handle(Requested(job(1)))
-    for tries in range(1, 4):
-        assert dispatch.wait_s(job(1)) == pytest.approx(2000.0 * 10.0 ** (tries - 1))
-        dispatch.handle(lost(1, "a"))
-        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(1, "a")]
-    assert dispatch.wait_s(job(1)) == LONGEST_WAIT_S
+    assert dispatch.wait_s(job(1)) == pytest.approx(2000.0)
+    assert dispatch.wait_s(Job(2, "call", b"")) == LONGEST_WAIT_S
+    assert longer_s(2000.0) == 20_000.0
+    assert longer_s(200_000.0) == LONGEST_WAIT_S
 
 
-def test_a_reply_has_a_least_time() -> None:
+def test_the_network_waits_for_a_least_time() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     dispatch.handle(replace(ok(0, "a"), took_s=0.01))
-    dispatch.handle(Requested(job(1)))
     assert dispatch.wait_s(job(1)) == LEAST_WAIT_S
 
 

@@ -20,8 +20,8 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.fleet import Fleet
-from coordinator.dispatch.pool import FIRST_S, REPLY_S
-from schema.errors import MalformedMessage
+from coordinator.dispatch.pool import FIRST_S, LONGEST_WAIT_S, REPLY_S
+from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.decoding import fingerprint
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
@@ -44,6 +44,7 @@ class Agents:
 
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
+        self.waits_s: list[float] = []
         self.cancelled: list[tuple[str, bytes]] = []
         self.asked: list[str] = []
         self.pauses_s: list[float] = []
@@ -52,8 +53,9 @@ class Agents:
             Joined("two", "worker", 2, "p"),
         ]
 
-    def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
+    def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
         self.sent.append((number, agent, payload))
+        self.waits_s.append(wait_s)
 
     def cancel(self, agent: str, payload: bytes, /) -> None:
         self.cancelled.append((agent, payload))
@@ -184,6 +186,74 @@ def test_a_job_that_its_agent_declined_is_given_to_another(
         assert len(told) == 6
     else:
         assert fleet.faults.total("cancelled") == 6
+
+
+def test_a_job_whose_wait_is_over_stays_with_its_worker(
+    fleet: Fleet, agents: Agents
+) -> None:
+    request(fleet)
+    shard = new_shard(fleet)
+    fleet.advance(shard)
+    first = list(agents.sent)
+    for wait_s in (300.0, 3000.0):
+        agents.news = [
+            Returned(number, agent, "expired", took_s=wait_s)
+            for number, agent, _ in first
+        ]
+        assert fleet.listen(0.0, wait_s) == {}
+        assert agents.waits_s[-2:] == [10.0 * wait_s] * 2
+    assert agents.sent == 3 * first
+    agents.news = [Returned(number, agent, "ok", b"x") for number, agent, _ in first]
+    (delivered,), (done,) = fleet.listen(0.0, 4000.0).values()
+    assert isinstance(delivered, Deliver)
+    assert done == ShardDone(shard, first[1][1], b"x")
+    assert (fleet.late, fleet.open) == (0, 0)
+
+
+def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
+    fleet: Fleet, agents: Agents
+) -> None:
+    request(fleet)
+    ((number, agent, _),) = agents.sent
+    fleet.leave(CLIENT)
+    agents.news = [Returned(number, agent, "expired", took_s=300.0)]
+    assert fleet.listen(0.0, 300.0) == {}
+    assert len(agents.sent) == 1
+    assert fleet.dispatch.assigned("worker") == 0
+
+
+def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
+    fleet: Fleet, agents: Agents
+) -> None:
+    shard = new_shard(fleet)
+    for now_s in (20.0, 40.0):
+        fleet.advance(shard)
+        number, agent, _ = agents.sent[-1]
+        agents.news = [Returned(number, agent, "ok", b"x")]
+        fleet.listen(0.0, now_s)
+    fleet.advance(shard)
+    # The first one holds what is needed to rebuild the state.
+    assert agents.waits_s == [LONGEST_WAIT_S, LONGEST_WAIT_S, pytest.approx(2000.0)]
+
+
+def test_a_state_that_cannot_be_read_ends_only_its_own_run(
+    fleet: Fleet, agents: Agents
+) -> None:
+    def unreadable(_command: AssignShard) -> tuple[bytes, Read]:
+        raise RunFolderError("island-0-5.bin: is missing")
+
+    shards = [fleet.new_shard(CLIENT, unreadable, ""), new_shard(fleet)]
+    for shard in shards:
+        fleet.advance(shard)
+    fleet.tell(Left("two"))
+    ((number, agent, _),) = agents.sent[-1:]
+    agents.news = [Returned(number, agent, "ok", b"x")]
+    assert fleet.listen(0.0, 1.0) == {
+        CLIENT: [ShardFailed(shards[0], "", "island-0-5.bin: is missing")],
+        ARENA: [ShardDone(shards[1], agent, b"x")],
+    }
+    assert fleet.open == 0
+    assert not any(a.busy for a in fleet.dispatch.workers.agents.values())
 
 
 @pytest.mark.parametrize("outcome", ["fenced", "cancelled"])

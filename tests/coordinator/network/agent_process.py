@@ -2,12 +2,14 @@
 
 Arguments: the agent's role, name and hub, and its behaviour. ``good`` answers;
 ``stuck`` prints a line and never answers; ``slow`` prints a line and answers when told
-to; ``busy`` computes for ever; ``old`` has another version.
+to; ``long`` is like it, and its jobs count as long; ``busy`` computes for ever;
+``old`` has another version.
 """
 
 import sys
 import threading
 
+from schema.agent import request_handler
 from schema.agent.network import Agent
 from schema.agent.platform_tag import wire_version
 from schema.agent.service import serve
@@ -24,10 +26,10 @@ def answer(request: bytes) -> bytes:
         raise MalformedMessage("settings: bad")
     if asked.settings == b"bug":
         raise ZeroDivisionError("a plug-in's own")
-    if BEHAVIOUR in {"stuck", "slow", "busy"}:
+    if BEHAVIOUR in {"stuck", "slow", "long", "busy"}:
         sys.stdout.write("begun\n")
         sys.stdout.flush()
-    if BEHAVIOUR == "slow":
+    if BEHAVIOUR in {"slow", "long"}:
         sys.stdin.readline()
     if BEHAVIOUR == "stuck":
         threading.Event().wait()
@@ -41,6 +43,8 @@ def answer(request: bytes) -> bytes:
 
 def main(role: Role, name: str, address: str) -> None:
     """Serve until SIGTERM."""
+    if BEHAVIOUR == "long":
+        request_handler.LONG_S = 0.0
     version = "another" if BEHAVIOUR == "old" else wire_version()
     serve(
         answer,

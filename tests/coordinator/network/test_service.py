@@ -244,11 +244,35 @@ def test_suspended_worker_leaves_and_joins_again_when_resumed(network: Network) 
         assert until(network, has(1)) == joined
 
 
-def test_a_job_without_a_reply_is_lost_after_its_wait(network: Network) -> None:
+def test_a_job_without_a_reply_expires_after_its_wait(network: Network) -> None:
     with agent(network, "w", "stuck"):
         until(network, has(1))
         network.send(0, "w", request(0), 0.5)
-        assert until(network, has(1)) == [Returned(0, "w", "lost")]
+        (event,) = until(network, has(1))
+        assert isinstance(event, Returned)
+        assert (event.number, event.agent, event.outcome) == (0, "w", "expired")
+        assert event.took_s == pytest.approx(0.5, abs=0.4)
+
+
+def test_a_long_job_that_is_asked_for_again_is_done_once(network: Network) -> None:
+    with agent(network, "w", "long") as process:
+        until(network, has(1))
+        network.send(0, "w", request(0), 0.5)
+        assert line_of(process) == "begun\n"
+        (event,) = until(network, has(1))
+        assert isinstance(event, Returned)
+        assert event.outcome == "expired"
+        network.send(0, "w", request(0), WAIT_S)
+        network.send(1, "w", request(1), WAIT_S)
+        assert process.stdin is not None
+        process.stdin.write("on\non\n")
+        process.stdin.flush()
+        events = until(network, has(2))
+        process.terminate()
+        assert process.stdout is not None
+        assert process.stdout.read().count("begun") == 1
+    told = [(e.number, e.outcome) for e in events if isinstance(e, Returned)]
+    assert told == [(0, "ok"), (1, "ok")]
 
 
 def test_the_memory_of_requests_is_free_after_their_wait(network: Network) -> None:

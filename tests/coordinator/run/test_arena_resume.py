@@ -407,7 +407,7 @@ def test_missing_snapshot_is_named(tmp_path: Path) -> None:
     ]
     assert found == [False, True, True, False]
     assert again.read(0, 9) == b"nine"
-    with pytest.raises(RunFolderError, match=r"island-0-5\.bin"):
+    with pytest.raises(RunFolderError, match=r"island-0-5\.bin: is missing: resume"):
         again.read(0, 5)
 
 

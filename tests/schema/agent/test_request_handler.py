@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from collections.abc import Callable
 
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
-from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
+from schema.agent.request_handler import LONG_S, MOST_SOURCES, FairQueue, Reply, Server
 from schema.agent.supervision import CurrentJob, Death, JobWatch, ProcessSlot, Task
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.limits import LONGEST_REASON, MOST_EPOCH, WAITING_JOB_BYTES
@@ -32,6 +33,24 @@ def test_request_gets_its_answer() -> None:
     made = server()
     assert made.reply(request()) == Reply(b"answer")
     assert (made.counts.answered, made.counts.refused) == (1, 0)
+
+
+def test_only_the_answer_to_a_long_job_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def compute(data: bytes) -> bytes:
+        asked.append(pb.Request.FromString(data).number)
+        monkeypatch.setattr(time, "monotonic", lambda: 100.0 + LONG_S * len(asked))
+        return b"%d" % asked[-1]
+
+    monkeypatch.setattr(time, "monotonic", lambda: 100.0)
+    made = server(compute)
+    assert [made.reply(request(n)).answer for n in (1, 2, 1, 2)] == [b"1", b"2"] * 2
+    assert asked == [1, 2]
+    monkeypatch.undo()
+    assert [made.reply(request(3)).answer for _ in range(2)] == [b"3", b"3"]
+    assert made.reply(request(1, epoch=2)).answer == b"1"
+    assert asked == [1, 2, 3, 3, 1]
 
 
 def test_an_older_epoch_is_fenced_once() -> None:
