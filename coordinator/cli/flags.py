@@ -1,6 +1,7 @@
 """Command line flags of the coordinator's commands."""
 
 import argparse
+import math
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS, HUB
@@ -93,7 +94,9 @@ def parser(command: str) -> Flags:
 
 
 def resume_flags(options: argparse.Namespace) -> list[str]:
-    """Return the flags with which ``revolve resume`` has the same agents and limits.
+    """Return the flags with which ``revolve resume`` does what the command does.
+
+    They are those of agents, limits and checks.
 
     Args:
         options: of ``run``, ``coordinator`` or ``resume``.
@@ -111,6 +114,9 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
         "--threads": options.threads,
         "--cpu-limit": _changed(options.cpu_limit, CPU_LIMIT_S),
         "--wait-limit": _changed(options.wait_limit, WAIT_LIMIT_S),
+        "--give-up-after": _changed(options.give_up_after, math.inf),
+        "--audit": _changed(options.audit, 0.0),
+        "--on-quarantine": "pause" if options.on_quarantine == "pause" else None,
     }
     switches = {
         "--in-process": options.in_process,

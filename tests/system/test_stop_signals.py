@@ -263,5 +263,5 @@ def test_a_lost_hub_is_told_once_and_its_return(
     second.terminate()
     assert coordinator.wait(60) == 1
     *_, last = coordinator.stderr.read().splitlines()
-    again = f"revolve resume run --workers 0 --connect {place}"
+    again = f"revolve resume run --workers 0 --connect {place} --give-up-after 8"
     assert last.endswith(f"(--give-up-after); to resume: {again}")

@@ -1,4 +1,4 @@
-"""Advice how to resume a run has the flags with which its agents are found again."""
+"""Advice how to resume a run has the flags of its agents, limits and checks."""
 
 import pytest
 
@@ -38,6 +38,12 @@ def _no_certificates(monkeypatch: pytest.MonkeyPatch) -> None:
             "resume runs/a --cpu-limit 7200 --wait-limit 0.5 --fsync --in-process",
             "--cpu-limit 7200 --wait-limit 0.5 --in-process --fsync",
         ),
+        ("resume runs/a --audit 0.1", "--audit 0.1"),
+        (
+            "run scenario1 --give-up-after 600 --on-quarantine pause --audit 1",
+            "--give-up-after 600 --audit 1 --on-quarantine pause",
+        ),
+        ("run scenario1 --on-quarantine go-on --audit 0", ""),
     ],
 )
 def test_resumed_run_has_the_same_agents_and_limits(line: str, expected: str) -> None:
