@@ -7,7 +7,7 @@ from uuid import uuid4
 
 from coordinator.cli.status import ask, ask_status
 from schema.agent.command import add_connect, add_network_flags
-from schema.agent.flags import Flags, add_count, number, whole_number
+from schema.agent.flags import Flags, add_count, birth_name, number
 from schema.agent.log import tell_user
 from schema.errors import InvalidRobot, NetworkError
 from schema.formats.files import read_robot
@@ -50,7 +50,7 @@ _EXAMPLES = {
     "pause": _ANY,
     "resume": _ANY,
     "insert": ("best.yaml --place 0.5 -1.2", "wheeled.yaml --experiment mine.toml"),
-    "remove": ("17", "17 --island 1 --connect runs/archipelago-arenas-seed1"),
+    "remove": ("17", "0:17 --island 1 --connect runs/archipelago-arenas-seed1"),
     "brain": ("17 best.yaml", "17 best.yaml --island 1"),
     "snapshot": _ANY,
 }
@@ -112,7 +112,8 @@ def _action(options: argparse.Namespace) -> OperatorAction:
     if options.action == "insert":
         place = tuple(options.place) if options.place else None
         return InsertRobot(_robot(options), place)
-    birth = BirthId(options.island, options.birth)
+    island, birth_number = options.birth
+    birth = BirthId(options.island if island is None else island, birth_number)
     if options.action == "remove":
         return RemoveRobot(birth)
     return SetBrain(birth, _robot(options))
@@ -157,7 +158,11 @@ def parser(_command: str = "arena") -> Flags:
         )
         if name in ("remove", "brain"):
             action.add_argument(
-                "birth", type=whole_number(0), metavar="BIRTH", help="birth number"
+                "birth",
+                type=birth_name,
+                metavar="BIRTH",
+                help="birth number, or ISLAND:N of a robot of another island, as the "
+                "list has it",
             )
         if name in ("insert", "brain"):
             action.add_argument(

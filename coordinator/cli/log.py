@@ -1,6 +1,5 @@
 """``revolve log``: the journal of a run as text, one line per event."""
 
-import argparse
 import json
 import sys
 import time
@@ -20,7 +19,7 @@ from coordinator.storage.journal import (
     is_empty,
     read_records,
 )
-from schema.agent.flags import Flags, add_count, whole_number
+from schema.agent.flags import Flags, add_count, birth_name
 from schema.agent.log import tell_user
 from schema.errors import RunFolderError, unreadable
 from schema.tables.description import check_folder, read_state
@@ -150,18 +149,6 @@ def _warn(line: str) -> None:
     print(line, file=sys.stderr)
 
 
-def _birth(text: str) -> tuple[int | None, int]:
-    """Return island and number of a birth; the island is optional."""
-    island, colon, number = text.rpartition(":")
-    read = whole_number(0)
-    try:
-        return read(island) if colon else None, read(number)
-    except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(
-            f"must be N or ISLAND:N in whole numbers >= 0, got {text!r}"
-        ) from None
-
-
 def parser(_command: str = "log") -> Flags:
     """Return the parser of ``revolve log``."""
     flags = Flags(
@@ -182,7 +169,7 @@ def parser(_command: str = "log") -> Flags:
     add_count(flags, "--island", None, islands, least=0)
     flags.add_argument(
         "--birth",
-        type=_birth,
+        type=birth_name,
         default=(None, None),
         metavar="N|ISLAND:N",
         help="only events of the robot with birth number N, on any island or on island "

@@ -26,6 +26,7 @@ from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.document import Experiment
 from schema.limits import LONGEST_REASON, printable
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.codec import decode_robot
 from schema.wire.operator import (
@@ -72,11 +73,11 @@ def reply_to(request: OperatorRequest, loop: Loop) -> OperatorReply:
     try:
         arena = _arena(loop, island)
         if isinstance(action, ListRobots):
-            return OperatorReply(_list(arena))
+            return OperatorReply(_list(arena, island))
         if isinstance(action, SaveSnapshot):
             loop.shard_requests.request_snapshot(island)
             return OperatorReply("the state is saved at the end of the next advance")
-        step, order = arena.next_step, _order(action, arena)
+        step, order = arena.next_step, _order(action, arena, island)
     except RevolveError as error:
         return OperatorReply(str(error), is_refused=True)
     loop.order(Commanded(island, request.request_id, step, order))
@@ -95,8 +96,14 @@ def _arena(loop: Loop, number: int) -> Arena:
 def _order(
     action: PauseArena | ResumeArena | InsertRobot | RemoveRobot | SetBrain,
     arena: Arena,
+    island: int,
 ) -> Order:
     """Return the order of an action.
+
+    Args:
+        action: what to do.
+        arena: where.
+        island: number of the arena.
 
     Raises:
         Refused: no living robot has the given birth number.
@@ -120,9 +127,11 @@ def _order(
             return insert
     living = arena.robot(action.birth)
     if living is None:
-        births = [str(one.birth.number) for one in arena.population]
-        alive, number = ", ".join(births) or "none", action.birth.number
-        raise Refused(f"birth {number}: is not alive; alive are {alive}")
+        alive = [_birth_name(one.birth, island) for one in arena.population]
+        raise Refused(
+            f"birth {_birth_name(action.birth, island)}: is not alive; alive are "
+            f"{', '.join(alive) or 'none'}"
+        )
     if isinstance(action, RemoveRobot):
         return Remove(action.birth)
     brain = decode_robot(action.robot).brain
@@ -159,17 +168,25 @@ def _check_place(place: tuple[float, float] | None, experiment: Experiment) -> N
         )
 
 
-def _list(arena: Arena) -> str:
+def _birth_name(birth: BirthId, island: int) -> str:
+    """Return the name of an arena's robot: that of an immigrant has its island."""
+    origin = "" if birth.island == island else f"{birth.island}:"
+    return f"{origin}{birth.number}"
+
+
+def _list(arena: Arena, island: int) -> str:
     """Return a line about the arena and one about each living robot."""
     state = "paused" if arena.is_paused else "running"
     now_s, wanted = arena.clock.seconds(arena.step), arena.experiment.births
     about = f"{arena.births} of {wanted} born, {len(arena.population)} alive"
-    lines = [f"{state} at {now_s:g} s, {about}", "birth  rank  fitness"]
+    names = [_birth_name(one.birth, island) for one in arena.population]
+    width = max(map(len, ["birth", *names]))
+    lines = [f"{state} at {now_s:g} s, {about}", f"{'birth':>{width}}  rank  fitness"]
     mature = {one.birth for one in arena.judged}
     lines += [
-        f"{one.birth.number:5}  {one.rank:4}  {one.fitness:7.4f}"
+        f"{name:>{width}}  {one.rank:4}  {one.fitness:7.4f}"
         f"{'' if one.birth in mature else '  immature'}"
-        for one in arena.population
+        for name, one in zip(names, arena.population, strict=True)
     ]
     return "\n".join(lines)
 

@@ -77,6 +77,18 @@ def whole_number(least: int = 1) -> Callable[[str], int]:
     return read
 
 
+def birth_name(text: str) -> tuple[int | None, int]:
+    """Return island and number of a birth; the island is None if it is not given."""
+    island, colon, number = text.rpartition(":")
+    read = whole_number(0)
+    try:
+        return read(island) if colon else None, read(number)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"must be N or ISLAND:N in whole numbers >= 0, got {text[:80]!r}"
+        ) from None
+
+
 def add_count(
     flags: argparse.ArgumentParser,
     name: str,

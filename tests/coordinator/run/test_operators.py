@@ -1,26 +1,41 @@
-"""Orders of operators: which run they go to."""
+"""Orders of operators: which run and which robots they go to."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
+from coordinator.arena.arena import Arena
 from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.events import Commanded, Remove, ReplaceBrain
 from coordinator.network.local import LocalAgents
-from coordinator.run.operators import answer_operator
+from coordinator.run.operators import answer_operator, reply_to
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import unbegun_status
+from schema.experiment.document import Arena as Rules
+from schema.experiment.document import Experiment, Islands, Selection, Simulation
 from schema.experiment.file import experiment_text
+from schema.experiment.migration import Migration
+from schema.robot.ids import BirthId
+from schema.wire.codec import encode_robot
 from schema.wire.operator import (
+    ListRobots,
+    OperatorAction,
     OperatorReply,
     OperatorRequest,
     PauseArena,
+    RemoveRobot,
+    SetBrain,
     decode_operator_reply,
     encode_operator_request,
 )
+from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import experiment
 
 DETAILS = RunDetails("arena", 0, 1, experiment_text(experiment(30)))
@@ -66,3 +81,49 @@ def test_a_run_is_named_by_its_folder_without_links(
         assert refused.is_refused
         reply = ask(scheduler, "real")
         assert not reply.is_refused, reply.text
+
+
+TWO_ARENAS = Experiment(
+    name="two",
+    selection=Selection(population=5, tournament_size=2),
+    simulation=Simulation(warmup_steps=600),
+    arena=Rules(population_limit=12, population_floor=4),
+    islands=(Islands(births=24), Islands(births=24)),
+    migration=Migration(topology="ring", epoch=7, handling="evict", replaced="none"),
+)
+
+
+def test_an_immigrant_is_listed_and_removed_by_its_whole_name() -> None:
+    lived = ArchipelagoRun(TWO_ARENAS)
+    arena = lived.islands[1]
+    assert isinstance(arena, Arena)
+    births: list[BirthId] = []
+    while not any(birth.island == 0 for birth in births):
+        lived.live(1)
+        births = [one.birth for one in arena.population]
+    orders: list[Commanded] = []
+    loop: Any = SimpleNamespace(islands=lived.islands, order=orders.append)
+
+    def ask(action: OperatorAction) -> OperatorReply:
+        return reply_to(OperatorRequest("x", 1, action), loop)
+
+    names = [
+        f"0:{one.number}" if one.island == 0 else str(one.number) for one in births
+    ]
+    _, _, *lines = ask(ListRobots()).text.splitlines()
+    assert [line.split()[0] for line in lines] == names
+    refused = ask(RemoveRobot(BirthId(0, 99)))
+    assert refused.text == (f"birth 0:99: is not alive; alive are {', '.join(names)}")
+    assert ask(RemoveRobot(BirthId(1, 99))).text.startswith("birth 99: is not alive")
+    immigrant = next(one for one in births if one.island == 0)
+    robot = arena.robot(immigrant)
+    assert robot is not None
+    assert not ask(SetBrain(immigrant, encode_robot(robot))).is_refused
+    assert not ask(RemoveRobot(immigrant)).is_refused
+    wanted = [ReplaceBrain(immigrant, robot.brain), Remove(immigrant)]
+    assert [order.order for order in orders] == wanted
+    for name, order in zip("ab", orders, strict=True):
+        lived.tell(1, replace(order, command_id=name))
+    lived.live()
+    (death,) = [row for row in lived.rows("deaths") if row["reason"] == "removed"]
+    assert (death["birth_island"], death["birth"]) == (0, immigrant.number)
