@@ -19,6 +19,7 @@ from cryptography.x509.oid import NameOID
 from schema.errors import RevolveError
 
 AUTHORITY_DAYS = 3650
+"""How long an authority is valid [d]."""
 _EARLIER = timedelta(hours=1)
 """A new certificate is valid for clocks that are this much behind."""
 
@@ -33,7 +34,8 @@ def make_authority(certificate: Path, key: Path, name: str, now: datetime) -> No
         now: the time, in UTC.
     """
     own = ec.generate_private_key(ec.SECP256R1())
-    builder = _builder(name, name, own.public_key(), now, AUTHORITY_DAYS)
+    end = now + timedelta(days=AUTHORITY_DAYS)
+    builder = _builder(name, name, own.public_key(), now, end)
     constraints = x509.BasicConstraints(ca=True, path_length=0)
     builder = builder.add_extension(constraints, critical=True)
     _write(certificate, key, builder.sign(own, hashes.SHA256()), own)
@@ -47,7 +49,7 @@ def issue(
     hosts: Iterable[str],
     now: datetime,
     days: int,
-) -> None:
+) -> datetime:
     """Write a certificate that the authority signs, and its private key (mode 0600).
 
     Args:
@@ -56,10 +58,13 @@ def issue(
         name: common name; the owner's name in the fleet.
         hosts: names and addresses by which clients reach the owner, if it is a hub.
         now: the time, in UTC.
-        days: how long it is valid [d].
+        days: how long it is valid [d], if the authority is valid as long.
+
+    Returns:
+        When the certificate expires, in UTC.
 
     Raises:
-        RevolveError: the authority's files cannot be read.
+        RevolveError: the authority's files cannot be read, or it has expired.
     """
     try:
         signer = x509.load_pem_x509_certificate(authority[0].read_bytes())
@@ -68,9 +73,14 @@ def issue(
         raise RevolveError(f"{authority[0].parent}: authority: {error}") from None
     if not isinstance(signer_key, ec.EllipticCurvePrivateKey):
         raise RevolveError(f"{authority[1]}: must be a key of an elliptic curve")
+    end = min(now + timedelta(days=days), signer.not_valid_after_utc)
+    if end <= now:
+        raise RevolveError(
+            f"{authority[0].parent}: authority: has expired: make a new kit"
+        )
     own = ec.generate_private_key(ec.SECP256R1())
     issuer = str(signer.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
-    builder = _builder(name, issuer, own.public_key(), now, days)
+    builder = _builder(name, issuer, own.public_key(), now, end)
     constraints = x509.BasicConstraints(ca=False, path_length=None)
     builder = builder.add_extension(constraints, critical=True)
     if names := [_alternative(host) for host in hosts]:
@@ -79,10 +89,15 @@ def issue(
     usages = x509.ExtendedKeyUsage([Usage.CLIENT_AUTH, Usage.SERVER_AUTH])
     builder = builder.add_extension(usages, critical=False)
     _write(*files, builder.sign(signer_key, hashes.SHA256()), own)
+    return end
 
 
 def _builder(
-    name: str, issuer: str, key: ec.EllipticCurvePublicKey, now: datetime, days: int
+    name: str,
+    issuer: str,
+    key: ec.EllipticCurvePublicKey,
+    now: datetime,
+    end: datetime,
 ) -> x509.CertificateBuilder:
     return (
         x509.CertificateBuilder()
@@ -91,7 +106,7 @@ def _builder(
         .public_key(key)
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - _EARLIER)
-        .not_valid_after(now + timedelta(days=days))
+        .not_valid_after(end)
     )
 
 

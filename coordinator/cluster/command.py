@@ -7,9 +7,10 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import get_args
 
+from coordinator.cluster.certificates import AUTHORITY_DAYS
 from coordinator.cluster.kit import DAYS, PORT, Cluster, Kit, utc_now
-from schema.agent.access import CertificateRole
-from schema.agent.flags import Flags, add_count
+from schema.agent.access import Certificate, CertificateRole, check_certificates
+from schema.agent.flags import Flags, add_count, whole_number
 
 _OTHERS: tuple[tuple[str, CertificateRole], ...] = (
     ("coordinator", "coordinator"),
@@ -55,8 +56,11 @@ def main(arguments: list[str]) -> int:
 
 
 def _init(folder: Path, options: argparse.Namespace) -> None:
-    kit = Kit.new(folder, Cluster(options.hub, options.port, options.days), utc_now)
     workers = [name for name in options.workers.split(",") if name]
+    names = ["hub", *(name for name, _ in _OTHERS), *workers]
+    # Before the folder is made: a kit cannot be made in one that is not empty.
+    check_certificates(Certificate(name, "worker") for name in names)
+    kit = Kit.new(folder, Cluster(options.hub, options.port, options.days), utc_now)
     for name, role in _OTHERS:
         kit.add(name, role)
     for name in workers:
@@ -153,7 +157,14 @@ def parser(_command: str = "cluster") -> Flags:
         help="a name for each worker's machine, or one for a whole batch system; "
         "separated by commas",
     )
-    add_count(init, "--days", DAYS, "days until the certificates expire")
+    init.add_argument(
+        "--days",
+        type=_days,
+        default=DAYS,
+        metavar="N",
+        help=f"days until the certificates expire, at most {AUTHORITY_DAYS} (default: "
+        "%(default)s)",
+    )
     add = action("add", "issue a certificate for another machine")
     add.add_argument("name", metavar="NAME", help="name of the machine, in the fleet")
     add.add_argument(
@@ -170,6 +181,16 @@ def parser(_command: str = "cluster") -> Flags:
     revoke.add_argument("name", metavar="NAME", help="name of the machine")
     action("list", "list the certificates, and when they expire")
     return flags
+
+
+def _days(text: str) -> int:
+    """Return a number of days in which the authority does not expire."""
+    days = whole_number()(text)
+    if days > AUTHORITY_DAYS:
+        raise argparse.ArgumentTypeError(
+            f"must be <= {AUTHORITY_DAYS}, the days of the authority, got {text!r}"
+        )
+    return days
 
 
 def _host(text: str) -> str:

@@ -5,7 +5,7 @@
 """
 
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
@@ -152,7 +152,8 @@ class Kit:
         """Issue another certificate for a member; its last one stays valid.
 
         Raises:
-            RevolveError: there is no such member, or it is revoked.
+            RevolveError: there is no such member, it is revoked, or the authority has
+                expired.
         """
         member = self.member(name)
         if member.is_revoked:
@@ -162,8 +163,9 @@ class Kit:
         own = (folder / "certificate.pem", folder / "key.pem")
         hosts = {self.cluster.hub, "localhost"} if member.role == "hub" else set[str]()
         authority = self._authority_of(self.folder)
-        issue(authority, own, name, hosts=sorted(hosts), now=now, days=days)
-        member.expires = now + timedelta(days=days)
+        member.expires = issue(
+            authority, own, name, hosts=sorted(hosts), now=now, days=days
+        )
         replace_text(folder / "ca.pem", authority[0].read_text("ascii"))
         replace_text(folder / "env", self._environment(member))
         self._write()

@@ -113,6 +113,18 @@ def test_renewal_moves_the_expiry(kit: Kit, clock: Clock) -> None:
     assert kit.member("boss").expires == clock.now + timedelta(days=30)
 
 
+def test_no_certificate_outlives_its_authority(kit: Kit, clock: Clock) -> None:
+    end = clock.now + timedelta(days=3650)
+    clock.now = end - timedelta(days=1)
+    kit.renew("a")
+    assert expiry(str(kit.folder / "ca.pem")) == end
+    assert expiry(str(kit.folder / "members/a/certificate.pem")) == end
+    assert kit.member("a").expires == end
+    clock.now = end
+    with pytest.raises(RevolveError, match="authority: has expired: make a new kit"):
+        kit.renew("a")
+
+
 @pytest.mark.parametrize("name", ["a", "a-1", "hub", "x/y", "", "-"])
 def test_name_that_clashes_or_is_invalid_is_refused(kit: Kit, name: str) -> None:
     with pytest.raises(RevolveError):
@@ -168,6 +180,28 @@ def test_a_hub_with_a_port_is_refused(
         main(["cluster", "init", str(tmp_path / "lab"), "--hub", hub])
     assert "without a port (see --port), got" in capsys.readouterr().err
     assert not (tmp_path / "lab").exists()
+
+
+@pytest.mark.parametrize("names", ["a,a", "a,a-1", "operator", "hub", "b,x/y"])
+def test_init_with_a_name_that_clashes_or_is_invalid_makes_no_folder(
+    tmp_path: Path, names: str
+) -> None:
+    lab = tmp_path / "lab"
+    with pytest.raises(RevolveError):
+        main(["cluster", "init", str(lab), "--hub", "h", "--workers", names])
+    assert not lab.exists()
+
+
+@pytest.mark.parametrize("days", ["3651", "5000000"])
+def test_certificates_of_more_days_than_the_authority_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], days: str
+) -> None:
+    lab = tmp_path / "lab"
+    with pytest.raises(SystemExit):
+        main(["cluster", "init", str(lab), "--hub", "h", "--days", days])
+    expected = f"--days: must be <= 3650, the days of the authority, got {days!r}"
+    assert expected in capsys.readouterr().err
+    assert not lab.exists()
 
 
 def test_a_hub_may_have_an_address_of_version_6(
