@@ -27,6 +27,8 @@ LOOK_S = 1.0
 """Interval between measurements of the CPU time of a job [s]."""
 _LEAST_SHARE = 0.002
 """Share of one core below which a job waits: a loop that only polls needs less."""
+_LONGEST_TIMER_S = 1e9
+"""Thirty years: a timer takes no time that its system cannot represent."""
 
 _SIZE = 2048
 _HEAD = struct.Struct("<HHQQ8s")
@@ -167,7 +169,7 @@ class ProcessSlot:
             yield
             return
         self.note.begin(task)
-        signal.setitimer(signal.ITIMER_PROF, cpu_limit_s)
+        signal.setitimer(signal.ITIMER_PROF, min(cpu_limit_s, _LONGEST_TIMER_S))
         try:
             yield
         except Exception:

@@ -63,7 +63,8 @@ def test_only_some_exit_codes_are_crashes_by_the_job(code: int, doing: str) -> N
     assert crash_cause(code) == doing
 
 
-def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
+@pytest.mark.parametrize("limit_s", [2000.0, 1e10, 1e12, 1e300])
+def test_a_job_is_noted_while_it_is_done_and_limited(limit_s: float) -> None:
     slot = ProcessSlot(0, CurrentJob())
     assert slot.note is not None
     seen: list[object] = []
@@ -74,7 +75,7 @@ def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
         seen.append(signal.getitimer(signal.ITIMER_PROF)[0] > 1000.0)
         return b"done"
 
-    with slot.doing(TASK, 2000.0):
+    with slot.doing(TASK, limit_s):
         assert job() == b"done"
     assert seen == [TASK, True]
     assert slot.note.read() is None
