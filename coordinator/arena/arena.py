@@ -224,7 +224,7 @@ class Arena:
         if self.step % self.clock.sample == 0:
             commands += self._living.sample(self._moment)
         if self.step % self.clock.birth == 0:
-            self.is_extinct = not self._orders.insertions and (
+            self.is_extinct = not self._orders.prevent_extinction and (
                 len(self._living) < self._parents_needed
             )
             migration = self._migration

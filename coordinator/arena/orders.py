@@ -46,6 +46,14 @@ class Orders:
         self._infancy = infancy
         self.ids: set[str] = set()
 
+    @property
+    def prevent_extinction(self) -> bool:
+        """A robot is to be inserted, at the next decision or when there is room."""
+        return bool(self.insertions) or any(
+            isinstance(order, Insert) and order.prevents_extinction
+            for order in self.pending
+        )
+
     def take(self, event: Commanded) -> None:
         """Store an order until the next decision.
 

@@ -151,10 +151,14 @@ class Insert(Message, frozen=True):
     Attributes:
         genome: bytes of its genome, in the encoding of the experiment.
         place: point of the ground plane [m]; drawn as for any birth if None.
+        prevents_extinction: the arena is not extinct at the decision at which the order
+            takes effect. Earlier versions did not count the order yet, and journals
+            that they wrote end so.
     """
 
     genome: bytes
     place: tuple[float, float] | None = None
+    prevents_extinction: bool = True
 
 
 class Remove(Message, frozen=True):

@@ -351,6 +351,7 @@ def _command(event: Commanded) -> pb.Command:
             command.resume.SetInParent()
         case Insert():
             command.insert.genome = order.genome
+            command.insert.prevents_extinction = order.prevents_extinction
             if order.place is not None:
                 command.insert.has_place = True
                 command.insert.x, command.insert.y = order.place
@@ -418,10 +419,10 @@ def _order(command: pb.Command) -> Order:
             return Resume()
         case "insert":
             insert = command.insert
-            if not insert.has_place:
-                return Insert(insert.genome)
-            place = finite(insert.x, "insert.x"), finite(insert.y, "insert.y")
-            return Insert(insert.genome, place)
+            place = None
+            if insert.has_place:
+                place = finite(insert.x, "insert.x"), finite(insert.y, "insert.y")
+            return Insert(insert.genome, place, insert.prevents_extinction)
         case "remove":
             return Remove(birth_from_message(command.remove))
         case "replace_brain":

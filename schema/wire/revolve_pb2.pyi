@@ -437,16 +437,18 @@ class Nothing(_message.Message):
     def __init__(self) -> None: ...
 
 class InsertOrder(_message.Message):
-    __slots__ = ("genome", "has_place", "x", "y")
+    __slots__ = ("genome", "has_place", "x", "y", "prevents_extinction")
     GENOME_FIELD_NUMBER: _ClassVar[int]
     HAS_PLACE_FIELD_NUMBER: _ClassVar[int]
     X_FIELD_NUMBER: _ClassVar[int]
     Y_FIELD_NUMBER: _ClassVar[int]
+    PREVENTS_EXTINCTION_FIELD_NUMBER: _ClassVar[int]
     genome: bytes
     has_place: bool
     x: float
     y: float
-    def __init__(self, genome: _Optional[bytes] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ...) -> None: ...
+    prevents_extinction: bool
+    def __init__(self, genome: _Optional[bytes] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., prevents_extinction: _Optional[bool] = ...) -> None: ...
 
 class Command(_message.Message):
     __slots__ = ("command_id", "step", "pause", "resume", "insert", "remove", "replace_brain")

@@ -70,6 +70,7 @@ ORDERS: list[Order] = [
     Resume(),
     Insert(CORE),
     Insert(CORE, (0.0, -1.5)),
+    Insert(CORE, prevents_extinction=False),
     Remove(BirthId(1, 2**40)),
     ReplaceBrain(
         BirthId(0, 3),
