@@ -24,6 +24,7 @@ from schema.wire.operator import (
     ResumeArena,
     SaveSnapshot,
     SetBrain,
+    selected_names,
 )
 from schema.wire.status import RunStatus
 
@@ -86,10 +87,12 @@ def _coordinator(options: argparse.Namespace) -> str:
         NetworkError: not exactly one coordinator has such a run.
     """
     found = ask_status(options)
+    runs = [run for status in found.values() for run in status.runs]
+    selected = selected_names(options.run, map(_name, runs))
     folders = {
         name: chosen
         for name, status in found.items()
-        if (chosen := [run.folder for run in status.runs if _is_of(run, options.run)])
+        if (chosen := [run.folder for run in status.runs if _name(run) in selected])
     }
     if len(folders) == 1:
         ((name, chosen),) = folders.items()
@@ -102,8 +105,8 @@ def _coordinator(options: argparse.Namespace) -> str:
     )
 
 
-def _is_of(run: RunStatus, wanted: str) -> bool:
-    return Path(run.folder).name.endswith(wanted)
+def _name(run: RunStatus) -> str:
+    return Path(run.folder).name
 
 
 def _action(options: argparse.Namespace) -> OperatorAction:
@@ -182,7 +185,8 @@ def parser(_command: str = "arena") -> Flags:
         add_connect(action)
         action.add_argument(
             "--run", default="", metavar="NAME",
-            help="run whose folder name ends with NAME (default: the only run)",
+            help="run whose folder is named NAME, else whose folder name ends with "
+            "NAME (default: the only run)",
         )  # fmt: skip
         add_count(action, "--island", 0, "island number", least=0)
         add_network_flags(action)

@@ -7,6 +7,7 @@ that step before the operator gets a reply, so that a replay carries it out too.
 import math
 import time
 from dataclasses import replace
+from pathlib import Path
 
 from coordinator.arena.arena import Arena
 from coordinator.arena.orders import check_order
@@ -42,6 +43,7 @@ from schema.wire.operator import (
     SetBrain,
     decode_operator_request,
     encode_operator_reply,
+    selected_names,
 )
 
 FARTHEST_PLACE_M = 1e6
@@ -236,15 +238,18 @@ def _carry_out(request: OperatorRequest, scheduler: RunScheduler) -> OperatorRep
 
 
 def _run(name: str, scheduler: RunScheduler) -> RunSession:
-    """Return the run whose folder's name ends with a name.
+    """Return the run that a name selects among all runs, finished ones included.
 
     Raises:
         Refused: no running run with an arena has such a name, or several have.
     """
+    active = scheduler.active
+    planned = [Path(each.status.folder).name for each in scheduler.planned]
+    selected = selected_names(name, [*planned, *map(_name, active)])
     runs = [
         run
-        for run in scheduler.active
-        if _name(run).endswith(name)
+        for run in active
+        if _name(run) in selected
         and any(isinstance(each, Arena) for each in run.loop.islands.values())
     ]
     if len(runs) == 1:

@@ -1,5 +1,6 @@
 """Requests of operators to a coordinator, its replies, and their bytes."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 from msgspec import Meta
@@ -92,7 +93,7 @@ class OperatorRequest(Message, frozen=True):
         request_id: unique; a request that arrives twice is carried out once.
         island: number of the arena's island.
         action: what to do.
-        run: last part of the run folder's path, which selects one of several runs.
+        run: name of a run folder, or the end of one, which selects one of several runs.
     """
 
     request_id: Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
@@ -115,6 +116,19 @@ class OperatorReply(Message, frozen=True):
     is_refused: bool = False
     status: Status | None = None
     time_s: Finite | None = None
+
+
+def selected_names(wanted: str, names: Iterable[str]) -> set[str]:
+    """Return the names of run folders that a given name selects.
+
+    Args:
+        wanted: whole name of a run folder, or the end of one.
+        names: names of all run folders.
+    """
+    known = set(names)
+    if wanted in known:
+        return {wanted}
+    return {name for name in known if name.endswith(wanted)}
 
 
 _REQUEST = Decoder(OperatorRequest)

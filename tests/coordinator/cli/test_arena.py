@@ -4,9 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.cli.arena import _action, parser
+from coordinator.cli import arena
+from coordinator.cli.arena import _action, _coordinator, parser
+from schema.errors import NetworkError
 from schema.robot.ids import BirthId
 from schema.wire.operator import RemoveRobot, SetBrain
+from schema.wire.status import RunStatus, Status
 
 ROBOT = Path(__file__).parents[2] / "data" / "documents-3063df1" / "parts.yaml"
 
@@ -39,3 +42,38 @@ def test_a_name_of_another_form_is_refused(
         parser().parse_args(["remove", birth])
     expected = f"BIRTH: must be N or ISLAND:N in whole numbers >= 0, got {birth!r}"
     assert expected in capsys.readouterr().err
+
+
+@pytest.fixture
+def coordinators(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two coordinators with three runs answer."""
+
+    def status(*folders: str) -> Status:
+        runs = tuple(RunStatus(each, "zoo", 0, "running") for each in folders)
+        return Status(runs, workers=1, analyzers=1, births_per_s=0.0)
+
+    found = {"a": status("runs/zoo-0"), "b": status("runs/wet-zoo-0", "runs/zoo-1")}
+    monkeypatch.setattr(arena, "ask_status", lambda _options: found)
+
+
+@pytest.mark.usefixtures("coordinators")
+@pytest.mark.parametrize(
+    ("name", "expected", "told"),
+    [
+        ("zoo-0", "a", "arena of runs/zoo-0"),
+        ("t-zoo-0", "b", "arena of runs/wet-zoo-0"),
+        ("zoo-1", "b", "arena of runs/zoo-1"),
+    ],
+)
+def test_a_run_is_named_by_its_whole_name_or_the_end_of_it(
+    name: str, expected: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert _coordinator(parser().parse_args(["list", "--run", name])) == expected
+    assert told in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("coordinators")
+@pytest.mark.parametrize("name", ["-0", "", "pond"])
+def test_a_name_of_several_runs_or_of_none_is_refused(name: str) -> None:
+    with pytest.raises(NetworkError, match="exactly one coordinator must have a run"):
+        _coordinator(parser().parse_args(["list", "--run", name]))

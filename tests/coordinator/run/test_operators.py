@@ -9,11 +9,13 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+import analyzer.report
+import worker.serve.null
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Commanded, Remove, ReplaceBrain
 from coordinator.network.local import LocalAgents
-from coordinator.run.operators import answer_operator, reply_to
+from coordinator.run.operators import _run, answer_operator, reply_to
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
@@ -41,19 +43,29 @@ from tests.coordinator.arena_world import experiment
 DETAILS = RunDetails("arena", 0, 1, experiment_text(experiment(30)))
 
 
+def planned(path: Path, *, is_finished: bool = False) -> Planned:
+    """Return the plan of a run of an arena in a folder."""
+    status = unbegun_status(path, DETAILS)
+    if is_finished:
+        status = replace(status, state="finished")
+    return Planned(status, lambda: RunFolder(path, DETAILS))
+
+
 @contextmanager
-def started(path: Path) -> Iterator[RunScheduler]:
-    """Start a run of an arena in a folder."""
-    fleet = Fleet(LocalAgents({}, ""))
+def started(*runs: Planned) -> Iterator[RunScheduler]:
+    """Start runs; a run starts when few requests of those before it are open."""
+    answers = {"analyzer": analyzer.report.answer, "worker": worker.serve.null.answer}
+    fleet = Fleet(LocalAgents(answers, "any"))  # type: ignore[arg-type]
     scheduler = RunScheduler(
-        [Planned(unbegun_status(path, DETAILS), lambda: RunFolder(path, DETAILS))],
+        runs,
         fleet,
         open_run=lambda held, _watched: RunSession(held, fleet),
-        most=1,
+        most=len(runs),
         conclude=lambda _run: None,
         report=lambda *_: None,
     )
-    scheduler.turn(0.0, lambda: 0.0)
+    while len(scheduler.active) < sum(not run.is_finished for run in runs):
+        scheduler.turn(0.0, lambda: 0.0)
     try:
         yield scheduler
     finally:
@@ -74,13 +86,29 @@ def test_a_run_is_named_by_its_folder_without_links(
     real.mkdir()
     (tmp_path / "link").symlink_to(real)
     monkeypatch.chdir(real if given == "." else tmp_path)
-    with started(Path(given)) as scheduler:
+    with started(planned(Path(given))) as scheduler:
         (run,) = scheduler.status(0.0).runs
         assert Path(run.folder).name == "real"
         refused = ask(scheduler, "other")
         assert refused.is_refused
         reply = ask(scheduler, "real")
         assert not reply.is_refused, reply.text
+
+
+def test_a_run_is_named_by_its_whole_name_or_the_end_of_it(tmp_path: Path) -> None:
+    runs = [planned(tmp_path / name) for name in ("zoo-0", "wet-zoo-0")]
+    with started(*runs) as scheduler:
+        for name, run in zip(("zoo-0", "t-zoo-0"), scheduler.active, strict=True):
+            assert _run(name, scheduler) is run
+        for name in ("o-0", ""):
+            assert ask(scheduler, name).text.endswith("matching: wet-zoo-0, zoo-0")
+
+
+def test_the_name_of_a_finished_run_is_not_the_end_of_another(tmp_path: Path) -> None:
+    finished = planned(tmp_path / "zoo-0", is_finished=True)
+    with started(finished, planned(tmp_path / "wet-zoo-0")) as scheduler:
+        assert ask(scheduler, "zoo-0").text.endswith("matching: none")
+        assert not ask(scheduler, "o-0").is_refused
 
 
 TWO_ARENAS = Experiment(
