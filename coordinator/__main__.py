@@ -184,6 +184,8 @@ def _deployment(
         raise NetworkError("--listen and --connect exclude each other")
     if options.view and options.in_process:
         raise NetworkError("--view needs a network, but --in-process has none")
+    if options.in_process and options.command != "coordinator" and options.workers:
+        raise NetworkError("--workers: --in-process starts no other processes")
     listen = options.listen
     if options.command == "coordinator" and not options.connect:
         listen = listen or HUB

@@ -29,7 +29,7 @@ def parser(_command: str = "robot render") -> Flags:
     )
     flags.add_argument(
         "--width",
-        type=whole_number(16),
+        type=whole_number(16, 4096),
         default=640,
         metavar="PIXELS",
         help="width of a picture (default: 640)",

@@ -27,10 +27,18 @@ from coordinator.storage.campaign import (
 from coordinator.storage.folder import holds_run, read_details
 from schema.agent.import_path import environment, python_command
 from schema.agent.log import warn_user
-from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
+from schema.errors import (
+    ExperimentError,
+    RevolveError,
+    UnknownPlugin,
+    nearest,
+    one_line,
+    shown,
+)
 from schema.experiment.document import (
     Arena,
     Experiment,
+    body_space,
     island_count,
     island_experiment,
     references,
@@ -42,7 +50,7 @@ from schema.experiment.file import (
 )
 from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
-from schema.parts import PartType
+from schema.parts import BUILT_IN, PartType
 from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
 from schema.plugins.part_checks import check_sensed_boxes, check_slot_directions
@@ -257,7 +265,8 @@ def check_here(
                     with _time_limit(limit_s):
                         _check_plugin(word, name, use, say)
                 if ":" not in word and not _is_folder(Path(word)):
-                    _check_document(word, kinds, births, limit_s)
+                    for warning in _check_document(word, kinds, births, limit_s):
+                        say("warn", f"{word}: warning: {warning}")
                 if not uses:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
@@ -291,13 +300,21 @@ def _check_plugin(
 
 def _check_document(
     source: str, kinds: Sequence[Kind], births: int | None, limit_s: float
-) -> None:
-    """Raise what a run would refuse besides the document's own plug-ins."""
+) -> Iterator[str]:
+    """Raise what a run would refuse besides own plug-ins; yield warnings."""
     for experiment in read_experiments((source,), births):
         with _time_limit(limit_s):
             check_built_in(experiment, kinds)
             for number in range(island_count(experiment)):
                 check_fitness_keys(island_experiment(experiment, number).fitness)
+            types = body_space(experiment.space)
+        for kind in types.values():
+            for name in kind.not_on:
+                if name not in types and name not in BUILT_IN:
+                    yield (
+                        f"space.part_types: {kind.name}.not_on: no part type is named "
+                        f"{shown(name)}{nearest(name, types)}"
+                    )
 
 
 def _is_folder(folder: Path) -> bool:

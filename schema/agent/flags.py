@@ -59,18 +59,21 @@ class Flags(argparse.ArgumentParser):
         return found, []
 
 
-def whole_number(least: int = 1) -> Callable[[str], int]:
+def whole_number(least: int = 1, most: int | None = None) -> Callable[[str], int]:
     """Return a reader of whole numbers.
 
     Args:
         least: smallest number allowed; not negative.
+        most: greatest number allowed; None for no limit.
     """
+    limits = f">= {least}" if most is None else f"in {least}..{most}"
 
     def read(text: str) -> int:
         is_number = text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS
-        if not (is_number and int(text) >= least):
+        is_allowed = is_number and int(text) >= least
+        if not is_allowed or (most is not None and int(text) > most):
             raise argparse.ArgumentTypeError(
-                f"must be a whole number >= {least}, got {text[:80]!r}"
+                f"must be a whole number {limits}, got {text[:80]!r}"
             )
         return int(text)
 

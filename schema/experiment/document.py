@@ -97,7 +97,9 @@ class Generation(Section, frozen=True):
     """Generation of random robots (thesis section 4.4.2).
 
     Attributes:
-        parts_mean: mean of the number of parts, which has a normal distribution.
+        parts_mean: mean of the number of parts, which has a normal distribution; a
+            number beyond ``min_parts`` or ``max_parts`` of ``[space]`` becomes that
+            limit.
         parts_sd: standard deviation of the number of parts.
         p_connect_neurons: probability of each possible connection.
         hidden_on: parts that get hidden neurons: ``any``, or those that are

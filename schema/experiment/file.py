@@ -3,7 +3,7 @@
 import json
 import re
 import tomllib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from importlib import resources
@@ -13,11 +13,17 @@ from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schema.errors import ExperimentError, cut, expectation, nearest, shown, unreadable
 from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Experiment, references
+from schema.experiment.document import (
+    Experiment,
+    island_count,
+    island_experiment,
+    references,
+)
 from schema.experiment.environment import is_mjcf
 from schema.experiment.sweep import (
     Point,
@@ -244,7 +250,22 @@ def _drafts(
         with _at_point(point):
             tables = with_point(document, point, name)
             experiments.append(_converted(tables, where))
+    _refuse_equal(experiments, where)
     return tuple(experiments)
+
+
+def _refuse_equal(experiments: Sequence[Experiment], where: str) -> None:
+    """Raise if every island replaces what the experiments of a sweep differ in."""
+    first: dict[bytes, str] = {}
+    for one in experiments:
+        islands = [island_experiment(one, n) for n in range(island_count(one))]
+        plain = [replace(each, name="", sweep=None) for each in islands]
+        known = first.setdefault(msgspec.json.encode(plain), one.name)
+        if known != one.name:
+            raise ExperimentError(
+                f"{where}: sweep: {known} and {one.name} have equal islands: "
+                "[[islands]] replace the swept settings"
+            )
 
 
 @contextmanager

@@ -282,9 +282,11 @@ def fitness_argument(
     if kind is not None and not issubclass(kind, Fitness):
         return read_parameters(fitness.parameters, kind, where)
     if fitness.parameters:
+        then = "it must annotate its second argument with a msgspec Struct"
+        if fitness.function in (*FITNESS, *FITNESS.values()):
+            then = "its keys are those of [fitness]"
         raise ExperimentError(
-            f"{where}: {fitness.function} has no parameters of its own; it must "
-            "annotate its second argument with a msgspec Struct"
+            f"{where}: {fitness.function} has no parameters of its own; {then}"
         )
     return fitness
 

@@ -24,7 +24,7 @@ class Range(Section, frozen=True):
         low: least value.
         high: greatest value.
         steps: number of evenly spaced values, both ends included; without ``samples``
-            it must be given.
+            it must be given. Whole numbers are rounded, and equal ones count once.
         log: space the values evenly in their logarithm.
     """
 
@@ -51,7 +51,7 @@ class Sweep(PluginSection, frozen=True):
         settings: values by the dotted key of each setting, such as
             ``"arena.birth_interval_s"``: a list, or a range ``{low, high, steps}``.
         samples: number of points of a Latin hypercube; 0: every combination.
-        seed: random seed of the Latin hypercube.
+        seed: random seed of the Latin hypercube; every combination needs none.
         chosen: the values of one experiment of the sweep; ``revolve run`` sets it.
     """
 

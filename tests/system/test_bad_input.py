@@ -183,6 +183,13 @@ def test_worker_without_a_coordinator_reports_it_and_retries(
     assert worker.wait(30) == 0
 
 
+def test_workers_of_a_run_in_one_process_are_refused(workspace: Workspace) -> None:
+    words = ("run", "scenario1", "--in-process", "--workers", "3")
+    output = workspace.run(*words, code=2)
+    line = "error: revolve: --workers: --in-process starts no other processes\n"
+    assert output.endswith(line)
+
+
 def _fill_the_disk(workspace: Workspace, *words: str, kilobytes: int) -> None:
     """Run on a small disk until it is full; copy the run folder to ``moved``."""
     disk = workspace.folder / "disk"

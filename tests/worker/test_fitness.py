@@ -129,8 +129,12 @@ def test_own_parameters_are_read_as_the_struct_of_the_second_argument() -> None:
 
 
 def test_parameters_of_a_function_without_a_struct_are_refused() -> None:
-    with pytest.raises(ExperimentError, match="thesis has no parameters of its own"):
+    message = r"thesis has no parameters of its own; its keys are those of \[fitness\]$"
+    with pytest.raises(ExperimentError, match=message):
         check_fitness(thesis, Fitness(parameters={"reach_m": 3.0}))
+    own = Fitness(function=f"{__name__}:_writes", parameters={"reach_m": 3.0})
+    with pytest.raises(ExperimentError, match="it must annotate its second argument"):
+        check_fitness(_writes, own)
 
 
 def test_message_names_file_and_line_that_raised() -> None:

@@ -111,9 +111,11 @@ def _measure(name: str, table: dict[str, Any] | None, where: str) -> Measure:
         load_function(name, where_named, 1 if kind is None else 2, names)
     if kind is None:
         if table is not None:
+            then = "it must annotate its second argument with a msgspec Struct"
+            if name in BUILT_IN:
+                then = "remove the table"
             raise ExperimentError(
-                f"{where}: {name} has no parameters of its own; it must annotate its "
-                "second argument with a msgspec Struct"
+                f"{where}: {name} has no parameters of its own; {then}"
             )
         return Measure(name, found)
     return Measure(name, found, (read_parameters(table or {}, kind, where),))

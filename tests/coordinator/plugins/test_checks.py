@@ -79,6 +79,26 @@ def test_a_part_type_is_recognised() -> None:
     assert re.search(r"part-type at parts\.py:\d+: in order", text)
 
 
+def test_a_part_that_is_never_attached_to_an_unknown_one_makes_a_warning(
+    lab: Callable[[str], Path], tmp_path: Path
+) -> None:
+    file = lab("""
+from dataclasses import replace
+
+from schema.parts import HINGE
+
+FIN = replace(HINGE, name="Fin", not_on=("ActiveHing", "Hinge"))
+""")
+    document = tmp_path / "fins.toml"
+    parts = f'"schema.parts:CORE", "schema.parts:ACTIVE_HINGE", "{file.stem}:FIN"'
+    document.write_text(f'name = "fins"\n[space]\npart_types = [{parts}]\n')
+    (warning,) = [text for step, text in checked(str(document)) if step == "warn"]
+    assert warning == (
+        f"{document}: warning: space.part_types: Fin.not_on: no part type is named "
+        "'ActiveHing'; did you mean 'ActiveHinge'?"
+    )
+
+
 def test_a_part_type_with_two_imus_is_refused(lab: Callable[[str], Path]) -> None:
     file = lab("""
 from dataclasses import replace

@@ -19,6 +19,7 @@ def parsed(read: Callable[[str], float], text: str) -> float:
     [
         (whole_number(0), "0", 0),
         (whole_number(), "17", 17),
+        (whole_number(16, 99), "99", 99),
         (number, "-2.5", -2.5),
         (positive_number, "1e-3", 1e-3),
         (share, "0", 0.0),
@@ -37,6 +38,7 @@ def test_what_is_allowed(read: Callable[[str], float], text: str, value: float) 
         (whole_number(), "1.5", "a whole number >= 1"),
         (whole_number(), "\u00b2", "a whole number >= 1"),
         (whole_number(16), "15", "a whole number >= 16"),
+        (whole_number(16, 99), "100", "a whole number in 16..99"),
         (number, "inf", "a finite number"),
         (number, "five", "a finite number"),
         (positive_number, "0", "a finite number > 0"),

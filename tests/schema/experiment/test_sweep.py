@@ -129,6 +129,28 @@ def test_a_wrong_sweep_is_refused(tmp_path: Path, settings: str, message: str) -
     assert "\n" not in str(caught.value)
 
 
+ISLANDS = """
+name = "x"
+births = 20
+[sweep]
+settings."selection.children" = [5, 6]
+[[islands]]
+[islands.selection]
+population = 5
+children = 5
+[[islands]]
+"""
+
+
+def test_a_sweep_of_a_setting_that_every_island_replaces_is_refused(
+    tmp_path: Path,
+) -> None:
+    assert len(experiments_of(_written(tmp_path, ISLANDS))) == 2
+    own = f"{ISLANDS}[islands.selection]\npopulation = 5\nchildren = 5\n"
+    with pytest.raises(ExperimentError, match="sweep: x-0 and x-1 have equal islands"):
+        experiments_of(_written(tmp_path, own))
+
+
 def test_a_sweep_is_no_single_experiment(tmp_path: Path) -> None:
     with pytest.raises(ExperimentError, match="stands for several experiments"):
         read_experiment(_written(tmp_path, GRID))
