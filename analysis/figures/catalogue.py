@@ -1,6 +1,5 @@
 """Catalogue of the figures: number, title, caption and drawing function."""
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -10,6 +9,7 @@ from typing import Any, Literal
 from analysis.figures.bench import arena_speed, spider_speed
 from analysis.figures.brains import changes_over_births
 from analysis.figures.courses import course_caption, over_births
+from analysis.figures.file_names import file_name
 from analysis.figures.forms import (
     Panels,
     Tables,
@@ -77,8 +77,7 @@ class Figure:
     def stem(self) -> str:
         """Name of the figure's files without ending, for example ``A-connections``."""
         number = self.number.partition("-")[0]
-        words = re.findall(r"[\w.~+]+", self.subject or self.title.lower())
-        return "-".join([number, *words])
+        return file_name(f"{number}-{self.subject or self.title.lower()}")
 
 
 @dataclass(frozen=True, slots=True)

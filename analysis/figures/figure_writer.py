@@ -12,6 +12,7 @@ from rich.progress import Progress
 
 from analysis.figures.catalogue import BIRTHS, FIGURES, DrawnFigure, Figure
 from analysis.figures.family_tree import LINEAGE, Best, best_robots
+from analysis.figures.file_names import FileNames
 from analysis.figures.films import film
 from analysis.figures.forms import NothingToDraw, Tables
 from analysis.figures.pictures import family_tree, gaits
@@ -88,6 +89,7 @@ class FigureWriter:
             folder: an existing folder.
         """
         self._folder = folder
+        self._names = FileNames()
         for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif", _EARLIER):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
@@ -100,7 +102,7 @@ class FigureWriter:
         except NothingToDraw as error:
             self.leave_out(figure.number, str(error))
             return
-        stem = self._folder / figure.stem
+        stem = self._folder / self._names.add(figure.stem)
         save(drawn, stem)
         picture = stem.with_name(stem.name + PICTURE_ENDING)
         caption = figure.caption
@@ -109,12 +111,15 @@ class FigureWriter:
 
     def leave_out(self, number: str, why: str) -> None:
         """Record why there is no such figure, and remove one of an earlier analysis."""
-        self._remove(f"{escape(number)}-*.p??")
+        # Files of experiments are removed already; a name may begin as they do.
+        if "-" not in number:
+            self._remove(f"{escape(number)}-*.p??")
         self.left_out.append(LeftOut("", f"figure {number}", why))
 
     def add_film(self, one: RobotPicture) -> Film:
         """Write the moving picture of a robot."""
-        path = self._folder / f"{_FILM}{one.best.experiment}.gif"
+        name = self._names.add(f"{_FILM}{one.best.experiment}")
+        path = self._folder / f"{name}.gif"
         path.write_bytes(film(one.film, one.film_interval_s))
         return Film(one.best, path)
 

@@ -1,0 +1,59 @@
+"""Tests of the files of figures and films."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import pyplot as plt
+from PIL import Image
+
+from analysis.figures.catalogue import Figure
+from analysis.figures.family_tree import LINEAGE, Best
+from analysis.figures.figure_writer import FigureWriter
+from analysis.figures.robot_pictures import RobotPicture
+
+
+def tree_of(experiment: str) -> Figure:
+    return Figure(
+        f"G-{experiment}", "Ancestry", "", (), lambda _: plt.figure(figsize=(1, 1)),
+        "robots", f"ancestry-of-{experiment}",
+    )  # fmt: skip
+
+
+def robot_of(experiment: str, shade: int) -> RobotPicture:
+    pictures = tuple(np.full((8, 8, 3), shade, np.uint8) for _ in range(2))
+    best = Best(experiment, Path("f"), 0, 0, 1, 0.1)
+    lineage = LINEAGE.empty_table()
+    return RobotPicture(best, (), (), pictures, 0.1, 0.0, None, {}, {}, lineage)
+
+
+def test_each_experiment_has_files_of_its_own(tmp_path: Path) -> None:
+    writer = FigureWriter(tmp_path)
+    names = ("a b", "a-b", "sw-map=maps/a.png", f"sw-list=[{'1,' * 200}]")
+    for experiment in names:
+        writer.add(tree_of(experiment), {})
+    films = [writer.add_film(robot_of(name, 60 * at)) for at, name in enumerate(names)]
+    pictures = [one.picture for one in writer.drawn]
+    assert [path.name for path in pictures[:3]] == [
+        "G-ancestry-of-a-b.png",
+        "G-ancestry-of-a-b-2.png",
+        "G-ancestry-of-sw-map=maps-a.png.png",
+    ]
+    assert {path for path in pictures if path.is_file()} == {*tmp_path.glob("*.png")}
+    assert len({*pictures}) == len({*tmp_path.glob("*.pdf")}) == len(names)
+    assert [one.path.name for one in films[:3]] == [
+        "best-robot-of-a-b.gif",
+        "best-robot-of-a-b-2.gif",
+        "best-robot-of-sw-map=maps-a.png.gif",
+    ]
+    for at, one in enumerate(films):
+        with Image.open(one.path) as shown:
+            assert abs(int(np.asarray(shown.convert("L"))[4, 4]) - 60 * at) < 8
+
+
+def test_a_left_out_figure_removes_only_its_own_earlier_files(tmp_path: Path) -> None:
+    (tmp_path / "6.2-fitness.png").touch()
+    writer = FigureWriter(tmp_path)
+    writer.add(tree_of("b"), {})
+    writer.leave_out("G-ancestry", "the best robot of ancestry is a founder")
+    writer.leave_out("6.2", "no finished run could be measured")
+    assert [path.name for path in tmp_path.glob("*.png")] == ["G-ancestry-of-b.png"]
