@@ -45,7 +45,8 @@ def variability(tables: Tables) -> p9.ggplot:
         tables: ``variability``.
 
     Raises:
-        NothingToDraw: no run has an arena, or no two robots differ in variability.
+        NothingToDraw: no run has an arena, or no two robots of an experiment differ in
+            variability.
 
     Source: Hupkes 2016, figure 6.8.
     """
@@ -53,26 +54,38 @@ def variability(tables: Tables) -> p9.ggplot:
     if rows is None:
         raise NothingToDraw("no run has an arena")
     rows = rows.filter(pc.field("variability").is_valid())
-    if len(set(rows["variability"].to_pylist())) <= 1:
-        raise NothingToDraw("no two robots of an arena were evaluated twice")
-    frame = rows.to_pandas()
-    return (
-        p9.ggplot(frame, p9.aes("variability"))
-        + p9.geom_density(p9.aes(fill="experiment"), alpha=0.25, colour="none")
-        + p9.stat_density(
+    frame = _varied(rows.to_pandas(), "experiment")
+    if frame.empty:
+        raise NothingToDraw("no two robots of an experiment differ in variability")
+    line_colours, fill_colours = scales(tables, frame["experiment"])
+    figure = p9.ggplot(frame, p9.aes("variability")) + fill_colours
+    figure += p9.geom_density(p9.aes(fill="experiment"), alpha=0.25, colour="none")
+    lines = _varied(frame, "folder")
+    if not lines.empty:
+        # A scale without a layer that uses it is a warning.
+        figure += line_colours
+        figure += p9.stat_density(
             p9.aes(colour="experiment", group="folder"),
+            data=lines,
             geom="line",
             size=0.4,
             alpha=0.8,
             position="identity",
         )
-        + scales(tables, rows["experiment"].to_pylist())
+    return (
+        figure
         + p9.coord_cartesian(xlim=(0, 1))
         + p9.labs(
             x="range of a robot's fitness / range of the population's", y="density"
         )
         + theme_of_size(3.6)
     )
+
+
+def _varied(robots: Any, group: str) -> Any:  # noqa: ANN401 - pandas
+    """Return the robots of groups with different values: others have no density."""
+    values = robots.groupby(group)["variability"]
+    return robots[values.transform("max") > values.transform("min")]
 
 
 def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
