@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -105,8 +105,7 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {name_of(birth)}: no evaluation is recorded")
-    fitness = [-math.inf if f is None else f for f in (r["fitness"] for r in rows)]
-    number = fitness.index(max(fitness))
+    number = _fittest(rows)
     recorded = rows[number]
     if recorded["simulated_s"] is not None:
         steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
@@ -115,7 +114,7 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
     genome, stored = (born[name][0].as_py() for name in ("genome", "robot"))
     robot = robot_of_birth(genome, stored, own)
     origin = Origin(seed=run.seed, run=run.number, island=birth.island)
-    identity = Identity(origin, birth, recorded["trial"])
+    identity = Identity(origin, birth, _trial(run.folder, birth, recorded["trial"]))
     evaluation, poses = simulators.alone(robot, settings, identity)
     differing = [
         f"{name} {recorded[name]}, now {getattr(evaluation, name)}"
@@ -125,7 +124,26 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
     name = name_of(birth)
     if len(rows) > 1:
         name += f", evaluation {number + 1} of {len(rows)}, the fittest"
-    return Motion(birth, poses, _verdict(name, differing, recorded["platform"]))
+    if own.robust is None:
+        return Motion(birth, poses, _verdict(name, differing, recorded["platform"]))
+    # The evaluation combines several simulations; the poses are of another one.
+    verdict = _verdict(name, differing, recorded["platform"], "evaluates")
+    return Motion(birth, poses, f"{verdict}; shown without disturbances")
+
+
+def _trial(folder: Path, birth: BirthId, recorded: int) -> int:
+    """Return the number under which a recorded evaluation was simulated.
+
+    Number 0 of a robot that learnt is its best trial, which has another number.
+    """
+    trials = _rows_of(folder, "learning", birth).to_pylist()
+    return trials[_fittest(trials)]["trial"] if trials and not recorded else recorded
+
+
+def _fittest(rows: list[dict[str, Any]]) -> int:
+    """Return the index of the greatest fitness, the first of equal ones."""
+    fitness = [-math.inf if row["fitness"] is None else row["fitness"] for row in rows]
+    return fitness.index(max(fitness))
 
 
 def _in_arena(
@@ -193,10 +211,12 @@ def _only(poses: pa.Table, birth: BirthId) -> pa.Table:
     return poses.filter(is_island & (pc.field("birth") == birth.number))
 
 
-def _verdict(name: str, differing: list[str], platform: str) -> str:
+def _verdict(
+    name: str, differing: list[str], platform: str, verb: str = "moves"
+) -> str:
     """Return a line of text that says whether a robot moves as recorded."""
     if not differing:
-        return f"{name}: moves as recorded, equal to the last bit"
+        return f"{name}: {verb} as recorded, equal to the last bit"
     here = platform_tag()
     where = f"same platform, {here}"
     if platform != here:

@@ -1,16 +1,20 @@
 """Which evaluation of a robot is shown again."""
 
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import pyarrow as pa
 import pytest
+from msgspec.structs import replace
 
 from analysis.measures.load import Run
 from analysis.viewer import resimulate
 from analysis.viewer.resimulate import Simulators
+from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.identity import Identity
+from schema.experiment.robust import Robust
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
@@ -19,6 +23,53 @@ from schema.wire.codec import encode_robot
 
 ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 BIRTH = BirthId(0, 16)
+
+
+def shown_again(
+    experiment: Experiment,
+    fitness: list[float | None],
+    trials: tuple[float | None, ...] = (),
+) -> tuple[int, str]:
+    """Return the number of the evaluation that is simulated, and the verdict.
+
+    Args:
+        experiment: settings.
+        fitness: of the recorded evaluations.
+        trials: fitness of the trials of a robot that learns.
+    """
+    rows: dict[str, list[dict[str, Any]]] = {
+        "evaluations": [
+            {"trial": number, "fitness": value, "path_velocity": 0.1,
+             "straight_velocity": 0.1, "simulated_s": 12.0, "platform": "p"}
+            for number, value in enumerate(fitness)
+        ],
+        "births": [{"genome": None, "robot": encode_robot(ROBOT)}],
+        "learning": [
+            {"trial": number, "fitness": value} for number, value in enumerate(trials)
+        ],
+    }  # fmt: skip
+    asked: list[int] = []
+    known = [value for value in fitness if value is not None]
+
+    def alone(
+        _robot: Robot, _settings: EvaluationSettings, identity: Identity
+    ) -> tuple[Evaluation, pa.Table]:
+        asked.append(identity.trial)
+        return Evaluation(max(known), 0.1, 0.1, 12.0), pa.table({})
+
+    simulators = Simulators(alone, lambda *_: (b"", None), lambda *_: iter(()))  # type: ignore[arg-type]
+    run = Run(Path(), "e", 0, 1, "finished", experiment_text(experiment), ())
+    with (
+        patch.object(
+            resimulate,
+            "_rows_of",
+            lambda _folder, table, _birth: pa.Table.from_pylist(rows[table]),
+        ),
+        patch.object(resimulate, "robot_of_birth", lambda *_: ROBOT),
+    ):
+        (motion,) = resimulate.resimulate(run, [BIRTH], simulators, lambda _: None)
+    (number,) = asked
+    return number, motion.verdict
 
 
 @pytest.mark.parametrize(
@@ -32,35 +83,32 @@ BIRTH = BirthId(0, 16)
 def test_the_fittest_evaluation_of_a_robot_is_shown(
     fitness: list[float | None], trial: int, named: str
 ) -> None:
-    experiment = read_experiment("scenario1")
-    rows = {
-        "evaluations": [
-            {"trial": number, "fitness": value, "path_velocity": 0.1,
-             "straight_velocity": 0.1, "simulated_s": 12.0, "platform": "p"}
-            for number, value in enumerate(fitness)
-        ],
-        "births": [{"genome": None, "robot": encode_robot(ROBOT)}],
-    }  # fmt: skip
-    asked: list[int] = []
+    shown, verdict = shown_again(read_experiment("scenario1"), fitness)
+    assert shown == trial
+    assert verdict.startswith(named)
 
-    def alone(
-        _robot: Robot, _settings: EvaluationSettings, identity: Identity
-    ) -> tuple[Evaluation, pa.Table]:
-        asked.append(identity.trial)
-        shown = fitness[identity.trial]
-        assert shown is not None
-        return Evaluation(shown, 0.1, 0.1, 12.0), pa.table({})
 
-    simulators = Simulators(alone, lambda *_: (b"", None), lambda *_: iter(()))  # type: ignore[arg-type]
-    run = Run(Path(), "e", 0, 1, "finished", experiment_text(experiment), ())
-    with (
-        patch.object(
-            resimulate,
-            "_rows_of",
-            lambda _folder, table, _birth: pa.Table.from_pylist(rows[table]),
-        ),
-        patch.object(resimulate, "robot_of_birth", lambda *_: ROBOT),
-    ):
-        (motion,) = resimulate.resimulate(run, [BIRTH], simulators, lambda _: None)
-    assert asked == [trial]
-    assert motion.verdict.startswith(named)
+@pytest.mark.parametrize(
+    ("fitness", "trials", "trial"),
+    [
+        ([0.5], (0.2, None, 0.5, 0.5, 0.3), 2),
+        ([-0.2], (None, -0.3, -0.2), 2),
+        # A re-evaluation has its own number, and only its brain was learnt.
+        ([0.5, 0.7], (0.2, 0.1, 0.5), 1),
+    ],
+)
+def test_a_learnt_robot_is_shown_as_in_its_best_trial(
+    fitness: list[float | None], trials: tuple[float | None, ...], trial: int
+) -> None:
+    """Noise and pushes depend on the number of the trial."""
+    shown, verdict = shown_again(read_experiment("scenario1"), fitness, trials)
+    assert shown == trial
+    assert verdict.endswith("moves as recorded, equal to the last bit")
+
+
+def test_a_motion_without_the_disturbances_of_its_evaluation_is_named_so() -> None:
+    experiment = replace(read_experiment("scenario1"), robust=Robust(draws=2))
+    _, verdict = shown_again(experiment, [0.2])
+    assert verdict == (
+        "0:16: evaluates as recorded, equal to the last bit; shown without disturbances"
+    )
