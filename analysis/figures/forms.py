@@ -81,7 +81,7 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     """Return the distributions of measures over runs at the end, by experiment.
 
     Each point is a run. A box summarises five or more runs, a bar shows the median of
-    fewer. Pale violins show the robots of all last populations.
+    fewer. Pale violins show the robots of the last populations at the same births.
 
     Args:
         tables: ``outcomes``, and ``robots`` if they have the measure; ``runs`` for
@@ -157,8 +157,8 @@ def spread_caption(tables: Tables, panels: Panels, note: str = "") -> str:
         texts.append(f"With fewer than {BOX_RUNS} runs a bar shows their median.")
     if _violins(tables, panels, {}, in_order(sizes)):
         texts.append(
-            "Pale shapes show the robots of all last populations, each once, from the "
-            "least to the greatest value."
+            "Pale shapes show the robots of the last populations at those births, each "
+            "once, from the least to the greatest value."
         )
     texts += [note] if note else []
     return " ".join(texts) + (fitness_note(tables) if FITNESS in panels else "")
@@ -264,19 +264,24 @@ def _violins(
 def _last_robots(tables: Tables) -> pa.Table:
     """Return the robots of last populations at the births of their run's outcomes.
 
-    Runs that are unfinished or longer than the others have other last populations.
+    Runs that are unfinished or longer than the others have other last populations, and
+    so have islands with more births than another one of their run.
     """
     robots = tables["robots"].filter(pc.field("is_last"))
     populations = tables.get("populations")
     if populations is None or "folder" not in robots.column_names:
         return robots
-    last = populations.group_by("folder").aggregate([("births", "max")])
-    ends = dict(
-        zip(*(last[name].to_pylist() for name in last.schema.names), strict=True)
-    )
+    keys = ["folder", "island"]
+    ends = populations.group_by(keys).aggregate([("births", "max")]).to_pylist()
     outcomes = tables["outcomes"].select(["folder", "births"]).to_pylist()
-    equal = [row["folder"] for row in outcomes if ends[row["folder"]] == row["births"]]
-    return robots.filter(pc.is_in(robots["folder"], pa.array(equal, pa.string())))
+    births = {row["folder"]: row["births"] for row in outcomes}
+    equal = {
+        (row["folder"], row["island"])
+        for row in ends
+        if row["births_max"] <= births.get(row["folder"], -1)
+    }
+    homes = zip(*(robots[key].to_pylist() for key in keys), strict=True)
+    return robots.filter(pa.array([home in equal for home in homes], pa.bool_()))
 
 
 def _summaries(runs: Any) -> list[Any]:  # noqa: ANN401 - pandas

@@ -100,6 +100,29 @@ def test_violins_show_no_robots_of_later_births() -> None:
     assert shown["geom_violin"]["value"] == [2.0, 2.5]
 
 
+def test_violins_show_the_islands_of_a_run_that_end_at_its_outcome() -> None:
+    """The outcome is at 60 births, which both islands reach; island 1 has 75."""
+    found = [
+        {**row, "folder": "a-0", "island": island}
+        for island in range(2)
+        for row in robots("a", 1.0 + island, 1.5 + island)
+    ]
+    populations = [
+        {"experiment": "a", "folder": "a-0", "island": island, "births": births}
+        for island, births in ((0, 60), (1, 60), (1, 75))
+    ]
+    tables = {
+        "outcomes": table("outcomes", outcomes("a", 0.1)),
+        "robots": table("robots", found),
+        "populations": table("populations", populations),
+    }
+    assert layers(over_runs(tables, FITNESS))["geom_violin"]["value"] == [1.0, 1.5]
+    assert spread_caption(tables, FITNESS).endswith(
+        "Pale shapes show the robots of the last populations at those births, each "
+        "once, from the least to the greatest value."
+    )
+
+
 def test_panels_keep_their_given_order() -> None:
     panels = {"parts": "z", "hidden": "a"}
     rows = [{"experiment": "x", "parts": 7.0, "hidden": 1.0}]
