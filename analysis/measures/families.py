@@ -83,11 +83,12 @@ def families(run: RunTables) -> pa.Table:
     """Return the family of the fittest robot of each island's last population.
 
     Returns:
-        One row per ``island``: ``births`` there, ``birth`` of the robot, ``members`` of
-        its family on five levels, ``distance`` (mean tree edit distance of pairs of
-        them), ``founder_distance`` (the same for the robots without parents among the
-        first 15 of the island) and ``founders`` (robots without parents whose parts
-        are in the family). Null where there are no pairs, or no genes.
+        One row per ``island``: ``births`` there, ``birth_island`` and ``birth`` of the
+        robot, ``members`` of its family on five levels, ``distance`` (mean tree edit
+        distance of pairs of them), ``founder_distance`` (the same for the robots
+        without parents among the first 15 of the island) and ``founders`` (robots
+        without parents whose parts are in the family). Null where there are no pairs,
+        or no genes.
 
     Source: Hupkes 2016, figures 6.18 to 6.20; measures: own.
     """
@@ -110,6 +111,7 @@ def families(run: RunTables) -> pa.Table:
             {
                 "island": island,
                 "births": int(table.births[group]),
+                "birth_island": int(home[best]),
                 "birth": int(birth[best]),
                 "members": len(members),
                 "distance": _mean_distance(run.trees, members),

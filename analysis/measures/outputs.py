@@ -203,7 +203,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
     },
     "families": {
         **_ISLAND,
-        "birth": "number of birth of the fittest robot of the last population",
+        "birth_island": "island of birth of the fittest robot of the last population",
+        "birth": "number of birth of that robot there",
         "members": "robots of its family: its ancestors of four levels, and itself",
         "distance": "mean tree edit distance of pairs of the family",
         "founder_distance": "mean tree edit distance of pairs of robots born first",

@@ -22,7 +22,7 @@ from analysis.measures.outputs import schema
 from analysis.measures.run_tables import RunTables
 from schema.robot.ids import BirthId
 from tests.analysis.bodies import Body, part
-from tests.analysis.tables import births
+from tests.analysis.tables import births, population
 
 
 def body(*genes: int) -> Body:
@@ -80,7 +80,7 @@ def test_families_are_those_of_the_fittest_of_the_last_populations(
     members: pa.Table,
 ) -> None:
     rows = [(15, 4, 0.9), (30, 3, 0.1), (30, 5, 0.3), (30, 2, None)]
-    population = pa.table(
+    living = pa.table(
         {
             "island": [0] * 4,
             "births": [births for births, _, _ in rows],
@@ -90,7 +90,7 @@ def test_families_are_those_of_the_fittest_of_the_last_populations(
             "is_online": [True] * 4,
         }
     )
-    run = RunTables({"births": members, "population": population})
+    run = RunTables({"births": members, "population": living})
     (found,) = families(run).to_pylist()
     assert (found["births"], found["birth"], found["members"]) == (30, 5, 5)
     # Bodies differ by their numbers of parts: 2, 3, 2, 2, 1 in the family, so 1 in six
@@ -98,6 +98,15 @@ def test_families_are_those_of_the_fittest_of_the_last_populations(
     assert found["distance"] == pytest.approx((6 * 1 + 2) / 10)
     assert found["founder_distance"] == pytest.approx(2 / 3)
     assert found["founders"] == 2
+
+
+def test_the_robot_of_a_family_may_be_an_immigrant() -> None:
+    home, away = (0, 0), (1, 0)
+    living = population((0, 15, {home: 0.5}), (1, 15, {home: 0.4, away: 0.1}))
+    born = births((home, []), (away, []))
+    rows = families(RunTables({"births": born, "population": living})).to_pylist()
+    names = ("island", "birth_island", "birth")
+    assert [[row[name] for name in names] for row in rows] == [[0, 0, 0], [1, 0, 0]]
 
 
 def test_lineage_is_all_ancestors_parents_first(members: pa.Table) -> None:
