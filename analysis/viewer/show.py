@@ -36,12 +36,25 @@ _BLINK_S = 0.1
 
 @dataclass(slots=True)
 class _Clock:
-    """Time of each birth on one island [s], by its number there; both ascend."""
+    """Time of each birth on one island [s], by its number there; both ascend.
+
+    After a lost message births arrive late, and are sorted at the next question.
+    """
 
     times_s: dict[int, float] = field(default_factory=dict)
+    is_sorted: bool = True
+
+    def add(self, births: int, time_s: float) -> None:
+        """Add a birth."""
+        last = next(reversed(self.times_s), 0)
+        self.is_sorted = self.is_sorted and births > last
+        self.times_s[births] = time_s
 
     def births_at(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
         """Return the numbers of births up to some times."""
+        if not self.is_sorted:
+            self.times_s = dict(sorted(self.times_s.items()))
+            self.is_sorted = True
         after = np.searchsorted(list(self.times_s.values()), times_s, side="right")
         return np.array([0, *self.times_s], dtype=np.int64)[after]
 
@@ -184,7 +197,7 @@ class Show:
         if not self._lineage.add(one):
             return
         if one.sim_time_s is not None:
-            self._clocks[one.birth.island].times_s[one.births] = one.sim_time_s
+            self._clocks[one.birth.island].add(one.births, one.sim_time_s)
         parents = " and ".join(map(name_of, one.parents))
         text = f"{name_of(one.birth)} is born{' to ' if parents else ''}{parents}"
         self._recording.log_line(text, TimePoint(one.sim_time_s, one.births), "INFO")
