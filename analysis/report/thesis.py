@@ -24,13 +24,15 @@ def findings(rows: Sequence[Mapping[str, Any]]) -> str:
     if not rows:
         return ""
     verdicts = [str(row["verdict"]) for row in rows]
-    counts = ", ".join(
+    counts = [
         f"{verdicts.count(verdict)} {verdict}"
         for verdict in ("reproduced", "not reproduced", "undecided")
-    )
+    ]
+    if apart := verdicts.count("does not apply"):
+        counts.append(f"{apart} {'does' if apart == 1 else 'do'} not apply")
     is_tested = any(row["runs_a"] is not None for row in rows)
     about = (
-        f"{counts}."
+        f"{', '.join(counts)}."
         if is_tested
         else f"None of the {len(rows)} findings can be tested: they are about "
         "experiments of the thesis (scenario1 and others), two finished runs of each."
