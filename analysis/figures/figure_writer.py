@@ -175,8 +175,8 @@ def draw_figures(
         if name in pictures:
             _add_tree(writer, pictures[name], tables["robots"])
         else:
-            why = problems.get(name, f"no robot of {name} was evaluated")
-            writer.leave_out(_tree_number(name), why)
+            why = f"no evaluated robot of {name} is in a recorded population"
+            writer.leave_out(_tree_number(name), problems.get(name, why))
         bar.advance(task)
     films = [writer.add_film(one) for one in pictures.values()]
     figures = sorted(writer.drawn, key=_place)
@@ -244,7 +244,7 @@ def _add_gaits(
     for name, why in problems.items():
         writer.leave_out(f"{number} of {name}", why)
     if not pictures and not problems:
-        writer.leave_out(number, "no robot was evaluated")
+        writer.leave_out(number, "no evaluated robot is in a recorded population")
     if not pictures:
         return
     caption = (

@@ -34,14 +34,14 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
         tables: ``runs`` and ``populations``.
 
     Raises:
-        NothingToDraw: no run has several islands.
+        NothingToDraw: no run has several islands, or none has a judged population.
     """
-    several = tables["runs"].filter(pc.field("islands") > 1)["folder"]
+    several = _of_several(tables)["folder"]
     rows = tables["populations"]
     chosen = pc.is_in(rows["folder"], several.combine_chunks())
     frame = rows.filter(chosen).filter(pc.field("fitness").is_valid()).to_pandas()
     if frame.empty:
-        raise NothingToDraw(_NO_ISLANDS)
+        raise NothingToDraw("no run of several islands has a judged population")
     frame["island"] = frame["island"].astype(str)
     frame["line"] = frame["folder"] + " " + frame["island"]
     names = sorted(set(frame["island"]), key=int)
@@ -64,18 +64,31 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
     )
 
 
+def _of_several(tables: Tables) -> pa.Table:
+    """Return the rows of ``runs`` with several islands.
+
+    Raises:
+        NothingToDraw: there is none.
+    """
+    several = tables["runs"].filter(pc.field("islands") > 1)
+    if not several:
+        raise NothingToDraw(_NO_ISLANDS)
+    return several
+
+
 def between(tables: Tables) -> p9.ggplot:
     """Return the mean distances of bodies within and between islands, over runs.
 
     Args:
-        tables: ``between``.
+        tables: ``runs`` and ``between``.
 
     Raises:
-        NothingToDraw: no run has several islands.
+        NothingToDraw: no run has several islands, or all have too few births.
     """
+    _of_several(tables)
     rows = tables.get("between")
     if not rows:
-        raise NothingToDraw(_NO_ISLANDS)
+        raise NothingToDraw("no run of several islands has 15 births on one of them")
     keys = ["experiment", "births"]
     frame = rows.to_pandas().rename(columns=_PAIRS)
     pairs = frame.melt(keys, list(_PAIRS.values()), "pairs", "distance")

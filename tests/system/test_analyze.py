@@ -111,7 +111,9 @@ def test_figures_are_written_or_left_out_with_a_reason(
     table = pq.read_table(report / "measures" / "left_out.parquet").to_pylist()
     why = {row["what"]: row["why"] for row in table if not row["folder"]}
     assert "revolve bench arena" in why["figure 6.1"]
-    assert why["figure 6.19"] == "no robot of scenario2 was evaluated"
+    assert why["figure 6.19"] == (
+        "no evaluated robot of scenario2 is in a recorded population"
+    )
     assert "left out: figures " in output
     assert "B, D (no run has several islands)" in " ".join(output.split())
     missing = {n for n, stem in stems.items() if stem not in drawn}

@@ -5,11 +5,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib import pyplot as plt
 from PIL import Image
+from rich.progress import Progress
 
 from analysis.figures.catalogue import Figure
 from analysis.figures.family_tree import LINEAGE, Best
-from analysis.figures.figure_writer import FigureWriter
+from analysis.figures.figure_writer import FigureWriter, draw_figures
 from analysis.figures.robot_pictures import RobotPicture
+from tests.analysis.drawn import table
 
 
 def tree_of(experiment: str) -> Figure:
@@ -57,3 +59,19 @@ def test_a_left_out_figure_removes_only_its_own_earlier_files(tmp_path: Path) ->
     writer.leave_out("G-ancestry", "the best robot of ancestry is a founder")
     writer.leave_out("6.2", "no finished run could be measured")
     assert [path.name for path in tmp_path.glob("*.png")] == ["G-ancestry-of-b.png"]
+
+
+def test_figures_of_robots_name_what_is_missing(tmp_path: Path) -> None:
+    """A robot that was evaluated before its run was interrupted is in no population."""
+    names = ("outcomes", "progression", "runs", "populations", "extremities",
+             "findings")  # fmt: skip
+    robot = {"experiment": "scenario1", "folder": "f", "fitness": 0.1, "is_last": False}
+    tables = {name: table(name, []) for name in names} | {
+        "robots": table("robots", [robot])
+    }
+    found = draw_figures(tables, {}, tmp_path, lambda: NotImplemented, Progress())
+    why = {one.what: one.why for one in found.left_out}
+    assert why["figure 6.10"] == "no evaluated robot is in a recorded population"
+    assert why["figure 6.18"] == (
+        "no evaluated robot of scenario1 is in a recorded population"
+    )

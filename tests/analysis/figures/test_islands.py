@@ -51,9 +51,24 @@ def test_within_and_between_islands_are_means_over_runs() -> None:
         {"experiment": "ring", "births": 15, "within": within, "between": between}
         for within, between in ((2.0, 5.0), (4.0, 8.0))
     ]
-    figure = between({"between": table("between", rows)})
+    runs = [{"experiment": "ring", "folder": "f", "islands": 2}]
+    figure = between({"runs": table("runs", runs), "between": table("between", rows)})
     shown = dict(zip(figure.data["pairs"], figure.data["distance"], strict=True))
     assert shown == {"within islands": 3.0, "between islands": 6.5}
+
+
+def test_islands_without_enough_births_are_not_said_to_be_missing() -> None:
+    runs = [{"folder": "f", "islands": 2}, {"folder": "g", "islands": 1}]
+    empty = {name: table(name, []) for name in ("between", "populations")}
+    several = {**empty, "runs": table("runs", runs)}
+    with pytest.raises(NothingToDraw, match="no run of several islands has 15 births"):
+        between(several)
+    with pytest.raises(NothingToDraw, match="no run of several islands has a judged"):
+        fitness_by_island(several)
+    alone = {**empty, "runs": table("runs", runs[1:])}
+    for draw in (between, fitness_by_island):
+        with pytest.raises(NothingToDraw, match="no run has several islands"):
+            draw(alone)
 
 
 def test_fitness_by_extremities_has_bars_where_three_runs_are() -> None:
