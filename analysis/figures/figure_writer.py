@@ -285,7 +285,7 @@ def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None
         )
     caption = (
         f"Robot {best.birth_island}:{best.birth} of {best.folder.name}, the fittest "
-        "robot of the last populations, at the bottom, and its ancestors over five "
+        "robot of the last populations, at the bottom, and its ancestors over four "
         "levels of reproduction: parents are drawn above their children. A dotted line "
         f"leads to a parent that is drawn on another level. {colours} The robot has "
         f"{one.lineage.num_rows - 1} ancestors in total."

@@ -84,11 +84,11 @@ def families(run: RunTables) -> pa.Table:
 
     Returns:
         One row per ``island``: ``births`` there, ``birth_island`` and ``birth`` of the
-        robot, ``members`` of its family on five levels, ``distance`` (mean tree edit
-        distance of pairs of them), ``founder_distance`` (the same for the robots
-        without parents among the first 15 of the island) and ``founders`` (robots
-        without parents whose parts are in the family). Null where there are no pairs,
-        or no genes.
+        robot, ``members`` of its family (its ancestors of four levels, and itself),
+        ``distance`` (mean tree edit distance of pairs of them), ``founder_distance``
+        (the same for the robots without parents among the first 15 of the island) and
+        ``founders`` (robots without parents whose parts are in the family). Null where
+        there are no pairs, or no genes.
 
     Source: Hupkes 2016, figures 6.18 to 6.20; measures: own.
     """

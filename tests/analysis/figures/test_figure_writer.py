@@ -1,16 +1,20 @@
 """Tests of the files of figures and films."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib import pyplot as plt
 from PIL import Image
 from rich.progress import Progress
 
+from analysis.figures import figure_writer
 from analysis.figures.catalogue import Figure
 from analysis.figures.family_tree import LINEAGE, Best
 from analysis.figures.figure_writer import FigureWriter, draw_figures
 from analysis.figures.robot_pictures import RobotPicture
+from analysis.measures.families import LEVELS, Family
 from tests.analysis.drawn import table
 
 
@@ -75,3 +79,19 @@ def test_figures_of_robots_name_what_is_missing(tmp_path: Path) -> None:
     assert why["figure 6.18"] == (
         "no evaluated robot of scenario1 is in a recorded population"
     )
+
+
+def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        figure_writer, "family_tree", lambda *_: plt.figure(figsize=(1, 1))
+    )
+    writer = FigureWriter(tmp_path)
+    # The robot, and one ancestor on each level above it.
+    chain = tuple((row,) for row in range(LEVELS))
+    shown = replace(robot_of("a", 0), family=Family(chain, (), (), {}))
+    robots = table("robots", [])
+    figure_writer._add_tree(writer, shown, robots)
+    (tree,) = writer.drawn
+    assert "its ancestors over four levels of reproduction" in tree.caption
