@@ -14,6 +14,7 @@ from schema.tables.files import campaign, read_table
 from schema.tables.segments import parquet_files
 from schema.wire.updates import (
     Update,
+    arenas_of,
     read_birth,
     read_death,
     read_levels,
@@ -62,7 +63,7 @@ def read_news(run: Run) -> Update:
         experiment=run.experiment,
         births=tuple(births),
         deaths=tuple(map(read_death, read_table(folder, "deaths").to_pylist())),
-        levels=tuple(read_levels(population)),
+        levels=tuple(read_levels(population, arenas_of(births))),
         migrants=tuple(map(read_migrant, read_table(folder, "migrations").to_pylist())),
         document=run.document,
     )

@@ -20,6 +20,7 @@ from schema.wire.updates import (
     Migrant,
     Update,
     WorkerInfo,
+    arenas_of,
     read_birth,
     read_death,
     read_levels,
@@ -55,6 +56,7 @@ class Feed:
         self._levels: list[bytes] = []
         self._bodies: dict[BirthId, tuple[int, Birth]] = {}
         self._born = Counter[int]()
+        self._arenas = set[int]()
         self._newest: dict[int, Level] = {}
         self._migrants: list[Migrant] = []
         # By table: births, deaths, migrants, and rows of populations.
@@ -67,7 +69,9 @@ class Feed:
             match record.table:
                 case "births":
                     self._born[row["island"]] += 1
-                    new.append(read_birth(row, self._born[row["island"]]))
+                    birth = read_birth(row, self._born[row["island"]])
+                    self._arenas |= arenas_of([birth])
+                    new.append(birth)
                 case "population":
                     new.append(row)
                 case "deaths":
@@ -90,7 +94,7 @@ class Feed:
             document="",
             births=tuple(new["births"]),
             deaths=tuple(new["deaths"]),
-            levels=tuple(read_levels(new["population"])),
+            levels=tuple(read_levels(new["population"], self._arenas)),
             migrants=tuple(new["migrations"]),
         )
         self._remember(update)

@@ -4,7 +4,7 @@ A live run sends an ``Update`` a few times per second. A replay builds the same 
 the tables, through the functions of this file, so that a viewer shows both alike.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import groupby
 from math import fsum
 from operator import itemgetter
@@ -65,7 +65,8 @@ class Level(Message, frozen=True):
         island: number of the population's island.
         births: number of births on the island so far.
         size: number of living individuals.
-        judged: number of living individuals that have a fitness.
+        judged: number of living individuals whose fitness counts: in an arena that of
+            mature robots, off-line that of all, 0 of a failed evaluation.
         mean, best: fitness of those; 0 if there is none.
         members: living individuals, ascending; given for the newest level of an
             island only.
@@ -195,18 +196,33 @@ def read_death(row: Mapping[str, Any]) -> Death:
     return Death(row["island"], individual(row), row["births"], time_s, reason)
 
 
-def read_levels(rows: Iterable[Mapping[str, Any]]) -> list[Level]:
+def arenas_of(births: Iterable[Birth]) -> set[int]:
+    """Return the numbers of the islands that are arenas: births there have a time."""
+    return {one.birth.island for one in births if one.sim_time_s is not None}
+
+
+def read_levels(
+    rows: Iterable[Mapping[str, Any]], arenas: Container[int]
+) -> list[Level]:
     """Return the levels of rows of the population table, one per set of rows.
 
     Args:
-        rows: in the order of the table, so that rows of one set are adjacent.
+        rows: in the order of the table, so that rows of one set are adjacent. A null
+            fitness is in an arena that of an immature robot, otherwise of a failure.
+        arenas: numbers of the islands that are arenas.
     """
     sets = groupby(rows, key=lambda row: (row["island"], row["births"]))
-    return [_level(island, births, list(each)) for (island, births), each in sets]
+    return [
+        _level(island, births, list(each), is_online=island in arenas)
+        for (island, births), each in sets
+    ]
 
 
-def _level(island: int, births: int, rows: Sequence[Mapping[str, Any]]) -> Level:
-    fitness = [row["fitness"] for row in rows if row["fitness"] is not None]
+def _level(
+    island: int, births: int, rows: Sequence[Mapping[str, Any]], *, is_online: bool
+) -> Level:
+    known = [row["fitness"] for row in rows if row["fitness"] is not None]
+    fitness = known if is_online else known + [0.0] * (len(rows) - len(known))
     return Level(
         island=island,
         births=births,

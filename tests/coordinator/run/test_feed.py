@@ -1,5 +1,6 @@
 """Updates for viewers: numbered, complete, without bodies of dead robots."""
 
+import pytest
 from msgspec.structs import replace
 
 from coordinator.islands.events import Record
@@ -117,3 +118,17 @@ def test_bodies_of_robots_that_were_not_selected_are_dropped_off_line() -> None:
     feed.update(())
     bodies = {one.birth.number: one.body for one in feed.whole().births}
     assert bodies == {0: None, 1: BODY, 2: None, 3: BODY, 4: BODY}
+
+
+@pytest.mark.parametrize(
+    ("sim_time_s", "expected"), [(None, (2, 0.75, 1.5)), (4.0, (1, 1.5, 1.5))]
+)
+def test_failed_robots_count_as_zero_off_line(
+    sim_time_s: float | None, expected: tuple[int, float, float]
+) -> None:
+    """In an arena a robot without fitness is immature, and does not count."""
+    failed, grown = _population(2, 0, 1)
+    failed = Record("population", {**failed.row, "fitness": None})
+    feed = _feed(_birth(0, sim_time_s), _birth(1, sim_time_s), failed, grown)
+    (level,) = _sent(feed.update(())).levels
+    assert (level.judged, level.mean, level.best) == expected

@@ -76,7 +76,7 @@ def test_body_that_is_not_a_tree_is_malformed() -> None:
         decode_update(encode_update(bad))
 
 
-def test_level_averages_the_individuals_that_have_a_fitness() -> None:
+def test_level_counts_failed_robots_off_line_and_no_immature_ones_of_arenas() -> None:
     rows: list[Row] = [
         {"island": 0, "births": 2, "birth": 0, "fitness": 0.5},
         {"island": 0, "births": 2, "birth": 1, "fitness": None},
@@ -84,7 +84,13 @@ def test_level_averages_the_individuals_that_have_a_fitness() -> None:
         {"island": 0, "births": 3, "birth": 1, "fitness": 0.75},
         {"island": 0, "births": 3, "birth": 2, "fitness": None},
     ]
-    assert read_levels(rows) == [
-        Level(0, 2, 2, 1, 0.5, 0.5, (BirthId(0, 0), BirthId(0, 1))),
-        Level(0, 3, 3, 2, 0.5, 0.75, tuple(BirthId(0, each) for each in range(3))),
+    two, three = (tuple(BirthId(0, each) for each in range(n)) for n in (2, 3))
+    assert read_levels(rows, arenas={0}) == [
+        Level(0, 2, 2, 1, 0.5, 0.5, two),
+        Level(0, 3, 3, 2, 0.5, 0.75, three),
+    ]
+    # A failed evaluation counts as 0, as in selection.
+    assert read_levels(rows, arenas={1}) == [
+        Level(0, 2, 2, 2, 0.25, 0.5, two),
+        Level(0, 3, 3, 3, 1 / 3, 0.75, three),
     ]
