@@ -222,4 +222,4 @@ def _draw_points(runs: SweepRuns, panel: Axes, measure: str, setting: str) -> No
 
 
 def _text(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

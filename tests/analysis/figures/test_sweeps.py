@@ -81,6 +81,18 @@ def test_a_caption_names_no_best_point_among_those_without_fitness() -> None:
         assert sweep_caption(tables, "e").endswith(end)
 
 
+def test_settings_keep_their_digits() -> None:
+    points = [{"a": 2404.0, "b": 0.0625}, {"a": 2404.0, "b": 0.1234}] * 2
+    points += [{"a": 1e-7, "b": 0.0625}, {"a": 1e-7, "b": 0.1234}] * 2
+    assert "highest at a = 2404, b = 0.1234:" in sweep_caption(_tables(points), "e")
+    figure = sweep_map(_tables(points), "e")
+    panel = figure.axes[0]
+    ticks = [each.get_text() for each in panel.get_xticklabels()]
+    assert ticks == ["1e-07", "2404"]
+    assert [each.get_text() for each in panel.get_yticklabels()] == ["0.0625", "0.1234"]
+    plt.close(figure)
+
+
 def test_scattered_settings_have_a_panel_each() -> None:
     points = [{"a": 1.0, "b": 4.0}, {"a": 2.0, "b": 5.0}, {"a": 3.0, "b": 6.0}]
     figure = sweep_map(_tables(points), "e")
