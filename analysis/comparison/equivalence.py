@@ -12,6 +12,7 @@ from statistics import NormalDist
 import numpy as np
 
 from analysis.comparison.statistics import (
+    mean,
     rank_sum_ways,
     score_variance,
     standard_error,
@@ -69,7 +70,7 @@ def mean_alike_p(values: Numbers, reference: float, margin: float) -> float:
 
     Source: Schuirmann, 1987, with Student's t.
     """
-    room = margin - abs(float(values.mean()) - reference)
+    room = margin - abs(mean(values) - reference)
     error = standard_error(values)
     if math.isnan(error):
         return 1.0

@@ -9,6 +9,7 @@ from analysis.comparison.statistics import (
     cliffs_delta,
     delta_interval,
     false_discovery,
+    mean,
     mean_difference,
     rank_sum_p,
     signed_rank,
@@ -42,8 +43,8 @@ def _described(a: Numbers, b: Numbers | float) -> Row:
     difference, low, high = mean_difference(a, b)
     return {
         "runs_a": len(a),
-        "mean_a": float(a.mean()),
-        "mean_b": float(np.mean(b)),
+        "mean_a": mean(a),
+        "mean_b": mean(np.atleast_1d(b)),
         "median_a": float(np.median(a)),
         "median_b": float(np.median(b)),
         "difference": difference,

@@ -17,7 +17,7 @@ LEVEL = 0.95
 """Confidence level of all intervals."""
 EQUAL_RUNS = 10
 """Fewer equal runs than this do not show that there is no spread: ten show with 95 %
-confidence that at most a quarter of all runs differ."""
+confidence that at most 26 % of all runs differ."""
 
 
 def cliffs_delta(a: Numbers, b: Numbers) -> float:
@@ -186,8 +186,19 @@ def standard_error(values: Numbers) -> float:
         values: (N,) one number per run.
     """
     count = len(values)
-    error = float(values.std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0
-    return error if error > 0.0 or count >= EQUAL_RUNS else math.nan
+    # The deviation of equal numbers may be rounded to more than 0.
+    if not np.ptp(values):
+        return 0.0 if count >= EQUAL_RUNS else math.nan
+    return float(values.std(ddof=1)) / math.sqrt(count)
+
+
+def mean(values: Numbers) -> float:
+    """Return the mean of numbers; of equal ones exactly their value.
+
+    Args:
+        values: (N,) one number per run.
+    """
+    return float(np.clip(values.mean(), values.min(), values.max()))
 
 
 def mean_difference(a: Numbers, b: Numbers | float) -> tuple[float, float, float]:
@@ -203,7 +214,7 @@ def mean_difference(a: Numbers, b: Numbers | float) -> tuple[float, float, float
     Source: Welch, *The generalization of Student's problem*, Biometrika 34, 1947.
     """
     samples = [x for x in (a, b) if isinstance(x, np.ndarray)]
-    difference = float(a.mean() - np.mean(b))
+    difference = mean(a) - mean(np.atleast_1d(b))
     parts = [standard_error(sample) ** 2 for sample in samples]
     total = sum(parts)
     if math.isnan(total):
@@ -261,5 +272,5 @@ def _t_shares(freedom: float) -> tuple[Numbers, Numbers]:
     # With t = sqrt(freedom) tan(angle) the density becomes cos(angle)^(freedom - 1).
     angles = np.linspace(0.0, math.pi / 2, 20001)
     area = np.cos(angles) ** (freedom - 1)
-    steps = (area[1:] + area[:-1]) / 2
-    return angles, np.append(0.0, np.cumsum(steps)) / steps.sum()
+    until = np.append(0.0, np.cumsum(area[1:] + area[:-1]))
+    return angles, until / until[-1]

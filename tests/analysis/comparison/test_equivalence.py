@@ -61,9 +61,9 @@ def test_mean_alike_equals_two_t_tests_of_scipy() -> None:
 
 
 def test_few_equal_runs_show_nothing() -> None:
-    equal = np.full(9, 1.5)
-    assert mean_alike_p(equal, 1, 0.8) == 1
-    assert mean_alike_power(equal, 0.8) == 0
+    for equal in (np.full(9, 1.5), np.full(3, 0.7), np.full(6, 0.7)):
+        assert mean_alike_p(equal, equal[0], 0.8) == 1
+        assert mean_alike_power(equal, 0.8) == 0
 
 
 def test_mean_power_grows_with_the_margin_and_the_runs() -> None:
@@ -84,3 +84,10 @@ def test_tails_of_t_equal_scipy() -> None:
         for value in (-3.0, 0.0, 0.7, 12.0):
             expected = stats.t.sf(value, freedom)
             assert t_tail(value, freedom) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("freedom", [1, 2.5, 5, 29])
+def test_tails_of_t_are_probabilities(freedom: float) -> None:
+    assert t_tail(1e18, freedom) == pytest.approx(0, abs=1e-15)
+    assert t_tail(1e18, freedom) >= 0
+    assert t_tail(-1e18, freedom) <= 1

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy import optimize, stats
 
 from analysis.comparison.statistics import (
+    EQUAL_RUNS,
     cliffs_delta,
     delta_interval,
     false_discovery,
@@ -17,6 +18,7 @@ from analysis.comparison.statistics import (
     rank_sum_p,
     ranks,
     signed_rank,
+    standard_error,
     t_quantile,
 )
 from analysis.measures.population_table import Numbers
@@ -129,6 +131,22 @@ def test_one_run_or_few_equal_ones_have_no_interval(few: Numbers, turns: int) ->
 def test_ten_equal_runs_have_no_spread() -> None:
     assert mean_difference(np.full(10, 3.0), 1.0) == (2.0, 2.0, 2.0)
     assert math.isnan(mean_difference(np.full(9, 3.0), 1.0)[1])
+    # Ten equal runs of ten have a probability of 5 % if 26 % of all runs differ.
+    assert (1 - 0.26) ** EQUAL_RUNS < 0.05 < (1 - 0.25) ** EQUAL_RUNS
+
+
+@pytest.mark.parametrize("count", [3, 6, 7, 10])
+@pytest.mark.parametrize("value", [0.05, 0.1, 0.7, 14 / 15, 1.4])
+def test_equal_runs_have_no_spread_by_rounding(value: float, count: int) -> None:
+    """The mean of three times 0.1 is rounded, so that their deviation is not 0."""
+    error = standard_error(np.full(count, value))
+    assert error == 0 if count >= EQUAL_RUNS else math.isnan(error)
+
+
+def test_experiments_of_equal_runs_do_not_differ_by_rounding() -> None:
+    """The mean of twelve times 0.1 is rounded, that of ten times is not."""
+    same = mean_difference(np.full(10, 0.1), np.full(12, 0.1))
+    assert same == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("delta", [-1.0, -0.6, 0.0, 0.3, 1.0])
