@@ -118,7 +118,10 @@ def _differences_of(comparison: Sequence[Row], measure: str, title: str) -> str:
 
 
 def _interval(row: Row) -> tuple[float, float] | None:
-    """Return the interval of a difference; None without two runs of each."""
+    """Return the interval of a difference; None without two runs of each.
+
+    Fewer than ten equal runs have none either.
+    """
     low, high = row["difference_low"], row["difference_high"]
     if low is None or min(row["runs_a"], row["runs_b"]) < _SURE:
         return None
@@ -130,18 +133,22 @@ def _difference(row: Row, reach: float) -> str:
     a, b = (f"<b>{escape(label(row[name]))}</b>" for name in "ab")
     both = _interval(row)
     counts = f"{row['runs_a']} and {plural(row['runs_b'], 'run')}"
-    at = f"{counts}, at {row['births']} births"
+    has_two = min(row["runs_a"], row["runs_b"]) >= _SURE
+    is_tested = has_two and row["p"] is not None
+    p = f"; rank-sum p = {number(row['p'])}" * is_tested
+    at = f"{counts}, at {row['births']} births{p}"
     sign = "+" * (row["difference"] > 0)
     value = f"<b>{sign}{number(row['difference'])}</b>"
     if both is None:
-        verdict = "no interval: it needs two finished runs of each (--repeats)"
         text = f"{value} ({at})"
+        verdict = "no interval: it needs two finished runs of each (--repeats)"
+        if has_two:
+            verdict = (
+                "no interval: all runs of one are equal, and they are fewer than ten"
+            )
     else:
         low, high = both
-        text = (
-            f"{value}, 95 % interval {number(low)} to {number(high)} ({at}; "
-            f"rank-sum p = {number(row['p'])})"
-        )
+        text = f"{value}, 95 % interval {number(low)} to {number(high)} ({at})"
         verdict = "the interval includes 0: these runs do not tell which is fitter"
         if row["apart"]:
             verdict = "in an arena and off-line: this does not show which is fitter"

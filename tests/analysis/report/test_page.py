@@ -135,6 +135,20 @@ def test_both_comparisons_of_fitness_show_the_pairs_in_one_order() -> None:
     assert lines == ["c", "b"] * 2
 
 
+@pytest.mark.parametrize("p", [0.1, None])
+def test_equal_runs_have_no_interval_and_keep_their_p(p: float | None) -> None:
+    """Three runs of 0.25 each against 0.5, 0.6 and 0.7: p is 2 of 20 ways."""
+    row = {"measure": "fitness", "a": "a", "b": "b", "births": 9, "runs_a": 3,
+           "runs_b": 3, "mean_a": 0.25, "mean_b": 0.6, "difference": -0.35,
+           "effect": -1.0, "p": p}  # fmt: skip
+    given = tables()
+    given["comparison"] = pa.Table.from_pylist([row], schema("comparison"))
+    text = re.sub("<[^>]+>", "", differences(given))
+    why = "no interval: all runs of one are equal, and they are fewer than ten"
+    at = "&minus;0.35 (3 and 3 runs, at 9 births"
+    assert (f"{at}; rank-sum p = 0.1){why}" if p else f"{at}){why}") in text
+
+
 def test_compared_measures_are_explained_and_equal_ones_counted(read: Reader) -> None:
     assert "1 measure is equal in all runs: size mean." in read.text
     assert "What the measures mean" in read.folds
