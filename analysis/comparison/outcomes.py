@@ -39,7 +39,8 @@ def outcome(
         rows = np.flatnonzero((islands == island) & (counts <= births))
         if len(rows):
             columns = {name: _column(populations, name)[rows] for name in POPULATION}
-            founders = settings[island].founders
+            # An island that is not in the document has the settings of the last one.
+            founders = settings[min(island, len(settings) - 1)].founders
             each.append(_of_island(columns, counts[rows], births, founders))
     found = {"births": float(births)}
     for name in each[0] if each else ():

@@ -131,6 +131,16 @@ def test_changes_are_counted_from_the_founders_of_the_experiment() -> None:
     assert outcome(tables(levels), 24, SETTINGS)["gain"] == pytest.approx(0.3)
 
 
+def test_an_island_that_is_not_in_the_document_has_the_settings_of_the_last() -> None:
+    """Eight founders, as island 1 has: the gain is 0.3 - 0.1."""
+    levels = [
+        {"island": 2, "births": births, "fitness": fitness}
+        for births, fitness in ((8, 0.1), (15, 0.6), (24, 0.3))
+    ]
+    settings = (SETTINGS[0], replace(SETTINGS[0], founders=8))
+    assert outcome(tables(levels), 24, settings)["gain"] == pytest.approx(0.2)
+
+
 def test_families_without_rows_have_no_outcome() -> None:
     empty = pa.Table.from_pylist([], schema("families"))
     made = {**tables([{"births": 15, "fitness": 0.1}]), "families": empty}
