@@ -48,8 +48,13 @@ def outcome(
     if "robots" in tables:
         found |= _of_robots(tables["robots"], found, births)
     found |= _own_measures(tables, births)
-    # Families and contacts are those of whole runs.
-    whole = tables if births >= counts.max(initial=0) else {}
+    # Families and contacts are those of the whole time of an island.
+    going_on = np.unique(islands[counts > births]).tolist()
+    whole = {
+        name: tables[name].filter(~pc.field("island").isin(going_on))
+        for name in ("families", "interactions")
+        if name in tables
+    }
     found |= _of_families(whole) | _of_arena(tables, births)
     return found | _of_contacts(whole)
 

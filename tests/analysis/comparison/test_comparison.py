@@ -147,12 +147,26 @@ def test_families_without_rows_have_no_outcome() -> None:
     assert math.isnan(outcome(made, 15, SETTINGS)["family_distance"])
 
 
-def test_contacts_of_later_births_do_not_count() -> None:
-    contacts = pa.Table.from_pylist([{"touched": 0.5}], schema("interactions"))
-    levels = [{"births": births, "fitness": 0.1} for births in (15, 30)]
-    made = {**tables(levels), "interactions": contacts}
-    assert outcome(made, 30, SETTINGS)["touched"] == 0.5
-    assert math.isnan(outcome(made, 15, SETTINGS)["touched"])
+def test_contacts_and_families_of_later_births_do_not_count() -> None:
+    """Island 0 ends with 15 births, island 1 goes on to 30."""
+    levels = [
+        {"island": island, "births": births, "fitness": 0.1}
+        for island, births in ((0, 15), (1, 15), (1, 30))
+    ]
+    contacts = [{"island": 0, "touched": 0.5}, {"island": 1, "touched": 0.7}]
+    families = [
+        {"island": island, "distance": distance, "founder_distance": 1.0}
+        for island, distance in ((0, 0.2), (1, 0.4))
+    ]
+    made = tables(levels) | {
+        "interactions": pa.Table.from_pylist(contacts, schema("interactions")),
+        "families": pa.Table.from_pylist(families, schema("families")),
+    }
+    found = [outcome(made, births, SETTINGS) for births in (30, 15, 14)]
+    names = ("touched", "family_distance")
+    assert [found[0][name] for name in names] == pytest.approx([0.6, 0.3])
+    assert [found[1][name] for name in names] == pytest.approx([0.5, 0.2])
+    assert all(math.isnan(found[2][name]) for name in names)
 
 
 def test_outcome_of_several_islands_is_their_mean() -> None:
