@@ -19,7 +19,9 @@ def outcome(
 ) -> dict[str, float]:
     """Return the outcomes of a run at a number of births.
 
-    No outcome depends on what happened after these births.
+    No outcome depends on what happened after these births. Contacts, families,
+    variability, and the fitness of robots that are judged again while they live are
+    known for whole lives only: they are those of the islands that end by then.
 
     Args:
         tables: tables of one run, with the columns of ``outputs``.
@@ -35,28 +37,43 @@ def outcome(
     islands = np.asarray(populations["island"], np.int64)
     counts = _column(populations, "births")
     each = []
-    for island in np.unique(islands):
+    for island in np.unique(islands).tolist():
         rows = np.flatnonzero((islands == island) & (counts <= births))
         if len(rows):
             columns = {name: _column(populations, name)[rows] for name in POPULATION}
-            # An island that is not in the document has the settings of the last one.
-            founders = settings[min(island, len(settings) - 1)].founders
+            founders = _settings_of(island, settings).founders
             each.append(_of_island(columns, counts[rows], births, founders))
     found = {"births": float(births)}
     for name in each[0] if each else ():
         found[name] = _mean(np.array([one[name] for one in each]))
+    going_on = np.unique(islands[counts > births]).tolist()
     if "robots" in tables:
         found |= _of_robots(tables["robots"], found, births)
+        judged_again = [
+            island
+            for island in going_on
+            if (own := _settings_of(island, settings)).is_online or own.reevaluation
+        ]
+        judged = _without(tables["robots"], judged_again)
+        found |= _correlations(judged.filter(pc.field("birth") < births))
     found |= _own_measures(tables, births)
-    # Families and contacts are those of the whole time of an island.
-    going_on = np.unique(islands[counts > births]).tolist()
     whole = {
-        name: tables[name].filter(~pc.field("island").isin(going_on))
-        for name in ("families", "interactions")
+        name: _without(tables[name], going_on)
+        for name in ("families", "interactions", "variability")
         if name in tables
     }
-    found |= _of_families(whole) | _of_arena(tables, births)
-    return found | _of_contacts(whole)
+    found |= _of_families(whole) | _of_contacts(whole)
+    return found | _of_arena({**tables, **whole}, births)
+
+
+def _settings_of(island: int, settings: Sequence[IslandSettings]) -> IslandSettings:
+    """Return the settings of an island; the last ones if it is not in the document."""
+    return settings[min(island, len(settings) - 1)]
+
+
+def _without(table: pa.Table, islands: Sequence[int]) -> pa.Table:
+    """Return the rows of other islands than these."""
+    return table.filter(~pc.field("island").isin(islands))
 
 
 def _of_island(
@@ -100,16 +117,21 @@ def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) ->
 def _of_robots(
     robots: pa.Table, last: dict[str, float], births: int
 ) -> dict[str, float]:
-    born = robots.filter(pc.field("birth") < births)
-    random = born.filter(pc.field("ancestors") == 0)
+    is_random = pc.field("ancestors") == 0
+    random = robots.filter((pc.field("birth") < births) & is_random)
     found = {}
     for name in ("parts", "touch_sensors", "hidden"):
         change = last.get(name, math.nan) - _mean(_column(random, name))
         found[f"{name}_change"] = change
-    for name in ("parts", "extremities", "extremities_per_part"):
-        correlation = _correlation(_column(born, name), _column(born, "fitness"))
-        found[f"{name}_fitness"] = correlation
     return found
+
+
+def _correlations(robots: pa.Table) -> dict[str, float]:
+    fitness = _column(robots, "fitness")
+    return {
+        f"{name}_fitness": _correlation(_column(robots, name), fitness)
+        for name in ("parts", "extremities", "extremities_per_part")
+    }
 
 
 def _own_measures(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:

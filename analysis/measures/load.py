@@ -55,6 +55,8 @@ class IslandSettings:
         records_touches: it records which robots touch.
         learns: its robots learn.
         founders: size of its first population.
+        reevaluation: how re-evaluations of its robots count, ``replace`` or ``mean``;
+            empty if there are none.
     """
 
     births: int
@@ -62,6 +64,7 @@ class IslandSettings:
     records_touches: bool
     learns: bool = False
     founders: int = _FOUNDERS
+    reevaluation: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,8 +296,12 @@ def _settings(document: dict[str, Any]) -> Iterable[IslandSettings]:
         learns = bool(entry.get("learning") or document.get("learning"))
         selection = entry.get("selection") or document.get("selection") or {}
         founders = int(selection.get("population", _FOUNDERS))
+        again = selection.get("reevaluation")
+        reevaluation = "" if again is None else str(again.get("fitness", "replace"))
         for _ in range(count):
-            yield IslandSettings(births, arena is not None, touches, learns, founders)
+            yield IslandSettings(
+                births, arena is not None, touches, learns, founders, reevaluation
+            )
 
 
 def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:

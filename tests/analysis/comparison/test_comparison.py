@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pytest
@@ -167,6 +168,39 @@ def test_contacts_and_families_of_later_births_do_not_count() -> None:
     assert [found[0][name] for name in names] == pytest.approx([0.6, 0.3])
     assert [found[1][name] for name in names] == pytest.approx([0.5, 0.2])
     assert all(math.isnan(found[2][name]) for name in names)
+
+
+@pytest.mark.parametrize(
+    ("changes", "at_15"),
+    [({}, 0.9), ({"reevaluation": "replace"}, -1.0), ({"is_online": True}, -1.0)],
+)
+def test_fitness_of_whole_lives_counts_on_islands_that_end(
+    changes: Mapping[str, Any], at_15: float
+) -> None:
+    """Island 0 ends with 15 births; island 1 goes on, and larger ones are fitter."""
+    levels = [
+        {"island": island, "births": births, "fitness": 0.1}
+        for island, births in ((0, 15), (1, 15), (1, 30))
+    ]
+    robots = [
+        {"island": island, "parts": parts, "fitness": fitness}
+        for island, parts, fitness in (
+            (0, 3.0, 0.2), (0, 4.0, 0.1), (1, 5.0, 0.3), (1, 6.0, 0.4), (1, 7.0, 0.5),
+        )
+    ]  # fmt: skip
+    lives = [
+        {"island": island, "birth": birth, "variability": value}
+        for island, birth, value in ((0, 0, 0.2), (0, 1, 0.4), (1, 0, 0.9), (1, 1, 0.9))
+    ]
+    made = tables(levels, robots)
+    made["variability"] = pa.Table.from_pylist(lives, schema("variability"))
+    settings = (SETTINGS[0], replace(SETTINGS[1], **changes))
+    early, late = (outcome(made, births, settings) for births in (15, 30))
+    # Ranks 2 1 3 4 5, or 2 1 alone: 1 - 6 (1 + 1) / (5 (25 - 1)) = 0.9.
+    assert early["parts_fitness"] == pytest.approx(at_15)
+    assert late["parts_fitness"] == pytest.approx(0.9)
+    assert early["variability"] == pytest.approx(0.3)
+    assert late["variability"] == pytest.approx(0.65)
 
 
 def test_outcome_of_several_islands_is_their_mean() -> None:

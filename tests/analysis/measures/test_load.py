@@ -371,6 +371,20 @@ def test_islands_have_their_own_settings(made: Maker) -> None:
     assert {"between", "migrants", "variability"} <= set(measured.tables)
 
 
+def test_islands_know_how_reevaluations_count(made: Maker) -> None:
+    folder = made("x")
+    selections: list[dict[str, object] | None] = [
+        None, {"reevaluation": None}, {"reevaluation": {}},
+        {"reevaluation": {"fitness": "mean"}},
+    ]  # fmt: skip
+    islands = [{"selection": each} for each in selections]
+    document = {"births": 3, "arena": None, "islands": islands}
+    details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
+    (folder / "run.json").write_text(json.dumps(details))
+    found = [one.reevaluation for one in found_in(folder).islands]
+    assert found == ["", "", "replace", "mean"]
+
+
 def test_immigrants_keep_their_birth_id(made: Maker) -> None:
     folder = made("x")
     rows: list[dict[str, object]] = [
