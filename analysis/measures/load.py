@@ -4,7 +4,7 @@ Everything readable is read; everything else is reported with its folder and the
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,16 @@ class IslandSettings:
     learns: bool = False
     founders: int = _FOUNDERS
     reevaluation: str = ""
+
+
+def settings_of(island: int, islands: Sequence[IslandSettings]) -> IslandSettings:
+    """Return the settings of an island; the last ones if it is not in the document.
+
+    Args:
+        island: number of the island.
+        islands: settings of the islands of the document.
+    """
+    return islands[min(island, len(islands) - 1)]
 
 
 @dataclass(frozen=True, slots=True)

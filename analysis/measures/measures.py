@@ -17,6 +17,7 @@ from analysis.measures.diversity import mean_distances
 from analysis.measures.families import families
 from analysis.measures.interactions import interactions
 from analysis.measures.learning import learning, learning_curves
+from analysis.measures.load import settings_of
 from analysis.measures.named_measures import named_measures
 from analysis.measures.population_table import (
     Booleans,
@@ -24,6 +25,7 @@ from analysis.measures.population_table import (
     individual_ids,
     is_last_of_each,
     last_there,
+    residence_ids,
     rows_of,
 )
 from analysis.measures.populations import populations
@@ -82,9 +84,10 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Integers, Booleans, Booleans]:
     """Return each individual's fitness, if it lives at the end, and if it failed.
 
     Returns:
-        The last fitness, the greatest one of an individual that was judged on several
-        islands, NaN if there is none; the island of it, -1 if there is none; whether
-        it is in a last population; whether all its evaluations failed.
+        The last fitness (or the mean that selection takes), the greatest one of an
+        individual that was judged on several islands, NaN if there is none; the
+        island of it, -1 if there is none; whether it is in a last population; whether
+        all its evaluations failed.
     """
     fitness = np.full(run.births.num_rows, np.nan)
     islands = np.full(len(fitness), -1, np.int64)
@@ -108,9 +111,9 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Integers, Booleans, Booleans]:
         homes = np.asarray(rows["island"], np.int64)
         take(rows_of(individual_ids(rows), run.births), values, homes)
 
-    evaluations = run.tables["evaluations"]
-    take_table(last_there(evaluations, np.arange(evaluations.num_rows)))
+    take_table(_evaluations(run))
     is_failed = ~np.isnan(fitness)
+    evaluations = run.tables["evaluations"]
     succeeded = evaluations.filter(pc.is_valid(evaluations["fitness"]))
     rows = rows_of(individual_ids(succeeded), run.births)
     is_failed[rows[rows >= 0]] = False
@@ -122,6 +125,35 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Integers, Booleans, Booleans]:
     is_last = np.zeros(len(fitness), np.bool_)
     is_last[table.members[chosen]] = True
     return fitness, islands, is_last, is_failed
+
+
+def _evaluations(run: RunTables) -> pa.Table:
+    """Return the last evaluation of each individual on each island that it lives on.
+
+    Natives of an island on which the mean of their evaluations counts have that mean,
+    in which a failed evaluation is 0.
+    """
+    every = run.tables["evaluations"]
+    last = last_there(every, np.arange(every.num_rows))
+    islands = np.asarray(last["island"], np.int64)
+    averaged = [
+        island
+        for island in np.unique(islands).tolist()
+        if run.islands and settings_of(island, run.islands).reevaluation == "mean"
+    ]
+    if not averaged:
+        return last
+    values = np.asarray(every["fitness"].to_numpy(), np.float64)
+    # The ids of the last evaluations are in this order, too.
+    _, rows, counts = np.unique(
+        residence_ids(every), return_inverse=True, return_counts=True
+    )
+    means = np.bincount(rows, np.nan_to_num(values)) / counts
+    succeeded = np.bincount(rows, ~np.isnan(values)) > 0
+    is_native = islands == np.asarray(last["birth_island"], np.int64)
+    is_averaged = is_native & np.isin(islands, averaged) & succeeded
+    fitness = pc.if_else(pa.array(is_averaged), pa.array(means), last["fitness"])
+    return last.set_column(last.schema.get_field_index("fitness"), "fitness", fitness)
 
 
 def _greatest(run: RunTables, last: Numbers) -> Numbers:

@@ -143,7 +143,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "on several islands, and the greatest fitness counts",
         **_ROBOT,
         "is_last": "whether it is judged in an island's last population",
-        "fitness": "last fitness; off-line 0 if the evaluation failed",
+        "fitness": "last fitness, or the mean of its evaluations if selection takes "
+        "that; off-line 0 if the evaluation failed",
         "rank": "rank (thesis eq. 6.1)",
         "ancestors": "number of different ancestors",
         **BODY,

@@ -1,6 +1,6 @@
 """The tables of a run, with values that several measures share."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import pyarrow as pa
@@ -8,6 +8,7 @@ import pyarrow as pa
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import body_sizes
 from analysis.measures.brains.measures import Brains, brain_measures
+from analysis.measures.load import IslandSettings
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
@@ -26,13 +27,18 @@ class RunTables:
         tables: by name, as ``analysis.measures.load.read_tables`` returns them: births,
             evaluations, population, fitness, deaths, touches, migrations, learning.
         slots: slot that labels a part in tree edit distance.
+        islands: settings of the islands; without them no robot is re-evaluated.
     """
 
     def __init__(
-        self, tables: Mapping[str, pa.Table], slots: SlotRule = "parent"
+        self,
+        tables: Mapping[str, pa.Table],
+        slots: SlotRule = "parent",
+        islands: Sequence[IslandSettings] = (),
     ) -> None:
         self.tables = tables
         self.slots = slots
+        self.islands = islands
 
     @property
     def births(self) -> pa.Table:

@@ -69,7 +69,7 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
     """Return the measures of one run, and what was left out."""
     tables, left_out = read_tables(run)
     folder = str(run.folder)
-    shared = RunTables(tables, slots)
+    shared = RunTables(tables, slots, run.islands)
     unread = frozenset(one.what.removeprefix(TABLE) for one in left_out)
     found, problems = measure(shared, _wanted(run), unread)
     if skipped := shared.population_table.incomplete:

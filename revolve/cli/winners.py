@@ -67,7 +67,7 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     tables, left_out = read_tables(run)
     for each in left_out:
         raise RunFolderError(f"{each.folder}: {each.what}: {each.why}")
-    found = robots(RunTables(tables))
+    found = robots(RunTables(tables, islands=run.islands))
     if not found.num_rows:
         raise RunFolderError(f"{folder}: no robot was evaluated")
     best = found["fitness"].to_pylist().index(pc.max(found["fitness"]).as_py())

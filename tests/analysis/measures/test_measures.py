@@ -1,6 +1,7 @@
 """Tests of all measures, with small tables and known results."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from analysis.comparison.progression import progression
 from analysis.measures.ancestry import ancestors, migrants, parents_of
 from analysis.measures.bodies import body_sizes, extremity_bins
 from analysis.measures.diversity import diversity, mean_distances
+from analysis.measures.load import IslandSettings
 from analysis.measures.measures import births_so_far, measure, robots
 from analysis.measures.outputs import OUTPUTS
 from analysis.measures.population_table import population_table
@@ -237,6 +239,40 @@ def test_robots_have_their_last_fitness() -> None:
     assert found["is_last"].to_pylist() == [True, False, True]
     assert found["ancestors"].to_pylist() == [0, 0, 2]
     assert found["is_failed"].to_pylist() == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("rule", "expected"),
+    [("replace", [0.3, 0.4, 0.0, 0.5, 0.3]), ("mean", [0.2, 0.2, 0.0, 0.5, 0.3])],
+)
+def test_robots_have_the_mean_of_their_evaluations_if_selection_takes_it(
+    rule: str, expected: list[float]
+) -> None:
+    """A, B and C are dead; a failed evaluation of B counts as 0, D lives.
+
+    On island 1, an immigrant is judged each time that it arrives: the last one counts.
+    """
+    evaluations: list[dict[str, Any]] = [
+        {"birth": birth, "trial": trial, "fitness": fitness}
+        for birth, trial, fitness in (
+            (0, 0, 0.1), (1, 0, None), (2, 0, None), (3, 0, 0.9),
+            (0, 1, 0.3), (1, 1, 0.4), (2, 1, None), (3, 1, 0.1),
+        )
+    ] + [
+        {"island": 1, "birth_island": 0, "birth": 4, "fitness": fitness}
+        for fitness in (0.7, 0.3)
+    ]  # fmt: skip
+    tables = run(
+        births=FAMILY,
+        population=population((0, 5, {D: 0.5})),
+        evaluations=table("evaluations", evaluations),
+    )
+    settings = IslandSettings(5, is_online=False, records_touches=False)
+    islands = (replace(settings, reevaluation=rule),)
+    found = robots(RunTables(tables, islands=islands))
+    assert found["fitness"].to_pylist() == pytest.approx(expected)
+    failed = [False, False, True, False, False]
+    assert found["is_failed"].to_pylist() == failed
 
 
 def test_of_several_islands_the_greatest_of_the_last_fitness_counts() -> None:
