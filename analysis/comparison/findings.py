@@ -14,7 +14,7 @@ from analysis.comparison.equivalence import (
     mean_alike_p,
     mean_alike_power,
 )
-from analysis.comparison.samples import Row, correct, one_sample, two_samples
+from analysis.comparison.samples import Row, centres, correct, one_sample, two_samples
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
 from analysis.measures.outputs import schema
 from analysis.measures.population_table import Numbers
@@ -110,8 +110,6 @@ def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
     if min(map(len, samples)) <= 1:
         why = "less than two runs have a value"
         return {"births": births, "verdict": "undecided", "why": why}
-    if claim.is_spread:
-        samples = [np.abs(values - np.median(values)) for values in samples]
     if claim.b is None:
         return {"births": births, **_against_number(samples[0], claim)}
     a, b = samples
@@ -129,9 +127,16 @@ def _against_number(a: Numbers, claim: Claim) -> Row:
 
 
 def _against_experiment(a: Numbers, b: Numbers, claim: Claim) -> Row:
-    row = two_samples(a, claim.share * b)
+    compared = (_distances(a), _distances(b)) if claim.is_spread else (a, b)
+    row = two_samples(compared[0], claim.share * compared[1]) | centres(a, b)
     if claim.expected != "=":
         return row | {"margin": NEGLIGIBLE}
     p = alike_p(row["effect"], len(a), len(b), LARGE)
     power = alike_power(len(a), len(b), LARGE)
     return row | {"margin": LARGE, "p_alike": p, "power": power}
+
+
+def _distances(values: Numbers) -> Numbers:
+    """Return the distances of runs from their median, (N,)."""
+    found: Numbers = np.abs(values - np.median(values))
+    return found

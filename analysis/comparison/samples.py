@@ -39,14 +39,21 @@ def one_sample(a: Numbers, reference: float) -> Row:
     return {**_described(a, reference), "effect": effect, "p": p}
 
 
-def _described(a: Numbers, b: Numbers | float) -> Row:
-    difference, low, high = mean_difference(a, b)
+def centres(a: Numbers, b: Numbers | float) -> Row:
+    """Return means and medians of an experiment and another one, or a number."""
     return {
-        "runs_a": len(a),
         "mean_a": mean(a),
         "mean_b": mean(np.atleast_1d(b)),
         "median_a": float(np.median(a)),
         "median_b": float(np.median(b)),
+    }
+
+
+def _described(a: Numbers, b: Numbers | float) -> Row:
+    difference, low, high = mean_difference(a, b)
+    return {
+        "runs_a": len(a),
+        **centres(a, b),
         "difference": difference,
         "difference_low": known(low),
         "difference_high": known(high),

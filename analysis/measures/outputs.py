@@ -285,6 +285,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "expected": "'>', '<', '=' (alike), '!=' or 'some' (occurs) of a against b",
         "births": OUTCOME["births"],
         **_TWO_SAMPLES,
+        "difference": "mean_a - mean_b, or what the claim says: mean_a minus a share "
+        "of mean_b, or difference of the mean distances of runs from their median",
         "verdict": "reproduced, not reproduced, undecided or does not apply",
         "why": "the rule of the verdict",
         "topic": "the finding without the names of experiments",

@@ -9,9 +9,11 @@ from analysis.report.html import cell, folded, table
 _HEADS = ("figure", "finding", "expected", "runs", "mean a", "mean b", "effect",
           "low", "high", "q", "verdict", "why")  # fmt: skip
 _NOTE = (
-    "The unit is the run. The effect is Cliff's delta of a over b with its 95 % "
-    "interval, or the rank-biserial correlation where one experiment is compared "
-    "with a number. q is the p value, corrected for all tests of the table."
+    "The unit is the run. Means are those of the experiments. The effect is Cliff's "
+    "delta of a over b with its 95 % interval, or the rank-biserial correlation where "
+    "one experiment is compared with a number; it compares what the finding says: "
+    "values, a share of those of b, or distances of runs from their median. q is the "
+    "p value, corrected for all tests of the table."
 )
 
 

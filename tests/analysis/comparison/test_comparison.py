@@ -387,8 +387,13 @@ def test_findings_of_few_births_spreads_shares_and_numbers() -> None:
         "not reproduced",
     ]
     assert (found[0]["births"], found[0]["p"]) == (100, None)
-    assert found[2]["mean_a"] == 3
-    assert (found[4]["mean_a"], found[4]["mean_b"]) == (5.5, 17.75)
+    # Means are those of the experiments, also where spreads or shares are compared:
+    # the distances from the median are 3 and 3 / 50 on average; half of 35.5 is 17.75.
+    means = ("mean_a", "mean_b", "median_a", "median_b")
+    assert [found[2][name] for name in means] == pytest.approx([0.0] * 4)
+    assert found[2]["difference"] == pytest.approx(3 - 0.06)
+    assert [found[4][name] for name in means] == [5.5, 35.5, 5.5, 35.5]
+    assert found[4]["difference"] == 5.5 - 17.75
     # A difference of 0.1 is significant, but less than the margin.
     assert found[11]["q"] < 0.05
     assert found[11]["why"].startswith("the interval of the difference ends below 0.5")
