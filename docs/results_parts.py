@@ -31,7 +31,11 @@ _ROWS = (
     ("ancestors_per_robot", "ancestors per robot", 1),
     ("diversity", "tree edit distance", 1),
     ("retention", "retention after 120 births", 2),
-    ("touching", "share of life in contact", 3),
+    (
+        "touching",
+        "contact time per lifetime (simultaneous contacts count separately)",
+        3,
+    ),
 )
 """Measures of the table of ends: column, text, decimals."""
 _SPEEDS = (5, 15, 30, 50)

@@ -88,7 +88,8 @@ OUTCOME = {
     "parts_fitness": "rank correlation of fitness and parts, all robots",
     "family_distance": "distance within the best robot's family / among founders",
     "family_founders": "number of founders whose parts are in that family",
-    "touching": "contact time of robots divided by their lifetimes (on-line)",
+    "touching": "contact time of robots divided by their lifetimes; simultaneous "
+    "contacts count separately (on-line)",
     "real_time_factor": "simulated by wall-clock time of 30 robots (bench arena)",
 }
 """Outcome of a run: one number per measure, by which experiments are compared."""
@@ -193,7 +194,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "lived_s": "sum of their lifetimes [s]",
         "pairs": "pairs of robots that ever touched",
         "touched": "share of robots that ever touched another robot",
-        "touching": "contact time, counted for both robots, divided by lived_s",
+        "touching": "contact time, counted for both robots and simultaneous contacts "
+        "separately, divided by lived_s",
     },
     "between": {
         **_RUN,

@@ -49,6 +49,18 @@ def test_a_page_with_other_parts_is_refused() -> None:
         results.updated(page, {"runs": "new"})
 
 
+def test_contact_time_is_not_called_a_share_of_life(
+    tables: dict[str, pa.Table],
+) -> None:
+    """A robot that touches two others at once counts twice, so it can exceed 1."""
+    words = "contact time per lifetime (simultaneous contacts count separately)"
+    assert f"| {words} |" in parts_of(tables)["ends"]
+    assert words in (results.DOCS / "analysis.md").read_text("utf-8")
+    (claim,) = [claim for claim in CLAIMS if claim.measure == "touching"]
+    assert words in claim.text
+    assert "an upper bound" in results.PAGE.read_text("utf-8")
+
+
 @cache
 def _rows(experiment: str) -> list[Row]:
     paths = sorted((DATA / "outcomes").glob(f"{experiment}-[0-9][0-9].parquet"))
