@@ -259,10 +259,10 @@ _WHOLE = 1000
 
 def _short(value: float) -> str:
     """Return a number with three digits, without an exponent."""
-    rounded = float(f"{value:.3g}") + 0.0
+    rounded = float(f"{value:.3g}")
     if abs(rounded) >= _WHOLE:
         return f"{rounded:.0f}"
-    return f"{rounded:.4f}".rstrip("0").rstrip(".")
+    return _plain(rounded, 4).rstrip("0").rstrip(".")
 
 
 def _all(tables: Tables) -> str:

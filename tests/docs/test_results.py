@@ -15,7 +15,7 @@ from analysis.comparison.claims import ARENA, CLAIMS, Claim
 from analysis.measures.population_table import Numbers
 from docs import results
 from docs.campaign_data import DATA
-from docs.results_parts import parts_of
+from docs.results_parts import _short, parts_of
 
 Row = dict[str, Any]
 FEW = 10
@@ -47,6 +47,17 @@ def test_a_page_with_other_parts_is_refused() -> None:
     assert results.updated(page, {"ends": "new"}) == page.replace("old", "new")
     with pytest.raises(ValueError, match=re.escape("must have parts ['runs']")):
         results.updated(page, {"runs": "new"})
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (-0.00001, "0"), (0.0, "0"), (-0.0, "0"), (-0.00006, "-0.0001"),
+        (0.0123456, "0.0123"), (-12.344, "-12.3"), (-1234.5, "-1230"),
+    ],
+)  # fmt: skip
+def test_short_numbers_have_no_negative_zero(value: float, text: str) -> None:
+    assert _short(value) == text
 
 
 def test_contact_time_is_not_called_a_share_of_life(
