@@ -201,8 +201,10 @@ class ArenaPopulation:
     def _settle(self, clusters: Sequence[Cluster]) -> None:
         """Replace the clusters; record the state of new ones from now on."""
         known, rows = set(self.clusters), self.robot_rows.rows
-        for cluster in known.difference(clusters):
+        gone = known.difference(clusters)
+        for cluster in gone:
             cluster.drop_history()
+        self._new = [cluster for cluster in self._new if cluster not in gone]
         self.clusters = tuple(sorted(clusters, key=lambda c: rows[c.members[0]]))
         self.cluster_of = {
             birth: cluster for cluster in self.clusters for birth in cluster.members

@@ -133,6 +133,23 @@ def test_touch_sensors_of_survivors_keep_their_contacts() -> None:
     assert found[0].tolist() == found[1].tolist()
 
 
+def test_survivor_merges_at_the_check_at_which_its_cluster_mate_diverges() -> None:
+    """The cluster that it is alone in at that check is replaced at once."""
+    robot = on_its_sensor()
+    first, second, third = (BirthId(0, number) for number in range(3))
+    places = ((first, 0.0), (second, 0.12), (third, -0.4))
+    world = populated(
+        settings_of(drop_m=0.0), [Insertion(one, robot, (x, 0.0)) for one, x in places]
+    )
+    world.advance(25)
+    world.population.find(second).view.qvel[2] = 60.0
+    world.population.find(third).view.qpos[0] = -0.12
+    gone = world.advance(50).casualties
+    assert [each.birth for each in gone] == [second]
+    members = [each.members for each in world.population.clusters]
+    assert members == [(first, third)]
+
+
 def on_its_sensor() -> Robot:
     """Return a core that turns a touch sensor to the ground."""
     grey = (0.5, 0.5, 0.5)
