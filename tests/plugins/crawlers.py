@@ -1,9 +1,10 @@
-"""A user's plug-in file: a part type with slider, cylinder and own sensor."""
+"""A user's plug-in file: a part with slider, cylinder and own sensor, a blind core."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from revolve import Box, Joint, Motor, PartType, Shape, Slot, cylinder
+from schema.parts import CORE
 
 ALONG_X = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
 _PISTON = Shape(
@@ -52,3 +53,4 @@ PISTON = PartType(
 FRAGILE = PartType(
     "Piston", 2, lambda _values: _PISTON, sensors=(Fragile(),), motor=_MOTOR
 )
+BLIND_CORE = replace(CORE, sensors=())

@@ -214,7 +214,7 @@ class BatchedIO:
         self.readings = np.concatenate([np.zeros((0, self._width.inputs)), *readings])
         simple = [row for row, view in enumerate(views) if view.sensors.is_simple]
         self._others = sorted(set(range(len(views))).difference(simple))
-        self._padded = [row for row in simple if views[row].sensors.pads]
+        self._padded = [row for row, view in enumerate(views) if view.sensors.pads]
         self._simple = np.array(simple, dtype=np.intp)
         before = [views[row].sensors.velocities[0] for row in simple]
         self._velocities: Floats = np.array(before).reshape(-1, 3)

@@ -2,10 +2,14 @@
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from schema.experiment.document import Space
+from schema.plugins.permission import allow
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -112,14 +116,22 @@ def test_separated_robots_are_split(turtle: Robot) -> None:
     assert (world.population.merges, world.population.splits) == (1, 1)
 
 
-def test_touch_sensors_of_survivors_keep_their_contacts() -> None:
-    """One of two robots of a cluster dies at a tick, the other lies on its sensor."""
-    robot = on_its_sensor()
+@pytest.mark.parametrize(("core", "imu"), [("", 6), ("crawlers:BLIND_CORE", 0)])
+def test_touch_sensors_of_survivors_keep_their_contacts(core: str, imu: int) -> None:
+    """One of two robots of a cluster dies at a tick, the other lies on its sensor.
+
+    Robots without an imu at their centre are read one by one.
+    """
+    allow([str(Path(__file__).parents[2] / "plugins" / "crawlers.py")])
+    settings, robot = settings_of(drop_m=0.0), on_its_sensor(imu)
+    if core:
+        space = replace(settings.space, part_types=(core, *Space().part_types[1:]))
+        settings = replace(settings, space=space)
     first, second = BirthId(0, 0), BirthId(0, 1)
     found: list[Floats] = []
     for velocity in (None, 1e3):
         world = populated(
-            settings_of(drop_m=0.0),
+            settings,
             [Insertion(first, robot, (0.0, 0.0)), Insertion(second, robot, (0.12, 0))],
         )
         world.advance(1024)
@@ -128,7 +140,8 @@ def test_touch_sensors_of_survivors_keep_their_contacts() -> None:
             world.population.find(second).view.qvel[0] = velocity
         gone = world.advance(1025).casualties
         assert [each.birth for each in gone] == [second] * (velocity is not None)
-        found.append(world.population.find(first).view.sensors.readings[0, 6:8].copy())
+        readings = world.population.find(first).view.sensors.readings
+        found.append(readings[0, imu : imu + 2].copy())
     assert found[0].any()
     assert found[0].tolist() == found[1].tolist()
 
@@ -150,7 +163,7 @@ def test_survivor_merges_at_the_check_at_which_its_cluster_mate_diverges() -> No
     assert members == [(first, third)]
 
 
-def on_its_sensor() -> Robot:
+def on_its_sensor(imu: int = 6) -> Robot:
     """Return a core that turns a touch sensor to the ground."""
     grey = (0.5, 0.5, 0.5)
     parts = (
@@ -158,5 +171,5 @@ def on_its_sensor() -> Robot:
         Part("ActiveHinge", 0, 0, 0, 0, grey),
         Part("TouchSensor", 1, 1, 0, 0, grey),
     )
-    inputs = [Neuron("input", INPUT, part) for part in (0,) * 6 + (2,) * 2]
+    inputs = [Neuron("input", INPUT, part) for part in (0,) * imu + (2,) * 2]
     return Robot(parts, Brain((*inputs, Neuron("output", "Simple", 1, (1.0, 1.0)))))
