@@ -5,7 +5,7 @@ whose parts have drifted apart is split. Everything is ordered by birth, so resu
 do not depend on the order of insertions.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -200,10 +200,8 @@ class ArenaPopulation:
 
     def _settle(self, clusters: Sequence[Cluster]) -> None:
         """Replace the clusters; record the state of new ones from now on."""
-        known, rows = set(self.clusters), self.robot_rows.rows
+        known, rows, before = set(self.clusters), self.robot_rows.rows, self.cluster_of
         gone = known.difference(clusters)
-        for cluster in gone:
-            cluster.drop_history()
         self._new = [cluster for cluster in self._new if cluster not in gone]
         self.clusters = tuple(sorted(clusters, key=lambda c: rows[c.members[0]]))
         self.cluster_of = {
@@ -211,14 +209,17 @@ class ArenaPopulation:
         }
         self.layout = Layout(self.clusters, self.robot_rows, self._most_moments)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
-        if self.rollout is None:
-            return
-        moment, count = self.rollout.moment, len(self.rollout.plan)
-        for cluster in self.clusters:
-            if cluster not in known:
-                cluster.keep(range(moment, count))
-                self._new.append(cluster)
-        self.rollout.read(self.layout)
+        if self.rollout is not None:
+            moment, count = self.rollout.moment, len(self.rollout.plan)
+            for cluster in self.clusters:
+                if cluster not in known:
+                    cluster.keep(range(moment, count))
+                    touching = _touching(cluster.members, before, moment)
+                    cluster.history.touching[moment] = touching
+                    self._new.append(cluster)
+            self.rollout.read(self.layout)
+        for cluster in gone:
+            cluster.drop_history()
 
     def _merge_pairs(self, rollout: Rollout) -> Pairs:
         """Return the pairs to merge now; computes them for all checks ahead."""
@@ -232,6 +233,29 @@ class ArenaPopulation:
     def _links(self, pairs: Pairs) -> Links:
         """Return the births of pairs of rows."""
         return [(self.robots[a].birth, self.robots[b].birth) for a, b in pairs]
+
+
+def _touching(
+    members: Group, cluster_of: Mapping[BirthId, Cluster], moment: int
+) -> list[tuple[int, int]]:
+    """Return which members of a new cluster were in contact in their former ones.
+
+    Args:
+        members: of the new cluster.
+        cluster_of: the former cluster of each.
+        moment: of the interval.
+
+    Returns:
+        Pairs of indices of members, ascending.
+    """
+    index_of = {birth: index for index, birth in enumerate(members)}
+    pairs: list[tuple[int, int]] = []
+    for former in dict.fromkeys(cluster_of[birth] for birth in members):
+        for touching in former.history.touching[moment]:
+            first, second = (former.members[index] for index in touching)
+            if first in index_of and second in index_of:
+                pairs.append((index_of[first], index_of[second]))
+    return sorted(pairs)
 
 
 def connected_components(groups: Iterable[Group], links: Links) -> list[Group]:

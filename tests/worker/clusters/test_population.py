@@ -14,12 +14,14 @@ from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
-from schema.wire.arena import Casualty, Changes, Insertion
+from schema.wire.arena import Casualty, Changes, Insertion, Touch
 from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of
 from tests.worker.arena_oracle import Oracle
 from worker.arena.world import World
 
 Robots = Callable[[int], Robot]
+GREY = (0.5, 0.5, 0.5)
+CORE = Part("Core", -1, -1, -1, 0, GREY)
 
 
 def live(
@@ -146,6 +148,25 @@ def test_touch_sensors_of_survivors_keep_their_contacts(core: str, imu: int) -> 
     assert found[0].tolist() == found[1].tolist()
 
 
+def test_contacts_of_survivors_are_counted_when_a_cluster_mate_diverges() -> None:
+    """Two robots overlap by 0.5 mm; the third diverges at one of five checks."""
+    robot = Robot((CORE,), Brain((Neuron("input", INPUT, 0),) * 6))
+    births = [BirthId(0, number) for number in range(3)]
+    places = zip(births, (0.0, 0.0895, 0.19), strict=True)
+    newborns = [Insertion(birth, robot, (x, 0.0)) for birth, x in places]
+    found: list[tuple[Touch, ...]] = []
+    for velocity in (0.0, 60.0):
+        world = populated(settings_of(drop_m=0.0, record_touches=True), newborns)
+        world.advance(25)
+        assert [each.members for each in world.population.clusters] == [(*births,)]
+        world.population.find(births[2]).view.qvel[2] = velocity
+        advance = world.advance(50)
+        assert len(advance.casualties) == (velocity > 0.0)
+        found.append(advance.touches)
+    assert found[0] == found[1]
+    assert [(each.first, each.second) for each in found[0]] == [(births[0], births[1])]
+
+
 def test_survivor_merges_at_the_check_at_which_its_cluster_mate_diverges() -> None:
     """The cluster that it is alone in at that check is replaced at once."""
     robot = on_its_sensor()
@@ -165,11 +186,10 @@ def test_survivor_merges_at_the_check_at_which_its_cluster_mate_diverges() -> No
 
 def on_its_sensor(imu: int = 6) -> Robot:
     """Return a core that turns a touch sensor to the ground."""
-    grey = (0.5, 0.5, 0.5)
     parts = (
-        Part("Core", -1, -1, -1, 0, grey),
-        Part("ActiveHinge", 0, 0, 0, 0, grey),
-        Part("TouchSensor", 1, 1, 0, 0, grey),
+        CORE,
+        Part("ActiveHinge", 0, 0, 0, 0, GREY),
+        Part("TouchSensor", 1, 1, 0, 0, GREY),
     )
     inputs = [Neuron("input", INPUT, part) for part in (0,) * imu + (2,) * 2]
     return Robot(parts, Brain((*inputs, Neuron("output", "Simple", 1, (1.0, 1.0)))))
