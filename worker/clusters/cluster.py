@@ -18,6 +18,7 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from worker.robot.contacts import contact_reader
 from worker.robot.devices import Sensors, Servos
 from worker.robot.recording import Probe, probed_channels, step_with
 
@@ -230,7 +231,7 @@ class Cluster:
         self.probes = [view.probe for view in self.views if view.probe is not None]
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
-        self._contacts = self.data.contact
+        self._contacts = contact_reader(model, self.data)
         self.history = StateHistory(self)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
@@ -296,14 +297,12 @@ class Cluster:
             return []
         owners = self._owners
         # Plain numbers, as contacts are few and most of them with the ground.
-        geoms: list[list[int]] = self._contacts.geom.tolist()
-        pairs = {(owners[first], owners[second]) for first, second in geoms}
+        pairs = {(owners[first], owners[second]) for first, second in self._contacts()}
         return sorted({(min(p), max(p)) for p in pairs if p[0] != p[1] and min(p) >= 0})
 
     def _read_touched(self) -> None:
         if self._has_pads:
-            geoms: list[list[int]] = self._contacts.geom.tolist()
-            self.touched = frozenset(chain.from_iterable(geoms))
+            self.touched = frozenset(chain.from_iterable(self._contacts()))
 
     def reset(self) -> None:
         """Reset the state to the model's initial one."""

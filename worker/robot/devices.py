@@ -16,6 +16,7 @@ from schema.errors import ExperimentError
 from schema.parts import BodySpace, Sensor
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from worker.robot.contacts import contact_reader
 from worker.robot.own_sensors import OwnSensors
 
 _Velocity = tuple[float, float, float]
@@ -69,6 +70,7 @@ class Sensors:
             ExperimentError: a light sensor in a world without light.
         """
         self._model, self._data = model, data
+        self._contacts = contact_reader(model, data)
         self.velocities: list[_Velocity] = []
         self.pads: list[tuple[int, int]] = []
         self.core_imu = -1
@@ -157,7 +159,7 @@ class Sensors:
 
     def touching(self) -> set[int]:
         """Return the geoms in contact in the last step."""
-        return set(chain.from_iterable(self._data.contact.geom.tolist()))
+        return set(chain.from_iterable(self._contacts()))
 
     def _read_core(self, interval_s: float) -> None:
         """Read the imu of the core from the free joint's state.

@@ -18,6 +18,7 @@ from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.robot.trace import RECORDED, Trace
 from worker.measures.functions import functions_of
+from worker.robot.contacts import contact_reader
 
 Indices = npt.NDArray[np.intp]
 _FREE, _FREE_DOFS = 7, 6
@@ -191,7 +192,7 @@ class Probe:
             geoms: first and last + 1 of its geoms.
             prefix: of its names in the model.
         """
-        self._data, self._velocities = data, data.qvel
+        self._contacts, self._velocities = contact_reader(model, data), data.qvel
         self._timestep_s = float(model.opt.timestep)
         first = dofs.start + _FREE_DOFS
         driven = model.jnt_dofadr[model.actuator_trnid[:, 0]]
@@ -222,8 +223,7 @@ class Probe:
         part_of, parts = self._part_of, self._parts
         self.numbers[self._driven] = self._torques(self._velocities[self._dofs])
         self.numbers[parts:] = 0.0
-        pairs: list[list[int]] = self._data.contact.geom.tolist()
-        for one, other in pairs:
+        for one, other in self._contacts():
             if (one in part_of) != (other in part_of):
                 touching = part_of[one if one in part_of else other]
                 self.numbers[parts + touching] = 1.0

@@ -1,0 +1,50 @@
+"""Contacts of the last step, near scenery that has a gap."""
+
+import mujoco
+import pytest
+from msgspec.structs import replace
+
+from schema.experiment.document import Simulation
+from schema.experiment.environment import Environment
+from schema.mjcf.model import solo_spec
+from schema.parts import BUILT_IN
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.ids import BirthId
+from schema.robot.robot import Part, Robot
+from schema.wire.arena import Insertion
+from tests.worker.arena_cases import populated, settings_of
+from worker.robot.devices import Sensors
+from worker.robot.recording import Probe
+
+GREY = (0.5, 0.5, 0.5)
+WITH_PADS = Robot(
+    (Part("Core", -1, -1, -1, 0, GREY), Part("TouchSensor", 0, 3, 0, 0, GREY)),
+    Brain(tuple(Neuron("input", INPUT, part) for part in (0,) * 6 + (1,) * 2)),
+)
+"""A core with two pads in front of its face towards -x, 5.55 cm from its centre."""
+
+
+@pytest.mark.parametrize("gap_m", [0.0, 0.03])
+@pytest.mark.parametrize(("x", "touches"), [(0.0, 0.0), (-0.01, 1.0)])
+def test_contacts_within_a_gap_do_not_count(
+    x: float, touches: float, gap_m: float
+) -> None:
+    """The pads end 9.5 mm from a wall, or 0.5 mm in it."""
+    geom = f'<geom type="box" size="0.05 2 0.3" pos="-0.115 0 0.3" gap="{gap_m}"/>'
+    scenery = f"<mujoco><worldbody>{geom}</worldbody></mujoco>"
+    environment = Environment(scenery=scenery)
+    model = solo_spec(WITH_PADS, BUILT_IN, Simulation(), environment).compile()
+    data = mujoco.MjData(model)
+    data.qpos[0] = x
+    sensors = Sensors(WITH_PADS, BUILT_IN, model, data, width=8)
+    assert sensors.start()[0, 6:].tolist() == [touches, touches]
+    probe = Probe(model, data, WITH_PADS, dofs=slice(0, 6), geoms=(2, model.ngeom))
+    probe.read()
+    assert probe.numbers[-1] == touches
+    settings = replace(settings_of(drop_m=0.0), environment=environment)
+    world = populated(settings, [Insertion(BirthId(0, 0), WITH_PADS, (0.0, 0.0))])
+    (robot,) = world.population.robots
+    robot.view.qpos[0] = x
+    world.advance(1)
+    pads = {geom for geom, _ in robot.view.sensors.pads}
+    assert pads.isdisjoint(world.population.clusters[0].touched) is not bool(touches)
