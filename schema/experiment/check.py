@@ -19,6 +19,7 @@ from schema.experiment.document import (
     body_space,
     island_experiment,
     light_of,
+    pose_problems,
     steps_of,
 )
 from schema.experiment.learning import learning_problems
@@ -116,7 +117,7 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _selection_problems(experiment)
     yield from _culling_problems(experiment)
     yield from _reevaluation_problems(experiment)
-    yield from _pose_problems(experiment.simulation, "window_steps")
+    yield from pose_problems(experiment.simulation, "window_steps")
     yield from _duration_problems(experiment)
     yield from world_problems(experiment)
     is_arena, clock = experiment.arena is not None, experiment.simulation
@@ -203,16 +204,6 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
         )
 
 
-def _pose_problems(clock: Simulation, name: str) -> Iterator[str]:
-    """Yield whether a number of steps does not end on a pose."""
-    steps = getattr(clock, name)
-    if steps % clock.pose_steps:
-        yield (
-            f"simulation.{name}: must be a multiple of simulation.pose_steps = "
-            f"{clock.pose_steps}, got {steps}"
-        )
-
-
 def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:
     selection = experiment.selection
     if selection.survivors != "best" or not selection.keep_parents:
@@ -247,7 +238,7 @@ def _arena_clock_problems(arena: Arena, clock: Simulation) -> Iterator[str]:
                 f"{tick * clock.timestep_s:g} s, the common multiple of "
                 f"simulation.brain_steps and pose_steps, got {seconds:g}"
             )
-    yield from _pose_problems(clock, "warmup_steps")
+    yield from pose_problems(clock, "warmup_steps")
 
 
 def _infancy_problems(clock: Simulation) -> Iterator[str]:

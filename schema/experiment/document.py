@@ -553,6 +553,16 @@ def start_problems(simulation: Simulation) -> Iterator[str]:
         )
 
 
+def pose_problems(simulation: Simulation, name: str) -> Iterator[str]:
+    """Yield whether a number of steps does not end on a pose."""
+    steps = getattr(simulation, name)
+    if steps % simulation.pose_steps:
+        yield (
+            f"simulation.{name}: must be a multiple of simulation.pose_steps = "
+            f"{simulation.pose_steps}, got {steps}"
+        )
+
+
 def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names.
 

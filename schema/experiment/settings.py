@@ -20,6 +20,7 @@ from schema.experiment.document import (
     Space,
     Vetting,
     light_of,
+    pose_problems,
     start_problems,
 )
 from schema.experiment.environment import (
@@ -220,6 +221,8 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
     if isinstance(found, ArenaSettings):
         problems += arena_problems(environment)
         problems += start_problems(found.simulation)
+    if isinstance(found, EvaluationSettings):
+        problems += pose_problems(found.simulation, "window_steps")
     problems += robust_problems(getattr(found, "robust", None), is_arena=False)
     for problem in problems:
         raise ExperimentError(f"{where}: {problem}")

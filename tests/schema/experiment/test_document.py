@@ -7,7 +7,7 @@ import pytest
 
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Experiment, Space, body_space
+from schema.experiment.document import Experiment, Simulation, Space, body_space
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
@@ -262,6 +262,18 @@ def test_malformed_settings(settings: bytes) -> None:
     for read in (read_vetting_settings, read_evaluation_settings):
         with pytest.raises(ExperimentError, match="settings of a request: "):
             read(settings)
+
+
+def test_settings_whose_window_ends_between_two_samples_are_refused() -> None:
+    """An evaluation that skips the end of its window would never end."""
+    clock = Simulation(window_steps=1000, pose_steps=48)
+    settings = evaluation_settings(Experiment(name="x", simulation=clock))
+    message = (
+        "settings of a request: simulation.window_steps: must be a multiple of "
+        "simulation.pose_steps = 48, got 1000"
+    )
+    with pytest.raises(ExperimentError, match=message):
+        read_evaluation_settings(settings)
 
 
 def test_document_in_a_file(tmp_path: Path) -> None:
