@@ -24,6 +24,7 @@ from schema.wire.arena_codec import Rebuild
 from worker.arena.changes import possible
 from worker.arena.records import pose_batch
 from worker.arena.world import World
+from worker.clusters.states import Schedule
 from worker.robot.evaluation import evaluate, simulate
 
 
@@ -102,32 +103,33 @@ def together(
         if past.snapshot
         else World(own, threads)
     )
-    tick = own.simulation.brain_steps
+    tick, next_tick = own.simulation.brain_steps, Schedule(own).next_tick
     try:
         for advance in past.history:
             world.apply(possible(advance.changes, world.births))
             is_shown = not births.isdisjoint(world.births)
-            samples: list[pa.Table] = []
-            motion: list[pa.Table] = []
-            while world.step < advance.until:
-                stop = advance.until
-                if is_shown:
-                    stop = min(stop, world.step - world.step % tick + tick)
-                samples.append(read_columns("poses", world.advance(stop).poses))
-                if is_shown:
-                    now = read_columns("poses", world.poses())
-                    motion.append(_rows_of(now, births))
+            motion = [ROWS["poses"].empty_table()]
+            if is_shown:
+                # Judging removes robots without a fitness, so only the end is judged.
+                for stop in range(next_tick(world.step), advance.until, tick):
+                    world.step_to(stop)
+                    motion.append(_motion(world, births))
+            samples = read_columns("poses", world.advance(advance.until).poses)
+            if is_shown:
+                motion.append(_motion(world, births))
             yield Scene(
                 world.step,
                 world.digest() == advance.digest,
-                pa.concat_tables(samples),
-                pa.concat_tables(motion) if motion else ROWS["poses"].empty_table(),
+                samples,
+                pa.concat_tables(motion),
             )
     finally:
         world.close()
 
 
-def _rows_of(poses: pa.Table, births: frozenset[BirthId]) -> pa.Table:
-    """Return the rows of some robots."""
+def _motion(world: World, births: frozenset[BirthId]) -> pa.Table:
+    """Return the present poses of some robots."""
+    poses = read_columns("poses", world.poses())
     names = zip(poses["island"].to_pylist(), poses["birth"].to_pylist(), strict=True)
-    return poses.filter(pa.array([BirthId(*name) in births for name in names]))
+    is_chosen = [BirthId(*name) in births for name in names]
+    return poses.filter(pa.array(is_chosen, pa.bool_()))

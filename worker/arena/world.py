@@ -130,9 +130,17 @@ class World:
             raise UnexpectedEvent(
                 f"advance: until must be > step = {self.step}, got {until}"
             )
+        self.step_to(until)
+        return self._report()
+
+    def step_to(self, until: int) -> None:
+        """Begin an advance: step to some step before its end, without judging robots.
+
+        Args:
+            until: step to reach.
+        """
         while self.step < until:
             self._advance_interval(self._schedule.moments(self.step, until))
-        return self._report()
 
     def snapshot(self) -> bytes:
         """Return the whole state, for ``restore``."""

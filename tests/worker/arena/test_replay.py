@@ -1,7 +1,9 @@
 """Replay of arenas: equal to the original, or reported as different."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
+import msgspec
 from msgspec.structs import replace
 
 from schema.experiment.document import Fitness, Simulation, Space
@@ -13,11 +15,12 @@ from schema.experiment.settings import (
     arena_settings,
     read_arena_settings,
 )
+from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.arena import BrainChange, Changes
+from schema.wire.arena import BrainChange, Changes, Insertion
 from schema.wire.arena_codec import PastAdvance, Rebuild
-from tests.worker.arena_cases import crowd
+from tests.worker.arena_cases import crowd, settings_of
 from worker.arena.replay import Scene, alone, together
 from worker.arena.world import World
 
@@ -27,20 +30,24 @@ TURN, TICKS = 50, 2
 A, B, C = (BirthId(0, number) for number in range(3))
 
 
-def lived(turns: Sequence[Changes]) -> tuple[PastAdvance, ...]:
+def lived(
+    turns: Sequence[Changes], settings: bytes = SETTINGS, turn: int = TURN
+) -> tuple[PastAdvance, ...]:
     """Return the history of an arena, with changes at the start of each turn."""
-    world = World(read_arena_settings(SETTINGS))
+    world = World(read_arena_settings(settings))
     history: list[PastAdvance] = []
     for changes in turns:
         world.apply(changes)
-        advance = world.advance(world.step + TURN)
+        advance = world.advance(world.step + turn)
         history.append(PastAdvance(changes, advance.step, advance.digest))
     return tuple(history)
 
 
-def scenes(history: Sequence[PastAdvance], birth: BirthId) -> list[Scene]:
+def scenes(
+    history: Sequence[PastAdvance], birth: BirthId, settings: bytes = SETTINGS
+) -> list[Scene]:
     past = Rebuild(b"", tuple(history))
-    found = list(together(SETTINGS, past, frozenset({birth})))
+    found = list(together(settings, past, frozenset({birth})))
     assert [scene.step for scene in found] == [past.until for past in history]
     return found
 
@@ -50,6 +57,45 @@ def test_replay_on_one_platform_is_equal(robot_of: Robots) -> None:
     found = scenes(lived([Changes((), newborns), Changes((A,)), Changes()]), A)
     assert [scene.is_equal for scene in found] == [True] * 3
     assert [scene.motion.num_rows for scene in found] == [TICKS, 0, 0]
+
+
+PICKY = """
+def short(trace, parameters):
+    if len(trace.core_position) == 4:
+        raise ValueError("no fitness of four samples")
+    return 0.0
+"""
+
+
+def test_replay_judges_only_when_the_original_did(
+    turtle: Robot, tmp_path: Path
+) -> None:
+    """Between two advances, the fitness of the robot is undefined for a while."""
+    (tmp_path / "picky.py").write_text(PICKY, "utf-8")
+    allow([str(tmp_path / "picky.py")])
+    settings = replace(
+        settings_of(drop_m=0.0),
+        simulation=Simulation(window_steps=400),
+        fitness=Fitness(function="picky:short"),
+    )
+    text, turn = msgspec.json.encode(settings), 4 * TURN
+    newborn = Insertion(A, turtle, (0.0, 0.0))
+    history = lived([Changes((), (newborn,)), Changes()], text, turn)
+    found = scenes(history, A, text)
+    assert [scene.is_equal for scene in found] == [True] * 2
+    assert [scene.motion.num_rows for scene in found] == [4 * TICKS] * 2
+    assert [scene.samples.num_rows for scene in found] == [turn // 40] * 2
+
+
+def test_replay_of_an_arena_in_which_all_robots_die(turtle: Robot) -> None:
+    """The robot diverges at the second of four ticks."""
+    heavy = Simulation(gravity=2000.0)
+    settings = replace(settings_of(drop_m=5.0), simulation=heavy)
+    text = msgspec.json.encode(settings)
+    newborn = Insertion(A, turtle, (0.0, 0.0))
+    (scene,) = scenes(lived([Changes((), (newborn,))], text, 4 * 25), A, text)
+    assert scene.is_equal
+    assert scene.motion.num_rows == 0
 
 
 def test_replay_of_a_drift_is_an_approximation_and_says_so(
