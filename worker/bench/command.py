@@ -9,8 +9,12 @@ import argparse
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import isnan
 from pathlib import Path
+from typing import TypeVar
 
+import msgspec
 import mujoco
 import numpy as np
 from msgspec.structs import replace
@@ -19,8 +23,13 @@ from rich.progress import track
 
 from schema.agent.flags import Flags, add_count
 from schema.errors import SimulationDiverged
+from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, Simulation, body_space
-from schema.experiment.file import parse_experiment, read_experiment
+from schema.experiment.file import (
+    experiment_from_tables,
+    parse_toml,
+    read_experiment,
+)
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
 from schema.robot.results import Floats
@@ -29,6 +38,7 @@ from worker.bench import arena_bench, fidelity
 from worker.robot import evaluation
 from worker.robot.robustness import finer
 
+T = TypeVar("T")
 LEAST_RATIO = 0.85
 """Goal for the ratio of bare engine time to evaluation time (design, section 9)."""
 LEAST_SPEARMAN = 0.95
@@ -128,6 +138,11 @@ def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
 
     Returns:
         0 if the measurement meets its goal, 1 if not.
+
+    Raises:
+        ExperimentError: an invalid experiment, a changed setting that does not fit the
+            run, or a run with too few robots.
+        RunFolderError: no run, or a damaged one.
     """
     options = parser().parse_args(arguments[1:])
     if options.what == "evaluate":
@@ -207,42 +222,47 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
 
 def _fidelity(options: argparse.Namespace) -> int:
     population = fidelity.read_population(options.run)
-    experiment = population.experiment
-    other = finer(experiment.simulation)
-    if options.against:
-        other = _changed(experiment, options.against)
+    change: fidelity.Change = partial(_changed, options.against)
     chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)
     best = fidelity.winners(population.fitness)
 
     def compared(which: list[int], name: str) -> Floats:
         robots = _shown([population.robots[index] for index in which], name)
-        return fidelity.compare(robots, experiment, other)
+        return fidelity.compare(robots, change)
 
     found, top = compared(chosen, "robots drawn"), compared(best, "winners")
     spearman = fidelity.spearman(*found)
     thirds = np.split(found, fidelity.THIRDS, axis=1)
     print(
-        f"{len(chosen)} robots of {options.run}: Spearman {spearman:.4f} "
+        f"{len(chosen)} robots of {options.run}: Spearman {_rounded(spearman, 4)} "
         f"(promised: {LEAST_SPEARMAN}); mean {found[0].mean():.4f} here, "
         f"{found[1].mean():.4f} there"
     )
-    by_third = ", ".join(f"{fidelity.spearman(*third):.3f}" for third in thirds)
+    by_third = ", ".join(_rounded(fidelity.spearman(*each), 3) for each in thirds)
     print(f"  by thirds, least fit first: {by_third}")
     for rank, (here, there) in enumerate(top.T, start=1):
         print(f"  winner {rank}: {here:.4f} here, {there:.4f} there")
     return 0 if spearman >= LEAST_SPEARMAN else 1
 
 
-def _changed(experiment: Experiment, settings: Sequence[str]) -> Simulation:
-    """Return the experiment's simulation with some keys set, checked."""
-    changes = "\n".join(settings)
-    text = f'name = "against"\n[simulation]\n{changes}'
-    wanted = parse_experiment(text, "--against").simulation
-    keys = [setting.partition("=")[0].strip() for setting in settings]
-    return replace(experiment.simulation, **{key: getattr(wanted, key) for key in keys})
+def _changed(settings: Sequence[str], experiment: Experiment) -> Simulation:
+    """Return the experiment's simulation with some keys set, or finer; checked."""
+    if not settings:
+        return finer(experiment.simulation)
+    where = "--against"
+    tables = parse_toml("[simulation]\n" + "\n".join(settings), where)
+    simulation = msgspec.to_builtins(experiment.simulation) | tables["simulation"]
+    tables |= {"name": experiment.name, "simulation": simulation}
+    changed = experiment_from_tables(tables, where).simulation
+    check_experiment(replace(experiment, simulation=changed), where)
+    return changed
 
 
-def _shown(robots: Sequence[Robot], what: str) -> Iterable[Robot]:
+def _rounded(correlation: float, digits: int) -> str:
+    return "undefined" if isnan(correlation) else f"{correlation:.{digits}f}"
+
+
+def _shown(robots: Sequence[T], what: str) -> Iterable[T]:
     """Yield robots one by one and show progress on the terminal."""
     # No automatic refresh, as its time would be measured.
     console = Console(stderr=True)

@@ -5,38 +5,52 @@ re-simulated with a finer time step, or with another changed setting; the two ra
 are compared.
 """
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
 
 from schema.errors import (
     ExperimentError,
+    FitnessUndefined,
     RunFolderError,
     SensorFailed,
     SimulationDiverged,
 )
-from schema.experiment.document import Experiment, Simulation
+from schema.experiment.document import Experiment, Simulation, island_experiment
 from schema.experiment.file import own_experiment
-from schema.formats.files import settings_of
+from schema.experiment.settings import evaluation_settings_of, lasting
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth
+from schema.wire.updates import individual
 from worker.robot.evaluation import evaluate
 
 THIRDS = 3
 WINNERS = 10
 
 
+Change = Callable[[Experiment], Simulation]
+"""Returns the simulation to compare with that of an experiment."""
+
+
+class Evaluated(NamedTuple):
+    """Robot of a run, and settings of its evaluation: those of its island."""
+
+    robot: Robot
+    experiment: Experiment
+
+
 @dataclass(frozen=True, slots=True)
 class Population:
-    """Evaluated robots of a run: its experiment, N robots, and their fitness (N,)."""
+    """Evaluated robots of a run, N of them, and their fitness (N,)."""
 
-    experiment: Experiment
-    robots: tuple[Robot, ...]
+    robots: tuple[Evaluated, ...]
     fitness: Floats
 
 
@@ -57,17 +71,25 @@ def read_population(folder: Path) -> Population:
     names = ["island", "birth", "genome", "robot"]
     births = read_table(folder, "births").select(names).to_pylist()
     born = {(row["island"], row["birth"]): row for row in births}
-    evaluations = read_table(folder, "evaluations")
-    columns = ["island", "birth", "fitness"]
-    evaluated = evaluations.select(columns).drop_null().to_pylist()
+    evaluations = read_table(folder, "evaluations").to_pylist()
+    evaluated = [row for row in evaluations if row["fitness"] is not None]
     return Population(
-        experiment,
-        tuple(
-            robot_of_birth(one["genome"], one["robot"], experiment)
-            for one in (born[row["island"], row["birth"]] for row in evaluated)
-        ),
+        tuple(_evaluated(row, born[individual(row)], experiment) for row in evaluated),
         np.array([row["fitness"] for row in evaluated]),
     )
+
+
+def _evaluated(
+    row: Mapping[str, Any], born: Mapping[str, Any], experiment: Experiment
+) -> Evaluated:
+    """Return the robot of a row of the evaluations table, given its birth."""
+    own = island_experiment(experiment, row["island"])
+    robot = robot_of_birth(born["genome"], born["robot"], own)
+    steps = round(row["simulated_s"] / own.simulation.timestep_s)
+    clock = lasting(evaluation_settings_of(own), steps).simulation
+    # This evaluation's own length, of which none is drawn.
+    clock = replace(clock, evaluation_s=None)
+    return Evaluated(robot, replace(own, simulation=clock))
 
 
 def sample_thirds(fitness: Floats, per_third: int, seed: int = 1) -> list[int]:
@@ -98,30 +120,28 @@ def winners(fitness: Floats) -> list[int]:
     return [int(index) for index in np.argsort(-fitness, kind="stable")[:WINNERS]]
 
 
-def compare(
-    robots: Iterable[Robot], experiment: Experiment, other: Simulation
-) -> Floats:
+def compare(robots: Iterable[Evaluated], change: Change) -> Floats:
     """Return the fitness of N robots in two simulations, (2, N) [m/s].
 
-    The first simulation is that of their experiment.
+    The first simulation is that of their island. An evaluation that fails counts as
+    fitness 0.
 
     Args:
         robots: checked robots.
-        experiment: limits, simulation and fitness.
-        other: simulation to compare with; a robot that diverges has fitness 0.
+        change: returns the other simulation.
     """
-    worlds = (experiment.simulation, other)
     found = [
-        [_fitness(robot, experiment, world) for world in worlds] for robot in robots
+        [_fitness(robot, own, world) for world in (own.simulation, change(own))]
+        for robot, own in robots
     ]
     return np.array(found).reshape(-1, 2).T
 
 
 def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
-    settings = replace(settings_of(experiment), simulation=world)
+    settings = replace(evaluation_settings_of(experiment), simulation=world)
     try:
         return evaluate(robot, settings).fitness
-    except (SimulationDiverged, SensorFailed):
+    except (SimulationDiverged, SensorFailed, FitnessUndefined):
         return 0.0
 
 
@@ -129,12 +149,18 @@ def spearman(first: Floats, second: Floats) -> float:
     """Return the rank correlation of two samples; ties share their mean rank.
 
     Args:
-        first: (N,), not all equal.
-        second: (N,), not all equal.
+        first: (N,).
+        second: (N,).
+
+    Returns:
+        The correlation; NaN if the numbers of a sample are all equal.
 
     Source: Spearman, 1904; tested against scipy in tests/worker/bench/test_fidelity.py.
     """
-    return float(np.corrcoef(_ranks(first), _ranks(second))[0, 1])
+    ranks = _ranks(first), _ranks(second)
+    if not all(each.std() for each in ranks):
+        return math.nan
+    return float(np.corrcoef(*ranks)[0, 1])
 
 
 def _ranks(values: Floats) -> Floats:

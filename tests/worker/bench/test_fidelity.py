@@ -1,5 +1,6 @@
 """Arithmetic of the fidelity benchmark."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,9 +10,13 @@ from msgspec.structs import replace
 from scipy.stats import spearmanr
 
 from schema.errors import ExperimentError, RunFolderError
-from schema.experiment.document import Experiment, Simulation
+from schema.experiment.document import Experiment, Fitness, Islands, Simulation
+from schema.plugins.permission import allow
+from schema.robot.brain import Brain
 from schema.robot.robot import Robot
+from tests.worker.bench.run_folder import write_run
 from worker.bench.fidelity import (
+    Evaluated,
     compare,
     read_population,
     sample_thirds,
@@ -59,19 +64,62 @@ def test_folder_without_a_run_is_rejected(tmp_path: Path) -> None:
         read_population(tmp_path)
 
 
+def test_robots_have_the_settings_of_their_islands(
+    turtle: Robot, tmp_path: Path
+) -> None:
+    """A robot of island 0 moves to island 1; one evaluation has its own length."""
+    clocks = [Simulation(window_steps=steps) for steps in (200, 400)]
+    islands = tuple(Islands(simulation=clock) for clock in clocks)
+    experiment = Experiment(name="test", islands=islands)
+    other = Robot(turtle.parts[:1], Brain(turtle.brain.neurons[:6]))
+    write_run(
+        tmp_path,
+        experiment,
+        births=[(0, 7, turtle), (1, 7, other)],
+        evaluations=[
+            (0, 7, None, 1.0, 0.2),
+            (1, 7, 0, 2.0, 0.3),
+            (1, 7, None, 2.5, 0.1),
+        ],
+    )
+    population = read_population(tmp_path)
+    assert population.fitness.tolist() == [0.2, 0.3, 0.1]
+    assert [each.robot for each in population.robots] == [turtle, turtle, other]
+    clocks = [each.experiment.simulation for each in population.robots]
+    assert [clock.window_steps for clock in clocks] == [200, 400, 400]
+    assert [clock.warmup_steps for clock in clocks] == [0, 0, 100]
+
+
 def test_same_simulation_agrees_and_a_diverging_one_counts_zero(turtle: Robot) -> None:
     short = Simulation(window_steps=400)
-    experiment = Experiment(name="test", simulation=short)
-    same = compare([turtle], experiment, short)
+    one = Evaluated(turtle, Experiment(name="test", simulation=short))
+    same = compare([one], lambda experiment: experiment.simulation)
     assert same[0].tolist() == same[1].tolist() != [0.0]
     wild = replace(short, timestep_s=0.5, servo_armature=0.0, servo_stiffness=1e9)
-    assert compare([turtle], experiment, wild)[1].tolist() == [0.0]
+    assert compare([one], lambda _experiment: wild)[1].tolist() == [0.0]
+
+
+def test_undefined_fitness_counts_zero(turtle: Robot, tmp_path: Path) -> None:
+    (tmp_path / "undefined.py").write_text("def value(trace, fitness):\n    1 / 0\n")
+    allow([str(tmp_path / "undefined.py")])
+    experiment = Experiment(
+        name="test",
+        simulation=Simulation(window_steps=80),
+        fitness=Fitness(function="undefined:value"),
+    )
+    one = Evaluated(turtle, experiment)
+    assert compare([one], lambda each: finer(each.simulation)).tolist() == [[0], [0]]
+
+
+def test_correlation_of_equal_numbers_is_undefined() -> None:
+    for first in ([0.5], [0.0, 0.0]):
+        assert math.isnan(spearman(np.array(first), np.arange(1.0 * len(first))))
 
 
 def test_random_robots_agree_with_finer_steps(robot_of: Callable[[int], Robot]) -> None:
     """A small version of ``revolve bench fidelity``."""
     experiment = Experiment(name="test", simulation=Simulation(window_steps=1200))
-    robots = [robot_of(seed) for seed in range(12)]
-    found = compare(robots, experiment, finer(experiment.simulation))
+    robots = [Evaluated(robot_of(seed), experiment) for seed in range(12)]
+    found = compare(robots, lambda each: finer(each.simulation))
     assert found.shape == (2, 12)
     assert spearman(*found) > 0.8
