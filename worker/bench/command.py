@@ -143,6 +143,7 @@ def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
         ExperimentError: an invalid experiment, a changed setting that does not fit the
             run, or a run with too few robots.
         RunFolderError: no run, or a damaged one.
+        SimulationDiverged: of all robots whose evaluation was to be timed.
     """
     options = parser().parse_args(arguments[1:])
     if options.what == "evaluate":
@@ -211,6 +212,10 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
     robots = source.robots(experiment, options.robots, options.seed, is_vetted=False)
     settings = evaluation_settings_of(experiment)
     timing = time_evaluations(_shown(robots, "random robots"), settings)
+    if not timing.robots:
+        raise SimulationDiverged(
+            f"all {len(robots)} random robots diverged: there is nothing to time"
+        )
     each_s = timing.evaluation_s / timing.robots
     print(
         f"{timing.robots} random robots: {1000 * each_s:.1f} ms CPU each, "

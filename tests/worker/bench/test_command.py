@@ -7,7 +7,7 @@ import pytest
 
 from analyzer.report import analyze
 from coordinator.evolution.generation import generate
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, SimulationDiverged
 from schema.experiment.document import Experiment, Simulation
 from schema.robot.robot import Robot
 from tests.worker.bench.run_folder import write_run
@@ -62,3 +62,11 @@ def test_changes_that_fit_the_run_only_are_possible(
     assert first.startswith(f"3 robots of {run}: Spearman ")
     assert thirds == "  by thirds, least fit first: undefined, undefined, undefined"
     assert len(winners) == 3
+
+
+def test_robots_that_all_diverge_cannot_be_timed(tmp_path: Path) -> None:
+    path = tmp_path / "tiny.toml"
+    path.write_text('name = "tiny"\n[simulation]\nmass_factor = 1e-9\n')
+    message = "all 2 random robots diverged: there is nothing to time"
+    with pytest.raises(SimulationDiverged, match=message):
+        main(["bench", "evaluate", str(path), "--robots", "2"], ROBOTS)
