@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from schema.errors import FitnessUndefined, SimulationDiverged
+from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import Simulation
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.robust import Robust
@@ -187,7 +187,7 @@ def rejudge(
     for change in changes:
         try:
             fitness = evaluate(robot, change.settings, identity).fitness
-        except (SimulationDiverged, FitnessUndefined):
+        except (SimulationDiverged, SensorFailed, FitnessUndefined):
             yield Judged(change, None)
         else:
             yield Judged(change, fitness)

@@ -6,7 +6,12 @@ from typing import Any
 import pytest
 from msgspec.structs import asdict, replace
 
-from schema.errors import SimulationDiverged
+from schema.errors import (
+    FitnessUndefined,
+    RevolveError,
+    SensorFailed,
+    SimulationDiverged,
+)
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.environment import Environment
 from schema.experiment.identity import NO_IDENTITY
@@ -120,12 +125,15 @@ def test_fitness_is_that_of_an_evaluation_with_the_changed_settings(
     ]
 
 
+@pytest.mark.parametrize(
+    "failure", [SimulationDiverged, SensorFailed, FitnessUndefined]
+)
 def test_failed_evaluations_have_no_fitness(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch, failure: type[RevolveError]
 ) -> None:
     def fake(_: Robot, settings: EvaluationSettings, __: object) -> SimpleNamespace:
         if settings.simulation.friction < 1.0:
-            raise SimulationDiverged("slipped away")
+            raise failure("slipped away")
         return SimpleNamespace(fitness=0.5)
 
     monkeypatch.setattr(robustness, "evaluate", fake)
