@@ -18,6 +18,7 @@ from schema.errors import RunFolderError
 from schema.experiment.document import Experiment as Document
 from schema.experiment.document import island_experiment, light_of
 from schema.experiment.identity import Identity, Origin
+from schema.experiment.settings import evaluation_settings_of, lasting
 from schema.robot.ids import BirthId
 from schema.tables.description import check_folder
 from schema.wire.updates import individual
@@ -29,7 +30,8 @@ class Chosen(NamedTuple):
     Attributes:
         row: first columns of its rows: experiment, folder, island, birth, is_best,
             is_last, recorded.
-        document: settings of its island, for an evaluation alone.
+        document: settings of its island, for an evaluation alone that takes as long
+            as the recorded one.
         robot: the robot.
         run: its run.
         identity: of the recorded evaluation, which determines noise, pushes and
@@ -74,8 +76,8 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     last = _last(found, most)
     own = OwnRun(folder)
     births = tables["births"]
-    trials = {
-        (row["island"], individual(row)): row["trial"]
+    evaluations = {
+        (row["island"], individual(row)): (row["trial"], row["simulated_s"])
         for row in tables["evaluations"].to_pylist()
     }
     chosen: list[Chosen] = []
@@ -98,8 +100,9 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         }
         there, name = row["island"], BirthId(island, birth)
         origin = Origin(seed=run.seed, run=run.number, island=there)
-        identity = Identity(origin, name, trials.get((there, name), 0))
-        document = _alone(own.experiment, there)
+        trial, simulated_s = evaluations.get((there, name), (0, None))
+        identity = Identity(origin, name, trial)
+        document = _alone(own.experiment, there, simulated_s)
         chosen.append(Chosen(head, document, robot, own, identity))
     return chosen
 
@@ -111,12 +114,22 @@ def _last(found: pa.Table, most: int | None) -> set[int]:
     return set(sorted(rows, key=lambda row: (-fitness[row], row))[:most])
 
 
-def _alone(experiment: Experiment, island: int) -> Document:
+def _alone(experiment: Experiment, island: int, simulated_s: float | None) -> Document:
     """Return the settings of one island for an evaluation alone, off-line.
 
     Robots of an arena start as at their birth, alone and without walls.
+
+    Args:
+        experiment: of the run.
+        island: number of the island.
+        simulated_s: recorded length of the evaluation; None if it failed, or in an
+            arena.
     """
     own = island_experiment(document_of(experiment), island)
+    if simulated_s is not None:
+        steps = round(simulated_s / own.simulation.timestep_s)
+        clock = lasting(evaluation_settings_of(own), steps).simulation
+        own = structs.replace(own, simulation=clock)
     if own.arena is not None:
         light = light_of(own.environment, own.arena)
         own = structs.replace(

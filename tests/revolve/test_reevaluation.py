@@ -14,8 +14,13 @@ from revolve.robot import plain
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import Identity, Origin
-from schema.experiment.settings import evaluation_settings_of
+from schema.experiment.settings import (
+    EvaluationSettings,
+    evaluation_settings_of,
+    lasting,
+)
 from schema.robot.ids import BirthId
+from schema.tables.files import read_table
 from worker.robot.ablation import all_ablations
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import all_changes
@@ -33,6 +38,7 @@ parents = "random"
 window_steps = 80
 brain_steps = 20
 pose_steps = 20
+evaluation_s = [0.4, 1.0]
 actuator_noise = 0.1
 [robust]
 draws = 2
@@ -53,10 +59,8 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
     rows = pq.read_table("out/robustness.parquet").to_pylist()
     assert Path("out/robustness.png").stat().st_size > 10_000
 
-    settings = evaluation_settings_of(read_experiment("short.toml"))
-    settings = replace(settings, robust=None)
-    changes = {each.name: each.settings for each in all_changes(settings)}
     run = rv.read("a")
+    changes = all_changes(settings_of(0))
     names = {(row["island"], row["birth"]) for row in rows}
     assert len(rows) == len(names) * len(changes)
     assert sum(row["is_last"] for row in rows) == 2 * len(changes)
@@ -67,9 +71,11 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
         robot = plain(run.robot(row["birth"]))
         if row["change"] not in ("friction 0.9", "sensor noise 0.05"):
             continue
+        settings = replace(settings_of(row["birth"]), robust=None)
+        changed_to = {each.name: each.settings for each in all_changes(settings)}
         own = identity(row["birth"])
         assert row["undisturbed"] == evaluate(robot, settings, own).fitness
-        changed = changes[row["change"]]
+        changed = changed_to[row["change"]]
         assert row["fitness"] == evaluate(robot, changed, own).fitness
 
     _check_ablations(capsys, run)
@@ -77,6 +83,14 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
     for command in ("robustness", "ablate"):
         assert main([command, "a"]) == 2
         assert "'revolve resume a' finishes it" in capsys.readouterr().err
+
+
+def settings_of(birth: int) -> EvaluationSettings:
+    """Return the settings of the run's evaluation, with its own length."""
+    settings = evaluation_settings_of(read_experiment("short.toml"))
+    rows = read_table(Path("a"), "evaluations").to_pylist()
+    (simulated_s,) = [row["simulated_s"] for row in rows if row["birth"] == birth]
+    return lasting(settings, round(simulated_s / settings.simulation.timestep_s))
 
 
 def identity(birth: int) -> Identity:
@@ -96,8 +110,8 @@ def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
     assert sum(each["is_last"] for each in rows) == len(
         [each for each in rows if each["birth"] == rows[0]["birth"]]
     )
-    settings = evaluation_settings_of(read_experiment("short.toml"))
     for birth in {each["birth"] for each in rows}:
+        settings = settings_of(birth)
         robot = plain(run.robot(birth))
         own = [each for each in rows if each["birth"] == birth]
         same = identity(birth)

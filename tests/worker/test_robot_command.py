@@ -56,6 +56,25 @@ def test_draws_of_a_run_are_told_from_those_alone(
         ) is is_told
 
 
+def test_drawn_lengths_of_a_run_are_told_from_that_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    file = tmp_path / "mine.toml"
+    told = (
+        "revolve: simulated for 2 s; the run draws the length of each evaluation "
+        "(simulation.evaluation_s)\n"
+    )
+    for text, is_told in (("", False), ("evaluation_s = [2.0, 4.0]\n", True)):
+        clock = "warmup_steps = 200\nwindow_steps = 200\n"
+        file.write_text(f'name = "mine"\n[simulation]\n{clock}{text}')
+        words = [str(tmp_path / "spider.yaml"), "--experiment", str(file)]
+        assert main(["robot simulate", *words]) == 0
+        shown = capsys.readouterr()
+        assert "simulated:         2.0 s" in shown.out
+        assert (told in shown.err) is is_told
+
+
 def test_robustness_is_shown_by_change_and_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
