@@ -110,20 +110,26 @@ def parser(command: str) -> Flags:
 def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
-    from worker.robot.brains import load_controls
+    from worker.robot.brains import Controls, load_controls
 
-    def check_brain(experiment: Experiment) -> None:
-        check_brain_genes(experiment)
+    def controls(experiment: Experiment) -> Controls:
         clock = experiment.simulation
         tick_s = clock.brain_steps * clock.timestep_s
         # Its check runs when it is made.
-        load_controls(experiment.brain, experiment.space, tick_s)
+        return load_controls(experiment.brain, experiment.space, tick_s)
+
+    def check_brain(experiment: Experiment) -> None:
+        check_brain_genes(experiment)
+        controls(experiment)
+
+    def check_new_brain(experiment: Experiment) -> None:
+        controls(experiment).check_new()
 
     return (
         *schema.experiment.kinds.KINDS,
         *worker.kinds.KINDS,
         *KINDS,
-        brain_kind(check_brain),
+        brain_kind(check_brain, check_new_brain),
     )
 
 

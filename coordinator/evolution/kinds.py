@@ -214,12 +214,15 @@ def _encodings(experiment: Experiment) -> Iterator[Use]:
         yield _encoding(experiment, own)
 
 
-def brain_kind(check: Callable[[Experiment], None]) -> Kind:
+def brain_kind(
+    check: Callable[[Experiment], None], check_new: Callable[[Experiment], None]
+) -> Kind:
     """Return the kind of brain types.
 
     Args:
         check: of both halves of the brain type of an experiment; one of them runs in
             workers.
+        check_new: of what only new runs must keep.
     """
 
     def use(experiment: Experiment) -> Use:
@@ -229,6 +232,7 @@ def brain_kind(check: Callable[[Experiment], None]) -> Kind:
             path,
             lambda: load_object(path, key, BRAINS),
             lambda _: check(experiment),
+            check_new=lambda _: check_new(experiment),
         )
 
     return Kind(

@@ -285,9 +285,12 @@ def _check_plugin(
     """
     say("begin", f"{use.key}: {use.path}")
     try:
-        where = check_use(use, lambda at: say("begin", f"{use.key}: {at}"))
+        is_new = not _is_folder(Path(word))
+        where = check_use(
+            use, lambda at: say("begin", f"{use.key}: {at}"), is_new=is_new
+        )
         plugin = use.load()
-        if isinstance(plugin, PartType) and not _is_folder(Path(word)):
+        if isinstance(plugin, PartType) and is_new:
             check_slot_directions(plugin, use.key)
             check_sensed_boxes(plugin, use.key)
         warning = use.advise(plugin)

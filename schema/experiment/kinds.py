@@ -32,6 +32,8 @@ class Use:
         load: returns the plug-in; raises ``ExperimentError`` if it cannot be had.
         check: takes the plug-in; raises any error if it breaks its contract.
         advise: takes a plug-in that is in order; returns a warning, or nothing.
+        check_new: as ``check``, of what versions before did not check: only for a run
+            that begins now.
     """
 
     key: str
@@ -39,6 +41,7 @@ class Use:
     load: Callable[[], object]
     check: Callable[[Any], None]
     advise: Callable[[Any], str] = lambda _: ""
+    check_new: Callable[[Any], None] = lambda _: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +63,15 @@ class Kind:
     used: Callable[[Experiment], Iterable[Use]]
 
 
-def check_use(use: Use, begin: Callable[[str], None] = lambda _: None) -> str:
+def check_use(
+    use: Use, begin: Callable[[str], None] = lambda _: None, *, is_new: bool = False
+) -> str:
     """Check a plug-in; return where it is defined.
 
     Args:
         use: to check.
         begin: called with file and line before the check.
+        is_new: also check what only new runs must keep.
 
     Raises:
         ExperimentError: one line with key, file and line, and what was expected.
@@ -76,6 +82,8 @@ def check_use(use: Use, begin: Callable[[str], None] = lambda _: None) -> str:
     file, _, _ = where.partition(":")
     try:
         use.check(plugin)
+        if is_new:
+            use.check_new(plugin)
     # A plug-in may call exit().
     except (Exception, SystemExit) as error:
         story = " ".join(str(error).split())

@@ -32,7 +32,7 @@ from schema.robot.brain import (
 )
 from schema.robot.neurons import BUILT_IN_NEURONS, SHORTEST_PERIOD_S
 from schema.robot.results import Floats
-from worker.robot.check_controls import check_controls
+from worker.robot.check_controls import check_controls, check_new_controls
 from worker.robot.cpg import CpgControl
 from worker.robot.own_neurons import STATE_LIMIT, OwnNeuron, OwnNeurons
 
@@ -328,9 +328,18 @@ class Controls:
         self._control = brain_half(brain, space.neuron_types, BUILT_IN)
         self._tick_s = tick_s
         self.neurons = self._control.neurons
+        self._place = f"brain.type: {where_defined(type(self._control))}"
         if self.is_checked:
-            check_controls(self, f"brain.type: {where_defined(type(self._control))}")
+            check_controls(self, self._place)
         self._rest = self.bank(()).states.shape[1]
+
+    def check_new(self) -> None:
+        """Check what brains of new runs must keep, and runs begun earlier need not.
+
+        Raises:
+            ExperimentError: as of ``check_new_controls``.
+        """
+        check_new_controls(self, self._place)
 
     def pack(self, brain: Brain) -> Any:  # noqa: ANN401 - a brain type's own
         """Return a checked brain in the form that ``bank`` and ``solo`` take.

@@ -46,8 +46,7 @@ def check_controls(controls: Controls, place: str) -> None:
 
     Raises:
         ExperimentError: code that raises; states or outputs of a wrong shape or not
-            finite; outputs that are no array of float64; states that are not changed
-            in place; a robot that moves differently a second time, alone, in another
+            finite; a robot that moves differently a second time, alone, in another
             row, or after its states were saved and restored.
     """
     everybody = list(range(_ROBOTS))
@@ -68,8 +67,29 @@ def check_controls(controls: Controls, place: str) -> None:
                 )
 
 
+def check_new_controls(controls: Controls, place: str) -> None:
+    """Raise unless brains also keep what versions before did not check.
+
+    Runs begun by them go on, so this is for new runs.
+
+    Args:
+        controls: brains that pass ``check_controls``.
+        place: where their code is, for messages.
+
+    Raises:
+        ExperimentError: outputs that are no array of float64; states that are not
+            changed in place.
+    """
+    rows = range(_ROBOTS)
+    _guarded(partial(_run, controls, rows, is_new=True), place)
+
+
 def _run(
-    controls: Controls, rows: Sequence[int], moved_at: int = _TICKS
+    controls: Controls,
+    rows: Sequence[int],
+    moved_at: int = _TICKS,
+    *,
+    is_new: bool = False,
 ) -> list[Floats]:
     """Return outputs and states after each tick; restore them once on the way."""
     packed = [controls.pack(_brain(controls, number)) for number in rows]
@@ -85,16 +105,22 @@ def _run(
             bank.states[...] = states
         states = bank.states
         outputs = bank.step(readings[tick, rows], float(tick))
-        # An arena keeps views of the rows, from which robots are saved and moved.
-        if states.size and not np.shares_memory(states, bank.states):
-            raise ValueError(
-                "`states` is another array after a step: change it in place"
-            )
-        _require_floats(outputs)
+        if is_new:
+            _require_in_place(states, bank.states)
+            _require_floats(outputs)
         _require("outputs", outputs, (len(rows), controls.width.outputs))
         _require("states", bank.states, (len(rows), kept))
         found.append(np.hstack([outputs, bank.states]))
     return found
+
+
+def _require_in_place(before: Floats, after: Floats) -> None:
+    """Raise unless states are the same array after a step.
+
+    An arena keeps views of the rows, from which robots are saved and moved.
+    """
+    if before.size and not np.shares_memory(before, after):
+        raise ValueError("`states` is another array after a step: change it in place")
 
 
 def _require_floats(outputs: object) -> None:

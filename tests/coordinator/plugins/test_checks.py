@@ -12,6 +12,8 @@ import pytest
 from coordinator.__main__ import plugin_kinds
 from coordinator.plugins.checks import check_apart, check_here, refuse_faulty
 from schema.errors import ExperimentError
+from schema.experiment.document import BrainSection, Experiment
+from schema.experiment.kinds import check_use
 from schema.plugins import permission
 from tests.own_brains import write_module
 
@@ -117,6 +119,26 @@ def test_neuron_and_brain_types_are_recognised(tmp_path: Path) -> None:
     neuron, brain = [text for step, text in found if step == "fine"]
     assert re.fullmatch(r"my_brains:Adapting: neuron-type at .*:\d+: in order", neuron)
     assert re.fullmatch(r"my_brains:Wave: brain at my_brains.py:\d+: in order", brain)
+
+
+def test_brain_type_with_other_outputs_is_refused_in_new_runs_only(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "single_brains.py"
+    text = write_module(tmp_path).read_text()
+    single = text.replace("return 0.5 + 0.5 * amplitude", "return np.float32(amplitude")
+    file.write_text(single.replace("(self.states - delay))", "(self.states - delay)))"))
+    ((_, fault),) = [each for each in checked(f"{file}:Wave") if each[0] == "fault"]
+    expected = r"brain\.type: single_brains\.py:\d+: expected .* got one of float32"
+    assert re.match(expected, fault)
+    brain = BrainSection(type="single_brains:Wave")
+    (use,) = [
+        use
+        for kind in plugin_kinds()
+        for use in kind.used(Experiment(name="begun", brain=brain))
+        if use.path == brain.type
+    ]
+    assert check_use(use).startswith("single_brains.py:")
 
 
 def test_a_broken_half_of_a_brain_type_is_named(tmp_path: Path) -> None:

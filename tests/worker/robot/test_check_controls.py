@@ -12,7 +12,7 @@ from schema.plugins.protocols import Bank
 from schema.robot.brain import NEURON_TYPES, Brain, NeuronKinds
 from schema.robot.results import Floats
 from worker.robot.brains import Controls
-from worker.robot.check_controls import check_controls
+from worker.robot.check_controls import check_controls, check_new_controls
 
 Change = Callable[["Leaking", Floats, Floats], Floats]
 
@@ -61,11 +61,6 @@ def raises(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
 
 CASES: dict[str, tuple[Change, str]] = {
     "shape": (lambda _, __, outputs: outputs[:, :3], "outputs of shape"),
-    "whole numbers": (
-        lambda _, __, outputs: (outputs > 0.0).astype(np.int64),
-        "outputs must be an array of float64, got one of int64",
-    ),
-    "list": (lambda _, __, outputs: outputs.tolist(), "of float64, got a list"),
     "not finite": (lambda _, __, outputs: outputs / 0.0, "outputs that are not finite"),
     "other robots": (lambda _, readings, outputs: outputs + readings.max(), "alone"),
     "row": (
@@ -77,8 +72,19 @@ CASES: dict[str, tuple[Change, str]] = {
         lambda _, __, outputs: outputs + np.random.default_rng().random(),
         "a second time",
     ),
-    "other array": (replaces, "`states` is another array after a step"),
     "raises": (raises, "got KeyError: '10 motors'"),
+}
+NEW_CASES: dict[str, tuple[Change, str]] = {
+    "whole numbers": (
+        lambda _, __, outputs: (outputs > 0.0).astype(np.int64),
+        "outputs must be an array of float64, got one of int64",
+    ),
+    "single": (
+        lambda _, __, outputs: outputs.astype(np.float32),
+        "outputs must be an array of float64, got one of float32",
+    ),
+    "list": (lambda _, __, outputs: outputs.tolist(), "of float64, got a list"),
+    "other array": (replaces, "`states` is another array after a step"),
 }
 
 
@@ -92,6 +98,17 @@ def test_broken_brains_are_refused_in_one_line(name: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("name", list(NEW_CASES))
+def test_brains_of_runs_begun_earlier_may_break_what_was_not_checked(name: str) -> None:
+    change, message = NEW_CASES[name]
+    check_controls(Broken(change), "brain.type: mine.py:7")
+    with pytest.raises(ExperimentError, match=message) as caught:
+        check_new_controls(Broken(change), "brain.type: mine.py:7")
+    assert str(caught.value).startswith("brain.type: mine.py:7: expected ")
+    assert "\n" not in str(caught.value)
+
+
 def test_sound_brains_pass() -> None:
-    check_controls(Broken(lambda _, __, outputs: outputs), "mine")
-    check_controls(Controls(NETWORK, Space(), 0.125), "network")
+    for check in (check_controls, check_new_controls):
+        check(Broken(lambda _, __, outputs: outputs), "mine")
+        check(Controls(NETWORK, Space(), 0.125), "network")
