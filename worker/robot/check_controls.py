@@ -58,13 +58,7 @@ def check_controls(controls: Controls, place: str) -> None:
         ("after its states were restored", everybody, _TICKS // 2),
     ):
         found = _guarded(partial(_run, controls, rows, moved_at), place)
-        for tick, (one, other) in enumerate(zip(found, expected, strict=True)):
-            if one.tobytes() != other[rows].tobytes():
-                raise ExperimentError(
-                    f"{place}: expected equal outputs and states for equal robots, got "
-                    f"other ones {what} at tick {tick}: use elementwise NumPy, arrays "
-                    "of fixed width, and keep everything in `states`"
-                )
+        _require_equal(found, [each[rows] for each in expected], place, what)
 
 
 def check_new_controls(controls: Controls, place: str) -> None:
@@ -77,11 +71,15 @@ def check_new_controls(controls: Controls, place: str) -> None:
         place: where their code is, for messages.
 
     Raises:
-        ExperimentError: outputs that are no array of float64; states that are not
-            changed in place.
+        ExperimentError: states that are not 0 at birth or not changed in place;
+            outputs that are no array of float64; code that raises, or robots that move
+            differently, if the ages are an array, as in an arena.
     """
-    rows = range(_ROBOTS)
-    _guarded(partial(_run, controls, rows, is_new=True), place)
+    run = partial(_run, controls, range(_ROBOTS), is_new=True)
+    expected = _guarded(run, place)
+    what = "with an array (R, 1) of ages"
+    found = _guarded(partial(run, has_ages=True), place, f" {what}")
+    _require_equal(found, expected, place, what)
 
 
 def _run(
@@ -90,13 +88,24 @@ def _run(
     moved_at: int = _TICKS,
     *,
     is_new: bool = False,
+    has_ages: bool = False,
 ) -> list[Floats]:
-    """Return outputs and states after each tick; restore them once on the way."""
+    """Return outputs and states after each tick; restore them once on the way.
+
+    Args:
+        controls: the brains.
+        rows: numbers of the robots.
+        moved_at: tick before which the states are restored; none if there is no such.
+        is_new: also require what only brains of new runs must keep.
+        has_ages: the ages are an array, not one number.
+    """
     packed = [controls.pack(_brain(controls, number)) for number in rows]
     kept = controls.bank(()).states.shape[1]
     rng = np.random.default_rng(0)
     readings = rng.normal(0.0, 3.0, (_TICKS, _ROBOTS, controls.width.inputs))
     bank = controls.bank(packed)
+    if is_new:
+        _require_rest(bank.states)
     found: list[Floats] = []
     for tick in range(_TICKS):
         if tick == moved_at:
@@ -104,7 +113,8 @@ def _run(
             bank = controls.bank(packed)
             bank.states[...] = states
         states = bank.states
-        outputs = bank.step(readings[tick, rows], float(tick))
+        ages = np.full((len(rows), 1), float(tick)) if has_ages else float(tick)
+        outputs = bank.step(readings[tick, rows], ages)
         if is_new:
             _require_in_place(states, bank.states)
             _require_floats(outputs)
@@ -112,6 +122,26 @@ def _run(
         _require("states", bank.states, (len(rows), kept))
         found.append(np.hstack([outputs, bank.states]))
     return found
+
+
+def _require_equal(
+    found: Sequence[Floats], expected: Sequence[Floats], place: str, what: str
+) -> None:
+    """Raise unless outputs and states are equal to the last bit at each tick."""
+    for tick, (one, other) in enumerate(zip(found, expected, strict=True)):
+        if one.tobytes() != other.tobytes():
+            raise ExperimentError(
+                f"{place}: expected equal outputs and states for equal robots, got "
+                f"other ones {what} at tick {tick}: use elementwise NumPy, arrays "
+                "of fixed width, and keep everything in `states`"
+            )
+
+
+def _require_rest(states: Floats) -> None:
+    """Raise unless states are 0 at birth, as arenas start new brains."""
+    if states.any():
+        first = float(states[states != 0.0][0])
+        raise ValueError(f"`states` must be 0 at birth, got {first:g}")
 
 
 def _require_in_place(before: Floats, after: Floats) -> None:
@@ -142,13 +172,15 @@ def _require(what: str, array: Floats, shape: tuple[int, int]) -> None:
         raise ValueError(f"{what} that are not finite")
 
 
-def _guarded(compute: Callable[[], list[Floats]], place: str) -> list[Floats]:
+def _guarded(
+    compute: Callable[[], list[Floats]], place: str, what: str = ""
+) -> list[Floats]:
     """Return what a plug-in computes; its exceptions become one line."""
     try:
         return compute()
     except Exception as error:
         raise ExperimentError(
-            f"{place}: expected pack, bank and step as in BrainControl, got "
+            f"{place}: expected pack, bank and step as in BrainControl{what}, got "
             f"{error_text(error)}"
         ) from error
 

@@ -21,15 +21,25 @@ class Leaking:
     """Bank whose outputs are sums of past readings, changed by a function."""
 
     def __init__(self, count: int, change: Change) -> None:
-        self.states = np.zeros((count, 10))
+        self.states = np.full((count, 10), 0.25 if change is awake else 0.0)
         self.hidden = np.zeros((count, 10))
+        self.ages: Floats | float = 0.0
         self._change = change
 
     def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
-        del age_ticks
+        self.ages = age_ticks
         self.states += readings
         self.hidden += readings
         return self._change(self, readings, self.states.copy())
+
+
+def awake(_bank: Leaking, _readings: Floats, outputs: Floats) -> Floats:
+    return outputs
+
+
+def asks(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
+    del readings
+    return outputs if bank.ages > 3.0 else 0.5 * outputs
 
 
 class Broken:
@@ -85,6 +95,12 @@ NEW_CASES: dict[str, tuple[Change, str]] = {
     ),
     "list": (lambda _, __, outputs: outputs.tolist(), "of float64, got a list"),
     "other array": (replaces, "`states` is another array after a step"),
+    "awake": (awake, "`states` must be 0 at birth, got 0.25"),
+    "ages": (asks, r"with an array \(R, 1\) of ages, got ValueError: The truth value"),
+    "ages of rows": (
+        lambda bank, _, outputs: outputs + 0.1 * (np.shape(bank.ages) == (7, 1)),
+        r"got other ones with an array \(R, 1\) of ages at tick 0",
+    ),
 }
 
 
