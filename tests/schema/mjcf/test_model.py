@@ -9,7 +9,13 @@ import pytest
 
 from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT
-from schema.mjcf.model import add_ground, robot_spec, set_options, solo_spec
+from schema.mjcf.model import (
+    add_ground,
+    robot_spec,
+    set_options,
+    shared_model,
+    solo_spec,
+)
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
 
@@ -190,3 +196,47 @@ def test_one_spec_can_be_attached_to_a_world_twice() -> None:
     assert (
         model.geom("8:1/servo").solref.tolist() == solo.geom("1/servo").solref.tolist()
     )
+
+
+def chain(parts: int) -> Robot:
+    """Return a core with a chain of hinges."""
+    hinges = (
+        Part("ActiveHinge", index, 1 if index else 0, 0, 0, GREY)
+        for index in range(parts - 1)
+    )
+    return Robot((CORE, *hinges))
+
+
+@pytest.mark.parametrize(
+    ("parts", "mebibytes"), [(2, 1), (30, 1), (31, 2), (60, 4), (61, 5), (300, 100)]
+)
+def test_memory_grows_with_the_square_of_the_parts(parts: int, mebibytes: int) -> None:
+    """Robots of up to 30 parts all have 1 MiB, twice that among others."""
+    assert model_of(chain(parts)).narena == mebibytes << 20
+    child = robot_spec(chain(parts), BUILT_IN, WORLD).spec
+    core = robot_spec(Robot((CORE,)), BUILT_IN, WORLD).spec
+    shared = shared_model([("a/", child), ("b/", core)], WORLD, FLAT)
+    assert shared.narena == 2 * (mebibytes + 1) << 20
+
+
+def test_memory_is_enough_for_a_long_robot_that_lies_on_the_ground() -> None:
+    """All its hinges touch the ground; the engine raises if its memory is full."""
+    model = model_of(chain(120))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 50)
+    assert data.ncon > 300
+    assert not data.warning.number.any()
+    assert 1 << 20 < data.maxuse_arena < model.narena // 2
+
+
+def test_memory_has_no_effect_on_a_robot_that_needs_less() -> None:
+    spec = solo_spec(chain(40), BUILT_IN, WORLD, FLAT)
+    states = []
+    for memory in (1 << 20, spec.memory):
+        spec.memory = memory
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 100)
+        states.append((data.qpos.tobytes(), data.qvel.tobytes()))
+    assert spec.memory == 2 << 20
+    assert states[0] == states[1]
