@@ -194,13 +194,14 @@ def _has(methods: Iterable[str], plugin: object) -> bool:
 def _encoding(experiment: Experiment, own: Experiment) -> Use:
     """Return the use of an encoding by an island whose experiment is ``own``."""
     path = own.encoding.type
-
-    def load() -> object:
+    return Use(
+        WHERE,
+        path,
+        lambda: load_object(path, WHERE, ENCODINGS, METHODS),
+        lambda _: check_encoding(own),
         # What is wrong elsewhere is not the fault of this plug-in.
-        check_experiment(experiment, experiment.name)
-        return load_object(path, WHERE, ENCODINGS, METHODS)
-
-    return Use(WHERE, path, load, lambda _: check_encoding(own))
+        check_rest=lambda: check_experiment(experiment, experiment.name),
+    )
 
 
 def _encoding_by_hand(path: str) -> Use:

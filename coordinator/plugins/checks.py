@@ -284,8 +284,11 @@ def _check_plugin(
         ExperimentError: it is not in order.
     """
     say("begin", f"{use.key}: {use.path}")
+    # A run goes on that was started before a check was added.
+    is_new = not _is_folder(Path(word))
     try:
-        is_new = not _is_folder(Path(word))
+        if is_new:
+            use.check_rest()
         where = check_use(
             use, lambda at: say("begin", f"{use.key}: {at}"), is_new=is_new
         )

@@ -34,6 +34,8 @@ class Use:
         advise: takes a plug-in that is in order; returns a warning, or nothing.
         check_new: as ``check``, of what versions before did not check: only for a run
             that begins now.
+        check_rest: raises ``ExperimentError`` if the rest of a new experiment is wrong,
+            for plug-ins that are checked with it; called before ``load``.
     """
 
     key: str
@@ -42,6 +44,7 @@ class Use:
     check: Callable[[Any], None]
     advise: Callable[[Any], str] = lambda _: ""
     check_new: Callable[[Any], None] = lambda _: None
+    check_rest: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,17 @@ from pathlib import Path
 import pytest
 
 from coordinator.__main__ import plugin_kinds
-from coordinator.plugins.checks import check_apart, check_here, refuse_faulty
+from coordinator.plugins.checks import (
+    check_apart,
+    check_here,
+    refuse_faulty,
+    refuse_faulty_of,
+)
+from coordinator.storage.folder import RunDetails, RunFolder
 from schema.errors import ExperimentError
 from schema.experiment.document import BrainSection, Experiment
 from schema.experiment.kinds import check_use
+from schema.experiment.file import draft_experiments, experiment_text
 from schema.plugins import permission
 from tests.own_brains import write_module
 
@@ -250,6 +257,23 @@ def test_own_encoding_of_islands_is_in_order(tmp_path: Path) -> None:
         "[migration]\ntopology = 'ring'\nepoch = 5\n[[islands]]\ncount = 2\n"
     )
     assert check_apart([str(document)]) == []
+
+
+def test_run_with_an_own_encoding_goes_on_after_later_checks(tmp_path: Path) -> None:
+    """Its pushes never come: a new run is refused, and its encoding not named."""
+    shutil.copy(CRITTERS / "genomes.py", tmp_path)
+    document = tmp_path / "late.toml"
+    document.write_text(
+        'name = "late"\n[encoding]\ntype = "genomes:Snakes"\n'
+        "[simulation]\nwindow_steps = 400\n[environment]\npush_impulse = 0.001\n"
+    )
+    (problem,) = check_apart([str(document)])
+    expected = r"late\.toml: late: environment\.push_interval_s: must be < 2 s"
+    assert re.match(expected, problem), problem
+    (experiment,) = draft_experiments(str(document))
+    details = RunDetails("late", 0, 0, experiment_text(experiment))
+    RunFolder(tmp_path / "run", details).close()
+    assert refuse_faulty_of(tmp_path / "run") == (experiment,)
 
 
 def test_name_that_no_folder_can_have_is_a_fault(tmp_path: Path) -> None:
