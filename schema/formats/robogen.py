@@ -6,7 +6,7 @@ give it the same pose.
 Source: RoboGen's published sources of 2018, planar bodies as it builds them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import pi
 
@@ -31,6 +31,7 @@ KINDS: Mapping[str, str] = {
     "LightSensor": "LightSensor",
 }
 """Our part types by RoboGen's; a core without IMU has unconnected inputs."""
+_NO_IMU = "CoreComponentNoIMU"
 
 _NEURONS = {
     "simple": "Simple",
@@ -57,6 +58,7 @@ class RobogenPart:
         orientation: quarter turns, 0..3.
         parameters: as in the file: length [m], alpha and beta [degrees].
         where: file and line or path, for messages.
+        has_imu: false of a core whose inputs RoboGen does not have.
         children: by RoboGen's slot; parts that are not square number them from 1.
     """
 
@@ -65,6 +67,7 @@ class RobogenPart:
     orientation: int
     parameters: tuple[float, ...]
     where: str
+    has_imu: bool = True
     children: dict[int, "RobogenPart"] = field(default_factory=dict)
 
     def subtree(self) -> list["RobogenPart"]:
@@ -124,7 +127,7 @@ def checked_part(
     wanted = _BAR_NUMBERS if ours == "ParametricBarJoint" else 0
     if len(values) != wanted:
         raise InvalidRobot(f"{at}: {kind} takes {wanted} numbers, got {len(values)}")
-    return RobogenPart(name, ours, turns, values, where)
+    return RobogenPart(name, ours, turns, values, where, kind != _NO_IMU)
 
 
 def neuron_kind(name: str, where: str) -> str:
@@ -139,6 +142,11 @@ def neuron_kind(name: str, where: str) -> str:
     return _NEURONS[name.lower()]
 
 
+def two_neurons(part: str, number: int) -> str:
+    """Return what is wrong with a part that has two neurons of one number."""
+    return f"part {shown(part)} has two neurons {number}"
+
+
 def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
     """Return the robot of a RoboGen file.
 
@@ -149,14 +157,14 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
 
     Raises:
         InvalidRobot: a slot that a part does not have, a parameter out of range, an
-            unknown neuron or part.
+            unknown neuron or part, two neurons of one number.
     """
     body = _Body()
     try:
         body.add(theirs.root, (-1, -1, -1), 0, 0)
     except RecursionError:
         raise InvalidRobot(f"{where}: nested too deeply") from None
-    neurons, index = _neurons(theirs, body, space)
+    neurons, index = _neurons(theirs, body, space, where)
     ends = (end for *pair, _ in theirs.weights for end in pair)
     for name, number in (*theirs.kinds, *ends):
         if (name, number) not in index:
@@ -173,9 +181,10 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
         check_number(robot)
         check_robot(robot, space)
     except InvalidRobot as error:
-        names = [f"{part} {number}" for part, number in index]
-        links = [(names[edge.source], names[edge.target]) for edge in connections]
-        message = with_ids(str(error), body.names, names, links)
+        names = {place: f"{part} {number}" for (part, number), place in index.items()}
+        known = [names.get(place, "imu") for place in range(len(neurons))]
+        links = [(known[edge.source], known[edge.target]) for edge in connections]
+        message = with_ids(str(error), body.names, known, links)
         raise InvalidRobot(f"{where}: {message}") from None
     return robot
 
@@ -236,30 +245,40 @@ def _parameters(part: RobogenPart) -> tuple[float, ...]:
 
 
 def _neurons(
-    theirs: RobogenRobot, body: _Body, space: BodySpace
+    theirs: RobogenRobot, body: _Body, space: BodySpace, where: str
 ) -> tuple[list[Neuron], dict[Ending, int]]:
-    """Return Revolve's neurons in order, and their indices by RoboGen's names."""
+    """Return Revolve's neurons in order, and their indices by RoboGen's names.
+
+    The inputs of a core without IMU have no such names.
+    """
     neurons: list[Neuron] = []
     index: dict[Ending, int] = {}
-
-    def add(layer: Layer, part: int, end: Ending) -> None:
+    for layer, part, end in _ends(theirs, body, space):
         kind, values = theirs.kinds.get(end, USUAL)
         if layer == "input":
             kind, values = INPUT, ()
-        index[end] = len(neurons)
+        if layer != "input" or part or theirs.root.has_imu:
+            if end in index:
+                raise InvalidRobot(f"{where}: {two_neurons(*end)}")
+            index[end] = len(neurons)
         neurons.append(Neuron(layer, kind, part, values))
+    return neurons, index
 
+
+def _ends(
+    theirs: RobogenRobot, body: _Body, space: BodySpace
+) -> Iterator[tuple[Layer, int, Ending]]:
+    """Yield layer, part and RoboGen's name of each neuron in Revolve's order."""
     types = [part_type(part.kind, space, "body") for part in body.parts]
     for part, kind in enumerate(types):
         for number in range(kind.inputs):
-            add("input", part, (body.names[part], number))
+            yield "input", part, (body.names[part], number)
     for part, kind in enumerate(types):
         for number in range(kind.outputs):
-            add("output", part, (body.names[part], number))
+            yield "output", part, (body.names[part], number)
     hidden: dict[str, list[Ending]] = {}
     for end in theirs.hidden:
         hidden.setdefault(end[0], []).append(end)
     for part, name in enumerate(body.names):
         for end in hidden.get(name, ()):
-            add("hidden", part, end)
-    return neurons, index
+            yield "hidden", part, end

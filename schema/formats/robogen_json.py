@@ -15,6 +15,7 @@ from schema.formats.robogen import (
     checked_part,
     neuron_kind,
     our_robot,
+    two_neurons,
 )
 from schema.parts import BodySpace
 from schema.robot.brain import LAYERS
@@ -53,9 +54,16 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
         raise InvalidRobot(f"{where}: not valid JSON: {reason}") from None
     theirs = RobogenRobot(_body(document, where))
     ends: dict[str, Ending] = {}
+    taken: set[Ending] = set()
     for at, neuron in _items(document, ("brain", "neuron"), where):
         end = (_get(neuron, "bodyPartId", str, at), _get(neuron, "ioId", int, at))
-        ends[_get(neuron, "id", str, at)] = end
+        name = _get(neuron, "id", str, at)
+        if name in ends:
+            raise InvalidRobot(f"{at}.id: duplicate neuron {shown(name)}")
+        if end in taken:
+            raise InvalidRobot(f"{at}: {two_neurons(*end)}")
+        ends[name] = end
+        taken.add(end)
         layer = _get(neuron, "layer", str, at)
         if layer not in LAYERS:
             allowed = ", ".join(LAYERS)

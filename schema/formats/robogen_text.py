@@ -63,17 +63,19 @@ def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
     sections = _sections(text, where)
     root = _body(next(sections), where)
     # Of each part: its input and output neurons, then the hidden ones so far.
-    kinds = {part.name: BUILT_IN[part.kind] for part in root.subtree()}
-    numbers = {name: kind.inputs + kind.outputs for name, kind in kinds.items()}
+    numbers: dict[str, int] = {}
+    for part in root.subtree():
+        kind = BUILT_IN[part.kind]
+        numbers[part.name] = kind.outputs + (kind.inputs if part.has_imu else 0)
     theirs = RobogenRobot(root)
     for line, words in next(sections, []):
-        part, kind = _exactly(words, ("PART", "TYPE"), line)
-        if part not in numbers:
-            raise InvalidRobot(f"{line}: no part {shown(part)}")
-        theirs.hidden.append((part, numbers[part]))
+        name, type_name = _exactly(words, ("PART", "TYPE"), line)
+        if name not in numbers:
+            raise InvalidRobot(f"{line}: no part {shown(name)}")
+        theirs.hidden.append((name, numbers[name]))
         # The last section overrides it.
-        theirs.kinds[theirs.hidden[-1]] = (neuron_kind(kind, line), (0.0, 1.0))
-        numbers[part] += 1
+        theirs.kinds[theirs.hidden[-1]] = (neuron_kind(type_name, line), (0.0, 1.0))
+        numbers[name] += 1
     for line, words in next(sections, []):
         names = ("PART", "NUMBER", "PART", "NUMBER", "WEIGHT")
         source, one, target, two, weight = _exactly(words, names, line)

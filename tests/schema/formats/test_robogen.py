@@ -1,7 +1,9 @@
 """RoboGen's robots: poses derived from its frames, names and errors."""
 
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -109,6 +111,37 @@ def test_neurons_and_connections() -> None:
     assert weights == [-1.25, 0.125, 0.5]
 
 
+NO_IMU = """\
+0 CoreComponentNoIMU C 0
+\t0 ActiveHinge H 0
+
+C simple
+C sigmoid
+
+C 0 H 0 1.5
+C 1 C 0 0.5
+
+C 0 simple 0.25
+"""
+
+
+def test_hidden_neurons_of_a_core_without_imu_count_from_0() -> None:
+    """Its six inputs have no number in the file, and no connection."""
+    robot = read(NO_IMU)
+    assert [neuron.layer for neuron in robot.brain.neurons[6:]] == [
+        "output", "hidden", "hidden",
+    ]  # fmt: skip
+    assert robot.brain.neurons[7].parameters == (0.25, 1.0)
+    assert robot.brain.connections == (Connection(7, 6, 1.5), Connection(8, 7, 0.5))
+    with_imu = NO_IMU.replace("NoIMU", "").replace("C 1 C 0", "C 7 C 6")
+    assert read(with_imu.replace("\nC 0", "\nC 6")) == robot
+    assert read("0 N C 0\n\nC simple\n\nC 0 C 0 1\n") == read(
+        "0 E C 0\n\nC simple\n\nC 6 C 6 1\n"
+    )
+    with pytest.raises(InvalidRobot, match=r"it\.txt: no neuron 2 on part 'C'"):
+        read(NO_IMU.replace("C 1", "C 2"))
+
+
 def test_bar_parameters_are_converted() -> None:
     robot = read("0 E C 0\n\t0 ParametricJoint bar 2 0.05 -60 0\n")
     length, alpha, beta = robot.parts[1].parameters[:3]
@@ -192,6 +225,9 @@ def test_json_and_text_give_the_same_robot() -> None:
         (("brain", "neuron", 1, "layer"), "x", r"neuron\[1\].layer: must be one of in"),
         (("brain", "neuron", 1, "bodyPartId"), "X", "no neuron 0 on part 'X'"),
         (("brain", "neuron", 1, "ioId"), 3, "no neuron 3 on part 'H'"),
+        (("brain", "neuron", 1, "id"), "C-0", r"\[1\].id: duplicate neuron 'C-0'"),
+        (("brain", "neuron", 1, "bodyPartId"), "C", r"\[1\]: part 'C' has two ne"),
+        (("brain", "neuron", 1, "layer"), "hidden", "it: part 'H' has two neurons 0"),
         (("brain",), 3, "it: must be an object with 'neuron'"),
         (("body", "part"), 3, "it: body.part must be a list"),
     ],
@@ -206,6 +242,28 @@ def test_errors_name_the_path(
     inner[path[-1]] = value  # type: ignore[index]
     with pytest.raises(InvalidRobot, match=message):
         robot_from_robogen_json(json.dumps(changed), "it", BUILT_IN)
+
+
+def test_json_of_a_core_without_imu() -> None:
+    """Its hidden neuron is number 0; a wrong weight is named by its ends."""
+    changed = NO_IMU.replace("C sigmoid\n", "").replace("C 1 C 0", "H 0 C 0")
+    robot = read(changed)
+    found: dict[str, Any] = document()
+    found["body"]["part"][0]["type"] = "CoreComponentNoIMU"
+    found["body"]["part"][1]["orientation"] = 0
+    hidden, motor = found["brain"]["neuron"]
+    hidden |= {"layer": "hidden", "bias": 0.25}
+    motor |= {"bias": 0.0, "gain": 1.0}
+    edges = [
+        {"src": "C-0", "dest": "H-0", "weight": 1.5},
+        {"src": "H-0", "dest": "C-0", "weight": 0.5},
+    ]
+    found["brain"]["connection"] = edges
+    assert robot_from_robogen_json(json.dumps(found), "it", BUILT_IN) == robot
+    edges[1]["weight"] = math.inf
+    text = json.dumps(found).replace("Infinity", "1e999")
+    with pytest.raises(InvalidRobot, match="it: connection 'H 0' -> 'C 0': "):
+        robot_from_robogen_json(text, "it", BUILT_IN)
 
 
 def test_invalid_json_is_refused() -> None:
