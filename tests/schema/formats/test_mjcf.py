@@ -94,6 +94,54 @@ def test_edited_body_is_refused() -> None:
         robot_from_mjcf(fewer, "it")
 
 
+WALKER = Robot(
+    (
+        Part("Core", -1, -1, -1, 0, GREY),
+        Part("ActiveHinge", 0, 0, 0, 0, GREY),
+        Part("TouchSensor", 0, 1, 0, 0, GREY),
+    ),
+    Brain(
+        (
+            *(Neuron("input", INPUT, part) for part in (0,) * 6 + (2, 2)),
+            Neuron("output", "Simple", 1, (0.0, 0.5)),
+        )
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("written", "edited", "name"),
+    [
+        ('name="body1" pos=".*?"', 'name="body1" pos="0.5 0.5 0.5"', "body_pos"),
+        ('name="body1"', 'name="body1" quat="0 1 0 0"', "body_quat"),
+        ('name="root" pos="0 0', 'name="root" pos="0.1 0', "body_pos"),
+        ('(?=<geom name="1_servo")',
+         '<inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/>', "body_ipos"),
+        ('name="joint1"', 'name="joint1" pos="0 0 0.1"', "jnt_pos"),
+        ('(name="joint1" .*?)axis=".*?"', r'\1axis="1 0 0"', "jnt_axis"),
+        ('name="joint1"', 'name="joint1" damping="0.1"', "dof_damping"),
+        ('armature="0.005"', 'armature="0.01"', "dof_armature"),
+        ('forcerange=".*?"', 'forcerange="-9 9"', "actuator_forcerange"),
+        ('kv="1"', 'kv="77"', "actuator_gainprm"),
+    ],
+)  # fmt: skip
+def test_each_edit_of_a_body_is_refused(written: str, edited: str, name: str) -> None:
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    changed = re.sub(written, edited, text, count=1)
+    assert changed != text
+    mujoco.MjModel.from_xml_string(changed)
+    with pytest.raises(InvalidRobot, match=rf"^it: its body differs .*\b{name}\b"):
+        robot_from_mjcf(changed, "it")
+
+
+def test_robot_may_stand_at_another_height() -> None:
+    """Earlier versions placed robots in other ways on rough ground and scenery."""
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    lifted = text.replace('name="root" pos="0 0 0.0225"', 'name="root" pos="0 0 0.03"')
+    assert lifted != text
+    assert robot_from_mjcf(lifted, "it") == (WALKER, SETTINGS)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
