@@ -43,7 +43,7 @@ def modules_named(document: bytes) -> list[str]:
 
     Args:
         document: JSON; every text in it like ``module:attribute`` names a plug-in, but
-            for parameters of plug-ins, which may be any text.
+            for its own name and for parameters of plug-ins, which may be any text.
 
     Raises:
         ValueError: the document is not JSON.
@@ -53,7 +53,9 @@ def modules_named(document: bytes) -> list[str]:
 
 
 def _texts(document: object) -> Iterator[str]:
-    """Yield the texts and keys of JSON, without parameters of plug-ins."""
+    """Yield the texts and keys of JSON, without its name and plug-ins' parameters."""
+    if isinstance(document, dict):
+        document = {key: document[key] for key in document if key != "name"}
     left = [document]
     while left:
         value = left.pop()

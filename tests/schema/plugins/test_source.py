@@ -37,6 +37,7 @@ def test_modules_of_plugins_are_named_once_and_sorted() -> None:
         {"sweep": {"settings": {"fitness.parameters.gait": ["trot:slow"]}}},
         {"sweep": {"chosen": {"selection.survivors_parameters.order": "up:down"}}},
         {"fitness": {"function": "a:b c"}},
+        {"name": "numpy:one", "births": 5},
     ],
 )
 def test_other_texts_name_no_module(document: object) -> None:
