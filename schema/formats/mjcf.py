@@ -73,20 +73,24 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
         settings: of its evaluation.
 
     Raises:
-        InvalidRobot: the robot is not well formed in the settings' body space.
+        InvalidRobot: the robot is not well formed in the settings' body space, or
+            MuJoCo cannot build it.
     """
     space = body_space(settings.space)
     check_robot(robot, space, neuron_kinds(settings.brain, settings.space))
-    spec = solo_spec(robot, space, settings.simulation, settings.environment)
-    add_sensors(spec, robot, space)
-    spec.modelname = "robot"
-    for name, data in (
-        (ROBOT, encode_robot(robot)),
-        (SETTINGS, msgspec.json.encode(settings)),
-    ):
-        text = spec.add_text()
-        text.name, text.data = name, base64.b64encode(data).decode("ascii")
-    spec.compile()
+    try:
+        spec = solo_spec(robot, space, settings.simulation, settings.environment)
+        add_sensors(spec, robot, space)
+        spec.modelname = "robot"
+        for name, data in (
+            (ROBOT, encode_robot(robot)),
+            (SETTINGS, msgspec.json.encode(settings)),
+        ):
+            text = spec.add_text()
+            text.name, text.data = name, base64.b64encode(data).decode("ascii")
+        spec.compile()
+    except ValueError as error:
+        raise InvalidRobot(f"cannot be built: {one_line(error)}") from None
     return portable(spec.to_xml())
 
 

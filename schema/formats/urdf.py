@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
+from schema.errors import InvalidRobot, one_line
 from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
 from schema.parts import BodySpace
@@ -30,11 +31,15 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
         simulation: gives the masses, the damping of the joints and the torques.
 
     Raises:
-        InvalidRobot: the body is not well formed in this body space.
+        InvalidRobot: the body is not well formed in this body space, or MuJoCo cannot
+            build it.
     """
     check_tree(robot.parts)
     check_body(robot.parts, space)
-    model = robot_spec(robot, space, simulation).spec.compile()
+    try:
+        model = robot_spec(robot, space, simulation).spec.compile()
+    except ValueError as error:
+        raise InvalidRobot(f"cannot be built: {one_line(error)}") from None
     root = ET.Element("robot", name="robot")
     for body in range(1, model.nbody):
         root.append(_link(model, body))

@@ -244,3 +244,9 @@ def test_a_file_without_one_sensor_is_refused() -> None:
     assert fewer != text
     with pytest.raises(InvalidRobot, match=r"its body differs .*\(nsensor\)"):
         robot_from_mjcf(fewer, "it")
+
+
+def test_a_body_that_the_engine_cannot_build_is_refused() -> None:
+    tiny = replace(SETTINGS, simulation=replace(SETTINGS.simulation, mass_factor=1e-9))
+    with pytest.raises(InvalidRobot, match=r"^cannot be built: .*inertia must .*body1"):
+        robot_to_mjcf(ARM, tiny)

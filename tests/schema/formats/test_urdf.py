@@ -133,3 +133,11 @@ def test_urdf_is_not_read(tmp_path: Path) -> None:
     assert path.read_text().startswith("<?xml")
     with pytest.raises(InvalidRobot, match=r"must end in one of .*, got '\.urdf'"):
         read_robot(path)
+
+
+def test_a_body_that_the_engine_cannot_build_is_refused() -> None:
+    tiny = changed(SIMULATION, mass_factor=1e-9)
+    core, hinge = Part("Core", -1, -1, -1, 0, GREY), Part("Hinge", 0, 2, 0, 0, GREY)
+    robot = Robot((core, hinge), Brain(SENSES))
+    with pytest.raises(InvalidRobot, match=r"^cannot be built: .*inertia must .*body1"):
+        robot_to_urdf(robot, BUILT_IN, tiny)
