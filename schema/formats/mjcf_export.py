@@ -5,7 +5,6 @@ sensors are only for other tools: our own readings follow from positions, veloci
 and contacts. MuJoCo has no sensor of light.
 """
 
-from itertools import chain
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -60,16 +59,16 @@ def portable(text: str) -> str:
 
 
 def _rename(spec: mujoco.MjSpec) -> None:
-    """Replace ``/`` in all names."""
-    elements = [*chain(spec.bodies, spec.joints, spec.geoms, spec.sites)]
-    taken = {element.name for element in elements}
-    for element in elements:
-        if "/" in element.name:
-            name = element.name.replace("/", "_")
-            while name in taken:
-                name += "_"
-            taken.add(name)
-            element.name = name
+    """Replace ``/`` in all names, which are unique among elements of a kind."""
+    for elements in (spec.bodies, spec.joints, spec.geoms, spec.sites):
+        taken = {element.name for element in elements}
+        for element in elements:
+            if "/" in element.name:
+                name = element.name.replace("/", "_")
+                while name in taken:
+                    name += "_"
+                taken.add(name)
+                element.name = name
 
 
 def _add(spec: mujoco.MjSpec, kind: mujoco.mjtSensor, site: str, name: str) -> None:

@@ -1,5 +1,6 @@
 """MJCF files with a brain: round trips, and refusal of edited bodies."""
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -12,12 +13,14 @@ from msgspec.structs import replace
 
 from schema.errors import InvalidRobot
 from schema.experiment.bounded import parse_xml
+from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.mjcf import robot_from_mjcf, robot_to_mjcf
+from schema.formats.mjcf_export import add_sensors
 from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import solo_spec
-from schema.parts import BUILT_IN
+from schema.parts import BUILT_IN, CORE, Box, Sensor, Shape, constant_shape
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
 
@@ -250,3 +253,22 @@ def test_a_body_that_the_engine_cannot_build_is_refused() -> None:
     tiny = replace(SETTINGS, simulation=replace(SETTINGS.simulation, mass_factor=1e-9))
     with pytest.raises(InvalidRobot, match=r"^cannot be built: .*inertia must .*body1"):
         robot_to_mjcf(ARM, tiny)
+
+
+def test_box_of_an_imu_may_have_its_name() -> None:
+    """The names of a geom and a site do not collide."""
+    plain = CORE.shape(())
+    chip = Box("imu", (0.01, 0.01, 0.005), (0.0, 0.0, 0.025), 0.002)
+    core = dataclasses.replace(
+        CORE,
+        shape=constant_shape(Shape((*plain.boxes, chip), plain.slots)),
+        sensors=(Sensor("imu", "imu"), Sensor("touch", "imu")),
+    )
+    robot = Robot((Part("Core", -1, -1, -1, 0, GREY),))
+    spec = solo_spec(robot, {"Core": core}, Simulation(), Environment())
+    add_sensors(spec, robot, {"Core": core})
+    model = spec.compile()
+    assert [model.site(index).name for index in range(2)] == ["0_imu", "0_imu_touch"]
+    assert model.geom("0_imu").size.tolist() == [0.005, 0.005, 0.0025]
+    assert model.site("0_imu").pos.tolist() == [0.0, 0.0, 0.025]
+    assert model.nsensor == 3
