@@ -13,9 +13,10 @@ from msgspec import to_builtins
 
 from coordinator.arena.arena import Arena
 from coordinator.run.session import RunSession
+from coordinator.storage.disk import storage_errors
 from coordinator.storage.hints import command
 from schema.agent.screen import missing_screen
-from schema.errors import counted, rounded
+from schema.errors import InvalidRobot, counted, rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import (
     Experiment,
@@ -24,7 +25,9 @@ from schema.experiment.document import (
     island_experiment,
 )
 from schema.experiment.fitness_keys import fitness_text
-from schema.formats.files import BEST, write_robot
+from schema.formats.files import BEST
+from schema.formats.yaml import robot_to_yaml
+from schema.robot.robot import Robot
 from schema.tables.files import read_table
 from schema.tables.last_populations import Row, best_of, last_populations
 from schema.tables.learnt import learnt_births
@@ -164,8 +167,6 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
     )
     (row,) = births.filter(is_it).select(["genome", "robot", "rank"]).to_pylist()
     robot = robot_of_birth(row["genome"], row["robot"], run.experiment)
-    kinds = neuron_kinds(run.experiment.brain, run.experiment.space)
-    write_robot(robot, folder / BEST, space, kinds=kinds)
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
     lives = f" on island {best['island']}" if best["island"] != birth.island else ""
@@ -175,8 +176,27 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
     )
     return [
         f"{line}{lives}, rank in ancestry {row['rank']} (founders: 1), {what}",
-        f"its file: {folder / BEST}",
+        _write_best(robot, folder, run.experiment),
     ]
+
+
+def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
+    """Write the best robot of a run to a file; return a line about the file.
+
+    Raises:
+        RunFolderError: the disk is full or failed.
+    """
+    file, space = folder / BEST, body_space(experiment.space)
+    kinds = neuron_kinds(experiment.brain, experiment.space)
+    with storage_errors(file):
+        try:
+            text = robot_to_yaml(robot, space, kinds)
+        except InvalidRobot as error:
+            # It may be another robot, of an earlier end of the run.
+            file.unlink(missing_ok=True)
+            return f"it has no file {file}: {error}"
+        file.write_bytes(text.encode())
+    return f"its file: {file}"
 
 
 def _windows(folder: Path, arenas: Sequence[Experiment]) -> list[str]:

@@ -31,6 +31,7 @@ from typing import Any
 
 import yaml
 
+from schema.errors import InvalidRobot
 from schema.parts import BodySpace, Parameter
 from schema.robot.brain import NeuronKinds, neuron_names
 from schema.robot.cpg import BUILT_IN_KINDS
@@ -45,8 +46,8 @@ def robot_to_yaml(
     """Return the YAML text of a robot.
 
     Raises:
-        InvalidRobot: the robot is not well formed in this body space, or has neurons
-            of other kinds.
+        InvalidRobot: the robot is not well formed in this body space, has neurons of
+            other kinds, or is nested too deeply: about 150 parts, each on the last.
     """
     check_robot(robot, space, kinds)
     entries: list[dict[str, Any]] = []
@@ -81,7 +82,12 @@ def robot_to_yaml(
             ],
         },
     }
-    return yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
+    try:
+        return yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
+    except RecursionError:
+        raise InvalidRobot(
+            "nested too deeply for YAML: a .pb file holds any robot"
+        ) from None
 
 
 def _part_entry(part: Part, index: int, space: BodySpace) -> dict[str, Any]:

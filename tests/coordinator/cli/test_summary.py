@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from coordinator.cli import summary
+from schema.errors import RunFolderError
 from schema.experiment.document import (
     Arena,
     Experiment,
@@ -13,7 +14,9 @@ from schema.experiment.document import (
     Simulation,
     island_experiment,
 )
-from schema.formats.files import BEST
+from schema.formats.files import BEST, read_robot
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.robot import Part, Robot
 
 
 @pytest.mark.parametrize("screen", ["", ":0"])
@@ -56,3 +59,22 @@ def test_windows_of_all_arenas_are_said(tmp_path: Path) -> None:
     assert line == f"in arenas fitness is that of {what}"
     (line,) = summary._windows(tmp_path, arenas[1:])
     assert "last 6 s before" in line
+
+
+def test_robot_without_a_file_is_said(tmp_path: Path) -> None:
+    """A file of an earlier end of the run is removed: it is another robot."""
+    grey = (0.5, 0.5, 0.5)
+    bricks = (
+        Part("FixedBrick", index, 1 if index else 0, 0, 0, grey) for index in range(399)
+    )
+    senses = tuple(Neuron("input", INPUT, 0) for _ in range(6))
+    chain = Robot((Part("Core", -1, -1, -1, 0, grey), *bricks), Brain(senses))
+    core, best = Robot(chain.parts[:1], chain.brain), tmp_path / BEST
+    assert summary._write_best(core, tmp_path, Experiment("e")) == f"its file: {best}"
+    assert read_robot(best) == core
+    line = summary._write_best(chain, tmp_path, Experiment("e"))
+    assert line.startswith(f"it has no file {best}: nested too deeply for YAML: ")
+    assert not best.exists()
+    best.mkdir()
+    with pytest.raises(RunFolderError, match=r"best\.yaml: cannot be written: "):
+        summary._write_best(core, tmp_path, Experiment("e"))
