@@ -19,8 +19,8 @@ from coordinator.plugins.checks import (
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.errors import ExperimentError
 from schema.experiment.document import BrainSection, Experiment
-from schema.experiment.kinds import check_use
 from schema.experiment.file import draft_experiments, experiment_text
+from schema.experiment.kinds import check_use
 from schema.plugins import permission
 from tests.own_brains import write_module
 
