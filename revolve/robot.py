@@ -16,7 +16,7 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.yaml_reader import OTHER_TYPES
-from schema.robot.brain import Brain
+from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
@@ -66,9 +66,9 @@ class Robot:
         """
         own = None if experiment is None else as_experiment(experiment)
         settings = _settings(own)
-        kinds = neuron_kinds(settings.brain, settings.space)
+        space = body_space(settings.space)
         try:
-            found = read_robot(Path(path), body_space(settings.space), kinds)
+            found = read_robot(Path(path), space, _kinds(settings))
         except InvalidRobot as error:
             text = str(error).replace(OTHER_TYPES, _OTHER_TYPES)
             raise InvalidRobot(text) from None
@@ -112,7 +112,7 @@ class Robot:
         """
         settings = _settings(self.experiment)
         space = body_space(settings.space)
-        write_robot(plain(self), Path(path), space, settings)
+        write_robot(plain(self), Path(path), space, settings, _kinds(settings))
 
     def picture(self, width: int = 640, height: int = 480) -> bytes:
         """Return a picture of the robot in neutral pose, as PNG.
@@ -176,11 +176,12 @@ def checked(robot: Robot | PlainRobot, settings: EvaluationSettings) -> PlainRob
     """Return a robot as the rooms have it.
 
     Raises:
-        InvalidRobot: it is not well formed in these settings' body space.
+        InvalidRobot: it is not well formed in these settings' body space, or has a
+            neuron of a type that they do not allow.
     """
     found = plain(robot)
     check_number(found)
-    check_robot(found, body_space(settings.space))
+    check_robot(found, body_space(settings.space), _kinds(settings))
     return found
 
 
@@ -199,6 +200,10 @@ def task_of(
     encoded = encode_robot(checked(robot, settings))
     data = msgspec.json.encode(settings)
     return Task(data, encoded, plugins(), is_judged, size)
+
+
+def _kinds(settings: EvaluationSettings) -> NeuronKinds:
+    return neuron_kinds(settings.brain, settings.space)
 
 
 def _settings(experiment: Experiment | None) -> EvaluationSettings:

@@ -15,6 +15,7 @@ import revolve as rv
 from revolve.experiment import document_of
 from revolve.robot import plain
 from schema.experiment.settings import evaluation_settings_of
+from tests.own_brains import write_module
 from worker.robot.evaluation import evaluate as evaluate_here
 
 TOP = Path(__file__).parents[2]
@@ -159,6 +160,32 @@ def test_genomes_mate_repeatably_and_develop_into_valid_robots() -> None:
         settings = evaluation_settings_of(document_of(each.experiment))
         evaluate_here(plain(each.develop()), settings)
         assert rv.Genome.from_bytes(each.to_bytes(), "scenario1") == each
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        '[brain]\ntype = "my_brains:Wave"',
+        '[space]\nneuron_types = ["my_brains:Adapting"]',
+    ],
+)
+def test_own_brains_are_evaluated_and_written(tmp_path: Path, kind: str) -> None:
+    write_module(tmp_path)
+    file = tmp_path / "own.toml"
+    file.write_text(f'name = "own"\n{kind}\n[simulation]\nwindow_steps = 80\n')
+    robot = rv.Robot.random(file, seed=1, number=7)
+    own = {neuron.kind for neuron in robot.brain.neurons} - {"Input"}
+    assert len(own) == 1
+    assert own <= {"Waver", "Adapting"}
+    result = rv.evaluate(robot, file)
+    assert result.failure == ""
+    assert result.fitness == _by_command(robot, rv.Experiment.read(file), tmp_path)
+    for name in ("a.yaml", "a.pb", "a.xml", "a.urdf"):
+        robot.write(tmp_path / name)
+        if name != "a.urdf":
+            assert rv.Robot.read(tmp_path / name, file) == robot
+    with pytest.raises(rv.InvalidRobot, match=r"must be one of Simple, .* got '"):
+        rv.evaluate(robot, "scenario1")
 
 
 def test_picture_is_a_png() -> None:

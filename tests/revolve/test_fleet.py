@@ -20,6 +20,7 @@ from coordinator.network.service import Network
 from revolve.workers import Workers
 from schema.plugins import permission
 from schema.wire.calls import call_settings
+from tests.own_brains import write_module
 
 TOP = Path(__file__).parents[2]
 pytestmark = pytest.mark.system
@@ -91,6 +92,19 @@ def test_rest_is_dropped_when_the_iterator_is_closed(
     found.close()  # type: ignore[attr-defined]
     until(lambda: not fleet._engine._open)  # type: ignore[union-attr]
     assert next(fleet.evaluate(robots(1))).failure == ""
+
+
+def test_own_brains_are_evaluated(fleet: rv.Fleet, tmp_path: Path) -> None:
+    write_module(tmp_path)
+    file = tmp_path / "own.toml"
+    file.write_text(
+        'name = "own"\n[brain]\ntype = "my_brains:Wave"\n'
+        "[simulation]\nwindow_steps = 80\n"
+    )
+    many = [rv.Robot.random(file, seed=3, number=number) for number in range(3)]
+    results = list(fleet.evaluate(many, file))
+    assert results == [rv.evaluate(robot) for robot in many]
+    assert {result.failure for result in results} == {""}
 
 
 def test_invalid_robot_raises_at_once(fleet: rv.Fleet) -> None:

@@ -21,6 +21,7 @@ from schema.experiment.settings import (
 )
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
+from tests.own_brains import write_module
 from worker.robot.ablation import all_ablations
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import all_changes
@@ -129,3 +130,25 @@ def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
         rng = stream(3, 0, BirthId(0, birth), 1, Purpose.OTHER_BRAIN)
         other = random_brain(rng, robot, read_experiment("short.toml"))
         assert own[-1]["fitness"] == evaluate(other, settings, same).fitness
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        '[brain]\ntype = "my_brains:Wave"',
+        '[space]\nneuron_types = ["my_brains:Adapting"]',
+    ],
+)
+def test_robots_with_own_brains_have_their_recorded_fitness(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_module(tmp_path)
+    Path("own.toml").write_text(f"{SHORT}{kind}\n")
+    words = ["run", "own.toml", "--seed", "3", "--in-process", "--quiet"]
+    assert main([*words, "--out", "a"]) == 0
+    words = ["ablate", "a", "--robots", "0", "--brains", "1", "--workers", "1"]
+    assert main([*words, "--out", "out"]) == 0
+    rows = pq.read_table("out/ablation.parquet").to_pylist()
+    assert {row["undisturbed"] == row["recorded"] for row in rows} == {True}
+    assert {row["failure"] for row in rows} == {""}
