@@ -13,7 +13,6 @@ from revolve.cli.reevaluation import Job, reevaluated, write_results
 from revolve.cli.winners import Chosen, chosen_robots
 from revolve.robot import plain
 from schema.experiment.document import REVOLVE_ANGLE, body_space
-from schema.experiment.settings import evaluation_settings_of
 from schema.robot.ids import BirthId
 from worker.robot.ablation import all_ablations
 
@@ -55,7 +54,7 @@ def ablate_runs(
 
 def _jobs(one: Chosen, brains: int) -> Iterator[Job]:
     """Yield the evaluations of a robot."""
-    settings, robot = evaluation_settings_of(one.document), plain(one.robot)
+    settings, robot = one.settings, plain(one.robot)
     yield Job(one, None, settings, robot)
     for change in all_ablations(robot, body_space(settings.space)):
         columns = {

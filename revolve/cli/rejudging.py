@@ -9,7 +9,6 @@ from analysis.comparison.robustness import summary, table_of
 from analysis.figures.robustness import robustness
 from revolve.cli.reevaluation import Job, reevaluated, write_results
 from revolve.cli.winners import Chosen, chosen_robots
-from schema.experiment.settings import evaluation_settings_of
 from worker.robot.robustness import all_changes
 
 STEM = "robustness"
@@ -39,7 +38,7 @@ def rejudge_runs(folders: Sequence[Path], out: Path, workers: int) -> None:
 
 def _jobs(one: Chosen) -> Iterator[Job]:
     """Yield the evaluations of a robot, without ``[robust]``."""
-    settings = replace(evaluation_settings_of(one.document), robust=None)
+    settings = replace(one.settings, robust=None)
     yield Job(one, None, settings, one.robot)
     for change in all_changes(settings):
         columns = {"group": change.group, "change": change.name}

@@ -16,9 +16,13 @@ from revolve.robot import Robot
 from revolve.runs import Run as OwnRun
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment as Document
-from schema.experiment.document import island_experiment, light_of
+from schema.experiment.document import island_experiment, light_of, steps_of
 from schema.experiment.identity import Identity, Origin
-from schema.experiment.settings import evaluation_settings_of, lasting
+from schema.experiment.settings import (
+    EvaluationSettings,
+    evaluation_settings_of,
+    lasting,
+)
 from schema.robot.ids import BirthId
 from schema.tables.description import check_folder
 from schema.wire.updates import individual
@@ -30,8 +34,9 @@ class Chosen(NamedTuple):
     Attributes:
         row: first columns of its rows: experiment, folder, island, birth, is_best,
             is_last, recorded.
-        document: settings of its island, for an evaluation alone that takes as long
-            as the recorded one.
+        document: settings of its island, for an evaluation alone.
+        settings: of the recorded evaluation, with its duration; of a robot of an arena,
+            of an evaluation alone.
         robot: the robot.
         run: its run.
         identity: of the recorded evaluation, which determines noise, pushes and
@@ -40,9 +45,17 @@ class Chosen(NamedTuple):
 
     row: dict[str, Any]
     document: Document
+    settings: EvaluationSettings
     robot: Robot
     run: OwnRun
     identity: Identity
+
+
+class _Recorded(NamedTuple):
+    """Number of a recorded evaluation among those of its robot, and simulated time."""
+
+    trial: int = 0
+    simulated_s: float | None = None
 
 
 def chosen_robots(folders: Iterable[Path], most: int | None = None) -> list[Chosen]:
@@ -76,10 +89,7 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     last = _last(found, most)
     own = OwnRun(folder)
     births = tables["births"]
-    evaluations = {
-        (row["island"], individual(row)): (row["trial"], row["simulated_s"])
-        for row in tables["evaluations"].to_pylist()
-    }
+    recorded = _recorded(tables)
     chosen: list[Chosen] = []
     for number, row in enumerate(found.to_pylist()):
         if not (number in last or number == best):
@@ -100,11 +110,36 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         }
         there, name = row["island"], BirthId(island, birth)
         origin = Origin(seed=run.seed, run=run.number, island=there)
-        trial, simulated_s = evaluations.get((there, name), (0, None))
-        identity = Identity(origin, name, trial)
-        document = _alone(own.experiment, there, simulated_s)
-        chosen.append(Chosen(head, document, robot, own, identity))
+        evaluation = recorded.get((there, name), _Recorded())
+        identity = Identity(origin, name, evaluation.trial)
+        document = _alone(own.experiment, there)
+        settings = evaluation_settings_of(document)
+        if evaluation.simulated_s is not None:
+            clock = settings.simulation
+            settings = lasting(settings, steps_of(evaluation.simulated_s, clock))
+        chosen.append(Chosen(head, document, settings, robot, own, identity))
     return chosen
+
+
+def _recorded(tables: dict[str, pa.Table]) -> dict[tuple[int, BirthId], _Recorded]:
+    """Return the last evaluation of each robot on each island.
+
+    Of a robot that has learnt there it is the first of its best trials.
+    """
+    found = {
+        (row["island"], individual(row)): _Recorded(row["trial"], row["simulated_s"])
+        for row in tables["evaluations"].to_pylist()
+    }
+    trials = tables["learning"].select(["island", "birth", "trial", "fitness"])
+    trials = trials.filter(pc.is_valid(trials["fitness"]))
+    order = [("fitness", "descending"), ("trial", "ascending")]
+    best: dict[tuple[int, BirthId], int] = {}
+    for row in trials.sort_by(order).to_pylist():
+        there = row["island"]
+        best.setdefault((there, BirthId(there, row["birth"])), row["trial"])
+    for key in best.keys() & found.keys():
+        found[key] = found[key]._replace(trial=best[key])
+    return found
 
 
 def _last(found: pa.Table, most: int | None) -> set[int]:
@@ -114,22 +149,12 @@ def _last(found: pa.Table, most: int | None) -> set[int]:
     return set(sorted(rows, key=lambda row: (-fitness[row], row))[:most])
 
 
-def _alone(experiment: Experiment, island: int, simulated_s: float | None) -> Document:
+def _alone(experiment: Experiment, island: int) -> Document:
     """Return the settings of one island for an evaluation alone, off-line.
 
     Robots of an arena start as at their birth, alone and without walls.
-
-    Args:
-        experiment: of the run.
-        island: number of the island.
-        simulated_s: recorded length of the evaluation; None if it failed, or in an
-            arena.
     """
     own = island_experiment(document_of(experiment), island)
-    if simulated_s is not None:
-        steps = round(simulated_s / own.simulation.timestep_s)
-        clock = lasting(evaluation_settings_of(own), steps).simulation
-        own = structs.replace(own, simulation=clock)
     if own.arena is not None:
         light = light_of(own.environment, own.arena)
         own = structs.replace(
