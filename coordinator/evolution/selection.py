@@ -55,27 +55,40 @@ class Rule:
     ) -> list[int]:
         """Return the answer of the rule, checked: different places in the population.
 
+        The rule gets a list of its own. It may sort it or remove from it, as rules of
+        earlier runs do; what it returns are then places in the changed list.
+
         Args:
             count: number of places that it must return.
             population: the candidates.
             rest: further arguments, without the parameters.
 
         Raises:
-            ExperimentError: it raises, or returns anything else.
+            ExperimentError: it raises, returns anything else, or puts individuals into
+                its list.
         """
+        given = list(population)
         try:
-            answer = self.function(population, *rest, self.parameters)
+            answer = self.function(given, *rest, self.parameters)
         except Exception as error:
             what = raised_by(self.function, error)
             raise ExperimentError(f"{self.key}: {what}") from error
+        place_of = {id(one): place for place, one in enumerate(population)}
+        try:
+            left = [place_of.pop(id(one)) for one in given]
+        except KeyError:
+            raise ExperimentError(
+                f"{self.key}: {where_defined(self.function)}: must not replace "
+                "individuals of the population"
+            ) from None
         places = _whole_numbers(answer)
         if len(places) == len(set(places)) == count and (
-            min(places) >= 0 and max(places) < len(population)
+            min(places) >= 0 and max(places) < len(left)
         ):
-            return places
+            return [left[at] for at in places]
         raise ExperimentError(
             f"{self.key}: {where_defined(self.function)}: must return {count} "
-            f"different whole numbers from 0 to {len(population) - 1}, got "
+            f"different whole numbers from 0 to {len(left) - 1}, got "
             f"{shown(answer)}"
         )
 

@@ -12,6 +12,7 @@ from coordinator.evolution.kinds import check_parents, check_survivors
 from coordinator.evolution.selection import (
     PARENTS,
     SURVIVORS,
+    Rule,
     Tournament,
     parents_rule,
     select_parents,
@@ -113,6 +114,47 @@ def test_own_survivors_come_in_birth_order(lab: Callable[[str], str]) -> None:
         survivors_rule(selection),
     )
     # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
+    assert chosen == (everybody[1], everybody[3])
+
+
+def rules(lab: Callable[[str], str], change: str) -> tuple[Rule, Rule]:
+    """Return rules that change their population and choose its first places."""
+    name = lab(
+        f"def mate(population, rng, parameters):\n    {change}\n    return 0, 1\n"
+        f"def live(population, count, rng, parameters):\n    {change}\n"
+        "    return list(range(count))\n"
+    )
+    parents = parents_rule(Selection(parents=f"{name}:mate"))
+    return parents, survivors_rule(Selection(survivors=f"{name}:live"))
+
+
+def test_rule_that_replaces_individuals_is_refused(lab: Callable[[str], str]) -> None:
+    parents, survivors = rules(lab, "population[0] = population[-1]")
+    everybody, rng = population(9, 5, 7, 4), np.random.default_rng(0)
+    for call in (
+        lambda: check_parents(parents.function),
+        lambda: check_survivors(survivors.function),
+        lambda: select_parents(everybody, rng, parents),
+        lambda: select_survivors(
+            everybody[:2], everybody[2:], rng, Selection(population=2), survivors
+        ),
+    ):
+        with pytest.raises(ExperimentError, match=r"\.py:\d: must not replace"):
+            call()
+
+
+def test_rule_that_sorts_its_list_chooses_from_the_sorted_one(
+    lab: Callable[[str], str],
+) -> None:
+    parents, survivors = rules(lab, "population.sort(key=lambda one: one.size)")
+    check_parents(parents.function)
+    check_survivors(survivors.function)
+    everybody, rng = tuple(population(9, 5, 7, 4)), np.random.default_rng(0)
+    # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
+    couple = select_parents(everybody, rng, parents)
+    assert couple == (everybody[3], everybody[1])
+    two = Selection(population=2)
+    chosen = select_survivors(everybody[:2], everybody[2:], rng, two, survivors)
     assert chosen == (everybody[1], everybody[3])
 
 
