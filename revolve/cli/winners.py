@@ -64,7 +64,7 @@ def chosen_robots(folders: Iterable[Path], most: int | None = None) -> list[Chos
     Args:
         folders: of finished runs.
         most: greatest number of robots of a run's last populations, the fittest
-            first; None: all.
+            first and failed ones last; None: all.
 
     Raises:
         RunFolderError: no finished run, or no robot of it was evaluated.
@@ -85,8 +85,9 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     found = robots(RunTables(tables, islands=run.islands))
     if not found.num_rows:
         raise RunFolderError(f"{folder}: no robot was evaluated")
-    best = found["fitness"].to_pylist().index(pc.max(found["fitness"]).as_py())
-    last = _last(found, most)
+    order = _fittest_first(found)
+    best, is_last = order[0], found["is_last"].to_pylist()
+    last = set([row for row in order if is_last[row]][:most])
     own = OwnRun(folder)
     births = tables["births"]
     recorded = _recorded(tables)
@@ -142,11 +143,11 @@ def _recorded(tables: dict[str, pa.Table]) -> dict[tuple[int, BirthId], _Recorde
     return found
 
 
-def _last(found: pa.Table, most: int | None) -> set[int]:
-    """Return the rows of the last populations, the fittest ones if there are more."""
-    is_last, fitness = found["is_last"].to_pylist(), found["fitness"].to_pylist()
-    rows = [number for number, is_chosen in enumerate(is_last) if is_chosen]
-    return set(sorted(rows, key=lambda row: (-fitness[row], row))[:most])
+def _fittest_first(found: pa.Table) -> list[int]:
+    """Return the rows of robots by descending fitness, failed robots last."""
+    failed, fitness = found["is_failed"].to_pylist(), found["fitness"].to_pylist()
+    rows = range(found.num_rows)
+    return sorted(rows, key=lambda row: (failed[row], -fitness[row]))
 
 
 def _alone(experiment: Experiment, island: int) -> Document:
