@@ -11,12 +11,15 @@ import sys
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from typing import Any, TextIO, cast
 
 import msgspec
 
 from revolve.command import main as run_command
 
 _SIMULATE = "simulate"
+_MISTAKE = 2
+"""Exit code after a user's error."""
 
 
 def main(words: list[str]) -> int:
@@ -30,14 +33,50 @@ def main(words: list[str]) -> int:
         _end_with_input(lambda: os._exit(0))
         return _serve(connection)
     _end_with_input(lambda: os.kill(os.getpid(), signal.SIGTERM))
+    sys.argv[1:] = words[2:]
+    return _run(connection)
+
+
+def _run(connection: Connection) -> int:
+    """Run the command of ``sys.argv``; send the error or the line that it ends with."""
+    is_told = False
 
     def tell(error: Exception) -> None:
+        nonlocal is_told
         from revolve.messages import problem_of  # noqa: PLC0415 - imports NumPy
 
+        is_told = True
         connection.send_bytes(msgspec.msgpack.encode(problem_of(error)))
 
-    sys.argv[1:] = words[2:]
-    return run_command(tell=tell)
+    written = _StandardError(sys.stderr)
+    sys.stderr = cast("TextIO", written)
+    try:
+        code = run_command(tell=tell)
+    except SystemExit as end:
+        # Of a parser, which has written what is wrong.
+        code = end.code if isinstance(end.code, int) else 1
+    if code == _MISTAKE and written.last_line and not is_told:
+        from schema.errors import RevolveError  # noqa: PLC0415 - as above
+
+        tell(RevolveError(written.last_line))
+    return code
+
+
+class _StandardError:
+    """Standard error that remembers the last line that this process writes."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self.last_line = ""
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - of any attribute
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        if lines := text.strip().splitlines():
+            self.last_line = lines[-1]
+        return self._stream.write(text)
 
 
 def _end_with_input(end: Callable[[], None]) -> None:

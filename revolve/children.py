@@ -82,7 +82,8 @@ def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:
         is_quiet: drop the command's standard output.
 
     Raises:
-        RevolveError: the command's error, of the same class.
+        RevolveError: the command's error, of the same class, or the line that it has
+            written about a wrong argument.
         KeyboardInterrupt: after Ctrl-C; the command has stopped as after its own.
     """
     child = Child(("command", *words), is_quiet=is_quiet)
@@ -99,7 +100,6 @@ def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:
     if problem is not None:
         raise error_of(_PROBLEMS.decode(problem))
     if code not in (0, 1):
-        # Of a flag, for example: written to standard error.
         raise RevolveError(f"revolve {words[0]} ended with exit code {code}")
     return code
 

@@ -2,6 +2,7 @@
 
 import html
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import pyarrow.compute as pc
@@ -95,6 +96,32 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
         rv.read(done.folder.parent)
     with pytest.raises(rv.ExperimentError, match="did you mean 'scenario"):
         rv.run("scenario", births=3, out=tmp_path / "x")
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"seed": -1}, "--seed: must be a whole number >= 0, got '-1'"),
+        ({"births": 0}, "--births: must be a whole number >= 1, got '0'"),
+        ({"births": 2.5}, "--births: must be a whole number >= 1, got '2.5'"),
+        ({"workers": True}, "--workers: must be "),
+    ],
+)
+def test_wrong_numbers_raise_the_line_of_the_command(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    keys: dict[str, Any],
+    expected: str,
+) -> None:
+    with pytest.raises(rv.RevolveError) as caught:
+        rv.run("scenario1", out=tmp_path / "x", **keys)
+    assert expected in str(caught.value)
+    assert capfd.readouterr().err == f"{caught.value}\n"
+
+
+def test_analysis_of_nothing_raises_the_line_of_the_command() -> None:
+    with pytest.raises(rv.RevolveError, match="required: FOLDER"):
+        rv.analyze()
 
 
 def test_finished_run_is_resumed_to_itself(done: rv.Run) -> None:
