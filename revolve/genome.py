@@ -9,6 +9,7 @@ import numpy as np
 from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from revolve.experiment import Experiment, document_of
 from revolve.robot import DEFAULT, Robot, as_experiment, of_plain
+from schema.errors import RevolveError, shown
 from schema.robot.ids import BirthId
 
 _NUMBERS = 2**32
@@ -40,9 +41,10 @@ class Genome:
 
         Raises:
             ExperimentError: no such experiment, or it allows (nearly) no robot.
+            RevolveError: ``rng`` is no generator of NumPy.
         """
-        own = as_experiment(experiment)
-        return cls(_encoding(own).random(rng, _birth(rng)), own)
+        own, birth = as_experiment(experiment), _birth(rng)
+        return cls(_encoding(own).random(rng, birth), own)
 
     def mate(self, other: Self, rng: np.random.Generator) -> Self | None:
         """Return a child by crossover and mutation; None if the attempt fails.
@@ -87,5 +89,14 @@ def _encoding(experiment: Experiment) -> IslandEncoding:
 
 
 def _birth(rng: np.random.Generator) -> BirthId:
-    """Return a random id that makes the new genes of a genome distinct."""
+    """Return a random id that makes the new genes of a genome distinct.
+
+    Raises:
+        RevolveError: no generator.
+    """
+    if not isinstance(rng, np.random.Generator):
+        raise RevolveError(
+            f"rng: must be a numpy.random.Generator, got {shown(rng)}; "
+            "numpy.random.default_rng(SEED) returns one"
+        )
     return BirthId(0, int(rng.integers(_NUMBERS)))

@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Self
 
 import msgspec
+import numpy as np
 
 from coordinator.evolution.breeding import Breeder
+from revolve.arguments import whole_number
 from revolve.children import SIMULATOR, plugins
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
-from schema.errors import InvalidRobot, RevolveError, counted, shown
+from schema.errors import InvalidRobot, RevolveError, counted, expectation, shown
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
@@ -24,6 +26,8 @@ from schema.wire.codec import encode_robot
 
 DEFAULT = "scenario1"
 """Experiment of a robot that has no other one."""
+_MOST_PIXELS = 4096
+"""Greatest width and height of a picture."""
 _OTHER_TYPES = (
     " (name the experiment with its part types: Robot.read(path, experiment))"
 )
@@ -88,12 +92,15 @@ class Robot:
 
         Args:
             experiment: whose restrictions it meets.
-            seed: random seed.
-            number: of the robot among those of the seed, from 0.
+            seed: random seed, below 2^64.
+            number: of the robot among those of the seed, from 0, below 2^32.
 
         Raises:
             ExperimentError: no such experiment, or it allows (nearly) no robot.
+            RevolveError: a seed or a number that is none of these.
         """
+        seed = whole_number("seed", seed, most=2**64 - 1)
+        number = whole_number("number", number)
         own = as_experiment(experiment)
         breeder = Breeder(document_of(own), seed, run=0)
         candidate = breeder.candidate(BirthId(0, number), 0, ())
@@ -118,14 +125,18 @@ class Robot:
         """Return a picture of the robot in neutral pose, as PNG.
 
         Args:
-            width: of the picture [pixels].
-            height: of the picture [pixels].
+            width: of the picture [pixels], 1 to 4096.
+            height: of the picture [pixels], 1 to 4096.
 
         Raises:
-            RevolveError: this machine cannot render.
+            RevolveError: this machine cannot render, or another size.
             InvalidRobot: the robot is not well formed.
         """
-        task = task_of(self, _settings(self.experiment), size=(width, height))
+        size = (
+            whole_number("width", width, 1, _MOST_PIXELS),
+            whole_number("height", height, 1, _MOST_PIXELS),
+        )
+        task = task_of(self, _settings(self.experiment), size=size)
         outcome = SIMULATOR.do(task)
         if outcome.failure:
             raise RevolveError(f"the process that renders {outcome.failure}")
@@ -145,15 +156,34 @@ class Robot:
 
 
 def plain(robot: object) -> PlainRobot:
-    """Return a robot as the rooms have it.
+    """Return a robot as the rooms have it, with plain numbers instead of NumPy's.
 
     Raises:
-        InvalidRobot: it is none, but the path of a file, for example.
+        InvalidRobot: it is none, but the path of a file, for example; a value in it is
+            of another type than it must be.
     """
     if not isinstance(robot, Robot | PlainRobot):
         hint = ": Robot.read reads a file" if isinstance(robot, str | Path) else ""
         raise InvalidRobot(f"robot must be a Robot, got {shown(robot)}{hint}")
-    return PlainRobot(robot.parts, robot.brain)
+    try:
+        return _ROBOTS.decode(_encode(PlainRobot(robot.parts, robot.brain)))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidRobot(f"robot: {expectation(str(error))}") from None
+
+
+def _of_numpy(value: object) -> object:
+    """Return an array or a number of NumPy as lists and numbers.
+
+    Raises:
+        TypeError: the value is something else.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"must be numbers and texts, got {shown(value)}")
+
+
+_encode = msgspec.msgpack.Encoder(enc_hook=_of_numpy).encode
+_ROBOTS = msgspec.msgpack.Decoder(PlainRobot)
 
 
 def of_plain(robot: PlainRobot, experiment: Experiment | None) -> Robot:

@@ -9,14 +9,16 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from revolve.arguments import whole_number
 from revolve.children import plugins as allowed_plugins
 from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
-from schema.errors import RevolveError, RunFolderError, rounded
+from schema.errors import RevolveError, RunFolderError, nearest, rounded, shown
 from schema.experiment.document import island_count, island_experiment
 from schema.experiment.file import own_experiment
 from schema.robot.ids import BirthId
+from schema.tables.columns import TABLES
 from schema.tables.description import (
     DETAILS,
     allow_plugins_of,
@@ -131,8 +133,12 @@ class Run:
             name: such as ``births``.
 
         Raises:
-            RunFolderError: the table is damaged or of another version.
+            RunFolderError: the table is damaged or of another version, or no run has
+                such a table; the nearest is named.
         """
+        if name not in TABLES:
+            near, allowed = nearest(name, TABLES), ", ".join(TABLES)
+            raise RunFolderError(f"no table {shown(name)}{near}; tables: {allowed}")
         return read_table(self.folder, name)
 
     def robot(self, number: int, island: int = 0) -> Robot:
@@ -144,8 +150,10 @@ class Run:
 
         Raises:
             RunFolderError: there is no such birth.
+            RevolveError: a number or an island that is no whole number >= 0.
         """
-        return self.robots(self._birth(BirthId(island, number)))[0]
+        birth = BirthId(whole_number("island", island), whole_number("number", number))
+        return self.robots(self._birth(birth))[0]
 
     def _birth(self, birth: BirthId) -> pa.Table:
         """Return the row of a birth."""
@@ -195,18 +203,20 @@ class Run:
         mature; the end of a run names the best robot of its last population instead.
 
         Args:
-            count: number of robots; fewer if there are no more.
+            count: number of robots, >= 0; fewer if there are no more.
 
         Raises:
             RunFolderError: a table is damaged.
+            RevolveError: another count.
         """
+        count = whole_number("count", count)
         found = self._judged()
         order = pc.sort_indices(found, [("fitness", "descending")])
         best: dict[BirthId, int] = {}
         for row in found.take(order).to_pylist():
-            best.setdefault(individual(row), row["island"])
             if len(best) == count:
                 break
+            best.setdefault(individual(row), row["island"])
         return [
             robot
             for birth, island in best.items()

@@ -132,7 +132,7 @@ def _neuron_problem(neuron: Neuron, part_count: int) -> str:
         return f".part: must be 0..{part_count - 1}, got {neuron.part}"
     if neuron.layer == "input" and neuron.kind != INPUT:
         return f".kind: must be one of {INPUT}, got {shown(neuron.kind)}"
-    if neuron.layer == "input" and neuron.parameters:
+    if neuron.layer == "input" and len(neuron.parameters):
         return f".parameters: {INPUT} takes 0, got {len(neuron.parameters)}"
     if not all(map(math.isfinite, neuron.parameters)):
         return ".parameters: must be finite"

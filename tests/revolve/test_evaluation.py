@@ -5,11 +5,13 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import revolve as rv
 from revolve.experiment import document_of
@@ -121,6 +123,67 @@ def test_invalid_robot_raises_before_anything_runs() -> None:
         rv.evaluate(path)
 
 
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        (
+            {"seed": -1},
+            r"seed: must be a whole number from 0 to 18446744073709551615, ",
+        ),
+        ({"seed": 1.5}, r"seed: .* got 1\.5"),
+        ({"seed": 2**64}, "seed: "),
+        ({"number": -1}, r"number: .* from 0 to 4294967295, got -1"),
+        ({"number": 2**32}, "number: "),
+    ],
+)
+def test_seed_of_another_kind_is_refused(keys: dict[str, Any], expected: str) -> None:
+    with pytest.raises(rv.RevolveError, match=expected):
+        rv.Robot.random("scenario1", **keys)
+
+
+def test_size_of_a_picture_is_limited() -> None:
+    robot = rv.Robot.random(seed=1)
+    for size in ((0, 0), (16, 4097), (2.5, 16), ("a", 16)):
+        with pytest.raises(rv.RevolveError, match="must be a whole number from 1 to"):
+            robot.picture(*size)
+
+
+def test_values_of_another_type_are_refused(tmp_path: Path) -> None:
+    robot = rv.Robot.random(seed=1, number=7)
+    brain, wrong = robot.brain, cast("Any", "a")
+    edge = structs.replace(brain.connections[0], weight=wrong)
+    neuron = structs.replace(brain.neurons[0], part=1.5)
+    part = structs.replace(robot.parts[0], parameters=(wrong,) * 3)
+    for changed in (
+        replace(robot, brain=replace(brain, connections=(edge,))),
+        replace(robot, brain=replace(brain, neurons=(neuron, *brain.neurons[1:]))),
+        replace(robot, parts=(part, *robot.parts[1:])),
+        replace(robot, parts=cast("Any", None)),
+        replace(robot, brain=cast("Any", object())),
+    ):
+        with pytest.raises(rv.InvalidRobot, match="robot: must be "):
+            rv.evaluate(changed)
+        with pytest.raises(rv.InvalidRobot, match="robot: must be "):
+            changed.write(tmp_path / "a.yaml")
+
+
+def test_numbers_of_numpy_are_those_of_python() -> None:
+    robot = rv.Robot.random(seed=1, number=7)
+    brain = robot.brain
+    neurons = [
+        structs.replace(each, parameters=np.array(each.parameters))
+        for each in brain.neurons
+    ]
+    edges = [
+        structs.replace(
+            each, weight=np.float64(each.weight), source=np.int64(each.source)
+        )
+        for each in brain.connections
+    ]
+    changed = replace(brain, neurons=tuple(neurons), connections=tuple(edges))
+    assert rv.evaluate(replace(robot, brain=changed)) == rv.evaluate(robot)
+
+
 def test_failing_fitness_and_crash_are_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -186,6 +249,15 @@ def test_own_brains_are_evaluated_and_written(tmp_path: Path, kind: str) -> None
             assert rv.Robot.read(tmp_path / name, file) == robot
     with pytest.raises(rv.InvalidRobot, match=r"must be one of Simple, .* got '"):
         rv.evaluate(robot, "scenario1")
+
+
+def test_genome_needs_a_generator() -> None:
+    wrong: Any = 3
+    with pytest.raises(rv.RevolveError, match=r"rng: must be a numpy.* got 3; numpy"):
+        rv.Genome.random(wrong)
+    genome = rv.Genome.random(np.random.default_rng(1))
+    with pytest.raises(rv.RevolveError, match="rng: must be"):
+        genome.mate(genome, wrong)
 
 
 def test_picture_is_a_png() -> None:

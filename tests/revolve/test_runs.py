@@ -56,6 +56,20 @@ def test_best_robot_has_the_best_fitness(done: rv.Run) -> None:
         done.robot(999)
 
 
+def test_wrong_numbers_and_names_are_refused(done: rv.Run) -> None:
+    assert done.best(0) == []
+    assert len(done.best(10**6)) == BIRTHS
+    with pytest.raises(rv.RevolveError, match=r"count: must be .* from 0 to .* got -1"):
+        done.best(-1)
+    wrong: Any = "3"
+    with pytest.raises(rv.RevolveError, match=r"number: must be a whole .* got '3'"):
+        done.robot(wrong)
+    with pytest.raises(rv.RevolveError, match="island: must be a whole"):
+        done.robot(3, wrong)
+    with pytest.raises(rv.RunFolderError, match="'birth'; did you mean 'births'"):
+        done.table("birth")
+
+
 def test_best_robot_of_an_arena_has_the_best_mature_sample(tmp_path: Path) -> None:
     with ZipFile(OLD / "arena.zip") as archive:
         archive.extractall(tmp_path)

@@ -1,0 +1,33 @@
+"""Checks of the arguments of the Python API."""
+
+from operator import index
+
+from schema.errors import RevolveError, shown
+
+MOST_NUMBER = 2**32 - 1
+"""Greatest number of a birth, or of a robot of a seed."""
+
+
+def whole_number(
+    name: str, value: object, least: int = 0, most: int = MOST_NUMBER
+) -> int:
+    """Return an argument that is a whole number.
+
+    Args:
+        name: of the argument, for messages.
+        value: of the argument; an integer of Python or NumPy.
+        least: smallest number allowed.
+        most: greatest number allowed.
+
+    Raises:
+        RevolveError: anything else.
+    """
+    try:
+        number = index(value)  # type: ignore[arg-type]
+    except TypeError:
+        number = least - 1
+    if least <= number <= most:
+        return number
+    raise RevolveError(
+        f"{name}: must be a whole number from {least} to {most}, got {shown(value)}"
+    )
