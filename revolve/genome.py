@@ -53,7 +53,20 @@ class Genome:
             other: the second parent; with ``revolve-angle`` it gives a subtree, and
                 this one gives the root.
             rng: all draws come from it.
+
+        Raises:
+            RevolveError: ``other`` is no genome, or of another encoding; ``rng`` as for
+                ``random``.
         """
+        if not isinstance(other, Genome):
+            raise RevolveError(f"other: must be a Genome, got {shown(other)}")
+        first, second = (
+            document_of(each.experiment).encoding.type for each in (self, other)
+        )
+        if first != second:
+            raise RevolveError(
+                f"genomes of different encodings cannot mate: {first!r} and {second!r}"
+            )
         encoding, birth = _encoding(self.experiment), _birth(rng)
         child = encoding.mate(self.value, other.value, rng, birth)
         return None if child is None else type(self)(child, self.experiment)

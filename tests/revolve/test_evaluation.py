@@ -278,7 +278,14 @@ def test_genomes_of_other_encodings() -> None:
     child = next(filter(None, children))
     assert rv.Genome.from_bytes(child.to_bytes(), patterns) == child
     assert child.develop().experiment == patterns
+    genome = rv.Genome.random(rng, "scenario1")
     with pytest.raises(rv.InvalidRobot, match="not a genome of encoding 'revolve-ang"):
         rv.Genome.from_bytes(child.to_bytes(), "scenario1")
     again = (rv.Robot.random(patterns, seed=4) for _ in range(2))
     assert next(again) == next(again) != rv.Robot.random("scenario1", seed=4)
+    for one, other in ((child, genome), (genome, child)):
+        with pytest.raises(rv.RevolveError, match="different encodings cannot mate: '"):
+            one.mate(other, rng)
+    wrong: Any = child.develop()
+    with pytest.raises(rv.RevolveError, match="other: must be a Genome, got <Robot"):
+        child.mate(wrong, rng)
