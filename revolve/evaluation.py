@@ -26,6 +26,8 @@ class Result:
         measures: named numbers of the experiment.
         failure: why there is no fitness; empty if there is one.
         trace: recording of the robot; None from a fleet, or if the physics diverged.
+            With ``[robust]`` it is that of a simulation without disturbances, which
+            did not give the fitness.
     """
 
     fitness: float | None = None
@@ -44,6 +46,8 @@ def evaluate(
 
     It runs in a process of its own, which is started with the first call and used
     again. The result equals that of ``revolve robot simulate`` to the last bit.
+    With ``simulation.evaluation_s`` it takes the shortest time, that of warm-up and
+    window: only runs draw other ones.
 
     Args:
         robot: to evaluate.

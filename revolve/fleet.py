@@ -181,7 +181,8 @@ class Fleet:
         """Evaluate robots; return their results in the same order.
 
         Robots are taken from the iterable as workers need them, some hundred ahead. The
-        rest is dropped if the iterator is closed.
+        rest is dropped if the iterator is closed. An evaluation takes as long as one of
+        ``revolve.evaluate``, also with ``simulation.evaluation_s``.
 
         Args:
             robots: to evaluate.
