@@ -171,7 +171,7 @@ def main(words: list[str]) -> int:
     ("words", "message"),
     [
         (("--gait", "0"), "--gait: must be a whole number >= 1, got '0'"),
-        (("--width", "-5"), "--width: must be a whole number >= 16, got '-5'"),
+        (("--width", "-5"), "--width: must be a whole number in 16..4096, got '-5'"),
     ],
 )
 def test_invalid_flags_are_refused(
