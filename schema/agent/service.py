@@ -46,11 +46,9 @@ UNSUPERVISED = ProcessSlot()
 
 
 _ENGINE_LOG = (
-    "warn,zenoh::net::runtime::orchestrator=error,zenoh_link_unixsock_stream=error,"
-    "zenoh::net::routing::dispatcher::queries=error"
+    "warn,zenoh::net::runtime::orchestrator=error,zenoh_link_unixsock_stream=error"
 )
-"""Levels of Zenoh's log; the commands themselves tell of a hub that is missing, and
-requests whose time is over are sent again."""
+"""Levels of Zenoh's log; the commands themselves tell of a hub that is missing."""
 
 
 def log_engine() -> None:

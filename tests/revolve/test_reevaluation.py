@@ -140,7 +140,6 @@ def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
         '[brain]\ntype = "my_brains:Wave"',
         '[space]\nneuron_types = ["my_brains:Adapting"]',
         '[learning]\nlearner = "random"\nbudget = 4',
-        "[simulation]\nevaluation_s = [0.4, 2.0]",
         "[selection.reevaluation]\ninterval = 2",
     ],
 )

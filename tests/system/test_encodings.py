@@ -108,7 +108,7 @@ def test_killed_islands_of_cppn_resume_to_the_same_births(
     assert compare(folder / "whole", folder / "killed") == []
     assert read_table(folder / "whole", "migrations").num_rows
     out = workspace.run("view", "whole", "--robot", "best", "--save", "a.rrd")
-    assert "moves as recorded, equal to the last bit" in out
+    assert "evaluates as recorded, equal to the last bit" in out
 
 
 def test_a_run_is_not_resumed_with_changed_code(
