@@ -18,6 +18,7 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.yaml_reader import OTHER_TYPES
+from schema.limits import MOST_PIXELS
 from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
@@ -26,8 +27,6 @@ from schema.wire.codec import encode_robot
 
 DEFAULT = "scenario1"
 """Experiment of a robot that has no other one."""
-_MOST_PIXELS = 4096
-"""Greatest width and height of a picture."""
 _OTHER_TYPES = (
     " (name the experiment with its part types: Robot.read(path, experiment))"
 )
@@ -133,8 +132,8 @@ class Robot:
             InvalidRobot: the robot is not well formed.
         """
         size = (
-            whole_number("width", width, 1, _MOST_PIXELS),
-            whole_number("height", height, 1, _MOST_PIXELS),
+            whole_number("width", width, 1, MOST_PIXELS),
+            whole_number("height", height, 1, MOST_PIXELS),
         )
         task = task_of(self, _settings(self.experiment), size=size)
         outcome = SIMULATOR.do(task)

@@ -86,6 +86,8 @@ MOST_FIELDS = 4_000_000
 
 MOST_MEASURES = 100
 """Measures of an experiment; an answer has the number of each."""
+MOST_PIXELS = 4096
+"""Width or height of a picture of a robot."""
 
 # Agents and what they say
 

@@ -10,6 +10,8 @@ from hypothesis import settings
 
 from analysis.render.stage import choose_engine
 from schema.plugins import permission
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.robot import Part, Robot
 from tests.own_brains import write_module
 
 # MuJoCo selects its rendering engine when it is first imported, by whichever test comes
@@ -47,3 +49,14 @@ def _own_brains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Allow the module of docs/brains.md as the plug-in ``my_brains``."""
     module = {"my_brains": write_module(tmp_path)}
     monkeypatch.setattr(permission, "_allowed", {**permission._allowed, **module})
+
+
+@pytest.fixture
+def chain() -> Robot:
+    """Return a robot of 400 parts, each on the last: a core and bricks."""
+    grey = (0.5, 0.5, 0.5)
+    bricks = (
+        Part("FixedBrick", index, 1 if index else 0, 0, 0, grey) for index in range(399)
+    )
+    senses = tuple(Neuron("input", INPUT, 0) for _ in range(6))
+    return Robot((Part("Core", -1, -1, -1, 0, grey), *bricks), Brain(senses))

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins, add_settings, whole_number
+from schema.limits import MOST_PIXELS
 
 
 def parser(_command: str = "robot render") -> Flags:
@@ -29,7 +30,7 @@ def parser(_command: str = "robot render") -> Flags:
     )
     flags.add_argument(
         "--width",
-        type=whole_number(16, 4096),
+        type=whole_number(16, MOST_PIXELS),
         default=640,
         metavar="PIXELS",
         help="width of a picture (default: 640)",

@@ -21,7 +21,12 @@ from schema.errors import (
     SensorFailed,
     SimulationDiverged,
 )
-from schema.experiment.document import Experiment, Simulation, island_experiment
+from schema.experiment.document import (
+    Experiment,
+    Simulation,
+    island_experiment,
+    steps_of,
+)
 from schema.experiment.file import own_experiment
 from schema.experiment.settings import evaluation_settings_of, lasting
 from schema.robot.results import Floats
@@ -85,7 +90,7 @@ def _evaluated(
     """Return the robot of a row of the evaluations table, given its birth."""
     own = island_experiment(experiment, row["island"])
     robot = robot_of_birth(born["genome"], born["robot"], own)
-    steps = round(row["simulated_s"] / own.simulation.timestep_s)
+    steps = steps_of(row["simulated_s"], own.simulation)
     clock = lasting(evaluation_settings_of(own), steps).simulation
     # This evaluation's own length, of which none is drawn.
     clock = replace(clock, evaluation_s=None)

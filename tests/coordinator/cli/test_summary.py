@@ -15,8 +15,7 @@ from schema.experiment.document import (
     island_experiment,
 )
 from schema.formats.files import BEST, read_robot
-from schema.robot.brain import INPUT, Brain, Neuron
-from schema.robot.robot import Part, Robot
+from schema.robot.robot import Robot
 
 
 @pytest.mark.parametrize("screen", ["", ":0"])
@@ -61,14 +60,8 @@ def test_windows_of_all_arenas_are_said(tmp_path: Path) -> None:
     assert "last 6 s before" in line
 
 
-def test_robot_without_a_file_is_said(tmp_path: Path) -> None:
+def test_robot_without_a_file_is_said(tmp_path: Path, chain: Robot) -> None:
     """A file of an earlier end of the run is removed: it is another robot."""
-    grey = (0.5, 0.5, 0.5)
-    bricks = (
-        Part("FixedBrick", index, 1 if index else 0, 0, 0, grey) for index in range(399)
-    )
-    senses = tuple(Neuron("input", INPUT, 0) for _ in range(6))
-    chain = Robot((Part("Core", -1, -1, -1, 0, grey), *bricks), Brain(senses))
     core, best = Robot(chain.parts[:1], chain.brain), tmp_path / BEST
     assert summary._write_best(core, tmp_path, Experiment("e")) == f"its file: {best}"
     assert read_robot(best) == core

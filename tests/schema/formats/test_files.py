@@ -13,9 +13,9 @@ from schema.errors import InvalidRobot, MalformedMessage, RevolveError
 from schema.formats.files import read_robot, robot_from_yaml, write_robot
 from schema.formats.yaml import robot_to_yaml
 from schema.parts import BUILT_IN
-from schema.robot.brain import INPUT, Brain, Connection, Neuron
+from schema.robot.brain import Connection, Neuron
 from schema.robot.genome import Node, develop
-from schema.robot.robot import Part, Robot, check_robot
+from schema.robot.robot import Robot, check_robot
 from schema.wire.codec import encode_robot
 
 NodeMaker = Callable[..., Node]
@@ -263,14 +263,10 @@ def test_malformed_robot_is_not_written(node: NodeMaker, tmp_path: Path) -> None
         assert not path.exists()
 
 
-def test_deeply_nested_robot_is_written_as_protobuf_only(tmp_path: Path) -> None:
+def test_deeply_nested_robot_is_written_as_protobuf_only(
+    tmp_path: Path, chain: Robot
+) -> None:
     """Writing YAML recurses for each level; reading it allows 400 levels."""
-    grey = (0.5, 0.5, 0.5)
-    bricks = (
-        Part("FixedBrick", index, 1 if index else 0, 0, 0, grey) for index in range(399)
-    )
-    senses = tuple(Neuron("input", INPUT, 0) for _ in range(6))
-    chain = Robot((Part("Core", -1, -1, -1, 0, grey), *bricks), Brain(senses))
     with pytest.raises(InvalidRobot, match=r"^nested too deeply for YAML: .*\.pb"):
         write_robot(chain, tmp_path / "it.yaml")
     assert list(tmp_path.iterdir()) == []
