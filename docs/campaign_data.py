@@ -12,12 +12,15 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from analysis.comparison.outcomes import of_courses
 from analysis.measures.outputs import BODY, schema
 from analysis.measures.population_table import Numbers
 
 DATA = Path(__file__).resolve().parent / "data"
 BENCHMARKS = ("arena", "spider")
 """Kinds of ``revolve bench`` whose files are in the folder ``bench``."""
+SPACING = 15
+"""Births between the populations that are kept: the brood size of the thesis."""
 LEVEL = 19
 """Compression level of zstd: files are written once and stay in the Git history."""
 
@@ -71,9 +74,13 @@ PARTS = (
 NAMES = [("experiment", pa.string()), ("run", pa.int32())]
 
 
+COURSES = ("late_rise", "early_diversity")
+"""Outcomes that are not in the files: computed from the kept ``populations``."""
+
+
 def _of_analysis(table: str) -> pa.Schema:
     """Return the columns of ``revolve analyze``, but the repeat for the folder."""
-    names = {"experiment", "folder"}
+    names = {"experiment", "folder", *COURSES}
     fields = [(one.name, one.type) for one in schema(table) if one.name not in names]
     return pa.schema([*NAMES, *fields])
 
@@ -215,7 +222,28 @@ def kept(data: Path, table: str) -> pa.Table:
     for name in sorted(path.stem for path in (data / table).glob("*.parquet")):
         rows = read_rows(data, table, name)
         pieces.append(rows.append_column("folder", pa.repeat(name, rows.num_rows)))
-    return pa.concat_tables(pieces)
+    found = pa.concat_tables(pieces)
+    return _with_courses(found, data) if table == "outcomes" else found
+
+
+def _with_courses(outcomes: pa.Table, data: Path) -> pa.Table:
+    """Return the rows of ``outcomes`` with those of ``COURSES``.
+
+    They are computed from the kept populations, of earlier and of later repeats alike.
+    """
+    populations = kept(data, "populations")
+    found: list[dict[str, float]] = []
+    columns = ("births", "fitness", "diversity")
+    for folder, births in zip(
+        outcomes["folder"].to_pylist(), outcomes["births"].to_pylist(), strict=True
+    ):
+        mine = populations.filter(pc.field("folder") == folder)
+        values = {name: np.asarray(mine[name], np.float64) for name in columns}
+        found.append(of_courses(values, values["births"], births, SPACING))
+    for name in COURSES:
+        column = pa.array([one[name] for one in found], pa.float64(), from_pandas=True)
+        outcomes = outcomes.append_column(name, column)
+    return outcomes
 
 
 class KeptOutcomes:

@@ -10,14 +10,12 @@ from analysis.comparison.outcomes import outcome
 from analysis.measures.families import family
 from analysis.measures.load import Run
 from analysis.measures.study import measure_run, reach
-from docs.campaign_data import TABLES
+from docs.campaign_data import SPACING, TABLES
 from schema.errors import RunFolderError
 from schema.tables.files import read_table
 
 MARKS = (600,)
 """Births at which outcomes are kept, besides the last."""
-SPACING = 15
-"""Births between the populations that are kept: the brood size of the thesis."""
 
 _PLATFORMS = (
     ("runs", "platform"),

@@ -1,9 +1,10 @@
-"""Writes the generated parts and pictures of docs/results.md from docs/data.
+"""Writes the generated parts and pictures of the results pages from docs/data.
 
     python -m docs.results            # write them
     python -m docs.results --check    # fail if they differ from what would be written
 
-A generated part is between two comments of the page that name it. A picture holds the
+The pages are docs/results.md and docs/findings.md. A generated part is between two
+comments of its page that name it. A picture holds the
 digest of the rows that it was drawn from, so that it can be checked without drawing.
 """
 
@@ -23,7 +24,6 @@ from docs.results_parts import parts_of
 from schema.errors import RevolveError
 
 DOCS = Path(__file__).resolve().parent
-PAGE = DOCS / "results.md"
 _PART = re.compile(r"(<!-- begin: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 _TABLES = ("outcomes", "populations", "runs", "family")
 
@@ -38,14 +38,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; compare")
     options = parser.parse_args(arguments)
     tables = tables_of(DATA)
-    page = updated(PAGE.read_text("utf-8"), parts_of(tables))
+    pages = pages_of(tables)
     if options.check:
-        stale = stale_files(page, tables)
+        stale = stale_files(pages, tables)
         for name in stale:
             print(f"{name}: not up to date, run python -m docs.results")
         return 1 if stale else 0
-    PAGE.write_text(page, encoding="utf-8")
-    print(PAGE.name)
+    for path, page in pages.items():
+        path.write_text(page, encoding="utf-8")
+        print(path.name)
     from docs.results_pictures import draw  # noqa: PLC0415 - draws robots
 
     try:
@@ -71,6 +72,18 @@ def tables_of(data: Path) -> dict[str, pa.Table]:
     return tables
 
 
+def pages_of(tables: Mapping[str, pa.Table]) -> dict[Path, str]:
+    """Return the pages with the generated parts of some tables.
+
+    Args:
+        tables: as ``tables_of`` returns them.
+    """
+    return {
+        DOCS / name: updated((DOCS / name).read_text("utf-8"), parts)
+        for name, parts in parts_of(tables).items()
+    }
+
+
 def updated(page: str, parts: Mapping[str, str]) -> str:
     """Return a page with new generated parts.
 
@@ -88,16 +101,18 @@ def updated(page: str, parts: Mapping[str, str]) -> str:
     return _PART.sub(lambda part: f"{part[1]}{parts[part[2]]}\n{part[3]}", page)
 
 
-def stale_files(page: str, tables: Mapping[str, pa.Table]) -> list[str]:
-    """Return the names of the page and pictures that differ from the rows.
+def stale_files(pages: Mapping[Path, str], tables: Mapping[str, pa.Table]) -> list[str]:
+    """Return the names of the pages and pictures that differ from the rows.
 
     Args:
-        page: the page as it should be.
+        pages: the pages as they should be.
         tables: as ``tables_of`` returns them.
     """
     from docs.results_pictures import digest_in, digests  # noqa: PLC0415 - slow import
 
-    stale = [] if PAGE.read_text("utf-8") == page else [PAGE.name]
+    stale = [
+        path.name for path, page in pages.items() if path.read_text("utf-8") != page
+    ]
     for path, digest in digests(tables).items():
         if digest_in(path) != digest:
             stale.append(path.name)

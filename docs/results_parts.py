@@ -1,4 +1,4 @@
-"""Generated parts of docs/results.md: Markdown tables of the campaign's numbers."""
+"""Generated parts of docs/results.md and docs/findings.md: tables of the campaign."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -7,8 +7,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.comparison.equivalence import alike_power
-from analysis.comparison.verdicts import LARGE
+from analysis.comparison.claims import TOUCHES
+from analysis.comparison.equivalence import ALPHA, alike_power
+from analysis.comparison.verdicts import LARGE, SURE
 from analysis.figures.style import in_order, label
 from docs.campaign_data import PARTS
 
@@ -17,46 +18,69 @@ Row = dict[str, Any]
 
 VERDICTS = ("reproduced", "not reproduced", "undecided", "does not apply")
 _ROWS = (
-    ("fitness", "fitness [m/s]", 3),
-    ("gain", "gain over founders [m/s]", 3),
-    ("size_mean", "living robots, mean over births", 1),
-    ("parts", "parts", 1),
-    ("active_joints", "active joints", 1),
-    ("passive_joints", "passive joints", 1),
-    ("joints_per_part", "joints per part", 2),
-    ("extremities", "extremities", 1),
-    ("touch_sensors", "touch sensors", 2),
-    ("hidden", "hidden neurons", 1),
-    ("rank", "rank", 0),
-    ("ancestors_per_robot", "ancestors per robot", 1),
-    ("diversity", "tree edit distance", 1),
-    ("retention", "retention after 120 births", 2),
+    ("fitness", "fitness [m/s]", 3, "0 to 0.5"),
+    ("gain", "gain over founders [m/s]", 3, ""),
+    ("size_mean", "living robots, mean over births", 1, ""),
+    ("parts", "parts", 1, "0 to 30"),
+    ("parts_change", "parts more than random robots have", 1, ""),
+    ("joints", "joints", 1, "0 to 20"),
+    ("active_joints", "active joints", 1, ""),
+    ("passive_joints", "passive joints", 1, ""),
+    ("joints_per_part", "joints per part", 2, "0 to 1"),
+    ("extremities", "extremities", 1, "0 to 15"),
+    ("extremities_per_part", "extremities per part", 2, "0 to 0.8"),
+    ("touch_sensors", "touch sensors", 2, "0 to 4"),
+    ("hidden", "hidden neurons", 1, ""),
+    ("rank", "rank", 0, ""),
+    ("ancestors_per_robot", "ancestors per robot", 1, "10 to 50"),
+    ("diversity", "tree edit distance", 1, "0 to 25"),
+    ("retention", "retention after 120 births, mean over births", 2, "0 to 0.75"),
     (
         "touching",
         "contact time per lifetime (simultaneous contacts count separately)",
         3,
+        "",
     ),
+    ("touched", "share of robots that ever touched another", 2, ""),
 )
-"""Measures of the table of ends: column, text, decimals."""
+"""Measures of the table of ends: column, text, decimals, axis in the thesis."""
+_CONTROLS = (
+    ("parts_fitness", "rank correlation of fitness with size", "6.9"),
+    ("extremities_fitness", "fitness with extremities", "6.14"),
+    ("extremities_per_part_fitness", "fitness with extremities per part", "6.14"),
+    ("retention_fitness", "fitness with retention, over births", "6.7"),
+    ("early_diversity", "tree edit distance, mean of the first tenth", "6.5"),
+    ("early_drop", "share of its loss in the first tenth", "6.5"),
+    ("family_distance", "distance in the best robot's family / of founders",
+     "6.18-6.20"),
+    ("family_founders", "founders of that family's parts", "6.18-6.20"),
+)  # fmt: skip
+"""Measures that are compared with the baselines': column, text, figures."""
+_CROWDED = 30
+"""Most robots that live in an arena of the thesis."""
+_PLANNED = {name: part.repeats for part in PARTS for name in part.names}
 _SPEEDS = (5, 15, 30, 50)
 """Numbers of robots whose speed is printed."""
 
 
-def parts_of(tables: Tables) -> dict[str, str]:
-    """Return the Markdown of each generated part by its name.
+def parts_of(tables: Tables) -> dict[str, dict[str, str]]:
+    """Return the Markdown of each generated part by page and name.
 
     Args:
         tables: as ``docs.results.tables_of`` returns them.
     """
     return {
-        "runs": _runs(tables),
-        "ends": _ends(tables),
-        "verdicts": _verdicts(tables),
-        "power": _power(tables),
-        "topics": _topics(tables),
-        "differences": _differences(tables),
-        "all": _all(tables),
-        "speed": _speed(tables),
+        "results.md": {
+            "runs": _runs(tables),
+            "ends": _ends(tables),
+            "arenas": _arenas(tables),
+            "verdicts": _verdicts(tables),
+            "topics": _topics(tables),
+            "differences": _differences(tables),
+            "controls": _controls(tables),
+            "speed": _speed(tables),
+        },
+        "findings.md": {"power": _power(tables), "all": _all(tables)},
     }
 
 
@@ -99,18 +123,58 @@ def _last(tables: Tables) -> dict[str, pa.Table]:
 def _ends(tables: Tables) -> str:
     """Return means over runs at the end, with least and greatest run."""
     last = _last(tables)
-    heads = [""] + [
-        f"{label(name)}, {rows.num_rows} x {rows['births'][0]} births"
-        for name, rows in last.items()
+    heads = [
+        "",
+        *(
+            f"{label(name)}, {rows.num_rows} x {rows['births'][0]} births"
+            for name, rows in last.items()
+        ),
+        "axis in the thesis",
     ]
-    rows = []
-    for measure, text, decimals in _ROWS:
-        cells = []
-        for outcomes in last.values():
-            values = outcomes[measure].drop_null().to_numpy()
-            cells.append(_spread(values, decimals))
-        rows.append([text, *cells])
+    rows = [
+        [text, *(_of_runs(runs, measure, decimals) for runs in last.values()), axis]
+        for measure, text, decimals, axis in _ROWS
+    ]
     return _table(heads, rows)
+
+
+def _arenas(tables: Tables) -> str:
+    """Return one row per arena of scenario 3: how many lived there, and its end."""
+    arenas, populations = _last(tables).get("scenario3"), tables["populations"]
+    rows = []
+    for arena in [] if arenas is None else arenas.to_pylist():
+        mine = populations.filter(pc.field("folder") == arena["folder"])
+        sizes, mature = (np.asarray(mine[name]) for name in ("size", "judged"))
+        rows.append(
+            [
+                str(arena["run"]),
+                f"{arena['size_mean']:.1f} ({sizes.max()})",
+                f"{mature.mean():.1f} ({mature.max()})",
+                str(int((sizes >= _CROWDED).sum())),
+                f"{arena['fitness']:.3f}",
+                f"{arena['rank']:.0f}",
+                f"{arena['retention']:.2f}",
+            ]
+        )
+    heads = ["repeat", "living robots (most)", "mature robots (most)",
+             f"populations of {_CROWDED}", "fitness [m/s]", "rank",
+             "retention"]  # fmt: skip
+    return _table(heads, rows)
+
+
+def _controls(tables: Tables) -> str:
+    """Return measures of findings beside those of the baselines, means over runs."""
+    last = _last(tables)
+    names = [name for name in last if name != TOUCHES]
+    rows = [
+        [figure, text, *(_of_runs(last[name], measure, 2) for name in names)]
+        for measure, text, figure in _CONTROLS
+    ]
+    return _table(["figure", "measure", *map(label, names)], rows)
+
+
+def _of_runs(outcomes: pa.Table, measure: str, decimals: int) -> str:
+    return _spread(outcomes[measure].drop_null().to_numpy(), decimals)
 
 
 def _spread(values: Any, decimals: int) -> str:  # noqa: ANN401 - array of numbers
@@ -142,25 +206,31 @@ def _verdicts(tables: Tables) -> str:
     rows = tables["findings"].to_pylist()
     sure = [row for row in rows if not row["near_automatic"]]
     untested = [row for row in rows if row["runs_a"] is None]
-    marked = f"Without the {len(rows) - len(sure)} that follow almost by construction"
+    off_line = [row for row in rows if "scenario3" not in (row["a"], row["b"])]
+    repeats = f"{_last(tables)['scenario3'].num_rows} of {_PLANNED['scenario3']}"
     lines = [
         f"Of {len(rows)} findings: **{_counts(rows)}**.",
-        f"{marked}, marked †: {_counts(sure)}.",
+        f"- Without the {len(rows) - len(sure)} marked †: {_counts(sure)}.",
+        f"- Without scenario 3, {repeats} repeats: {_counts(off_line)}.",
     ]
     if untested:
         reasons = sorted({row["why"] for row in untested})
         lines.append(
-            f"{len(untested)} of the undecided ones have no numbers yet "
+            f"- {len(untested)} of the undecided ones have no numbers yet "
             f"({'; '.join(reasons)})."
         )
     return "\n".join(lines)
 
 
 def _power(tables: Tables) -> str:
-    """Return the power of the equivalence test, as it stands and as planned."""
-    last = _last(tables)
-    sizes = {name: rows.num_rows for name, rows in last.items()}
-    planned = {name: part.repeats for part in PARTS for name in part.names}
+    """Return the power of the equivalence test, as it stands and as planned.
+
+    The corrected p of a test is below 5 % if p is below this share of 5 %: the number
+    of tests that show something to be alike, of all of them.
+    """
+    sizes = {name: rows.num_rows for name, rows in _last(tables).items()}
+    q = tables["findings"]["q_alike"].drop_null().to_numpy()
+    corrected = ALPHA * max(1, int((q < SURE).sum())) / max(1, len(q))
     rows = []
     for a, b in (
         ("scenario1", "scenario2"),
@@ -168,24 +238,18 @@ def _power(tables: Tables) -> str:
         ("scenario1", "no-selection"),
         ("scenario3", "no-selection"),
     ):
-        now = sizes.get(a, 0), sizes.get(b, 0)
-        power = f"{_powers(*now):.2f}" if min(now) > 1 else "-"
-        then = planned[a], planned[b]
-        rows.append(
-            [
-                f"{label(a)}, {label(b)}",
-                f"{now[0]}, {now[1]}",
-                power,
-                f"{then[0]}, {then[1]}",
-                f"{_powers(*then):.2f}",
-            ]
-        )
-    heads = ["compared", "repeats", "power", "planned repeats", "power then"]
+        now, planned = ((of.get(a, 0), of.get(b, 0)) for of in (sizes, _PLANNED))
+        for runs, text in {planned: ", planned", now: ""}.items():
+            powers = [alike_power(*runs, LARGE, level) for level in (ALPHA, corrected)]
+            rows.append(
+                [
+                    f"{label(a)}, {label(b)}",
+                    f"{runs[0]}, {runs[1]}{text}",
+                    *(f"{power:.2f}" for power in powers),
+                ]
+            )
+    heads = ["compared", "repeats", "power", f"power at p < {corrected:.3f}"]
     return _table(heads, rows)
-
-
-def _powers(first: int, second: int) -> float:
-    return alike_power(first, second, LARGE)
 
 
 def _grouped(tables: Tables, chosen: Callable[[Row], bool]) -> dict[Any, list[Row]]:
@@ -207,6 +271,8 @@ def _name(row: Row) -> str:
 def _topics(tables: Tables) -> str:
     """Return one row per finding without names: the pairs by verdict."""
     rows = []
+    found = set(tables["findings"]["verdict"].to_pylist())
+    verdicts = [name for name in VERDICTS if name in found]
     for (figure, topic, _), group in _grouped(tables, lambda _: True).items():
         cells = [
             ", ".join(
@@ -214,10 +280,10 @@ def _topics(tables: Tables) -> str:
                 for row in group
                 if row["verdict"] == verdict
             )
-            for verdict in VERDICTS
+            for verdict in verdicts
         ]
         rows.append([figure, topic, *cells])
-    return _table(["figure", "finding", *VERDICTS], rows)
+    return _table(["figure", "finding", *verdicts], rows)
 
 
 def _differences(tables: Tables) -> str:
@@ -296,7 +362,7 @@ def _speed(tables: Tables) -> str:
             continue
         sizes = np.asarray(mine["population"])
         factors = np.asarray(mine["factor"])
-        means = [f"{factors[sizes == size].mean():.3g}" for size in _SPEEDS]
+        means = [_spread(factors[sizes == size], 1) for size in _SPEEDS]
         count = int((sizes == _SPEEDS[0]).sum())
         rows.append([text, *means, str(count)])
     heads = ["arena of", *(f"{size} robots" for size in _SPEEDS), "repetitions"]

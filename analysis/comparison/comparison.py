@@ -21,7 +21,9 @@ from analysis.measures.outputs import OUTCOME, OWN, schema
 from analysis.measures.population_table import Numbers
 from analysis.measures.study import MeasuredRun, reach
 
-OF_FITNESS = frozenset({"fitness", "fitness_best", "late_gain", "variability", "gain"})
+OF_FITNESS = frozenset({
+    "fitness", "fitness_best", "late_gain", "late_rise", "variability", "gain",
+})  # fmt: skip
 """Measures whose values depend on the scale of the fitness function."""
 
 

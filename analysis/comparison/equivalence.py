@@ -42,8 +42,8 @@ def alike_p(delta: float, first: int, second: int, margin: float) -> float:
 
 
 @lru_cache
-def alike_power(first: int, second: int, margin: float) -> float:
-    """Return how probably ``alike_p`` is below 5 % for runs of one distribution.
+def alike_power(first: int, second: int, margin: float, alpha: float = ALPHA) -> float:
+    """Return how probably ``alike_p`` is at most ``alpha`` for one distribution.
 
     Counted exactly over all orders of the runs, without ties.
 
@@ -51,9 +51,10 @@ def alike_power(first: int, second: int, margin: float) -> float:
         first: number of runs of one experiment.
         second: number of runs of the other.
         margin: largest delta that counts as alike.
+        alpha: less than 5 % if p is corrected for many tests.
     """
     error = math.sqrt(score_variance((margin + 1) / 2, first, second))
-    most = margin - 2 * NormalDist().inv_cdf(1 - ALPHA) * error
+    most = margin - 2 * NormalDist().inv_cdf(1 - alpha) * error
     ways = rank_sum_ways(2 * np.arange(1, first + second + 1), first)
     # A doubled rank sum s is delta = (s - first (first + 1)) / (first second) - 1.
     delta = (np.arange(len(ways)) - first * (first + 1)) / (first * second) - 1

@@ -14,7 +14,7 @@ from analysis.comparison.equivalence import (
     mean_alike_p,
     mean_alike_power,
 )
-from analysis.comparison.samples import Row, centres, correct, one_sample, two_samples
+from analysis.comparison.samples import Row, correct, one_sample, two_samples
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
 from analysis.measures.outputs import schema
 from analysis.measures.population_table import Numbers
@@ -128,7 +128,7 @@ def _against_number(a: Numbers, claim: Claim) -> Row:
 
 def _against_experiment(a: Numbers, b: Numbers, claim: Claim) -> Row:
     compared = (_distances(a), _distances(b)) if claim.is_spread else (a, b)
-    row = two_samples(compared[0], claim.share * compared[1]) | centres(a, b)
+    row = two_samples(compared[0], claim.share * compared[1])
     if claim.expected != "=":
         return row | {"margin": NEGLIGIBLE}
     p = alike_p(row["effect"], len(a), len(b), LARGE)

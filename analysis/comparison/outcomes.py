@@ -87,7 +87,31 @@ def _of_island(
     found["gain"] = float(columns["fitness"][-1] - columns["fitness"][first])
     found["size_mean"] = _mean(columns["size"])
     found["retention_fitness"] = _correlation(retention, columns["fitness"])
-    return found
+    return found | of_courses(columns, counts, births, founders)
+
+
+def of_courses(
+    columns: Mapping[str, Numbers], counts: Numbers, births: int, spacing: int
+) -> dict[str, float]:
+    """Return the outcomes that are means over a part of an island's populations.
+
+    Args:
+        columns: ``fitness`` and ``diversity`` of its P populations, (P,) each.
+        counts: (P,) births at each of them, ascending.
+        births: at which the run is judged.
+        spacing: of the populations that count [births]: experiments that record one
+            at each birth are treated as those that record one per brood.
+    """
+
+    def over_tenth(name: str, end: float) -> float:
+        is_inside = (counts > end - births / 10) & (counts <= end)
+        return _mean(columns[name][is_inside & (counts % spacing == 0)])
+
+    rise = over_tenth("fitness", births) - over_tenth("fitness", births / 2)
+    return {
+        "late_rise": rise,
+        "early_diversity": over_tenth("diversity", births / 10),
+    }
 
 
 def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) -> float:

@@ -39,7 +39,7 @@ def one_sample(a: Numbers, reference: float) -> Row:
     return {**_described(a, reference), "effect": effect, "p": p}
 
 
-def centres(a: Numbers, b: Numbers | float) -> Row:
+def _centres(a: Numbers, b: Numbers | float) -> Row:
     """Return means and medians of an experiment and another one, or a number."""
     return {
         "mean_a": mean(a),
@@ -53,7 +53,7 @@ def _described(a: Numbers, b: Numbers | float) -> Row:
     difference, low, high = mean_difference(a, b)
     return {
         "runs_a": len(a),
-        **centres(a, b),
+        **_centres(a, b),
         "difference": difference,
         "difference_low": known(low),
         "difference_high": known(high),

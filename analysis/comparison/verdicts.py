@@ -40,8 +40,8 @@ def verdict(expected: str, row: Row) -> Verdict:
     sign = 1 if expected == ">" else -1
     if max(sign * low, sign * high) < margin:
         why = (
-            f"the interval{of} ends below {margin:g}: the effect in the expected "
-            "direction is at most negligible"
+            f"the 95 % interval{of} (uncorrected) ends below {margin:g}: the effect in "
+            "the expected direction is at most negligible"
         )
         return "not reproduced", why
     return _directed(row, sign)
@@ -66,8 +66,8 @@ def _alike(row: Row, ends: tuple[float, float], found: float) -> Verdict:
         return "reproduced", f"two one-sided tests: within +-{margin:g}, q < {SURE}"
     low, high = ends
     if (low > 0 or high < 0) and abs(found) >= margin and row["q"] < SURE:
-        return "not reproduced", f"q < {SURE}, and beyond +-{margin:g}"
-    return "undecided", f"neither within nor beyond +-{margin:g} for certain"
+        return "not reproduced", f"q < {SURE}, and the estimate is beyond +-{margin:g}"
+    return "undecided", f"shown neither to be within +-{margin:g} nor to be beyond"
 
 
 def _different(row: Row, most: float) -> Verdict:

@@ -72,7 +72,12 @@ OUTCOME = {
     "retention": "share of living robots that are still alive 120 births later, as the "
     "mean over the run's births",
     "late_gain": "share of the gain in fitness in the second half of births",
+    "late_rise": "mean fitness over the last tenth of births minus that over the tenth "
+    "that ends at half of the births, of populations as many births apart as there are "
+    "founders",
     "early_drop": "share of the loss of diversity in the first tenth of births",
+    "early_diversity": "mean diversity over the first tenth of births, of such "
+    "populations",
     "diversity_change": "diversity of the last population minus that of the founders",
     "parts_change": "parts of the last population minus those of random robots",
     "touch_sensors_change": "touch sensors, last population minus random robots",
@@ -287,8 +292,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "expected": "'>', '<', '=' (alike), '!=' or 'some' (occurs) of a against b",
         "births": OUTCOME["births"],
         **_TWO_SAMPLES,
-        "difference": "mean_a - mean_b, or what the claim says: mean_a minus a share "
-        "of mean_b, or difference of the mean distances of runs from their median",
+        "mean_b": "mean over runs of b, times a share that the claim names; if it is "
+        "about the spread, mean_a and mean_b are mean distances of runs from their "
+        "experiment's median",
         "verdict": "reproduced, not reproduced, undecided or does not apply",
         "why": "the rule of the verdict",
         "topic": "the finding without the names of experiments",

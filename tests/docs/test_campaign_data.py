@@ -52,7 +52,7 @@ ARENA = """
 name = "scenario3"
 births = 60
 [selection]
-population = 8
+population = 15
 [simulation]
 warmup_steps = 200
 window_steps = 400

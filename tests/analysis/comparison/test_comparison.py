@@ -112,6 +112,14 @@ def test_outcomes_by_hand() -> None:
     assert math.isnan(outcome(tables(levels[1:4]), 100, SETTINGS)["late_gain"])
     longer = [*levels[:4], {**levels[3], "births": 300}]
     assert outcome(tables(longer), 300, SETTINGS)["early_drop"] == pytest.approx(0.5)
+    # The tenth from birth 108 to 120 has 0.5, that until 60 has 0.4; until 12 nothing.
+    assert found["late_rise"] == pytest.approx(0.1)
+    assert math.isnan(found["early_diversity"])
+    early = outcome(tables(longer), 300, SETTINGS)["early_diversity"]
+    assert early == pytest.approx(8.0)  # of births 15 and 30
+    # Only populations as many births apart as there are founders, fifteen, count.
+    odd = [*longer, {**levels[0], "births": 20}]
+    assert outcome(tables(odd), 300, SETTINGS)["early_diversity"] == early
     assert found["diversity_change"] == -8
     # Random robots have no ancestors: 12 parts and 4 hidden neurons on average.
     assert found["parts_change"] == 8
@@ -387,16 +395,17 @@ def test_findings_of_few_births_spreads_shares_and_numbers() -> None:
         "not reproduced",
     ]
     assert (found[0]["births"], found[0]["p"]) == (100, None)
-    # Means are those of the experiments, also where spreads or shares are compared:
-    # the distances from the median are 3 and 3 / 50 on average; half of 35.5 is 17.75.
+    # Means are those of what is compared: the distances from the median are 3 and
+    # 3 / 50 on average; half of 35.5 is 17.75.
     means = ("mean_a", "mean_b", "median_a", "median_b")
-    assert [found[2][name] for name in means] == pytest.approx([0.0] * 4)
+    assert [found[2][name] for name in means[:2]] == pytest.approx([3, 0.06])
     assert found[2]["difference"] == pytest.approx(3 - 0.06)
-    assert [found[4][name] for name in means] == [5.5, 35.5, 5.5, 35.5]
+    assert [found[4][name] for name in means] == [5.5, 17.75, 5.5, 17.75]
     assert found[4]["difference"] == 5.5 - 17.75
     # A difference of 0.1 is significant, but less than the margin.
     assert found[11]["q"] < 0.05
-    assert found[11]["why"].startswith("the interval of the difference ends below 0.5")
+    words = "the 95 % interval of the difference (uncorrected) ends"
+    assert found[11]["why"].startswith(words)
     assert found[6]["power"] > 0.9
     assert found[6]["q_alike"] < 0.05
 
