@@ -128,6 +128,19 @@ class Returned:
 
 
 @dataclass(frozen=True, slots=True)
+class Expired:
+    """The network waited too long for a reply: the job is sent again to its agent.
+
+    Attributes:
+        number: of the job or the advance.
+        agent: that has it.
+    """
+
+    number: int
+    agent: str
+
+
+@dataclass(frozen=True, slots=True)
 class Died:
     """A job crashed the process that did it.
 
@@ -312,6 +325,7 @@ ShardEvent = (
     Joined
     | Left
     | Ticked
+    | Expired
     | ShardSeen
     | ShardRequested
     | ShardReturned

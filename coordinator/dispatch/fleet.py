@@ -24,6 +24,7 @@ from coordinator.dispatch.events import (
     DispatchCommand,
     DispatchEvent,
     Ended,
+    Expired,
     Job,
     Joined,
     Killed,
@@ -244,7 +245,7 @@ class Fleet:
         """Send a job again to the agent that has it; return whether it has it.
 
         An agent keeps what it works at, however long that takes. It answers a request
-        that comes again from memory if the job took long.
+        that comes again from memory if the job took long or is an arena's last advance.
         """
         number, agent = event.number, event.agent
         shard = self.shards.shard_of(number)
@@ -255,6 +256,8 @@ class Fleet:
         if payload is None:
             return False
         self._agents.send(number, agent, payload, longer_s(event.took_s or 0.0))
+        if shard is not None:
+            self._move(Expired(number, agent))
         return True
 
     def _advance_killed(self, event: Died, shard: int) -> None:

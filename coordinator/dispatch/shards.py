@@ -23,6 +23,7 @@ from coordinator.dispatch.events import (
     CancelShard,
     Client,
     Crowded,
+    Expired,
     Joined,
     Killed,
     Left,
@@ -178,9 +179,7 @@ class ShardDispatch:
         """
         match event:
             case Joined():
-                if event.kind != "worker":
-                    return []
-                return [*self._assignments(), *self._share(event)]
+                return list(self._joined(event))
             case Left():
                 self._leave(event.agent)
             case Ticked():
@@ -191,6 +190,8 @@ class ShardDispatch:
                 shard.client = event.client
             case ShardRequested():
                 self._want(event.shard)
+            case Expired():
+                self._expired(event.number)
             case ShardReturned():
                 return [*self._returned(event), *self._assignments()]
             case Killed():
@@ -209,6 +210,11 @@ class ShardDispatch:
         if shard.is_wanted:
             raise UnexpectedEvent(f"shard {number}: is requested already")
         shard.is_wanted = True
+
+    def _joined(self, joined: Joined) -> Iterator[ShardCommand]:
+        if joined.kind == "worker":
+            yield from self._assignments()
+            yield from self._share(joined)
 
     def _leave(self, agent: str) -> None:
         for shard in self._shards.values():
@@ -305,6 +311,16 @@ class ShardDispatch:
             shard.drifts_at_s = None
         elif shard.drifts_at_s is None:
             shard.drifts_at_s = self._now_s + DRIFT_S
+
+    def _expired(self, number: int) -> None:
+        """Learn how long an advance has taken so far: it may wait in a queue.
+
+        The next ones then wait longer, also if this one ends in another way.
+        """
+        shard = self._out.get(number)
+        if shard is not None and not self._shards[shard].is_whole:
+            waited_s = self._now_s - self._shards[shard].since_s
+            self._deadlines.learn(shard, waited_s)
 
     def _returned(self, event: ShardReturned) -> list[ShardCommand]:
         number = self._out.pop(event.number, None)

@@ -34,7 +34,10 @@ from schema.wire.decoding import fingerprint, parsed, require_most
 
 _MOST_REMEMBERED = 1000
 LONG_S = 60.0
-"""Answers to jobs that took as long are kept: their requests may come again [s]."""
+"""Answers to jobs that took as long are kept: their requests may come again [s].
+
+Arenas keep the answer to their last advance by themselves, however short it was.
+"""
 _MOST_LONG = 32
 _CANCELLED_S = 10.0
 """Time after which a cancelled job that waits loses its process [s]."""

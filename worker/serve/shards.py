@@ -3,6 +3,9 @@
 A shard is long-lived state. A worker that holds the state that a request starts from
 continues from there. Otherwise it asks for a history, rebuilds the state, and compares
 the digest of each advance with the recorded one.
+
+A request may come twice: a coordinator sends it again if it waited in a queue for too
+long. The second one is answered from memory, and the state stays.
 """
 
 import time
@@ -31,6 +34,7 @@ from schema.wire.arena_codec import (
     encode_advance_answer,
     encode_live,
 )
+from schema.wire.decoding import fingerprint
 from worker.arena.changes import possible
 from worker.serve.checks import checked_arena
 
@@ -84,11 +88,21 @@ class Outlet(Protocol):
 
 @dataclass(slots=True)
 class _Held:
-    """A shard after its latest advance; ``digest`` is empty before the first."""
+    """A shard after its latest advance.
+
+    Attributes:
+        world: the arena.
+        settings: as in the request.
+        digest: of its state; empty before the first advance.
+        request: fingerprint of the request for the latest advance.
+        answer: to that request.
+    """
 
     world: World
     settings: bytes
     digest: bytes
+    request: bytes = b""
+    answer: bytes = b""
 
 
 class Shards:
@@ -122,7 +136,8 @@ class Shards:
         """Return the encoded answer to an encoded request to advance a shard.
 
         A function of the request but for ``wall_s``, if the state that it starts from
-        is kept or comes with it. Otherwise the answer asks for the state.
+        is kept or comes with it, or if it is the request for the latest advance.
+        Otherwise the answer asks for the state.
 
         Raises:
             MalformedMessage: the bytes are no such request.
@@ -133,6 +148,9 @@ class Shards:
         """
         start = time.perf_counter()
         job = decode_advance_request(request, checked_arena)
+        key, asked = (job.run, job.shard), fingerprint(request)
+        if answer := self._answered(key, asked):
+            return answer
         settings = checked_arena(job.settings)
         _check_robots(job.changes, settings)
         # Not kept while it changes, so that an error below leaves no broken shard.
@@ -141,20 +159,31 @@ class Shards:
             held = _Held(self._rebuilt(job, job.rebuild), job.settings, job.from_digest)
             if job.rebuild.living is not None:
                 changes = possible(changes, held.world.births)
-        advance: Advance | None = None
-        snapshot = b""
-        if held is not None:
-            with _closed_on_error(held.world) as world:
-                world.apply(changes)
-                advance = world.advance(job.until)
-                snapshot = world.snapshot() if job.wants_snapshot else b""
-            held.digest = advance.digest
-            self._keep((job.run, job.shard), held)
-            self._publish(Live(job.run, job.shard, advance))
-        wall_s = time.perf_counter() - start
-        return encode_advance_answer(
-            AdvanceAnswer(job.epoch, job.number, wall_s, advance, snapshot)
-        )
+        if held is None:
+            wall_s = time.perf_counter() - start
+            return encode_advance_answer(
+                AdvanceAnswer(job.epoch, job.number, wall_s, None)
+            )
+        with _closed_on_error(held.world) as world:
+            world.apply(changes)
+            advance = world.advance(job.until)
+            snapshot = world.snapshot() if job.wants_snapshot else b""
+            wall_s = time.perf_counter() - start
+            answer = encode_advance_answer(
+                AdvanceAnswer(job.epoch, job.number, wall_s, advance, snapshot)
+            )
+        held.digest, held.request, held.answer = advance.digest, asked, answer
+        self._keep(key, held)
+        self._publish(Live(job.run, job.shard, advance))
+        return answer
+
+    def _answered(self, key: Key, asked: bytes) -> bytes:
+        """Return the answer to the latest request of a shard; b"" for another one."""
+        held = self._held.get(key)
+        if held is None or held.request != asked:
+            return b""
+        self._held.move_to_end(key)
+        return held.answer
 
     def _publish(self, live: Live) -> None:
         """Publish an advance; it is encoded only for viewers."""

@@ -20,7 +20,7 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.fleet import Fleet
-from coordinator.dispatch.pool import FIRST_S, LONGEST_WAIT_S, REPLY_S
+from coordinator.dispatch.pool import FIRST_S, LEAST_WAIT_S, LONGEST_WAIT_S, REPLY_S
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.decoding import fingerprint
 
@@ -234,6 +234,31 @@ def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
     fleet.advance(shard)
     # The first one holds what is needed to rebuild the state.
     assert agents.waits_s == [LONGEST_WAIT_S, LONGEST_WAIT_S, pytest.approx(2000.0)]
+
+
+def test_advances_after_one_that_expired_wait_longer(
+    fleet: Fleet, agents: Agents
+) -> None:
+    shard = new_shard(fleet)
+    for now_s in (1.0, 2.0):
+        fleet.advance(shard)
+        number, agent, _ = agents.sent[-1]
+        agents.news = [Returned(number, agent, "ok", b"x")]
+        fleet.listen(0.0, now_s)
+    fleet.advance(shard)
+    number, agent, payload = agents.sent[-1]
+    fleet.tell(Ticked(302.0))
+    fleet.tell(Returned(number, agent, "expired", took_s=300.0))
+    assert agents.sent[-1] == (number, agent, payload)
+    # Another worker ends it: nothing is learned from an advance that is rebuilt.
+    fleet.tell(Left(agent))
+    number, agent, payload = agents.sent[-1]
+    assert payload == b"whole True"
+    agents.news = [Returned(number, agent, "ok", b"x")]
+    fleet.listen(0.0, 303.0)
+    fleet.advance(shard)
+    assert agents.waits_s[:3] == [LONGEST_WAIT_S, LONGEST_WAIT_S, LEAST_WAIT_S]
+    assert agents.waits_s[-1] == pytest.approx(100.0 * (0.9 * 1.0 + 0.1 * 300.0))
 
 
 def test_a_state_that_cannot_be_read_ends_only_its_own_run(

@@ -53,10 +53,12 @@ class JobClient:
         rebuild: Rebuild | None = None,
         *,
         keep: bool = False,
+        number: int = 7,
     ) -> bytes:
         return encode_advance_request(
             AdvanceRequest(
-                run=self.run, epoch=1, number=7, settings=SETTINGS, shard=self.shard,
+                run=self.run, epoch=1, number=number, settings=SETTINGS,
+                shard=self.shard,
                 from_step=self.step, from_digest=self.digest,
                 changes=changes or Changes(), until=self.step + steps,
                 wants_snapshot=keep, rebuild=rebuild,
@@ -97,9 +99,9 @@ def lived(shards: AnyShards) -> JobClient:
 
 
 def following(
-    requester: JobClient, shards: AnyShards, rebuild: Rebuild | None
+    requester: JobClient, shards: AnyShards, rebuild: Rebuild | None, number: int = 7
 ) -> Advance | None:
-    request = requester.request(50, insertion(2), rebuild)
+    request = requester.request(50, insertion(2), rebuild, number=number)
     return decode_advance_answer(shards.answer(request)).advance
 
 
@@ -143,8 +145,35 @@ def test_state_that_is_ahead_of_the_request_is_dropped() -> None:
     shards = Shards(FakeWorld)
     requester = lived(shards)
     first = following(requester, shards, None)
-    assert following(requester, shards, None) is None
-    assert following(requester, shards, requester.whole()) == first
+    assert following(requester, shards, None, 8) is None
+    assert following(requester, shards, requester.whole(), 9) == first
+
+
+@pytest.mark.parametrize("is_whole", [False, True])
+def test_request_that_comes_again_is_answered_from_memory(is_whole: bool) -> None:  # noqa: FBT001 - a case
+    """A coordinator repeats a request that waited for too long in the queue."""
+    shards = Shards(FakeWorld)
+    requester = lived(Shards(FakeWorld) if is_whole else shards)
+    rebuild = requester.whole() if is_whole else None
+    request = requester.request(100, insertion(2), rebuild, keep=True)
+    FakeWorld.made = 0
+    answers = {shards.answer(request) for _ in range(3)}
+    assert len(answers) == 1
+    assert decode_advance_answer(answers.pop()).advance is not None
+    requester.ask(shards, 100, insertion(2), rebuild, keep=True)
+    # The state is kept: the next advance goes on from it.
+    assert requester.ask(shards).advance is not None
+    assert FakeWorld.made == is_whole
+    # Only the last answer is kept, and it goes with its state.
+    again = decode_advance_answer(shards.answer(request)).advance
+    assert (again is not None) == is_whole
+
+
+def test_request_of_the_next_coordinator_is_not_answered_from_memory() -> None:
+    shards = Shards(FakeWorld)
+    requester = lived(shards)
+    assert following(requester, shards, None) is not None
+    assert following(requester, shards, None, number=8) is None
 
 
 def test_state_with_another_digest_is_not_used() -> None:
