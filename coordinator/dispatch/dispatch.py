@@ -43,7 +43,6 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     FIRST_S,
-    LONGEST_WAIT_S,
     LOOK_S,
     REPLY_S,
     AgentState,
@@ -154,9 +153,9 @@ class Dispatch:
 
     def wait_s(self, job: Job) -> float:
         """Return for how long the network waits for the reply to a job [s]."""
-        # Calls take as long as the user's functions do, which differ.
-        is_call = job.kind == "call"
-        return LONGEST_WAIT_S if is_call else self._deadlines.wait_s(job.kind)
+        # Calls differ in duration. One that takes longer is sent again, and its worker
+        # goes on with it.
+        return self._deadlines.wait_s(job.kind)
 
     def payload(self, number: int, agent: str) -> bytes | None:
         """Return the request of a job that an agent has; None: it has no such job."""

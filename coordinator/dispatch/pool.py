@@ -382,8 +382,8 @@ class Deadlines:
         """Return for how long the network waits for a reply [s].
 
         The network holds some memory of each request until this time is over, even if
-        the reply came long ago: half a kilobyte, three times per birth. A request whose
-        time is over is sent again, see ``longer_s``.
+        the reply came long ago: half a kilobyte, three times per birth, once per call.
+        A request whose time is over is sent again, see ``longer_s``.
         """
         typical_s = self._typical_s.get(kind)
         if typical_s is None:

@@ -298,7 +298,6 @@ def test_the_network_waits_for_a_multiple_of_the_typical_duration() -> None:
     assert dispatch.wait_s(job(0)) == LONGEST_WAIT_S
     dispatch.handle(replace(ok(0, "a"), took_s=20.0))
     assert dispatch.wait_s(job(1)) == pytest.approx(2000.0)
-    assert dispatch.wait_s(Job(2, "call", b"")) == LONGEST_WAIT_S
     assert longer_s(2000.0) == 20_000.0
     assert longer_s(200_000.0) == LONGEST_WAIT_S
 
@@ -307,6 +306,15 @@ def test_the_network_waits_for_a_least_time() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     dispatch.handle(replace(ok(0, "a"), took_s=0.01))
     assert dispatch.wait_s(job(1)) == LEAST_WAIT_S
+
+
+def test_the_network_does_not_wait_long_for_replies_to_short_calls() -> None:
+    """It holds memory of each request until then, and there may be millions."""
+    dispatch = told(Ticked(0.0), worker("a"), Requested(job(0, "call")))
+    assert dispatch.wait_s(job(1, "call")) == LONGEST_WAIT_S
+    dispatch.handle(replace(ok(0, "a"), took_s=0.01))
+    assert dispatch.wait_s(job(1, "call")) == LEAST_WAIT_S
+    assert dispatch.wait_s(job(1, "evaluate")) == LONGEST_WAIT_S
 
 
 def test_late_answers_change_nothing() -> None:
