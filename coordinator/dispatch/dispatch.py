@@ -30,6 +30,7 @@ from coordinator.dispatch.events import (
     DispatchCommand,
     DispatchEvent,
     Ended,
+    Expired,
     Job,
     JobKind,
     Joined,
@@ -100,6 +101,7 @@ class Dispatch:
             Withdrawn: self._withdrawn,
             Ended: self._ended,
             Returned: self._returned,
+            Expired: self._expired,
             Died: self._died,
             Ticked: self._ticked,
             Progressed: self._progressed,
@@ -289,6 +291,12 @@ class Dispatch:
         pool.offer(event.agent)
         yield from self._assign(pool)
 
+    def _expired(self, event: Expired) -> Iterator[DispatchCommand]:
+        pending = self._jobs.get(event.number)
+        if pending and event.agent in pending.holders:
+            pending.repeated.add(event.agent)
+        yield from ()
+
     def _note_late(self, event: Returned) -> None:
         if event.outcome == "ok":
             self._faults.note("late", event.agent, f"job {event.number}")
@@ -308,14 +316,19 @@ class Dispatch:
     def _learn(self, pending: Pending, agent: AgentState, took_s: float | None) -> None:
         """Note how long an agent took for a job, which it no longer holds.
 
-        ``took_s`` is used if it is given. Otherwise the duration is measured between
-        ticks; that includes a pause of the coordinator and is too long for short jobs.
+        ``took_s`` is that of the last request. It is used if it is given and the only
+        one. Otherwise the duration is measured between ticks; that includes a pause of
+        the coordinator and is too long for short jobs.
         """
-        since_s, place = pending.holders.pop(agent.joined.agent)
-        if self._now_s is not None:
-            elapsed_s = self._now_s - since_s if took_s is None else took_s
-            self._deadlines.learn(pending.job.kind, elapsed_s)
-            agent.learn(elapsed_s / place)
+        name = agent.joined.agent
+        since_s, place = pending.holders.pop(name)
+        # An agent that is back may have the answer in memory.
+        if self._now_s is None or name in pending.lost:
+            return
+        if took_s is None or name in pending.repeated:
+            took_s = self._now_s - since_s
+        self._deadlines.learn(pending.job.kind, took_s)
+        agent.learn(took_s / place)
 
     def _fail(
         self, pending: Pending, event: Returned, reason: str

@@ -181,6 +181,7 @@ DispatchEvent = (
     | Withdrawn
     | Ended
     | Returned
+    | Expired
     | Died
     | Ticked
     | Progressed

@@ -256,8 +256,11 @@ class Fleet:
         if payload is None:
             return False
         self._agents.send(number, agent, payload, longer_s(event.took_s or 0.0))
-        if shard is not None:
-            self._move(Expired(number, agent))
+        expired = Expired(number, agent)
+        if shard is None:
+            self._obey(self.dispatch.handle(expired))
+        else:
+            self._move(expired)
         return True
 
     def _advance_killed(self, event: Died, shard: int) -> None:

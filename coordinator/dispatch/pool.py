@@ -59,6 +59,7 @@ class Pending:
             assignment [s], and its place in the queue of a slot (1.0 is first).
         errors: number of agents that could not do it.
         avoid: agents that failed at it.
+        repeated: agents that were sent it again after the wait for their reply.
         lost: how often each agent had it and gave no reply.
         killed: processes that it crashed, with the causes.
     """
@@ -67,6 +68,7 @@ class Pending:
     holders: dict[str, tuple[float, float]] = field(default_factory=dict)
     errors: int = 0
     avoid: tuple[str, ...] = ()
+    repeated: set[str] = field(default_factory=set)
     lost: Counter[str] = field(default_factory=Counter)
     killed: dict[str, str] = field(default_factory=dict)
 

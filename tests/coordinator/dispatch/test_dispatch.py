@@ -25,6 +25,7 @@ from coordinator.dispatch.events import (
     Died,
     DispatchCommand,
     DispatchEvent,
+    Expired,
     Job,
     JobKind,
     Joined,
@@ -315,6 +316,15 @@ def test_the_network_does_not_wait_long_for_replies_to_short_calls() -> None:
     dispatch.handle(replace(ok(0, "a"), took_s=0.01))
     assert dispatch.wait_s(job(1, "call")) == LEAST_WAIT_S
     assert dispatch.wait_s(job(1, "evaluate")) == LONGEST_WAIT_S
+
+
+def test_nothing_is_learned_from_an_agent_that_is_back_with_the_answer() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0, 1))
+    dispatch.handle(Left("a"))
+    dispatch.handle(worker("a"))
+    assert dispatch.handle(replace(ok(0, "a"), took_s=0.001))
+    assert dispatch.workers.agents["a"].job_s == 0.0
+    assert dispatch.wait_s(job(2)) == LONGEST_WAIT_S
 
 
 def test_late_answers_change_nothing() -> None:
@@ -684,6 +694,13 @@ class World:
     def lose(self) -> None:
         self.give_back("lost")
 
+    def expire(self) -> None:
+        """A job is sent again to its agent; either may be gone."""
+        if self.jobs:
+            number = self.random.choice(sorted(self.jobs))
+            agent = self.random.choice([*sorted(self.agents), "nobody"])
+            self.tell(Expired(number, agent))
+
     def report(self) -> None:
         """An agent reports progress; it may have left."""
         self.tell(Progressed(self.random.choice([*sorted(self.agents), "nobody"])))
@@ -725,6 +742,7 @@ ACTIONS = ["request"] * 3 + [
     "fail",
     "lose",
     "die",
+    "expire",
     "report",
     "tick",
     "tick",

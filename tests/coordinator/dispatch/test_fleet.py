@@ -222,6 +222,25 @@ def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
     assert fleet.dispatch.assigned("worker") == 0
 
 
+def test_a_job_that_was_sent_again_took_all_the_time(
+    fleet: Fleet, agents: Agents
+) -> None:
+    request(fleet)
+    ((number, agent, _),) = agents.sent
+    agents.news = [Returned(number, agent, "ok", b"x", took_s=2.0)]
+    fleet.listen(0.0, 2.0)
+    request(fleet)
+    number, agent, _ = agents.sent[-1]
+    agents.news = [Returned(number, agent, "expired", took_s=300.0)]
+    fleet.listen(0.0, 302.0)
+    agents.news = [Returned(number, agent, "ok", b"x", took_s=1.0)]
+    assert len(fleet.listen(0.0, 303.0)) == 1
+    typical_s = 0.9 * 2.0 + 0.1 * 301.0
+    assert fleet.dispatch.workers.agents[agent].job_s == pytest.approx(typical_s)
+    request(fleet)
+    assert agents.waits_s[-1] == pytest.approx(100.0 * typical_s)
+
+
 def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
     fleet: Fleet, agents: Agents
 ) -> None:
