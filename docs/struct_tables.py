@@ -134,7 +134,7 @@ def _default(field: kinds.Field) -> str:
     if field.default_factory is not NODEFAULT:
         value = field.default_factory()
     if value is NODEFAULT:
-        return "required" if field.required else ""
+        return "required" if field.required else "not given"
     if value is None:
         return "not given"
     if isinstance(value, Struct):

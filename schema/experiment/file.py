@@ -24,7 +24,7 @@ from schema.experiment.document import (
     island_experiment,
     references,
 )
-from schema.experiment.environment import is_mjcf
+from schema.experiment.environment import add_gap_contacts, is_mjcf
 from schema.experiment.sweep import (
     Point,
     Range,
@@ -385,11 +385,17 @@ def _refuse_many_islands(document: dict[str, Any], where: str) -> None:
 
 
 def _read_scenery(document: dict[str, Any], where: str) -> None:
-    """Replace paths of scenery by the text of the files, in place."""
+    """Replace paths of scenery by the text of the files, in place.
+
+    Tables whose scenery has gaps get the key ``gap_contacts``.
+    """
     for table in (document, *document.get("islands", ())):
         environment = table.get("environment", {})
         named = environment.get("scenery", "")
-        if not isinstance(named, str) or not named or is_mjcf(named):
+        if not isinstance(named, str) or not named:
+            continue
+        if is_mjcf(named):
+            add_gap_contacts(environment)
             continue
         path = Path(where).parent / named
         try:
@@ -402,6 +408,7 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
             # An empty text means no scenery.
             raise ExperimentError(f"{where}: environment.scenery: {named}: is empty")
         environment["scenery"] = text
+        add_gap_contacts(environment)
 
 
 def _read_calibration(document: dict[str, Any], where: str) -> None:

@@ -19,9 +19,11 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     Attributes:
         later: keys that documents of commit 3063df1 did not have.
+        uncounted: keys that ``stable_json`` leaves out, whatever their values.
     """
 
     later: ClassVar[tuple[str, ...]] = ()
+    uncounted: ClassVar[tuple[str, ...]] = ()
 
 
 def stable_json(section: Section) -> bytes:
@@ -37,6 +39,8 @@ def _stable(section: Section) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for each in fields(section):
         value = getattr(section, each.name)
+        if each.name in section.uncounted:
+            continue
         if each.name in section.later and value == _default(each):
             continue
         found[each.encode_name] = (

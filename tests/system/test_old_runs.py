@@ -2,6 +2,9 @@
 
 ``tests/data/runs-3063df1/README.md`` describes how they were made. Tables are compared
 with pyarrow only: the old files determine the columns and which of them are repeatable.
+
+The run of a later commit in ``tests/data/runs-b68fda16`` has contacts that no longer
+count.
 """
 
 import os
@@ -21,10 +24,11 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 Once = Callable[[str, Callable[[Workspace], object]], Path]
 
 ROOT = Path(__file__).parents[2]
-RUNS = ROOT / "tests" / "data" / "runs-3063df1"
-DOCUMENTS = ROOT / "tests" / "data" / "documents-3063df1"
+DATA = ROOT / "tests" / "data"
+DOCUMENTS = DATA / "documents-3063df1"
 FOLDERS = ("undisturbed", "killed")
 BIRTHS = {"off-line": 72, "arena": 24, "archipelago": 74}
+LATER = {"arena-gap": 12}
 FILLED = {
     "off-line": {"births", "evaluations", "population", "runs"},
     "arena": {"births", "deaths", "fitness", "population", "poses", "runs", "touches"},
@@ -38,6 +42,7 @@ FILLED = {
         "poses",
         "runs",
     },
+    "arena-gap": {"births", "deaths", "fitness", "population", "runs"},
 }
 """Tables that have rows in each undisturbed run."""
 
@@ -50,7 +55,8 @@ each_run = pytest.mark.parametrize("name", list(BIRTHS))
 
 def unpack(name: str, folder: Path) -> None:
     """Extract the folders ``killed`` and ``undisturbed`` of a run into a folder."""
-    with ZipFile(RUNS / f"{name}.zip") as archive:
+    (file,) = DATA.glob(f"runs-*/{name}.zip")
+    with ZipFile(file) as archive:
         archive.extractall(folder)
 
 
@@ -112,14 +118,14 @@ def resumed(once: Once) -> Callable[[str], Path]:
     return make
 
 
-@each_run
+@pytest.mark.parametrize("name", [*BIRTHS, *LATER])
 def test_killed_run_resumes_to_the_tables_of_the_undisturbed_run(
     resumed: Callable[[str], Path], name: str
 ) -> None:
     folder = resumed(name)
     old, new = tables(folder / "undisturbed"), tables(folder / "killed")
     assert {table for table, rows in old.items() if rows.num_rows} == FILLED[name]
-    assert old["births"].num_rows == BIRTHS[name]
+    assert old["births"].num_rows == (BIRTHS | LATER)[name]
     assert old.keys() <= new.keys()
     if platform(old) != platform(new):
         pytest.skip(f"only promised on the platform of the data, {platform(old)}")

@@ -1,7 +1,8 @@
 """Contacts of robots in the last step of a model.
 
 The engine also reports geoms that are farther apart than their ``margin`` but within
-the ``gap`` of scenery. They exert no force on each other, and do not touch.
+the ``gap`` of scenery. They exert no force on each other, and do not touch, except in
+runs that were begun by versions in which they did.
 """
 
 from collections.abc import Callable
@@ -14,12 +15,15 @@ ReadContacts = Callable[[], list[list[int]]]
 """Returns the pairs of geoms in contact in the last step, as plain numbers."""
 
 
-def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:
+def contact_reader(
+    model: mujoco.MjModel, data: mujoco.MjData, *, counts_gap: bool = False
+) -> ReadContacts:
     """Return a function that returns the contacts of the last step.
 
     Args:
         model: a compiled model.
         data: the model's state.
+        counts_gap: contacts within the gap of scenery count, too.
     """
     contacts = data.contact
 
@@ -31,4 +35,5 @@ def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:
         found: list[list[int]] = contacts.geom[contacts.exclude != _IN_GAP].tolist()
         return found
 
-    return read_some if model.geom_gap.any() else read_all
+    has_gap = bool(model.geom_gap.any())
+    return read_some if has_gap and not counts_gap else read_all

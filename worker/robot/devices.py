@@ -54,6 +54,7 @@ class Sensors:
         width: int,
         prefix: str = "",
         has_light: bool = False,
+        counts_gap: bool = False,
     ) -> None:
         """Find the sensors.
 
@@ -65,12 +66,13 @@ class Sensors:
             width: number I of readings, at least the robot's inputs.
             prefix: of the robot's names in the model.
             has_light: the caller writes the readings of light sensors.
+            counts_gap: touch sensors respond within the gap of scenery.
 
         Raises:
             ExperimentError: a light sensor in a world without light.
         """
         self._model, self._data = model, data
-        self._contacts = contact_reader(model, data)
+        self._contacts = contact_reader(model, data, counts_gap=counts_gap)
         self.velocities: list[_Velocity] = []
         self.pads: list[tuple[int, int]] = []
         self.core_imu = -1

@@ -219,6 +219,7 @@ class _ControlLoop:
             self.data,
             width=width.inputs,
             has_light=self._light is not None,
+            counts_gap=settings.environment.counts_gap,
         )
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.warmup_steps + simulation.window_steps
