@@ -7,7 +7,7 @@ from pathlib import Path
 from coordinator.cli.campaign_table import outcome_of, show
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.main_loop import execute_runs
-from coordinator.cli.summary import Conclusion, conclude, has_evaluated
+from coordinator.cli.summary import Conclusion, conclude, has_evaluated, restore_best
 from coordinator.run.scheduler import Planned
 from coordinator.run.session import RunSession
 from coordinator.storage.campaign import (
@@ -100,6 +100,8 @@ def resume(folder: Path, deployment: Deployment) -> int:
 def finished_code(folder: Path) -> int | None:
     """Return the exit code of a run that needs no resumption, and tell the user so.
 
+    The file of its best robot is written if it is missing.
+
     Returns:
         None for a campaign, for a run that is not finished or whose tables are to be
         written again, and where there is no run.
@@ -112,6 +114,7 @@ def finished_code(folder: Path) -> int | None:
     if _is_to_be_rewritten(folder) or read_state(folder) != "finished":
         return None
     tell_user(f"{folder}: already finished")
+    restore_best(folder)
     return 0 if has_evaluated(folder) else 1
 
 
@@ -165,8 +168,10 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
                 if _is_to_be_rewritten(path)
                 else folder_status(path)
             )
-            if status.state == "finished" and not has_evaluated(path):
-                failed.append(path)
+            if status.state == "finished":
+                restore_best(path)
+                if not has_evaluated(path):
+                    failed.append(path)
         except RevolveError as error:
             # The damaged run fails when the scheduler opens it; the others continue.
             planned.append(Planned(status, partial(_raise, error)))

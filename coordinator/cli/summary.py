@@ -13,10 +13,12 @@ from msgspec import to_builtins
 
 from coordinator.arena.arena import Arena
 from coordinator.run.session import RunSession
-from coordinator.storage.disk import storage_errors
+from coordinator.storage.disk import replace_durably, storage_errors
+from coordinator.storage.folder import read_details
 from coordinator.storage.hints import command
+from schema.agent.log import tell_user, warn_user
 from schema.agent.screen import missing_screen
-from schema.errors import InvalidRobot, counted, rounded
+from schema.errors import ExperimentError, InvalidRobot, counted, rounded
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import (
     Experiment,
@@ -24,10 +26,12 @@ from schema.experiment.document import (
     island_count,
     island_experiment,
 )
+from schema.experiment.file import own_experiment
 from schema.experiment.fitness_keys import fitness_text
 from schema.formats.files import BEST
 from schema.formats.yaml import robot_to_yaml
 from schema.robot.robot import Robot
+from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 from schema.tables.last_populations import Row, best_of, last_populations
 from schema.tables.learnt import learnt_births
@@ -66,6 +70,44 @@ def conclude(run: RunSession) -> Conclusion:
         lines.insert(1, failures)
     lines += [f"tables: {folder / 'tables'}", "try next:", *next_steps(folder)]
     return Conclusion("\n".join(lines), failures, has_evaluated(folder))
+
+
+def restore_best(folder: Path) -> None:
+    """Write the best robot of a finished run to a file if the file is missing.
+
+    A process that ends after its run, but before the summary, leaves no file.
+
+    Raises:
+        RunFolderError: a table cannot be read, or the robot cannot be written.
+    """
+    best = None if (folder / BEST).exists() else best_of(last_populations(folder))
+    if best is None:
+        return
+    try:
+        allow_plugins_of(folder, is_resumed=False)
+        experiment = own_experiment(read_details(folder).document)
+        if _is_extinct(folder, experiment):
+            return
+        _, robot = _read_best(folder, best, experiment)
+        done = _write_best(robot, folder, experiment)
+    except (ExperimentError, InvalidRobot) as error:
+        # A finished run needs none of its plug-ins for anything else.
+        warn_user(f"{folder}: the file {BEST} is missing and not written: {error}")
+        return
+    tell_user(f"{folder}: {BEST} was missing; best robot: {done}")
+
+
+def _is_extinct(folder: Path, experiment: Experiment) -> bool:
+    """Return whether all islands of a finished run are extinct arenas."""
+    born = Counter(read_table(folder, "births")["island"].to_pylist())
+    islands = [
+        island_experiment(experiment, number)
+        for number in range(island_count(experiment))
+    ]
+    return all(
+        own.arena is not None and born[number] < own.births
+        for number, own in enumerate(islands)
+    )
 
 
 def next_steps(folder: Path) -> list[str]:
@@ -160,13 +202,7 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
     """Describe the robot of a population row; write it to a file."""
     birth = individual(best)
     folder, space = run.held.path, body_space(run.experiment.space)
-    births = learnt_births(folder)
-    is_it = pc.and_(
-        pc.equal(births["island"], birth.island),
-        pc.equal(births["birth"], birth.number),
-    )
-    (row,) = births.filter(is_it).select(["genome", "robot", "rank"]).to_pylist()
-    robot = robot_of_birth(row["genome"], row["robot"], run.experiment)
+    rank, robot = _read_best(folder, best, run.experiment)
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
     lives = f" on island {best['island']}" if best["island"] != birth.island else ""
@@ -175,9 +211,21 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
         f"best robot: birth {birth.number}{where}, fitness {rounded(best['fitness'])}"
     )
     return [
-        f"{line}{lives}, rank in ancestry {row['rank']} (founders: 1), {what}",
+        f"{line}{lives}, rank in ancestry {rank} (founders: 1), {what}",
         _write_best(robot, folder, run.experiment),
     ]
+
+
+def _read_best(folder: Path, best: Row, experiment: Experiment) -> tuple[int, Robot]:
+    """Return the rank in ancestry and the robot of a population row."""
+    birth = individual(best)
+    births = learnt_births(folder)
+    is_it = pc.and_(
+        pc.equal(births["island"], birth.island),
+        pc.equal(births["birth"], birth.number),
+    )
+    (row,) = births.filter(is_it).select(["genome", "robot", "rank"]).to_pylist()
+    return row["rank"], robot_of_birth(row["genome"], row["robot"], experiment)
 
 
 def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
@@ -195,7 +243,7 @@ def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
             # It may be another robot, of an earlier end of the run.
             file.unlink(missing_ok=True)
             return f"it has no file {file}: {error}"
-        file.write_bytes(text.encode())
+    replace_durably(file, lambda path: path.write_bytes(text.encode()))
     return f"its file: {file}"
 
 

@@ -216,6 +216,23 @@ def test_missing_tables_are_written_again(
     assert compare(run, campaign_folder / "twice" / "seeing-0") == []
 
 
+def test_missing_file_of_the_best_robot_is_written_again(
+    workspace: Workspace, campaign_folder: Path
+) -> None:
+    """A process may have been killed after its run, before it wrote the file."""
+    shutil.copytree(campaign_folder / "twice", workspace.folder / "twice")
+    file = workspace.folder / "twice" / "seeing-1" / "best.yaml"
+    sound = file.read_bytes()
+    for folder in ("twice/seeing-1", "twice"):
+        file.unlink()
+        output = workspace.run("resume", folder, "--in-process", "--quiet")
+        assert "already finished" in output
+        assert "best.yaml was missing; best robot: its file: twice/seeing-1" in output
+        assert file.read_bytes() == sound
+        output = workspace.run("resume", folder, "--in-process", "--quiet")
+        assert "was missing" not in output
+
+
 def test_damaged_tables_of_a_campaign_are_written_again(
     workspace: Workspace, campaign_folder: Path
 ) -> None:

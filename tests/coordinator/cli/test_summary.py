@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
+from msgspec import structs
 
 from coordinator.cli import summary
 from schema.errors import RunFolderError
@@ -58,6 +60,30 @@ def test_windows_of_all_arenas_are_said(tmp_path: Path) -> None:
     assert line == f"in arenas fitness is that of {what}"
     (line,) = summary._windows(tmp_path, arenas[1:])
     assert "last 6 s before" in line
+
+
+@pytest.mark.parametrize(
+    ("births", "islands", "is_extinct"),
+    [
+        (3, (), True),
+        (2, (), False),
+        (3, (Islands(births=2),), False),
+        (3, (Islands(), Islands()), True),
+    ],
+)
+def test_run_is_extinct_if_all_of_its_arenas_have_too_few_births(
+    births: int,
+    islands: tuple[Islands, ...],
+    *,
+    is_extinct: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table = pa.table({"island": [0, 0]})
+    monkeypatch.setattr(summary, "read_table", lambda _folder, _name: table)
+    experiment = Experiment("e", births=births, arena=Arena(), islands=islands)
+    assert summary._is_extinct(Path(), experiment) is is_extinct
+    off_line = structs.replace(experiment, arena=None)
+    assert not summary._is_extinct(Path(), off_line)
 
 
 def test_robot_without_a_file_is_said(tmp_path: Path, chain: Robot) -> None:
