@@ -46,9 +46,14 @@ UNSUPERVISED = ProcessSlot()
 
 
 _ENGINE_LOG = (
-    "warn,zenoh::net::runtime::orchestrator=error,zenoh_link_unixsock_stream=error"
+    "warn,zenoh::net::runtime::orchestrator=error,zenoh_link_unixsock_stream=error,"
+    "zenoh::net::routing::dispatcher::queries=error"
 )
-"""Levels of Zenoh's log; the commands themselves tell of a hub that is missing."""
+"""Levels of Zenoh's log.
+
+The commands themselves tell of a hub that is missing. Queries whose time is over are
+normal: the job is sent again.
+"""
 
 
 def log_engine() -> None:
