@@ -23,7 +23,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.load import read_runs
-from schema.experiment.document import Experiment, body_space
+from schema.experiment.document import Experiment
 from schema.experiment.file import own_experiment
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import evaluation_settings_of
@@ -133,9 +133,8 @@ def _run_one(folder: Path, task: str, search: str, seed: int, workers: int) -> i
         writer.writerow({**row, "commit": _commit()})
     if search == "evolution" and seed == DRAWN:
         experiment, _, robot = best_robot(out)
-        write_robot(
-            robot, ROBOTS / f"{_file_name(task)}.yaml", body_space(experiment.space)
-        )
+        path = ROBOTS / f"{_file_name(task)}.yaml"
+        write_robot(robot, path, evaluation_settings_of(experiment))
     shutil.rmtree(out)
     return 0
 

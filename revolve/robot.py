@@ -13,13 +13,12 @@ from revolve.children import SIMULATOR, plugins
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
 from schema.errors import InvalidRobot, RevolveError, counted, expectation, shown
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
+from schema.experiment.brains import types_of
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.formats.yaml_reader import OTHER_TYPES
 from schema.limits import MOST_PIXELS
-from schema.robot.brain import Brain, NeuronKinds
+from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
@@ -68,10 +67,8 @@ class Robot:
             ExperimentError: no such experiment.
         """
         own = None if experiment is None else as_experiment(experiment)
-        settings = _settings(own)
-        space = body_space(settings.space)
         try:
-            found = read_robot(Path(path), space, _kinds(settings))
+            found = read_robot(Path(path), *types_of(_settings(own)))
         except InvalidRobot as error:
             text = str(error).replace(OTHER_TYPES, _OTHER_TYPES)
             raise InvalidRobot(text) from None
@@ -116,9 +113,7 @@ class Robot:
             InvalidRobot: another ending, a robot that is not well formed, or a file
                 that cannot be written.
         """
-        settings = _settings(self.experiment)
-        space = body_space(settings.space)
-        write_robot(plain(self), Path(path), space, settings, _kinds(settings))
+        write_robot(plain(self), Path(path), _settings(self.experiment))
 
     def picture(self, width: int = 640, height: int = 480) -> bytes:
         """Return a picture of the robot in neutral pose, as PNG.
@@ -210,7 +205,7 @@ def checked(robot: Robot | PlainRobot, settings: EvaluationSettings) -> PlainRob
     """
     found = plain(robot)
     check_number(found)
-    check_robot(found, body_space(settings.space), _kinds(settings))
+    check_robot(found, *types_of(settings))
     return found
 
 
@@ -229,10 +224,6 @@ def task_of(
     encoded = encode_robot(checked(robot, settings))
     data = msgspec.json.encode(settings)
     return Task(data, encoded, plugins(), is_judged, size)
-
-
-def _kinds(settings: EvaluationSettings) -> NeuronKinds:
-    return neuron_kinds(settings.brain, settings.space)
 
 
 def _settings(experiment: Experiment | None) -> EvaluationSettings:

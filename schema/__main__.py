@@ -5,8 +5,7 @@ from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.errors import RevolveError, counted
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
+from schema.experiment.brains import types_of
 from schema.formats.files import write_robot
 from schema.formats.run_settings import read_with_settings
 from schema.parts import BodySpace
@@ -33,15 +32,13 @@ def main(argv: list[str] | None = None) -> int:
     robot, settings, _ = read_with_settings(
         options.file, options.experiment, options.island
     )
-    space = body_space(settings.space)
-    kinds = neuron_kinds(settings.brain, settings.space)
     if options.command == "check":
         print(f"{options.file}: well formed; {_summary(robot)}")
     elif options.command == "convert":
-        write_robot(robot, options.output, space, settings, kinds)
+        write_robot(robot, options.output, settings)
         print(f"{options.output}: written")
     else:
-        _show(robot, space, kinds, options.file.name)
+        _show(robot, *types_of(settings), options.file.name)
     return 0
 
 

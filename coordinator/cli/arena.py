@@ -10,8 +10,7 @@ from schema.agent.command import add_connect, add_network_flags
 from schema.agent.flags import Flags, add_count, birth_name, number
 from schema.agent.log import tell_user
 from schema.errors import InvalidRobot, NetworkError
-from schema.formats.files import read_robot
-from schema.formats.run_settings import experiment_of, types_of
+from schema.formats.run_settings import experiment_of, read_robot_of
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode_robot
 from schema.wire.operator import (
@@ -132,8 +131,7 @@ def _robot(options: argparse.Namespace) -> bytes:
     file = Path(options.file)
     if not file.is_file():
         raise InvalidRobot(f"{file}: no such file")
-    types = types_of(experiment_of(file, options.experiment))
-    return encode_robot(read_robot(file, *types))
+    return encode_robot(read_robot_of(file, experiment_of(file, options.experiment)))
 
 
 def parser(_command: str = "arena") -> Flags:

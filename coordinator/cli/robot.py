@@ -6,8 +6,6 @@ from pathlib import Path
 from coordinator.evolution.breeding import Breeder
 from schema.agent.flags import Flags, add_count
 from schema.errors import counted
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.formats.files import settings_of, write_robot
 from schema.robot.ids import BirthId
@@ -31,8 +29,6 @@ def main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
     breeder = Breeder(experiment, options.seed, run=0)
-    space = body_space(experiment.space)
-    kinds = neuron_kinds(experiment.brain, experiment.space)
     for number in range(options.count):
         candidate = breeder.candidate(BirthId(0, number), 0, ())
         assert candidate is not None
@@ -40,7 +36,7 @@ def main(arguments: list[str]) -> int:
         path: Path = options.file
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")
-        write_robot(robot, path, space, settings_of(experiment), kinds)
+        write_robot(robot, path, settings_of(experiment))
         parts = counted(len(robot.parts), "part")
         print(f"{path}: {parts}, {counted(len(robot.brain.neurons), 'neuron')}")
     return 0

@@ -19,7 +19,7 @@ from coordinator.storage.hints import command
 from schema.agent.log import tell_user, warn_user
 from schema.agent.screen import missing_screen
 from schema.errors import ExperimentError, InvalidRobot, counted, rounded
-from schema.experiment.brains import neuron_kinds
+from schema.experiment.brains import types_of
 from schema.experiment.document import (
     Experiment,
     body_space,
@@ -234,11 +234,10 @@ def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
     Raises:
         RunFolderError: the disk is full or failed.
     """
-    file, space = folder / BEST, body_space(experiment.space)
-    kinds = neuron_kinds(experiment.brain, experiment.space)
+    file = folder / BEST
     with storage_errors(file):
         try:
-            text = robot_to_yaml(robot, space, kinds)
+            text = robot_to_yaml(robot, *types_of(experiment))
         except InvalidRobot as error:
             # It may be another robot, of an earlier end of the run.
             file.unlink(missing_ok=True)

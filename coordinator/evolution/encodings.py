@@ -19,7 +19,7 @@ from schema.errors import (
     one_line,
     shown,
 )
-from schema.experiment.brains import neuron_kinds
+from schema.experiment.brains import types_of
 from schema.experiment.document import (
     REVOLVE_ANGLE,
     Experiment,
@@ -92,8 +92,7 @@ class IslandEncoding:
 
     def __init__(self, encoding: Encoding[Any], experiment: Experiment) -> None:
         self.name = experiment.encoding.type
-        self.types: BodySpace = body_space(experiment.space)
-        self._kinds = neuron_kinds(experiment.brain, experiment.space)
+        self.types, self._kinds = types_of(experiment)
         self._encoding = encoding
         self._mates = encoding if isinstance(encoding, OneStepMating) else None
         self._space = experiment.space

@@ -7,7 +7,9 @@ from typing import Any, NamedTuple, TypeVar, cast
 from msgspec import Struct
 
 from schema.errors import ExperimentError, error_text
-from schema.experiment.document import BrainSection, Space
+from schema.experiment.document import BrainSection, Experiment, Space, body_space
+from schema.experiment.settings import ArenaSettings, EvaluationSettings
+from schema.parts import BodySpace
 from schema.plugins.check_neuron_type import check_neuron_type
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
@@ -75,6 +77,18 @@ def neuron_types(names: tuple[str, ...]) -> tuple[NeuronType, ...]:
     if not types:
         raise ExperimentError(f"{where}: must name at least one type, got none")
     return tuple(types.values())
+
+
+def types_of(
+    settings: Experiment | EvaluationSettings | ArenaSettings,
+) -> tuple[BodySpace, NeuronKinds]:
+    """Return the part types and the neuron types that robots may have, by name.
+
+    Raises:
+        UnknownPlugin: no such part type, neuron type or brain type.
+        ExperimentError: one that breaks its contract, or wrong parameters.
+    """
+    return body_space(settings.space), neuron_kinds(settings.brain, settings.space)
 
 
 def neuron_kinds(brain: BrainSection, space: Space) -> NeuronKinds:

@@ -8,6 +8,7 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 from pathlib import Path
 
 from schema.errors import InvalidRobot, MalformedMessage
+from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.contents import read_data, read_text
@@ -130,26 +131,24 @@ def _robogen_text(path: Path) -> str:
 
 
 def write_robot(
-    robot: Robot,
-    path: Path,
-    space: BodySpace = BUILT_IN,
-    settings: EvaluationSettings | None = None,
-    kinds: NeuronKinds = BUILT_IN_KINDS,
+    robot: Robot, path: Path, settings: EvaluationSettings | None = None
 ) -> None:
     """Write a robot to a file.
 
     Args:
         robot: the robot.
         path: ends in .yaml, .yml, .pb, .xml or .urdf.
-        space: its part types.
-        settings: stored in MJCF; the default values if None.
-        kinds: the allowed neuron types.
+        settings: name its types, and are stored in MJCF; None: the default values,
+            with all built-in types.
 
     Raises:
-        InvalidRobot: another ending, a robot that is not well formed in this body
-            space, or a file that cannot be written.
+        InvalidRobot: another ending, a robot that is not well formed with these types,
+            or a file that cannot be written.
     """
     ending = _ending(path, _WRITTEN)
+    space, kinds = (
+        (BUILT_IN, BUILT_IN_KINDS) if settings is None else types_of(settings)
+    )
     settings = settings or settings_of(None)
     if ending in _YAML:
         data = robot_to_yaml(robot, space, kinds).encode()

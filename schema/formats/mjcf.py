@@ -24,8 +24,7 @@ from schema.errors import (
     shown,
 )
 from schema.experiment.bounded import parse_xml
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
+from schema.experiment.brains import types_of
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.formats.contents import read_text
@@ -76,8 +75,8 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
         InvalidRobot: the robot is not well formed in the settings' body space, or
             MuJoCo cannot build it.
     """
-    space = body_space(settings.space)
-    check_robot(robot, space, neuron_kinds(settings.brain, settings.space))
+    space, kinds = types_of(settings)
+    check_robot(robot, space, kinds)
     try:
         spec = solo_spec(robot, space, settings.simulation, settings.environment)
         add_sensors(spec, robot, space)
@@ -114,9 +113,9 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
     try:
         robot = decode_robot(_bytes(held, ROBOT))
         settings = read_evaluation_settings(_bytes(held, SETTINGS))
-        space = body_space(settings.space)
+        space, kinds = types_of(settings)
         check_number(robot)
-        check_robot(robot, space, neuron_kinds(settings.brain, settings.space))
+        check_robot(robot, space, kinds)
         spec = solo_spec(robot, space, settings.simulation, settings.environment)
         # Earlier files have no sensors.
         if root.find("sensor") is not None:

@@ -4,19 +4,11 @@ import sys
 from pathlib import Path
 
 from schema.errors import ExperimentError
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import (
-    Experiment,
-    body_space,
-    island_count,
-    island_experiment,
-)
+from schema.experiment.brains import types_of
+from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.file import own_experiment, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.files import BEST, MJCF_ENDING, read_robot, settings_of
-from schema.parts import BUILT_IN, BodySpace
-from schema.robot.brain import NeuronKinds
-from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot
 from schema.tables.description import DETAILS, allow_plugins_of, read_description
 from schema.tables.last_populations import best_of, last_populations
@@ -117,7 +109,7 @@ def read_with_settings(
         _allow_run_of(file)
         return (*read_mjcf(file), None)
     found = experiment_of(file, named, island, tells_default=tells_default)
-    return read_robot(file, *types_of(found)), settings_of(found), found
+    return read_robot_of(file, found), settings_of(found), found
 
 
 def _allow_run_of(file: Path) -> None:
@@ -144,16 +136,14 @@ def _of_island(experiment: Experiment, number: int) -> Experiment:
         raise ExperimentError(f"--{error}") from None
 
 
-def types_of(experiment: Experiment | None) -> tuple[BodySpace, NeuronKinds]:
-    """Return the part types and neuron types of an experiment; built-in ones of None.
+def read_robot_of(file: Path, experiment: Experiment | None) -> Robot:
+    """Return the robot of a file; without experiment it may have all built-in types.
 
     Raises:
+        InvalidRobot, MalformedMessage: as of ``read_robot``.
         ExperimentError: a type that cannot be loaded.
     """
-    if experiment is None:
-        return BUILT_IN, BUILT_IN_KINDS
-    kinds = neuron_kinds(experiment.brain, experiment.space)
-    return body_space(experiment.space), kinds
+    return read_robot(file, *(types_of(experiment) if experiment else ()))
 
 
 def tell(line: str) -> None:

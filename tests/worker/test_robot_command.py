@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from schema.formats.files import settings_of, write_robot
-from schema.parts import BUILT_IN
 from worker.bench.spider import spider
 from worker.robot.evaluation import evaluate
 from worker.robot_command import main
@@ -16,7 +15,7 @@ def test_file_has_the_evaluation_of_its_robot(
 ) -> None:
     expected = evaluate(spider(), settings_of(None))
     for name in ("spider.xml", "spider.yaml", "spider.pb"):
-        write_robot(spider(), tmp_path / name, BUILT_IN)
+        write_robot(spider(), tmp_path / name)
         assert main(["robot simulate", str(tmp_path / name)]) == 0
         lines = capsys.readouterr().out.splitlines()
         assert lines[0] == f"fitness:           {expected.fitness!r}"
@@ -27,7 +26,7 @@ def test_file_has_the_evaluation_of_its_robot(
 def test_fitness_in_an_arena_is_told_from_that_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    write_robot(spider(), tmp_path / "spider.yaml")
     for experiment, is_arena in (("scenario1", False), ("scenario3", True)):
         words = [str(tmp_path / "spider.yaml"), "--experiment", experiment]
         assert main(["robot simulate", *words]) == 0
@@ -45,7 +44,7 @@ def test_fitness_in_an_arena_is_told_from_that_alone(
 def test_draws_of_a_run_are_told_from_those_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], section: str
 ) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    write_robot(spider(), tmp_path / "spider.yaml")
     file = tmp_path / "mine.toml"
     for text, is_told in (("", False), (section, True)):
         file.write_text(f'name = "mine"\n{text}\n')
@@ -59,7 +58,7 @@ def test_draws_of_a_run_are_told_from_those_alone(
 def test_drawn_lengths_of_a_run_are_told_from_that_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    write_robot(spider(), tmp_path / "spider.yaml")
     file = tmp_path / "mine.toml"
     told = (
         "revolve: simulated for 2 s; the run draws the length of each evaluation "
@@ -78,7 +77,7 @@ def test_drawn_lengths_of_a_run_are_told_from_that_alone(
 def test_robustness_is_shown_by_change_and_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    write_robot(spider(), tmp_path / "spider.yaml")
     short = tmp_path / "short.toml"
     short.write_text('name = "short"\n[simulation]\nwindow_steps = 400\n')
     words = [str(tmp_path / "spider.yaml"), "--experiment", str(short)]

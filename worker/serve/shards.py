@@ -17,10 +17,8 @@ from functools import lru_cache
 from typing import Protocol, Self
 
 from schema.errors import StateDiffers
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
+from schema.experiment.brains import types_of
 from schema.experiment.settings import ArenaSettings, read_arena_settings
-from schema.robot.brain import NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
 from schema.wire.arena import Advance, Changes
@@ -247,15 +245,12 @@ def _closed_on_error(world: World) -> Iterator[World]:
 
 
 def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
-    space = body_space(settings.space)
-    kinds = _neuron_kinds(settings)
+    space, kinds = _types_of(settings)
     for insertion in changes.insertions:
         check_robot(insertion.robot, space, kinds)
 
 
-@lru_cache(maxsize=64)
-def _neuron_kinds(settings: ArenaSettings) -> NeuronKinds:
-    return neuron_kinds(settings.brain, settings.space)
+_types_of = lru_cache(maxsize=64)(types_of)
 
 
 def _repeat(world: World, history: Sequence[PastAdvance]) -> None:

@@ -24,7 +24,6 @@ from analysis.render.picture import (
 from analysis.render.ray_caster import RayCaster, _checker
 from schema.experiment.environment import Environment
 from schema.formats.files import settings_of, write_robot
-from schema.parts import BUILT_IN
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
 
@@ -186,7 +185,7 @@ def test_invalid_flags_are_refused(
 @pytest.fixture
 def robot_file(tmp_path: Path) -> Path:
     path = tmp_path / "robot.yaml"
-    write_robot(ROBOT, path, BUILT_IN)
+    write_robot(ROBOT, path)
     return path
 
 

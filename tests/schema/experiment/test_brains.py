@@ -73,7 +73,7 @@ def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
     for ending in ("yaml", "pb", "xml"):
         file = tmp_path / f"robot.{ending}"
         settings = evaluation_settings_of(experiment)
-        write_robot(robot, file, settings=settings, kinds=kinds)
+        write_robot(robot, file, settings)
         assert read_robot(file, kinds=kinds) == robot
         with pytest.raises(RevolveError, match="one of Simple, ") as caught:
             read_robot(file)
