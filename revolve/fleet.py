@@ -29,6 +29,7 @@ from schema.agent.network import DEFAULT_FLEET, Tls
 from schema.agent.supervisor import cores
 from schema.agent.topics import unique_name
 from schema.errors import ExperimentError, JobRefused, RevolveError
+from schema.experiment.brains import types_of
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.load import load_function
@@ -251,7 +252,7 @@ class Fleet:
         settings: EvaluationSettings,
         identity: Identity = NO_IDENTITY,
     ) -> "Future[Result]":
-        encoded = encode_robot(checked(robot, settings))
+        encoded = encode_robot(checked(robot, types_of(settings)))
         data, simulated_s = _job_of(settings)
         order = Order(
             "evaluate",

@@ -15,10 +15,11 @@ from revolve.messages import Task
 from schema.errors import InvalidRobot, RevolveError, counted, expectation, shown
 from schema.experiment.brains import types_of
 from schema.experiment.settings import EvaluationSettings
-from schema.formats.files import read_robot, settings_of, write_robot
+from schema.formats.files import read_robot, settings_of, types_for, write_robot
 from schema.formats.yaml_reader import OTHER_TYPES
 from schema.limits import MOST_PIXELS
-from schema.robot.brain import Brain
+from schema.parts import BodySpace
+from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
@@ -68,7 +69,7 @@ class Robot:
         """
         own = None if experiment is None else as_experiment(experiment)
         try:
-            found = read_robot(Path(path), *types_of(_settings(own)))
+            found = read_robot(Path(path), *types_for(_settings(own)))
         except InvalidRobot as error:
             text = str(error).replace(OTHER_TYPES, _OTHER_TYPES)
             raise InvalidRobot(text) from None
@@ -196,16 +197,21 @@ def as_experiment(experiment: Experiment | str | Path) -> Experiment:
     return Experiment.read(experiment)
 
 
-def checked(robot: Robot | PlainRobot, settings: EvaluationSettings) -> PlainRobot:
+def checked(
+    robot: Robot | PlainRobot, types: tuple[BodySpace, NeuronKinds]
+) -> PlainRobot:
     """Return a robot as the rooms have it.
 
+    Args:
+        robot: the robot.
+        types: the allowed part types and neuron types.
+
     Raises:
-        InvalidRobot: it is not well formed in these settings' body space, or has a
-            neuron of a type that they do not allow.
+        InvalidRobot: it is not well formed with these types.
     """
     found = plain(robot)
     check_number(found)
-    check_robot(found, *types_of(settings))
+    check_robot(found, *types)
     return found
 
 
@@ -221,7 +227,9 @@ def task_of(
     Raises:
         InvalidRobot: the robot is not well formed.
     """
-    encoded = encode_robot(checked(robot, settings))
+    # A picture needs no brain: a robot without experiment may have any built-in one.
+    types = types_for(settings) if size else types_of(settings)
+    encoded = encode_robot(checked(robot, types))
     data = msgspec.json.encode(settings)
     return Task(data, encoded, plugins(), is_judged, size)
 

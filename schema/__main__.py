@@ -5,8 +5,7 @@ from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.errors import RevolveError, counted
-from schema.experiment.brains import types_of
-from schema.formats.files import write_robot
+from schema.formats.files import types_for, write_robot
 from schema.formats.run_settings import read_with_settings
 from schema.parts import BodySpace
 from schema.plugins.permission import allow
@@ -38,7 +37,7 @@ def main(argv: list[str] | None = None) -> int:
         write_robot(robot, options.output, settings)
         print(f"{options.output}: written")
     else:
-        _show(robot, *types_of(settings), options.file.name)
+        _show(robot, *types_for(settings), options.file.name)
     return 0
 
 

@@ -80,6 +80,18 @@ def settings_of(experiment: Experiment | None) -> EvaluationSettings:
     return evaluation_settings_of(experiment)
 
 
+def types_for(settings: EvaluationSettings) -> tuple[BodySpace, NeuronKinds]:
+    """Return the types of settings; the default ones have all built-in types.
+
+    Raises:
+        UnknownPlugin: as of ``types_of``.
+        ExperimentError: as of ``types_of``.
+    """
+    if settings == settings_of(None):
+        return BUILT_IN, BUILT_IN_KINDS
+    return types_of(settings)
+
+
 def read_robot(
     path: Path, space: BodySpace = BUILT_IN, kinds: NeuronKinds = BUILT_IN_KINDS
 ) -> Robot:
@@ -139,17 +151,15 @@ def write_robot(
         robot: the robot.
         path: ends in .yaml, .yml, .pb, .xml or .urdf.
         settings: name its types, and are stored in MJCF; None: the default values,
-            with all built-in types.
+            with all built-in types (in MJCF, those of the default brain).
 
     Raises:
         InvalidRobot: another ending, a robot that is not well formed with these types,
             or a file that cannot be written.
     """
     ending = _ending(path, _WRITTEN)
-    space, kinds = (
-        (BUILT_IN, BUILT_IN_KINDS) if settings is None else types_of(settings)
-    )
     settings = settings or settings_of(None)
+    space, kinds = types_for(settings)
     if ending in _YAML:
         data = robot_to_yaml(robot, space, kinds).encode()
     elif ending == ".pb":

@@ -111,6 +111,23 @@ def test_file_keeps_the_robot(tmp_path: Path) -> None:
     assert rv.Robot.random(seed=9, number=3) != robot
 
 
+def test_robot_without_experiment_may_have_any_built_in_neuron(tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        "body: {type: Core, children: {1: {slot: 0, id: leg, type: ActiveHinge}}}\n"
+        "brain: {neurons: [{part: leg, layer: output, type: PhaseOscillator}]}"
+    )
+    robot = rv.Robot.read(file)
+    robot.write(tmp_path / "robot.pb")
+    assert rv.Robot.read(tmp_path / "robot.pb") == robot
+    with pytest.raises(rv.InvalidRobot, match="must be one of Simple, "):
+        rv.evaluate(robot)
+    cpg = rv.Experiment.read(
+        "scenario1", brain={"type": "cpg"}, simulation={"window_steps": 400}
+    )
+    assert rv.evaluate(robot, cpg).fitness is not None
+
+
 def test_invalid_robot_raises_before_anything_runs() -> None:
     robot = rv.Robot.random(seed=1)
     broken = rv.Robot(robot.parts[:1] + robot.parts, robot.brain)

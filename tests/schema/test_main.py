@@ -101,6 +101,26 @@ def test_show_has_the_units_of_parameters(
     assert "Oscillator(period 2.5 s, phase_offset 0.25 periods, amplitude 1)" in shown
 
 
+def test_robots_without_experiment_have_all_built_in_neuron_types(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path.write_text(
+        "body: {type: Core, children: {1: {slot: 0, id: leg, type: ActiveHinge}}}\n"
+        "brain: {neurons: [{part: leg, layer: output, type: PhaseOscillator, "
+        "params: {frequency: 0.75}}]}"
+    )
+    assert main(["robot", "check", str(path)]) == 0
+    assert main(["robot", "show", str(path)]) == 0
+    assert "PhaseOscillator(frequency 0.75 Hz, " in capsys.readouterr().out
+    there, back = path.with_suffix(".pb"), path.with_suffix(".yml")
+    assert main(["robot", "convert", str(path), str(there)]) == 0
+    assert main(["robot", "convert", str(there), str(back)]) == 0
+    assert read_robot(path) == read_robot(there) == read_robot(back)
+    # MJCF holds settings: those of the default brain type do not allow it.
+    with pytest.raises(InvalidRobot, match=r"one of Simple, .* got 'PhaseOscillator'"):
+        main(["robot", "convert", str(path), str(path.with_suffix(".xml"))])
+
+
 def test_part_types_of_an_experiment(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
