@@ -30,6 +30,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.files import read_table
+from schema.tables.learnt import best_trials
 from schema.wire.arena_codec import Rebuild
 from schema.wire.born import robot_of_birth
 
@@ -114,7 +115,8 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
     genome, stored = (born[name][0].as_py() for name in ("genome", "robot"))
     robot = robot_of_birth(genome, stored, own)
     origin = Origin(seed=run.seed, run=run.number, island=birth.island)
-    identity = Identity(origin, birth, _trial(run.folder, birth, recorded["trial"]))
+    learnt = best_trials(_rows_of(run.folder, "learning", birth))
+    identity = Identity(origin, birth, recorded["trial"] or learnt.get(birth, 0))
     evaluation, poses = simulators.alone(robot, settings, identity)
     differing = [
         f"{name} {recorded[name]}, now {getattr(evaluation, name)}"
@@ -129,15 +131,6 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
     # The evaluation combines several simulations; the poses are of another one.
     verdict = _verdict(name, differing, recorded["platform"], "evaluates")
     return Motion(birth, poses, f"{verdict}; shown without disturbances")
-
-
-def _trial(folder: Path, birth: BirthId, recorded: int) -> int:
-    """Return the number under which a recorded evaluation was simulated.
-
-    Number 0 of a robot that learnt is its best trial, which has another number.
-    """
-    trials = _rows_of(folder, "learning", birth).to_pylist()
-    return trials[_fittest(trials)]["trial"] if trials and not recorded else recorded
 
 
 def _fittest(rows: list[dict[str, Any]]) -> int:

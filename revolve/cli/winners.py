@@ -25,6 +25,7 @@ from schema.experiment.settings import (
 )
 from schema.robot.ids import BirthId
 from schema.tables.description import check_folder
+from schema.tables.learnt import best_trials
 from schema.wire.updates import individual
 
 
@@ -127,19 +128,12 @@ def _recorded(tables: dict[str, pa.Table]) -> dict[tuple[int, BirthId], _Recorde
 
     Of a robot that has learnt there it is the first of its best trials.
     """
-    found = {
-        (row["island"], individual(row)): _Recorded(row["trial"], row["simulated_s"])
-        for row in tables["evaluations"].to_pylist()
-    }
-    trials = tables["learning"].select(["island", "birth", "trial", "fitness"])
-    trials = trials.filter(pc.is_valid(trials["fitness"]))
-    order = [("fitness", "descending"), ("trial", "ascending")]
-    best: dict[tuple[int, BirthId], int] = {}
-    for row in trials.sort_by(order).to_pylist():
-        there = row["island"]
-        best.setdefault((there, BirthId(there, row["birth"])), row["trial"])
-    for key in best.keys() & found.keys():
-        found[key] = found[key]._replace(trial=best[key])
+    learnt = best_trials(tables["learning"])
+    found: dict[tuple[int, BirthId], _Recorded] = {}
+    for row in tables["evaluations"].to_pylist():
+        island, birth = row["island"], individual(row)
+        own = learnt.get(birth, 0) if island == birth.island else 0
+        found[island, birth] = _Recorded(row["trial"] or own, row["simulated_s"])
     return found
 
 

@@ -1,10 +1,11 @@
-"""Robots of the births table with the brains that they learnt in arenas."""
+"""Brains that robots learnt: those of arenas in the births table, and best trials."""
 
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from schema.robot.ids import BirthId
 from schema.tables.files import read_table
 
 
@@ -42,3 +43,17 @@ def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:
     index = births.schema.get_field_index("robot")
     field = births.schema.field(index)
     return births.set_column(index, field, pa.array(robots, field.type))
+
+
+def best_trials(learning: pa.Table) -> dict[BirthId, int]:
+    """Return the number of each robot's best trial; of equal ones the first.
+
+    Robots whose trials all failed are left out. The evaluations row of a robot that
+    learnt off-line has number 0 in place of this one.
+    """
+    judged = learning.filter(pc.is_valid(learning["fitness"]))
+    judged = judged.sort_by([("fitness", "descending"), ("trial", "ascending")])
+    best: dict[BirthId, int] = {}
+    for row in judged.select(["island", "birth", "trial"]).to_pylist():
+        best.setdefault(BirthId(row["island"], row["birth"]), row["trial"])
+    return best

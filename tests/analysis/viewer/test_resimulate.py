@@ -19,6 +19,7 @@ from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Part, Robot
+from schema.tables.columns import TABLES
 from schema.wire.codec import encode_robot
 
 ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
@@ -45,7 +46,8 @@ def shown_again(
         ],
         "births": [{"genome": None, "robot": encode_robot(ROBOT)}],
         "learning": [
-            {"trial": number, "fitness": value} for number, value in enumerate(trials)
+            {"island": 0, "birth": 16, "trial": number, "fitness": value}
+            for number, value in enumerate(trials)
         ],
     }  # fmt: skip
     asked: list[int] = []
@@ -63,7 +65,9 @@ def shown_again(
         patch.object(
             resimulate,
             "_rows_of",
-            lambda _folder, table, _birth: pa.Table.from_pylist(rows[table]),
+            lambda _folder, table, _birth: pa.Table.from_pylist(
+                rows[table], TABLES[table] if table == "learning" else None
+            ),
         ),
         patch.object(resimulate, "robot_of_birth", lambda *_: ROBOT),
     ):
