@@ -7,9 +7,10 @@
     run = rv.run("scenario1", seed=1, births=600)
 
 This module is the only one that other code imports. Importing it loads nothing else and
-changes no setting of the process; each name is loaded when it is first used. What
-computes runs in processes of its own, with the settings of the command ``revolve``, and
-gives the same results to the last bit. docs/python.md is the tutorial.
+changes no setting of the process; each name is loaded when it is first used.
+Simulations, pictures, fleets, runs and analyses have processes of their own, with the
+settings of the command ``revolve``, and give the same results to the last bit.
+docs/python.md is the tutorial.
 """
 
 from difflib import get_close_matches

@@ -25,7 +25,7 @@ class Result:
         simulated_s: simulated time [s].
         measures: named numbers of the experiment.
         failure: why there is no fitness; empty if there is one.
-        trace: recording of the robot; None from a fleet, or if the physics diverged.
+        trace: recording of the robot; None from a fleet, or if the simulation failed.
             With ``[robust]`` it is that of a simulation without disturbances, which
             did not give the fitness.
     """
@@ -82,7 +82,8 @@ def simulate(
         experiment: as for ``evaluate``; its fitness is not computed.
 
     Raises:
-        SimulationDiverged: the physics diverged, or the process crashed.
+        SimulationDiverged: the physics diverged, a sensor of a plug-in failed, or the
+            process crashed.
         InvalidRobot: as for ``evaluate``.
         ExperimentError: as for ``evaluate``.
     """

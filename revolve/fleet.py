@@ -147,7 +147,11 @@ class Fleet:
 
     @property
     def workers(self) -> int:
-        """Number of workers that have joined and can do the jobs."""
+        """Number of workers that have joined and can do the jobs.
+
+        Raises:
+            RevolveError: the fleet is not open.
+        """
         return self._opened.workers
 
     def submit(
@@ -170,7 +174,7 @@ class Fleet:
         Raises:
             InvalidRobot: the robot is not well formed for this experiment.
             ExperimentError: no such experiment or file, or an invalid document.
-            RevolveError: the fleet is closed.
+            RevolveError: the fleet is closed or not open.
         """
         return self._submit(robot, settings_for(robot, experiment))
 
@@ -302,7 +306,7 @@ class Fleet:
     @property
     def _opened(self) -> Engine:
         if self._engine is None:
-            raise ExperimentError("the fleet is not open: use it in a 'with'")
+            raise RevolveError("the fleet is not open: use it in a 'with'")
         return self._engine
 
 

@@ -12,7 +12,14 @@ from revolve.arguments import whole_number
 from revolve.children import SIMULATOR, plugins
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
-from schema.errors import InvalidRobot, RevolveError, counted, expectation, shown
+from schema.errors import (
+    InvalidRobot,
+    MalformedMessage,
+    RevolveError,
+    counted,
+    expectation,
+    shown,
+)
 from schema.experiment.brains import types_of
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, types_for, write_robot
@@ -43,8 +50,9 @@ class Robot:
         parts: of the body, in depth-first order; the first is the core.
         brain: network of neurons. It has the connections of the genome that lead to a
             neuron (resolved); the births table counts the others, too.
-        experiment: whose part types and simulation apply; None: those of ``scenario1``
-            with all built-in part types.
+        experiment: whose part types and simulation apply; None: files and pictures may
+            have all built-in types; ``evaluate`` and ``simulate`` take ``scenario1``,
+            which has no light sensor.
     """
 
     parts: tuple[Part, ...]
@@ -60,8 +68,9 @@ class Robot:
         Args:
             path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
             experiment: whose part types are allowed, and whose simulation and fitness
-                apply; None: the built-in part types, and those of ``scenario1``, also
-                if the file lies in a run folder or holds settings (MJCF).
+                apply; None: all built-in types are allowed, and ``evaluate`` and
+                ``simulate`` take ``scenario1``, which has no light sensor, also if the
+                file lies in a run folder or holds settings (MJCF).
 
         Raises:
             InvalidRobot: the file holds no robot that is well formed.
@@ -73,6 +82,8 @@ class Robot:
         except InvalidRobot as error:
             text = str(error).replace(OTHER_TYPES, _OTHER_TYPES)
             raise InvalidRobot(text) from None
+        except MalformedMessage as error:
+            raise InvalidRobot(str(error)) from None
         return cls(found.parts, found.brain, own)
 
     @classmethod

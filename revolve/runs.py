@@ -287,7 +287,8 @@ def run(
         seed: random seed.
         births: number of births on each island; None: the experiment's.
         out: run folder; None: ``runs/NAME-seedSEED``.
-        workers: worker processes; None: one per core. No result depends on it.
+        workers: worker processes; None: one per core, or none with ``connect``. No
+            result depends on it.
         connect: address of a hub whose workers do the work.
         plugins: modules or ``.py`` files that may be imported, beside those that the
             experiment names.
@@ -297,6 +298,7 @@ def run(
         ExperimentError: an invalid experiment.
         RunFolderError: the folder is used, or the disk fails.
         NetworkError: no hub answers.
+        RevolveError: the run stopped before its end; ``resume`` continues it.
         KeyboardInterrupt: after Ctrl-C; ``resume`` continues the run.
     """
     document = document_of(experiment)
@@ -332,6 +334,7 @@ def resume(
 
     Raises:
         RunFolderError: there is no run, another process has it, or it is damaged.
+        RevolveError: as for ``run``.
         KeyboardInterrupt: as for ``run``.
     """
     _description(Path(folder))

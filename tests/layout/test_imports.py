@@ -120,7 +120,7 @@ def test_rooms_import_only_schema_and_themselves() -> None:
 
 
 def test_only_main_modules_import_the_command() -> None:
-    # `python -m coordinator` is `revolve coordinator`; no other module imports it.
+    # `python -m coordinator` is `revolve`; no other module imports it.
     importers = [
         relative(path)
         for path in sources()

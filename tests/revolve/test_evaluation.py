@@ -111,6 +111,13 @@ def test_file_keeps_the_robot(tmp_path: Path) -> None:
     assert rv.Robot.random(seed=9, number=3) != robot
 
 
+def test_damaged_file_holds_no_robot(tmp_path: Path) -> None:
+    file = tmp_path / "robot.pb"
+    file.write_bytes(b"\x00\xff")
+    with pytest.raises(rv.InvalidRobot, match=r"robot\.pb: not the bytes of a Robot"):
+        rv.Robot.read(file)
+
+
 def test_robot_without_experiment_may_have_any_built_in_neuron(tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     file.write_text(

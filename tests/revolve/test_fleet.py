@@ -208,7 +208,7 @@ def test_closed_fleet_cancels_and_refuses() -> None:
         future.result(0)
     with pytest.raises(rv.RevolveError, match="closed"):
         fleet.submit(robots(1)[0])
-    with pytest.raises(rv.ExperimentError, match="use it in a 'with'"):
+    with pytest.raises(rv.RevolveError, match="use it in a 'with'"):
         rv.Fleet(workers=1).submit(robots(1)[0])
     with pytest.raises(rv.ExperimentError, match="workers: must be >= 1, got 0"):
         rv.Fleet(workers=0)
