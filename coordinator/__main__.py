@@ -113,8 +113,7 @@ def plugin_kinds() -> tuple[Kind, ...]:
     from worker.robot.brains import Controls, load_controls
 
     def controls(experiment: Experiment) -> Controls:
-        clock = experiment.simulation
-        tick_s = clock.brain_steps * clock.timestep_s
+        tick_s = experiment.simulation.tick_s
         # Its check runs when it is made.
         return load_controls(experiment.brain, experiment.space, tick_s)
 

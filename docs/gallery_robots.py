@@ -93,7 +93,7 @@ def film_robot(robot: Robot, experiment: Experiment, path: Path) -> None:
     with RobotRenderer(robot, settings, size=SIZE) as renderer:
         pictures = [renderer.picture(pose) for pose in poses]
     world = settings.simulation
-    save_film(pictures, path, world.brain_steps * world.timestep_s)
+    save_film(pictures, path, world.tick_s)
 
 
 def record_robot(name: str, robot: Robot, experiment: Experiment, path: Path) -> None:

@@ -329,8 +329,8 @@ def _results(
 def _job_of(settings: EvaluationSettings) -> tuple[bytes, float]:
     """Return settings as JSON, and the length of an evaluation [s]."""
     clock = settings.simulation
-    steps = clock.warmup_steps + clock.window_steps
-    return msgspec.json.encode(settings), steps * clock.timestep_s
+    simulated_s = clock.evaluation_steps * clock.timestep_s
+    return msgspec.json.encode(settings), simulated_s
 
 
 def _encode(

@@ -97,7 +97,7 @@ def _read(
         tell("noise, pushes and [robust] use other random numbers than the run")
     clock = settings.simulation
     if clock.evaluation_s is not None:
-        seconds = (clock.warmup_steps + clock.window_steps) * clock.timestep_s
+        seconds = clock.evaluation_steps * clock.timestep_s
         tell(
             f"simulated for {seconds:g} s; the run draws the length of each evaluation "
             "(simulation.evaluation_s)"

@@ -217,7 +217,7 @@ def _motion(
     poses: list[Floats] = []
     watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
     simulate(robot, settings, watch=watch)
-    tick_s = settings.simulation.brain_steps * settings.simulation.timestep_s
+    tick_s = settings.simulation.tick_s
     step, film_step = (
         max(1, round(every_s / tick_s)) for every_s in (EVERY_S, FILM_EVERY_S)
     )

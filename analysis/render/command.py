@@ -61,15 +61,14 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
             save_picture(renderer.picture(), out)
         else:
             live = partial(simulate, robot, settings)
-            tick_s = world.brain_steps * world.timestep_s
-            _draw_motion(renderer, live, options.gait, out, tick_s)
+            _draw_motion(renderer, live, options.gait, out, world.tick_s)
     print(f"{out}: written")
     return 0
 
 
 def _check_gait(gait: int | None, world: Simulation) -> None:
     """Refuse more pictures than there are ticks."""
-    ticks = -(-(world.warmup_steps + world.window_steps) // world.brain_steps)
+    ticks = -(-world.evaluation_steps // world.brain_steps)
     most = ticks - ticks // 2
     if gait is not None and gait > most:
         raise NoPictures(

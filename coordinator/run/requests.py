@@ -123,7 +123,7 @@ class Requests:
             )
         own = context.experiments[requester_of(command)]
         clock = own.simulation
-        steps = command.steps or clock.warmup_steps + clock.window_steps
+        steps = command.steps or clock.evaluation_steps
         return partial(
             read_evaluation,
             expected=expected,

@@ -127,8 +127,7 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
         is_reevaluated=experiment.selection.reevaluation is not None,
         encoding=experiment.encoding.type,
     )
-    tick_s = clock.brain_steps * clock.timestep_s
-    yield from delay_problems(experiment.calibration, tick_s, is_arena=is_arena)
+    yield from delay_problems(experiment.calibration, clock.tick_s, is_arena=is_arena)
     if experiment.arena is not None:
         yield from _arena_problems(experiment, experiment.arena)
         yield from _arena_clock_problems(experiment.arena, experiment.simulation)
@@ -315,8 +314,8 @@ def _duration_problems(experiment: Experiment) -> Iterator[str]:
     shortest, longest = clock.evaluation_s
     if experiment.arena is not None:
         yield f"{where}: not for arenas, which evaluate all the time; remove it"
-    least = (clock.warmup_steps + clock.window_steps) * clock.timestep_s
-    if steps_of(shortest, clock) < clock.warmup_steps + clock.window_steps:
+    least = clock.evaluation_steps * clock.timestep_s
+    if steps_of(shortest, clock) < clock.evaluation_steps:
         yield (
             f"{where}: must be >= {least:g} s, warmup_steps and window_steps "
             f"together, got {shortest:g}"

@@ -39,7 +39,7 @@ def _scenery_problems(experiment: Experiment) -> Iterator[str]:
 def _push_problems(experiment: Experiment) -> Iterator[str]:
     """Yield whether pushes do not begin at a tick, or never begin."""
     world, clock = experiment.environment, experiment.simulation
-    tick_s = clock.brain_steps * clock.timestep_s
+    tick_s = clock.tick_s
     ticks = max(1, round(world.push_interval_s / tick_s))
     is_whole = isclose(ticks * tick_s, world.push_interval_s, rel_tol=1e-9)
     if world.push_impulse and not is_whole:
@@ -47,7 +47,7 @@ def _push_problems(experiment: Experiment) -> Iterator[str]:
             f"environment.push_interval_s: must be a whole multiple of {tick_s:g} s, "
             f"the time between brain ticks, got {world.push_interval_s:g}"
         )
-    steps = clock.warmup_steps + clock.window_steps
+    steps = clock.evaluation_steps
     if clock.evaluation_s is not None:
         steps = steps_of(clock.evaluation_s[1], clock)
     is_never = experiment.arena is None and ticks * clock.brain_steps >= steps

@@ -315,6 +315,16 @@ class Simulation(Section, frozen=True):
     mass_factor: Positive = 1.0
     torque_factor: Positive = 1.0
 
+    @property
+    def tick_s(self) -> float:
+        """Time between two brain ticks [s]."""
+        return self.brain_steps * self.timestep_s
+
+    @property
+    def evaluation_steps(self) -> int:
+        """Physics steps of an evaluation, warm-up and window."""
+        return self.warmup_steps + self.window_steps
+
 
 class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.

@@ -120,7 +120,7 @@ def _replay(
     space = body_space(settings.space)
     model = solo_spec(robot, space, clock, settings.environment).compile()
     data = mujoco.MjData(model)
-    left = clock.warmup_steps + clock.window_steps
+    left = clock.evaluation_steps
     start = time.thread_time()
     for command in commands:
         data.ctrl[:] = command

@@ -378,9 +378,7 @@ class Controls:
 @lru_cache(maxsize=64)
 def controls_of(settings: EvaluationSettings | ArenaSettings) -> Controls:
     """Return the brains of a request's experiment; see ``Controls``."""
-    clock = settings.simulation
-    tick_s = clock.brain_steps * clock.timestep_s
-    return load_controls(settings.brain, settings.space, tick_s)
+    return load_controls(settings.brain, settings.space, settings.simulation.tick_s)
 
 
 @lru_cache(maxsize=64)

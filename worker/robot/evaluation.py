@@ -91,7 +91,7 @@ def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:
         functions.fitness.value(trace),
         path_velocity(trace),
         straight_velocity(trace),
-        (clock.warmup_steps + clock.window_steps) * clock.timestep_s,
+        clock.evaluation_steps * clock.timestep_s,
         tuple(each.value(trace) for each in functions.measures),
     )
 
@@ -208,7 +208,7 @@ class _ControlLoop:
         self._model, self.data = model, mujoco.MjData(model)
         self._velocities = self.data.qvel.data
         self._simulation = simulation
-        self._tick_s = simulation.brain_steps * simulation.timestep_s
+        self._tick_s = simulation.tick_s
         controls = controls_of(settings)
         width = controls.width
         self._light = settings.environment.light
@@ -222,7 +222,7 @@ class _ControlLoop:
             counts_gap=settings.environment.counts_gap,
         )
         self._servos = Servos(robot, types, model, self.data)
-        steps = simulation.warmup_steps + simulation.window_steps
+        steps = simulation.evaluation_steps
         ticks = steps // simulation.brain_steps + 1
         self._controller = controls.solo(robot.brain, ticks)
         self._sensors.write_to(self._controller.readings)

@@ -37,9 +37,9 @@ class Pushes:
             model: a compiled model of the robot.
             data: the model's state, to which the forces are written.
         """
-        tick_s = simulation.brain_steps * simulation.timestep_s
+        tick_s = simulation.tick_s
         self._every = max(1, round(environment.push_interval_s / tick_s))
-        steps = simulation.warmup_steps + simulation.window_steps
+        steps = simulation.evaluation_steps
         count = steps // simulation.brain_steps // self._every + 1
         rng = stream(Purpose.PUSHES, identity.origin, identity.birth, identity.trial)
         angles = rng.uniform(0.0, 2.0 * pi, count).tolist()

@@ -24,7 +24,7 @@ def answer(request: bytes) -> bytes:
     """
     job = pb.Request.FromString(request)
     clock = read_evaluation_settings(job.settings).simulation
-    steps = job.steps or clock.warmup_steps + clock.window_steps
+    steps = job.steps or clock.evaluation_steps
     nothing = Evaluation(0.0, 0.0, 0.0, steps * clock.timestep_s)
     return encode_answer(Answer(job.epoch, job.number, 0.0, nothing))
 
