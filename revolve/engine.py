@@ -43,7 +43,7 @@ class Order:
     """
 
     kind: JobKind
-    encode: Callable[[str, int, int], bytes]
+    encode: Callable[..., bytes]
     read: Callable[[tuple[int, int]], Read]
     settle: Callable[[Deliver], Any]
     future: "Future[Any]" = field(default_factory=Future)
@@ -202,7 +202,8 @@ class Engine:
         if order.future.cancelled():
             return
         number = fleet.new_number()
-        payload = order.encode(*self._client, number)
+        run, epoch = self._client
+        payload = order.encode(run=run, epoch=epoch, number=number)
         read = order.read((_EPOCH, number))
         self._open[number] = order
         fleet.request(Job(number, order.kind, payload, -1, self._client, order, read))

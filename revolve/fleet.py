@@ -244,7 +244,12 @@ class Fleet:
             raise ExperimentError(f"item {number}: {error}") from None
         order = Order(
             "call",
-            partial(_encode_call, settings=settings, argument=argument),
+            partial(
+                encode_call_request,
+                settings=settings,
+                argument=argument,
+                plugins=plugins_of(settings),
+            ),
             lambda expected: partial(read_call_answer, expected=expected),
             partial(_value, number=number),
         )
@@ -260,7 +265,13 @@ class Fleet:
         data, simulated_s = _job_of(settings)
         order = Order(
             "evaluate",
-            partial(_encode, settings=data, robot=encoded, identity=identity),
+            partial(
+                encode_request,
+                settings=data,
+                robot=encoded,
+                identity=identity,
+                plugins=plugins_of(data),
+            ),
             lambda expected: partial(
                 read_evaluation,
                 expected=expected,
@@ -333,27 +344,6 @@ def _job_of(settings: EvaluationSettings) -> tuple[bytes, float]:
     return msgspec.json.encode(settings), simulated_s
 
 
-def _encode(
-    run: str,
-    epoch: int,
-    number: int,
-    *,
-    settings: bytes,
-    robot: bytes,
-    identity: Identity,
-) -> bytes:
-    """Return the request of an evaluation."""
-    return encode_request(
-        run=run,
-        epoch=epoch,
-        number=number,
-        settings=settings,
-        robot=robot,
-        identity=identity,
-        plugins=plugins_of(settings),
-    )
-
-
 def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
     """Return the result that the end of an evaluation gives.
 
@@ -387,20 +377,6 @@ def _path_of(function: str | Callable[[Any], Any]) -> str:
             "outside of any other function"
         )
     return f"{home}:{name}"
-
-
-def _encode_call(
-    run: str, epoch: int, number: int, *, settings: bytes, argument: bytes
-) -> bytes:
-    """Return the request of a call."""
-    return encode_call_request(
-        run=run,
-        epoch=epoch,
-        number=number,
-        settings=settings,
-        argument=argument,
-        plugins=plugins_of(settings),
-    )
 
 
 def _value(end: Deliver, *, number: int) -> object:
