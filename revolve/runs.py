@@ -26,7 +26,7 @@ from schema.tables.description import (
     read_state,
     run_columns,
 )
-from schema.tables.files import read_table
+from schema.tables.files import born_as, read_table
 from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual
@@ -157,10 +157,7 @@ class Run:
 
     def _birth(self, birth: BirthId) -> pa.Table:
         """Return the row of a birth."""
-        is_it = (pc.field("island") == birth.island) & (
-            pc.field("birth") == birth.number
-        )
-        found = self.births.filter(is_it)
+        found = self.births.filter(born_as(birth))
         if not found.num_rows:
             raise RunFolderError(
                 f"{self.folder}: has no birth {birth.number} on island {birth.island}"

@@ -29,7 +29,7 @@ from schema.experiment.settings import (
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
-from schema.tables.files import read_table
+from schema.tables.files import born_as, read_table
 from schema.tables.learnt import best_trials
 from schema.wire.arena_codec import Rebuild
 from schema.wire.born import robot_of_birth
@@ -169,9 +169,10 @@ def _in_arena(
     platform = next(iter(read_table(folder, "runs")["platform"].to_pylist()), "")
     motions = {}
     for birth, rows in recorded.items():
-        differing = _differences(rows, _only(replayed, birth), is_equal=is_equal)
+        again = replayed.filter(born_as(birth))
+        differing = _differences(rows, again, is_equal=is_equal)
         verdict = _verdict(name_of(birth), differing, platform)
-        motions[birth] = Motion(birth, _only(frames, birth), verdict)
+        motions[birth] = Motion(birth, frames.filter(born_as(birth)), verdict)
     return motions
 
 
@@ -192,16 +193,10 @@ def _differences(
 
 def _rows_of(folder: Path, table: str, birth: BirthId) -> pa.Table:
     """Return the rows of a robot on the island where it was born."""
-    rows = _only(read_table(folder, table), birth)
+    rows = read_table(folder, table).filter(born_as(birth))
     if "birth_island" in rows.column_names:
         rows = rows.filter(pc.is_null(rows["birth_island"]))
     return rows
-
-
-def _only(poses: pa.Table, birth: BirthId) -> pa.Table:
-    """Return the rows with a robot's island and number of birth."""
-    is_island = pc.field("island") == birth.island
-    return poses.filter(is_island & (pc.field("birth") == birth.number))
 
 
 def _verdict(

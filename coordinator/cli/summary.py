@@ -32,7 +32,7 @@ from schema.formats.files import BEST
 from schema.formats.yaml import robot_to_yaml
 from schema.robot.robot import Robot
 from schema.tables.description import allow_plugins_of
-from schema.tables.files import read_table
+from schema.tables.files import born_as, read_table
 from schema.tables.last_populations import Row, best_of, last_populations
 from schema.tables.learnt import learnt_births
 from schema.wire.born import robot_of_birth
@@ -218,13 +218,8 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
 
 def _read_best(folder: Path, best: Row, experiment: Experiment) -> tuple[int, Robot]:
     """Return the rank in ancestry and the robot of a population row."""
-    birth = individual(best)
-    births = learnt_births(folder)
-    is_it = pc.and_(
-        pc.equal(births["island"], birth.island),
-        pc.equal(births["birth"], birth.number),
-    )
-    (row,) = births.filter(is_it).select(["genome", "robot", "rank"]).to_pylist()
+    found = learnt_births(folder).filter(born_as(individual(best)))
+    (row,) = found.select(["genome", "robot", "rank"]).to_pylist()
     return row["rank"], robot_of_birth(row["genome"], row["robot"], experiment)
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pyarrow as pa
-import pyarrow.compute as pc
 from msgspec import structs
 
 from analysis.measures.load import read_run, read_tables
@@ -25,6 +24,7 @@ from schema.experiment.settings import (
 )
 from schema.robot.ids import BirthId
 from schema.tables.description import check_folder
+from schema.tables.files import born_as
 from schema.tables.learnt import best_trials
 from schema.wire.updates import individual
 
@@ -97,10 +97,8 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         if not (number in last or number == best):
             continue
         island, birth = row["birth_island"], row["birth"]
-        is_own = pc.and_(
-            pc.equal(births["island"], island), pc.equal(births["birth"], birth)
-        )
-        (robot,) = own.robots(births.filter(is_own))
+        name = BirthId(island, birth)
+        (robot,) = own.robots(births.filter(born_as(name)))
         head = {
             "experiment": run.experiment,
             "folder": str(folder),
@@ -110,7 +108,7 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
             "is_last": number in last,
             "recorded": row["fitness"],
         }
-        there, name = row["island"], BirthId(island, birth)
+        there = row["island"]
         origin = Origin(seed=run.seed, run=run.number, island=there)
         evaluation = recorded.get((there, name), _Recorded())
         identity = Identity(origin, name, evaluation.trial)

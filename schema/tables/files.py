@@ -21,6 +21,7 @@ from pyarrow.fs import LocalFileSystem
 from pyarrow.parquet import ParquetFile, read_schema
 
 from schema.errors import RunFolderError
+from schema.robot.ids import BirthId
 from schema.tables.checksums import digest_of, read_seal
 from schema.tables.columns import TABLES
 from schema.tables.description import read_description, run_columns
@@ -51,6 +52,15 @@ class Stored(NamedTuple):
     rows: int
     used: dict[Path, Batch | None]
     unused: list[Path]
+
+
+def born_as(birth: BirthId) -> pc.Expression:
+    """Return the filter for the rows of an individual, by island and number of birth.
+
+    Tables that have a column ``birth_island`` may also have rows of immigrants with
+    these numbers.
+    """
+    return (pc.field("island") == birth.island) & (pc.field("birth") == birth.number)
 
 
 def parquet_path(folder: Path, experiment: str, run: int, table: str) -> Path:
