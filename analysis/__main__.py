@@ -3,33 +3,14 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from analysis.extras import extra
 from analysis.viewer.flags import FILM_ENDING
-from schema.agent.extras import install_advice
 from schema.agent.flags import Flags, add_plugins, whole_number
-from schema.errors import RevolveError
 from schema.plugins.permission import allow
-
-
-class MissingExtra(RevolveError):  # noqa: N818 - names what is missing
-    """A library that only analysis needs is not installed."""
-
-
-@contextmanager
-def _extra(what: str, extra: str) -> Iterator[None]:
-    """Name the extra of the package with a library that cannot be imported.
-
-    Raises:
-        MissingExtra: a library is not installed.
-    """
-    try:
-        yield
-    except ImportError as error:
-        raise MissingExtra(f"{what} {error.name}: {install_advice(extra)}") from None
 
 
 def main(arguments: list[str]) -> int:
@@ -48,13 +29,13 @@ def main(arguments: list[str]) -> int:
     options = parser(arguments[0]).parse_args(arguments[1:])
     if arguments[0] == "robot render":
         simulate = _simulation()
-        with _extra("pictures need", "pictures"):
+        with extra("pictures need", "pictures"):
             from analysis.render.command import render
         return render(options, simulate)
     if arguments[0] == "view":
         return _view(options)
     allow(options.plugins)
-    with _extra("analysis needs", "analysis"):
+    with extra("analysis needs", "analysis"):
         from analysis.analyze_command import analyze
     return analyze(options, arguments, _simulation)
 
@@ -122,7 +103,7 @@ def _simulation() -> Callable[..., Any]:
     Raises:
         MissingExtra: a library for rendering is not installed.
     """
-    with _extra("pictures need", "pictures"):
+    with extra("pictures need", "pictures"):
         from analysis.render.stage import choose_engine
 
         # Before MuJoCo is imported.
@@ -137,14 +118,14 @@ def _view(options: argparse.Namespace) -> int:
     A film of an arena needs no viewer.
     """
     if options.save is not None and options.save.suffix.lower() == FILM_ENDING:
-        with _extra("pictures need", "pictures"):
+        with extra("pictures need", "pictures"):
             from analysis.render.stage import choose_engine
 
             # Before MuJoCo is imported.
             choose_engine()
             from analysis.viewer.arena_film import film
         return film(options)
-    with _extra("the viewer needs", "view"):
+    with extra("the viewer needs", "view"):
         from analysis.viewer.command import view
     from analysis.viewer.resimulate import Simulators
     from coordinator.run.history import arena_history

@@ -5,12 +5,11 @@ from contextlib import suppress
 
 import msgspec
 
+from analysis.extras import extra
 from revolve.messages import Outcome, Task, problem_of
 from revolve.trace import pack_trace
-from schema.agent.extras import install_advice
 from schema.errors import (
     FitnessUndefined,
-    RevolveError,
     SensorFailed,
     SimulationDiverged,
 )
@@ -67,14 +66,10 @@ def _picture(
     robot: Robot, settings: EvaluationSettings, size: tuple[int, int]
 ) -> bytes:
     """Return a picture of a robot in neutral pose, as PNG."""
-    try:
+    with extra("pictures need", "pictures"):
         from PIL import Image  # noqa: PLC0415
 
         from analysis.render.picture import RobotRenderer  # noqa: PLC0415
-    except ImportError as error:
-        raise RevolveError(
-            f"pictures need {error.name}: {install_advice('pictures')}"
-        ) from None
     file = io.BytesIO()
     with RobotRenderer(robot, settings, size=size) as renderer:
         Image.fromarray(renderer.picture()).save(file, "PNG")

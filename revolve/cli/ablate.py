@@ -1,9 +1,8 @@
 """``revolve ablate``: re-evaluate robots without some sensors and motors."""
 
+from analysis.extras import extra
 from revolve.cli.reevaluation_flags import add_reevaluation
-from schema.agent.extras import install_advice
 from schema.agent.flags import Flags, add_count
-from schema.errors import RevolveError
 from schema.plugins.permission import allow
 
 
@@ -15,16 +14,13 @@ def main(arguments: list[str]) -> int:
 
     Raises:
         RunFolderError: no run, an unfinished one, or a folder that cannot be written.
-        RevolveError: a library is missing, or no worker is left.
+        MissingExtra: a library is not installed.
+        RevolveError: no worker is left.
     """
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
-    try:
+    with extra("ablate needs", "analysis"):
         from revolve.cli.ablating import ablate_runs
-    except ImportError as error:
-        raise RevolveError(
-            f"ablate needs {error.name}: {install_advice('analysis')}"
-        ) from None
     ablate_runs(
         options.runs,
         options.out,

@@ -1,9 +1,8 @@
 """``revolve robustness``: re-evaluate the robots of finished runs under changes."""
 
+from analysis.extras import extra
 from revolve.cli.reevaluation_flags import add_reevaluation
-from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
-from schema.errors import RevolveError
 from schema.plugins.permission import allow
 
 
@@ -15,16 +14,13 @@ def main(arguments: list[str]) -> int:
 
     Raises:
         RunFolderError: no run, an unfinished one, or a folder that cannot be written.
-        RevolveError: a library is missing, or no worker is left.
+        MissingExtra: a library is not installed.
+        RevolveError: no worker is left.
     """
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
-    try:
+    with extra("robustness needs", "analysis"):
         from revolve.cli.rejudging import rejudge_runs
-    except ImportError as error:
-        raise RevolveError(
-            f"robustness needs {error.name}: {install_advice('analysis')}"
-        ) from None
     rejudge_runs(options.runs, options.out, options.workers)
     return 0
 
