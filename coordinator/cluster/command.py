@@ -159,7 +159,7 @@ def parser(_command: str = "cluster") -> Flags:
     )
     init.add_argument(
         "--days",
-        type=_days,
+        type=whole_number(most=AUTHORITY_DAYS),
         default=DAYS,
         metavar="N",
         help=f"days until the certificates expire, at most {AUTHORITY_DAYS} (default: "
@@ -181,16 +181,6 @@ def parser(_command: str = "cluster") -> Flags:
     revoke.add_argument("name", metavar="NAME", help="name of the machine")
     action("list", "list the certificates, and when they expire")
     return flags
-
-
-def _days(text: str) -> int:
-    """Return a number of days in which the authority does not expire."""
-    days = whole_number()(text)
-    if days > AUTHORITY_DAYS:
-        raise argparse.ArgumentTypeError(
-            f"must be <= {AUTHORITY_DAYS}, the days of the authority, got {text!r}"
-        )
-    return days
 
 
 def _host(text: str) -> str:
