@@ -25,6 +25,28 @@ FitnessFunction = Callable[[Trace, Any], float]
 """Function that ``fitness.function`` names: fitness of a trace; finite, maximised."""
 
 
+def finite_value(name: str, function: Callable[..., Any], *arguments: object) -> float:
+    """Return the value of a fitness function or a measure.
+
+    Args:
+        name: for messages.
+        function: of a user, or built-in.
+        arguments: of the call.
+
+    Raises:
+        FitnessUndefined: the function raised or gave no finite number.
+    """
+    try:
+        value = float(function(*arguments))
+    except Exception as error:
+        raise FitnessUndefined(
+            f"{name} raised {type(error).__name__}: {error}"
+        ) from error
+    if not math.isfinite(value):
+        raise FitnessUndefined(f"{name} must return a finite number, got {value}")
+    return value
+
+
 @dataclass(frozen=True, slots=True)
 class LoadedFitness:
     """Fitness function of an experiment with its parameters.
@@ -48,17 +70,7 @@ class LoadedFitness:
         Raises:
             FitnessUndefined: the function raised or gave no finite number.
         """
-        try:
-            value = float(self.function(trace, self.argument))
-        except Exception as error:
-            raise FitnessUndefined(
-                f"{self.name} raised {type(error).__name__}: {error}"
-            ) from error
-        if not math.isfinite(value):
-            raise FitnessUndefined(
-                f"{self.name} must return a finite number, got {value}"
-            )
-        return value
+        return finite_value(self.name, self.function, trace, self.argument)
 
 
 def load_fitness(fitness: Fitness) -> LoadedFitness:

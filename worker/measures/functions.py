@@ -1,23 +1,23 @@
 """Fitness and measures that an experiment names: functions, values, channels."""
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import msgspec
 
-from schema.errors import ExperimentError, FitnessUndefined
+from schema.errors import ExperimentError
 from schema.experiment.document import Measures
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.plugins.load import load_function, load_object
 from schema.plugins.needs import channels_of
 from schema.plugins.parameters import parameters_type, read_parameters
+from schema.plugins.protocols import MeasureFunction
 from schema.plugins.simple_traces import check_function
 from schema.robot.trace import Trace
 from worker.fitness import (
     LoadedFitness,
+    finite_value,
     load_fitness,
     path_velocity,
     straight_velocity,
@@ -31,9 +31,6 @@ from worker.measures.built_in import (
     joint_effort,
     turning,
 )
-
-MeasureFunction = Callable[..., Any]
-"""Function of a trace, and of its own parameters if it has any; finite."""
 
 BUILT_IN: dict[str, MeasureFunction] = {
     function.__name__: function
@@ -72,17 +69,8 @@ class Measure:
         Raises:
             FitnessUndefined: the function raised or gave no finite number.
         """
-        try:
-            value = float(self.function(trace, *self.arguments))
-        except Exception as error:
-            raise FitnessUndefined(
-                f"measure {self.name} raised {type(error).__name__}: {error}"
-            ) from error
-        if not math.isfinite(value):
-            raise FitnessUndefined(
-                f"measure {self.name} must return a finite number, got {value}"
-            )
-        return value
+        name = f"measure {self.name}"
+        return finite_value(name, self.function, trace, *self.arguments)
 
 
 @lru_cache(maxsize=64)
