@@ -137,7 +137,7 @@ class LivingRobots:
         candidate: Candidate,
         encoding: IslandEncoding,
         moment: Moment,
-        place: Place | None = None,
+        place: Place | None,
     ) -> list[Record]:
         """Insert a newborn; return the rows of its birth and of the population.
 

@@ -24,7 +24,7 @@ def brain_genes(experiment: Experiment) -> BrainGenes:
         UnknownPlugin: no such brain type or neuron type.
         ExperimentError: one that breaks its contract, or wrong parameters.
     """
-    return brain_half(experiment.brain, experiment.space.neuron_types, BUILT_IN)
+    return brain_half(experiment.brain, experiment.space, BUILT_IN)
 
 
 @lru_cache(maxsize=64)

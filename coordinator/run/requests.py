@@ -62,7 +62,7 @@ Expected = tuple[int, int]
 class Requests:
     """The vetting and evaluation requests of all islands of a run."""
 
-    def __init__(self, context: RunContext, fleet: Fleet, audit: float = 0.0) -> None:
+    def __init__(self, context: RunContext, fleet: Fleet, audit: float) -> None:
         """Initialise without requests.
 
         Args:

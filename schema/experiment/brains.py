@@ -107,14 +107,14 @@ def neuron_kinds(brain: BrainSection, space: Space) -> NeuronKinds:
 
 def brain_half(
     brain: BrainSection,
-    names: tuple[str, ...],
+    space: Space,
     built_in: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], Half]],
 ) -> Half:
     """Return the half of an experiment's brain type that one room needs.
 
     Args:
         brain: names the type.
-        names: ``space.neuron_types``.
+        space: names its neuron types.
         built_in: that half of the built-in types, by short name.
 
     Raises:
@@ -123,10 +123,10 @@ def brain_half(
     """
     if ":" in brain.type:
         # An own class has both halves.
-        return cast("Half", _own_brain(brain, names))
+        return cast("Half", _own_brain(brain, space.neuron_types))
     half = load_object(brain.type, _TYPE, built_in)
     parameters = _parameters(brain, _BUILT_IN[brain.type].parameters)
-    return half(parameters, neuron_types(names))
+    return half(parameters, neuron_types(space.neuron_types))
 
 
 def widths(space: Space) -> Widths:

@@ -50,8 +50,8 @@ class Learning(PluginSection, frozen=True):
 def learning_problems(
     learning: Learning | None,
     *,
-    is_reevaluated: bool = False,
-    encoding: str = "",
+    is_reevaluated: bool,
+    encoding: str,
 ) -> Iterator[str]:
     """Yield what is wrong with the section of one island.
 

@@ -12,8 +12,8 @@ _WORDS = {"body.parts": "part", "brain.neurons": "neuron", "brain.connections": 
 def with_ids(
     message: str,
     parts: Sequence[str],
-    neurons: Sequence[str] = (),
-    connections: Sequence[tuple[str, str]] = (),
+    neurons: Sequence[str],
+    connections: Sequence[tuple[str, str]],
 ) -> str:
     """Return a message of ``check_robot`` with ids in place of indices.
 

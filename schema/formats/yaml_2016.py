@@ -45,7 +45,7 @@ class RevolveReader(Reader):
         """Return the type of a part by its name in Revolve."""
         kind = _KINDS.get(table.text("type"), table.text("type"))
         if kind not in self.space:
-            table.refuse_word("type", self.space, OTHER_TYPES)
+            table.refuse_type(self.space, OTHER_TYPES)
         return kind
 
     def orientation(self, table: Table) -> int:
@@ -164,7 +164,7 @@ def _neuron(
     kind = INPUT if layer == "input" else "Simple"
     types = {INPUT: ()} if layer == "input" else NEURON_TYPES
     if typed is not None and (kind := typed.text("type")) not in types:
-        typed.refuse_word("type", types)
+        typed.refuse_type(types)
     values = []
     allowed = [*_ABOUT]
     for parameter in types[kind]:

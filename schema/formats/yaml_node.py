@@ -97,19 +97,16 @@ class Table:
         """Raise ``InvalidRobot`` about a key."""
         self._fail(self._at(key), message, self._key_lines.get(key, self.line))
 
-    def refuse_word(
-        self, key: str, allowed: Collection[str], hint: str = ""
-    ) -> NoReturn:
-        """Raise ``InvalidRobot`` about a word that is none of some words.
+    def refuse_type(self, allowed: Collection[str], hint: str = "") -> NoReturn:
+        """Raise ``InvalidRobot`` about a type that is none of some types.
 
         Args:
-            key: of the word.
-            allowed: the words; a similar one is named.
+            allowed: the types; one of a similar name is named.
             hint: end of the message.
         """
-        word = self.text(key)
-        line = self._key_lines[key]
-        problem = f"{self._at(key)} {shown(word)} is not supported"
+        word = self.text("type")
+        line = self._key_lines["type"]
+        problem = f"{self._at('type')} {shown(word)} is not supported"
         end = f"{nearest(word, allowed)}{hint}"
         self._fail("", f"{problem}: {_one_of(allowed)}{end}", line)
 

@@ -136,7 +136,7 @@ class Reader:
         """Return the type of a part."""
         kind = table.text("type")
         if kind not in self.space:
-            table.refuse_word("type", self.space, OTHER_TYPES)
+            table.refuse_type(self.space, OTHER_TYPES)
         return kind
 
     def own_slot(self, table: Table) -> int:
@@ -199,7 +199,7 @@ class Reader:
         )
         kind = table.text("type")
         if kind not in self._kinds:
-            table.refuse_word("type", self._kinds)
+            table.refuse_type(self._kinds)
         part = self.part_index[table.word("part", self.part_index)]
         values = _values(table, self._kinds[kind])
         return Neuron(layer, kind, part, values), table

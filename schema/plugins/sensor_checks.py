@@ -77,9 +77,7 @@ def ray_problem(direction: Vector, reach: float, start: Vector) -> None:
         raise ValueError(f"start must be finite, got {start}")
 
 
-def check_sensor(
-    sensor: OwnSensor, where: str = "sensor", shape: Shape | None = None
-) -> None:
+def check_sensor(sensor: OwnSensor, where: str, shape: Shape | None = None) -> None:
     """Raise unless an own sensor keeps its contract on three hand-made views.
 
     The views: at birth with nothing around; later, in touch, with a light and two other

@@ -39,6 +39,7 @@ from worker.robot import evaluation
 from worker.robot.robustness import finer
 
 T = TypeVar("T")
+_REPEATS = 7
 LEAST_RATIO = 0.85
 """Goal for the ratio of bare engine time to evaluation time (design, section 9)."""
 LEAST_SPEARMAN = 0.95
@@ -65,9 +66,7 @@ class Timing:
         return self.engine_s / self.evaluation_s
 
 
-def time_evaluations(
-    robots: Iterable[Robot], settings: EvaluationSettings, repeats: int = 7
-) -> Timing:
+def time_evaluations(robots: Iterable[Robot], settings: EvaluationSettings) -> Timing:
     """Return the time of evaluations and of their bare engine steps.
 
     Both are timed alternately, and the least time of each counts, as other load on the
@@ -76,7 +75,6 @@ def time_evaluations(
     Args:
         robots: checked robots.
         settings: of their evaluation.
-        repeats: number of measurements of each.
     """
     count, whole, bare = 0, 0.0, 0.0
     for robot in robots:
@@ -85,7 +83,7 @@ def time_evaluations(
         except SimulationDiverged:
             continue
         wholes, bares = [], []
-        for turn in range(2 * repeats):
+        for turn in range(2 * _REPEATS):
             if turn % 4 in {0, 3}:
                 wholes.append(_whole(robot, settings))
             else:

@@ -97,7 +97,7 @@ def _evaluated(
     return Evaluated(robot, replace(own, simulation=clock))
 
 
-def sample_thirds(fitness: Floats, per_third: int, seed: int = 1) -> list[int]:
+def sample_thirds(fitness: Floats, per_third: int, seed: int) -> list[int]:
     """Return indices drawn from each third of the robots, the least fit third first.
 
     Args:

@@ -325,7 +325,7 @@ class Controls:
         """
         self.width = widths(space)
         self.is_checked = any(":" in path for path in (brain.type, *space.neuron_types))
-        self._control = brain_half(brain, space.neuron_types, BUILT_IN)
+        self._control = brain_half(brain, space, BUILT_IN)
         self._tick_s = tick_s
         self.neurons = self._control.neurons
         self._place = f"brain.type: {where_defined(type(self._control))}"

@@ -13,7 +13,6 @@ from msgspec.structs import replace
 
 from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import Simulation
-from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.robust import Robust
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.robot import Robot
@@ -26,7 +25,7 @@ FRICTION = 0.99
 LIFT_M = 1e-4
 """Mean height by which starts are raised [m]."""
 STARTS = 8
-
+_SEED = 1
 
 FRICTIONS = (0.9, 0.99, 1.01, 1.1)
 FACTORS = (0.9, 1.1)
@@ -69,12 +68,11 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
     )
 
 
-def small_changes(settings: EvaluationSettings, seed: int = 1) -> tuple[Change, ...]:
+def small_changes(settings: EvaluationSettings) -> tuple[Change, ...]:
     """Return settings with finer time steps, less friction, and raised starts.
 
     Args:
         settings: to change.
-        seed: of the heights, drawn uniformly from 0 to ``2 LIFT_M``.
 
     Source: own definition.
     """
@@ -82,12 +80,12 @@ def small_changes(settings: EvaluationSettings, seed: int = 1) -> tuple[Change, 
     changed = [
         *_finer_steps(world),
         _with_friction(world, FRICTION),
-        *_raised_starts(world, seed),
+        *_raised_starts(world),
     ]
     return _as_changes(settings, changed)
 
 
-def all_changes(settings: EvaluationSettings, seed: int = 1) -> tuple[Change, ...]:
+def all_changes(settings: EvaluationSettings) -> tuple[Change, ...]:
     """Return settings with another time step, friction, start, noise, ground and robot.
 
     Time steps are finer. Friction, masses and torques differ by up to 10 %. Starts are
@@ -96,14 +94,13 @@ def all_changes(settings: EvaluationSettings, seed: int = 1) -> tuple[Change, ..
 
     Args:
         settings: to change, without ``robust``.
-        seed: as for ``small_changes``.
 
     Source: own definition.
     """
     world, ground = settings.simulation, settings.environment
     changed = [*_finer_steps(world)]
     changed += [_with_friction(world, factor) for factor in FRICTIONS]
-    changed += _raised_starts(world, seed)
+    changed += _raised_starts(world)
     roll, pitch, yaw = world.start_deg
     for roll_deg, pitch_deg in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         tilt = roll + TILT_DEG * roll_deg, pitch + TILT_DEG * pitch_deg, yaw
@@ -159,8 +156,10 @@ def _with_friction(world: Simulation, factor: float) -> _Changed:
     return f"friction {friction:g}", "friction", changed
 
 
-def _raised_starts(world: Simulation, seed: int) -> Iterator[_Changed]:
-    for lift_m in np.random.default_rng(seed).uniform(0.0, 2 * LIFT_M, STARTS).tolist():
+def _raised_starts(world: Simulation) -> Iterator[_Changed]:
+    """Yield starts at heights that are drawn uniformly from 0 to ``2 LIFT_M``."""
+    heights = np.random.default_rng(_SEED).uniform(0.0, 2 * LIFT_M, STARTS)
+    for lift_m in heights.tolist():
         higher = replace(world, drop_m=world.drop_m + lift_m)
         yield f"start {1000 * lift_m:.4f} mm higher", "start", higher
 
@@ -174,19 +173,16 @@ def _as_changes(
     )
 
 
-def rejudge(
-    robot: Robot, changes: Sequence[Change], identity: Identity = NO_IDENTITY
-) -> Iterator[Judged]:
+def rejudge(robot: Robot, changes: Sequence[Change]) -> Iterator[Judged]:
     """Evaluate a robot under each change, in their order.
 
     Args:
         robot: a checked robot.
         changes: changed settings.
-        identity: of the evaluations; noise and pushes depend on it.
     """
     for change in changes:
         try:
-            fitness = evaluate(robot, change.settings, identity).fitness
+            fitness = evaluate(robot, change.settings).fitness
         except (SimulationDiverged, SensorFailed, FitnessUndefined):
             yield Judged(change, None)
         else:

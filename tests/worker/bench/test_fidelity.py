@@ -38,13 +38,13 @@ def test_spearman_equals_that_of_scipy_with_ties() -> None:
 
 def test_each_third_is_sampled_equally() -> None:
     fitness = np.random.default_rng(4).permutation(30).astype(float)
-    chosen = fitness[sample_thirds(fitness, 4)]
+    chosen = fitness[sample_thirds(fitness, 4, 1)]
     assert (chosen[:4] < 10).all()
     assert ((chosen[4:8] >= 10) & (chosen[4:8] < 20)).all()
     assert (chosen[8:] >= 20).all()
     assert len(set(chosen.tolist())) == 12
     with pytest.raises(ExperimentError, match="3 x 11 robots are needed"):
-        sample_thirds(fitness, 11)
+        sample_thirds(fitness, 11, 1)
 
 
 def test_winners_are_the_ten_fittest_in_order() -> None:
