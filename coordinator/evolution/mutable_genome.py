@@ -6,7 +6,7 @@ function call, and convert it into a new genome.
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
-from operator import add, le, sub
+from operator import add, sub
 from typing import NamedTuple
 
 from msgspec import Struct, field
@@ -228,10 +228,6 @@ class SizeCounts(NamedTuple):
     def minus(self, other: Counts) -> "SizeCounts":
         """Return what is left without other counts."""
         return SizeCounts(*map(sub, self, other))
-
-    def fits(self, room: "SizeCounts") -> bool:
-        """Return whether no count exceeds that of ``room``."""
-        return all(map(le, self, room))
 
 
 def size_limits(space: Space) -> SizeCounts:

@@ -1,4 +1,4 @@
-"""Parsers of all commands, for completion, documentation and tests."""
+"""Parsers of the commands, for completion and documentation."""
 
 import argparse
 from importlib import import_module
@@ -31,16 +31,3 @@ def actions(parser: Flags) -> dict[str, Flags]:
     """Return the parsers of a command's actions, such as ``list`` of ``arena``."""
     found = subparsers_of(parser)
     return {} if found is None else dict(found.choices)
-
-
-def all_parsers() -> dict[str, Flags]:
-    """Return the parsers of all commands and of their actions, by their names.
-
-    The name of an action has two words, as ``arena list``.
-    """
-    found: dict[str, Flags] = {}
-    for command in COMMANDS:
-        found[command] = parser_of(command)
-        for name, parser in actions(found[command]).items():
-            found[f"{command} {name}"] = parser
-    return found

@@ -101,7 +101,7 @@ def experiments_of(source: str, births: int | None = None) -> tuple[Experiment, 
 
 
 def source_text(source: str) -> tuple[str, str]:
-    """Return the TOML text of an experiment, and its path for ``parse_experiment``.
+    """Return the TOML text of an experiment, and its path for ``parse_toml``.
 
     Args:
         source: as for ``read_experiment``.
@@ -159,31 +159,19 @@ def shipped_experiments() -> list[str]:
     )
 
 
-def parse_experiment(text: str, where: str) -> Experiment:
-    """Return the experiment of a TOML text of the user.
+def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
+    """Return the experiment of the tables of a user's TOML text, which are changed.
 
     The modules that it names may be imported by this process from now on.
 
     Args:
-        text: the document.
-        where: its path, for messages, and for relative paths of scenery and plug-ins.
-
-    Raises:
-        ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
-            wrong type or outside its range; inconsistent values.
-    """
-    return _checked(_converted(parse_toml(text, where), where), where, where)
-
-
-def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
-    """Return the experiment of the tables of a TOML text, which are changed.
-
-    Args:
         document: the tables.
-        where: as for ``parse_experiment``.
+        where: path of the text, for messages, and for relative paths of scenery and
+            plug-ins.
 
     Raises:
-        ExperimentError: as for ``parse_experiment``.
+        ExperimentError: an unknown key (the nearest is named); a value of a wrong type
+            or outside its range; inconsistent values.
     """
     return _checked(_converted(document, where), where, where)
 

@@ -45,7 +45,6 @@ from schema.experiment.document import Experiment, body_space
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    parse_experiment,
 )
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import (
@@ -132,6 +131,7 @@ from schema.wire.updates import (
 )
 from tests.coordinator.run.test_honest_worlds import advances, settings_of
 from tests.coordinator.sent_requests import BIRTH, JUDGED, ROBOT, VIABLE
+from tests.documents import parse_experiment
 from worker.arena.world import World
 
 JOB = (3, 5)

@@ -9,14 +9,20 @@ from collections import defaultdict
 import pytest
 
 from revolve.cli.commands import COMMANDS
-from revolve.cli.parsers import actions, all_parsers, parser_of
+from revolve.cli.parsers import actions, parser_of
 from revolve.command import main
 from schema.agent.flags import Flags
 
 
 @pytest.fixture(scope="module")
 def parsers() -> dict[str, Flags]:
-    return all_parsers()
+    """Parsers of all commands and of their actions, such as ``arena list``."""
+    found: dict[str, Flags] = {}
+    for command in COMMANDS:
+        found[command] = parser_of(command)
+        for name, parser in actions(found[command]).items():
+            found[f"{command} {name}"] = parser
+    return found
 
 
 def test_each_help_has_two_to_four_examples_that_its_parser_accepts(

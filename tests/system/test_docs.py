@@ -13,9 +13,9 @@ import pytest
 
 from revolve.cli.commands import COMMANDS
 from schema.experiment.document import Arena
-from schema.experiment.file import parse_experiment
 from schema.experiment.settings import fitness_function
 from schema.parts import ACTIVE_HINGE, PartType
+from tests.documents import parse_experiment
 from tests.own_brains import write_module
 from worker.fitness import check_fitness
 from worker.measures.functions import BUILT_IN, measures_of

@@ -62,7 +62,6 @@ class PartView:
         kind = mujoco.mjtObj.mjOBJ_JOINT
         joint = mujoco.mj_name2id(model, kind, f"{prefix}joint{index}")
         self._joint = joint if joint >= 0 else None
-        self._where = start
 
     @property
     def age_s(self) -> float:

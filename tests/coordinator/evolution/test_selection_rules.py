@@ -21,10 +21,10 @@ from coordinator.evolution.selection import (
 )
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import Selection
-from schema.experiment.file import parse_experiment
 from schema.plugins import permission
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
+from tests.documents import parse_experiment
 
 CORE = Node("Core", -1, 0, (0.5, 0.5, 0.5))
 

@@ -10,7 +10,6 @@ from schema.experiment.document import NETWORK, BrainSection, Space, references
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    parse_experiment,
 )
 from schema.experiment.section import stable_json
 from schema.experiment.settings import evaluation_settings, evaluation_settings_of
@@ -18,6 +17,7 @@ from schema.formats.files import read_robot, write_robot
 from schema.plugins import permission
 from schema.robot.brain import NEURON_TYPES, Brain, Neuron
 from schema.robot.robot import Part, Robot
+from tests.documents import parse_experiment
 
 own = pytest.mark.usefixtures("_own_brains")
 GREY = (0.5, 0.5, 0.5)

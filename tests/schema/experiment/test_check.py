@@ -3,12 +3,7 @@
 import pytest
 
 from schema.errors import ExperimentError
-from schema.experiment.document import Experiment
-from schema.experiment.file import parse_experiment
-
-
-def parse(text: str) -> Experiment:
-    return parse_experiment(f'name = "test"\n{text}', "test.toml")
+from tests.documents import parse
 
 
 def test_sections_are_off_by_default() -> None:

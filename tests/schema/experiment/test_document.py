@@ -11,7 +11,6 @@ from schema.experiment.document import Experiment, Simulation, Space, body_space
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    parse_experiment,
     read_experiment,
     shipped_experiments,
 )
@@ -23,6 +22,7 @@ from schema.experiment.settings import (
     vetting_settings,
 )
 from schema.parts import BUILT_IN
+from tests.documents import check_refused, parse, parse_experiment
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 NAME = 'name = "test"\n'
@@ -32,10 +32,6 @@ NAME = 'name = "test"\n'
 def users_package(monkeypatch: pytest.MonkeyPatch) -> None:
     """Put a user's package on the import path."""
     monkeypatch.syspath_prepend(PLUGINS)
-
-
-def parse(text: str) -> Experiment:
-    return parse_experiment(NAME + text, "test.toml")
 
 
 def test_defaults_are_the_thesis() -> None:
@@ -115,9 +111,7 @@ def test_window_may_be_smaller_than_a_generation() -> None:
     ],
 )
 def test_wrong_document(text: str, message: str) -> None:
-    with pytest.raises(ExperimentError, match=message) as caught:
-        parse(text)
-    assert "\n" not in str(caught.value)
+    check_refused(text, message)
 
 
 @pytest.mark.parametrize(
@@ -141,8 +135,7 @@ def test_wrong_document(text: str, message: str) -> None:
     ],
 )
 def test_impossible_experiment(text: str, message: str) -> None:
-    with pytest.raises(ExperimentError, match=message):
-        parse(text)
+    check_refused(text, message)
 
 
 @pytest.mark.parametrize(

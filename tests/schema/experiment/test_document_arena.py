@@ -3,19 +3,15 @@
 import pytest
 
 from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, steps_of
+from schema.experiment.document import steps_of
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    parse_experiment,
     read_experiment,
 )
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings, read_arena_settings
-
-
-def parse(text: str) -> Experiment:
-    return parse_experiment(f'name = "test"\n{text}', "test.toml")
+from tests.documents import check_refused, parse
 
 
 def test_scenario_3_is_the_thesis() -> None:
@@ -82,9 +78,7 @@ def test_settings_and_text_round_trip() -> None:
     ],
 )
 def test_wrong_arena(text: str, message: str) -> None:
-    with pytest.raises(ExperimentError, match=message) as caught:
-        parse(text)
-    assert "\n" not in str(caught.value)
+    check_refused(text, message)
 
 
 def test_arena_without_tournaments_needs_a_smaller_floor() -> None:

@@ -14,7 +14,6 @@ from schema.experiment.environment import FLAT, Environment, gravity_vector, rel
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    parse_experiment,
     read_experiment,
 )
 from schema.experiment.identity import Origin
@@ -25,6 +24,7 @@ from schema.experiment.settings import (
     read_arena_settings,
     read_evaluation_settings,
 )
+from tests.documents import parse_experiment
 
 HEAD = 'name = "mine"\nbirths = 60\n'
 WALL = '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'

@@ -2,19 +2,14 @@
 
 import pytest
 
-from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, island_experiment
+from schema.experiment.document import island_experiment
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    parse_experiment,
     read_experiment,
 )
 from schema.experiment.learning import Learning
-
-
-def parse(text: str) -> Experiment:
-    return parse_experiment(f'name = "test"\n{text}', "test.toml")
+from tests.documents import check_refused, parse
 
 
 def test_it_is_off_unless_the_section_is_there() -> None:
@@ -75,5 +70,4 @@ def test_an_island_may_have_its_own() -> None:
     ],
 )
 def test_refused_values_name_the_key(text: str, message: str) -> None:
-    with pytest.raises(ExperimentError, match=message):
-        parse(text)
+    check_refused(text, message)

@@ -5,7 +5,7 @@ import pytest
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, Measures, references
-from schema.experiment.file import parse_experiment
+from tests.documents import parse_experiment
 
 TEXT = """
 name = "a"

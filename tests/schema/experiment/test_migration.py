@@ -9,10 +9,10 @@ from schema.experiment.document import Experiment, island_count, island_experime
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    parse_experiment,
     read_experiment,
 )
 from schema.experiment.migration import Migration, migrant_count
+from tests.documents import parse_experiment
 
 TWO_KINDS = """
 name = "two-kinds"

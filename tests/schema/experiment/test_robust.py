@@ -2,15 +2,11 @@
 
 import pytest
 
-from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, island_experiment
-from schema.experiment.file import parse_experiment, read_experiment
+from schema.experiment.document import island_experiment
+from schema.experiment.file import read_experiment
 from schema.experiment.robust import Robust
 from schema.experiment.settings import evaluation_settings_of
-
-
-def parse(text: str) -> Experiment:
-    return parse_experiment(f'name = "test"\n{text}', "test.toml")
+from tests.documents import check_refused, parse
 
 
 def test_it_is_off_unless_the_section_is_there() -> None:
@@ -56,5 +52,4 @@ def test_arenas_may_have_off_line_neighbours_with_it() -> None:
     ],
 )
 def test_refused_values_name_the_key(text: str, message: str) -> None:
-    with pytest.raises(ExperimentError, match=message):
-        parse(text)
+    check_refused(text, message)

@@ -6,11 +6,11 @@ import pytest
 from schema.errors import ExperimentError
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
-from schema.experiment.file import parse_experiment
 from schema.experiment.scenery import object_count
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
+from tests.documents import parse_experiment
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
 YARD = """

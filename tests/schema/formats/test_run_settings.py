@@ -9,7 +9,7 @@ import pytest
 
 from schema.__main__ import main
 from schema.errors import ExperimentError, InvalidRobot, RunFolderError
-from schema.experiment.file import experiment_text, parse_experiment, read_experiment
+from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import settings_of
 from schema.formats.run_settings import experiment_of, read_with_settings
@@ -18,6 +18,7 @@ from schema.plugins.kept import kept_file, plugins_to_keep
 from schema.tables.description import Description, description_text
 from schema.tables.files import parquet_path
 from tests.analysis.tables import table
+from tests.documents import parse_experiment
 
 BUMPY = 'name = "bumpy"\n[environment]\nroughness_m = 0.04\n'
 PADDLES = """

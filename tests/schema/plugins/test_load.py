@@ -7,7 +7,7 @@ import pytest
 
 from schema.errors import ExperimentError, PluginDiffers, UnknownPlugin
 from schema.experiment.document import Fitness, body_space
-from schema.experiment.file import parse_experiment, read_experiment
+from schema.experiment.file import read_experiment
 from schema.experiment.settings import (
     evaluation_settings,
     fitness_function,
@@ -20,6 +20,7 @@ from schema.plugins import permission, source
 from schema.plugins.load import load_function, load_instance, load_object
 from schema.plugins.permission import allow, allowed
 from schema.plugins.source import check_plugins, plugins_of
+from tests.documents import parse_experiment
 
 FITNESS = "def fitness(track, settings):\n    return 1.0\n"
 

@@ -9,12 +9,12 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError
 from schema.experiment.calibration import Calibration, Response
 from schema.experiment.document import Fitness, Simulation, Space, body_space
-from schema.experiment.file import parse_experiment
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
+from tests.documents import parse_experiment
 from worker.bench.spider import spider
 from worker.robot.calibration import Calibrated
 from worker.robot.evaluation import evaluate
