@@ -45,6 +45,12 @@ def _plugins_of_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Allow no module."""
+    monkeypatch.setattr(permission, "_allowed", {})
+
+
+@pytest.fixture
 def _own_brains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Allow the module of docs/brains.md as the plug-in ``my_brains``."""
     module = {"my_brains": write_module(tmp_path)}

@@ -28,10 +28,9 @@ from coordinator.run.learners import Learners
 from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance
-from tests.coordinator.arena_world import VIABLE, World, distinct_fitness
-
-PROVENANCE = Provenance("worker-1", "x86", 0.5)
+from schema.robot.results import Evaluation
+from tests.coordinator.arena_world import World, distinct_fitness
+from tests.coordinator.reports import PROVENANCE, VIABLE
 
 Fit = Callable[[BirthId, int], float]
 

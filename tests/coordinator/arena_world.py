@@ -28,20 +28,10 @@ from coordinator.islands.events import (
 from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
-from schema.robot.results import Provenance, Report
 from schema.tables.columns import ROWS
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
 
-ORIGIN = (0.0, 0.0, 0.0)
-VIABLE = Report(
-    is_viable=True, reason="", intersections=(), lower=ORIGIN, upper=ORIGIN,
-    mass=0.1, motors=1,
-)  # fmt: skip
-CROWDED = Report(
-    is_viable=False, reason="parts 1 and 2 intersect", intersections=((1, 2),),
-    lower=ORIGIN, upper=ORIGIN, mass=0.1, motors=1,
-)  # fmt: skip
-PROVENANCE = Provenance("worker-1", "x86", 0.5)
 DT = 0.005
 POSE_STEPS = 40
 MATURE = 3000

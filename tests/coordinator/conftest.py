@@ -16,6 +16,9 @@ from schema.tables.columns import TABLES
 from schema.tables.files import read_table
 
 DETAILS = RunDetails("a/b c", 2, 1, "{}")
+Make = Callable[..., list[Record]]
+Feed = Callable[..., Recorder]
+Check = Callable[[Path, list[Record]], None]
 
 PART = {
     "idx": 0,

@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,9 @@ import zenoh
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import agents_alive
 from tests.system.workspace import Workspace, wait_until
+
+Fleets = Callable[..., Any]
+"""Type of the fixture that starts fleets."""
 
 
 def size(folder: Path) -> int:

@@ -1,6 +1,7 @@
 """Runs that are killed: their commands, and the undisturbed runs they must equal."""
 
 from tests.system import warm  # first: it prepares the process before NumPy's import
+from tests.system.fleet import size
 
 # isort: split
 import json
@@ -9,7 +10,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from coordinator.storage.journal import NAME
 from schema.tables.description import DETAILS, STATE
 from schema.tables.segments import segments_of
 from tests.system.instants import JOURNAL, Instants
@@ -52,12 +52,6 @@ class Tally:
     kills: Counter[str] = field(default_factory=Counter)
     per_run: list[int] = field(default_factory=list)
     differences: list[str] = field(default_factory=list)
-
-
-def size(folder: Path) -> int:
-    """Return the size of a run's journal [bytes]."""
-    journal = folder / NAME
-    return journal.stat().st_size if journal.exists() else 0
 
 
 def log_of(folder: Path) -> Path:

@@ -33,6 +33,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.system.fleet import size
 from tests.system.instants import JOURNAL, RECOVERY, Instants
 from tests.system.killed_runs import (
     FLAGS,
@@ -41,7 +42,6 @@ from tests.system.killed_runs import (
     check,
     cut_poses,
     log_of,
-    size,
     undisturbed,
     words_of,
 )

@@ -1,7 +1,6 @@
 """Tests of orders to a running arena and of its live stream."""
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from schema.agent.network import client_config
 from schema.tables.files import read_table
 from schema.tables.received import read_columns
 from schema.wire.arena_codec import Live, decode_live
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -35,7 +35,6 @@ sample_interval_s = 2.0
 """
 
 Workspace = Any
-Until = Callable[[Callable[[], bool], str], None]
 
 
 def test_pause_list_insert_remove_snapshot_resume(

@@ -24,12 +24,13 @@ from coordinator.storage.journal import NAME, Journal
 from schema.tables.columns import TABLES
 from schema.tables.files import read_table
 from schema.tables.segments import segments_of
+from tests.system.fleet import size
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
 Workspace = Any
 Process = subprocess.Popen[str]
-Until = Callable[[Callable[[], bool], str], None]
 
 DT = 0.005
 SNAPSHOT_STEPS = 2000
@@ -38,11 +39,6 @@ MOST_KILLS = 4
 
 def words(out: str) -> tuple[str, ...]:
     return ("crowd.toml", "--seed", "4", "--quiet", "--out", out)
-
-
-def size(folder: Path) -> int:
-    journal = folder / NAME
-    return journal.stat().st_size if journal.exists() else 0
 
 
 def advances(folder: Path) -> list[Advanced]:

@@ -3,7 +3,6 @@
 import json
 import signal
 import socket
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,10 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.description import read_state
-from tests.system.workspace import Workspace
+from tests.system.workspace import Until, Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Until = Callable[[Callable[[], bool], str], None]
 
 SHORT = """
 name = "{name}"

@@ -2,7 +2,6 @@
 
 import re
 import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,11 @@ from schema.tables.files import read_table
 from schema.wire.codec import decode_robot
 from tests.system.documents import OFF_LINE, SMALL_ARENA
 from tests.system.fleet import size
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 Workspace = Any
-Until = Callable[[Callable[[], bool], str], None]
 
 PAGE = Path(__file__).parents[2] / "docs" / "encodings.md"
 WORMS = """

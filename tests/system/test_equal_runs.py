@@ -1,7 +1,6 @@
 """Repeatability: equal runs for any number of workers and after any kill."""
 
 import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +9,12 @@ import pytest
 
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
+from tests.system.fleet import size
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 Workspace = Any
-Until = Callable[[Callable[[], bool], str], None]
 
 
 def _words(births: int, out: str) -> tuple[str, ...]:
@@ -31,11 +31,6 @@ evaluation_s = [12.0, 14.0]
 [selection.reevaluation]
 interval = 5
 """
-
-
-def _size(folder: Path) -> int:
-    journal = folder / "journal.bin"
-    return journal.stat().st_size if journal.exists() else 0
 
 
 def test_one_worker_gives_the_same_births_as_a_single_process(
@@ -58,9 +53,9 @@ def test_killing_one_of_three_workers_gives_the_same_births(
         workspace.start("worker", "--connect", address, "--processes", "1")
         for _ in range(3)
     ]
-    whole = _size(undisturbed)
+    whole = size(undisturbed)
     share = np.random.default_rng(11).uniform(0.2, 0.7)
-    until(lambda: _size(folder) > share * whole, "the run is on its way")
+    until(lambda: size(folder) > share * whole, "the run is on its way")
     workers[1].send_signal(signal.SIGKILL)
     until(lambda: coordinator.poll() is not None, "the run ends")
     assert coordinator.returncode == 0, coordinator.communicate()
@@ -72,12 +67,12 @@ def test_killed_coordinator_resumes_to_the_same_births(
     workspace: Workspace, undisturbed: Path, births: int, until: Until, draw: int
 ) -> None:
     folder = workspace.folder / "killed"
-    whole = _size(undisturbed)
+    whole = size(undisturbed)
     # One kill at a random instant of each quarter of the run.
     share = (draw + np.random.default_rng(draw).random()) / 4
     first = workspace.start("run", *_words(births, "killed"), "--workers", "2")
     until(
-        lambda: _size(folder) > share * whole or first.poll() is not None,
+        lambda: size(folder) > share * whole or first.poll() is not None,
         "the run is on its way",
     )
     first.send_signal(signal.SIGKILL)
@@ -125,7 +120,7 @@ def test_ctrl_c_stops_cleanly_and_shows_how_to_resume(
 ) -> None:
     folder = workspace.folder / "stopped"
     first = workspace.start("run", *_words(births, "stopped"), "--workers", "2")
-    until(lambda: _size(folder) > _size(undisturbed) // 3, "the run is on its way")
+    until(lambda: size(folder) > size(undisturbed) // 3, "the run is on its way")
     first.send_signal(signal.SIGINT)
     out, err = first.communicate(timeout=60)
     assert first.returncode == 130, out + err

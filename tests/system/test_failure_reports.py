@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,11 @@ from schema.errors import RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.columns import TABLES
 from schema.tables.description import read_state
+from tests.system.workspace import Until
 
 pytestmark = pytest.mark.system
 
 Workspace = Any
-Until = Callable[[Callable[[], bool], str], None]
 
 SHORT = """
 name = "{name}"

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ import pytest
 from coordinator.islands.events import Advanced
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME, Journal
-from tests.system.fleet import Fleet, agent_processes, size
+from tests.system.fleet import Fleet, Fleets, agent_processes, size
 from tests.system.workspace import wait_until
 
 pytestmark = [
@@ -28,7 +27,6 @@ pytestmark = [
 ]
 
 Workspace = Any
-Fleets = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
 MISBEHAVING_AGENT = Path(__file__).with_name("misbehaving_agent.py")
 

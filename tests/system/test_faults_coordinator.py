@@ -6,7 +6,6 @@ kills many.
 
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import pytest
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME
 from coordinator.storage.lock import LOCK
+from tests.system.fleet import Fleets
 
 pytestmark = [
     pytest.mark.system,
@@ -24,7 +24,6 @@ pytestmark = [
 ]
 
 Workspace = Any
-Fleets = Callable[..., Any]
 PATIENCE_S = 120
 
 

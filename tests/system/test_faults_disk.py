@@ -7,7 +7,6 @@ import re
 import shlex
 import signal
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,11 @@ import pytest
 
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 Workspace = Any
-Until = Callable[[Callable[[], bool], str], None]
 
 
 @pytest.fixture

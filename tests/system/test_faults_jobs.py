@@ -6,7 +6,6 @@ A plug-in causes the crashes, which depend only on the robot.
 import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,8 @@ import pytest
 
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
+from tests.system.fleet import Fleets
+from tests.system.workspace import Until
 
 pytestmark = [
     pytest.mark.system,
@@ -22,8 +23,6 @@ pytestmark = [
 ]
 
 Workspace = Any
-Fleets = Callable[..., Any]
-Until = Callable[[Callable[[], bool], str], None]
 
 DOCUMENT = """
 name = "harm"

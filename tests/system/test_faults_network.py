@@ -19,22 +19,14 @@ from coordinator.islands.events import Advanced
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME, Journal
 from schema.agent.network import Tls
+from tests.system.fleet import Fleets
+from tests.system.machines import ip
 
 Workspace = Any
-Fleets = Callable[..., Any]
 Certify = Callable[[Path, str, str, str], Tls]
 
 HOST = "10.231.77.1"
 PORT = 7447
-
-
-def ip(words: str) -> None:
-    done = subprocess.run(
-        ["ip", *words.split()], capture_output=True, text=True, check=False
-    )
-    if "not permitted" in done.stderr:
-        raise PermissionError(f"ip {words}: {done.stderr.strip()}")
-    assert done.returncode == 0, f"ip {words}: {done.stderr}"
 
 
 pytestmark = [

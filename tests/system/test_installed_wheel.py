@@ -20,7 +20,8 @@ from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
 from tests.system.documents import OFF_LINE, SMALL_ARENA
-from tests.system.test_strangers import PACKAGE, TOGETHER, Until, document
+from tests.system.test_strangers import PACKAGE, TOGETHER, document
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.long, pytest.mark.timeout(3600)]
 

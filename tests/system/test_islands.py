@@ -2,7 +2,7 @@
 
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from coordinator.storage.compare import compare
-from coordinator.storage.journal import NAME
 from schema.tables.files import read_table
 from tests.system.documents import MIXED, SHORT_ARENA, SHORT_EVALUATIONS
+from tests.system.fleet import size
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 Workspace = Any
-Until = Callable[[Callable[[], bool], str], None]
 
 RING = """
 name = "ring"
@@ -49,11 +49,6 @@ handling = "evict"
 
 def words(name: str, out: str) -> tuple[str, ...]:
     return f"{name}.toml", "--seed", "3", "--quiet", "--out", out
-
-
-def size(folder: Path) -> int:
-    journal = folder / NAME
-    return journal.stat().st_size if journal.exists() else 0
 
 
 class ComparedRuns:

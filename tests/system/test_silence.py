@@ -5,7 +5,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from coordinator.storage.journal import Journal
 from schema.experiment.file import experiment_text, read_experiment
 from schema.wire.arena_codec import decode_advance_request
 from schema.wire.codec import request_kind
+from tests.system.fleet import Fleets
 
 pytestmark = [
     pytest.mark.system,
@@ -32,7 +32,6 @@ pytestmark = [
 ]
 
 Workspace = Any
-Fleets = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
 MISBEHAVING_AGENT = Path(__file__).with_name("misbehaving_agent.py")
 

@@ -5,14 +5,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from schema.agent.supervisor import cores
-from tests.system.workspace import runtime_directory, said
+from tests.system.workspace import Until, runtime_directory, said
 
 pytestmark = [
     pytest.mark.system,
@@ -25,7 +25,6 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 NOWHERE = "tcp/127.0.0.1:9"
 Workspace = Any
 _STARTED: list[int] = []
-Until = Callable[[Callable[[], bool], str], None]
 
 SLOW = """
 name = "slow"

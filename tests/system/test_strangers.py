@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +18,11 @@ import pytest
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
 from tests.system.documents import OFF_LINE, SMALL_ARENA
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
 Workspace = Any
-Until = Callable[[Callable[[], bool], str], None]
 
 TOP = Path(__file__).parents[2]
 PACKAGE = TOP / "tests" / "plugins" / "critters_lab"

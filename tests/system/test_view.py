@@ -22,15 +22,15 @@ from schema.errors import rounded
 from schema.tables.checksums import digest_of
 from schema.tables.description import description_text, read_description
 from schema.tables.files import read_table
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 Workspace = Any
 Fleet = Callable[..., Any]
-Until = Callable[[Callable[[], bool], str], None]
 
 WORDS = ("hamlet.toml", "--seed", "4", "--quiet")
-CENTRES, QUATERNIONS = "Boxes3D:centers", "Boxes3D:quaternions"
+CENTRES = "Boxes3D:centers"
 
 
 def batches(file: Path, path: str) -> Iterator[tuple[pa.RecordBatch, bool]]:

@@ -20,12 +20,12 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from schema.tables.files import read_table
+from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 Workspace = Any
 Fleet = Callable[..., Any]
-Until = Callable[[Callable[[], bool], str], None]
 Floats = npt.NDArray[np.float64]
 
 PICTURE_TIME_S = 12.0

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import IO
 
 PATIENCE_S = 240.0
+Until = Callable[[Callable[[], bool], str], None]
+"""Type of the fixture that waits for a condition."""
 
 
 def runtime_directory(folder: Path) -> str:

@@ -24,10 +24,7 @@ from schema.robot.ids import BirthId
 from schema.tables.columns import ROWS
 from schema.wire.arena import Advance
 from tests.coordinator.arena_world import (
-    CROWDED,
     DT,
-    PROVENANCE,
-    VIABLE,
     ArenaRun,
     World,
     distinct_fitness,
@@ -36,6 +33,7 @@ from tests.coordinator.arena_world import (
     reject_some,
     viable,
 )
+from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
 
 
 def life(births: int = 3000, *, world: World | None = None) -> ArenaRun:

@@ -33,13 +33,9 @@ from schema.experiment.document import (
 )
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance, Report
+from schema.robot.results import Evaluation, Provenance
+from tests.coordinator.reports import VIABLE
 
-ORIGIN = (0.0, 0.0, 0.0)
-VIABLE = Report(
-    is_viable=True, reason="", intersections=(), lower=ORIGIN, upper=ORIGIN,
-    mass=0.1, motors=1,
-)  # fmt: skip
 BRIDGE = Experiment(
     name="test",
     births=40,

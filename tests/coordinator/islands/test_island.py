@@ -28,20 +28,10 @@ from schema.experiment.document import Experiment, Selection, body_space
 from schema.experiment.file import read_experiment, shipped_experiments
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance, Report
+from schema.robot.results import Evaluation
 from schema.tables.columns import ROWS
 from schema.wire.codec import decode_genome
-
-ORIGIN = (0.0, 0.0, 0.0)
-VIABLE = Report(
-    is_viable=True, reason="", intersections=(), lower=ORIGIN, upper=ORIGIN,
-    mass=0.1, motors=1,
-)  # fmt: skip
-CROWDED = Report(
-    is_viable=False, reason="parts 1 and 2 intersect", intersections=((1, 2),),
-    lower=ORIGIN, upper=ORIGIN, mass=0.1, motors=1,
-)  # fmt: skip
-PROVENANCE = Provenance("worker-1", "x86", 0.5)
+from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
 
 BASELINES = ("no-selection", "no-reproduction")
 

@@ -37,13 +37,12 @@ from schema.experiment.identity import Origin
 from schema.experiment.learning import Learning
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.columns import ROWS
 from schema.wire.codec import decode_genome, decode_robot
-from tests.coordinator.arena_world import VIABLE
+from tests.coordinator.reports import PROVENANCE, VIABLE
 
-PROVENANCE = Provenance("worker-1", "x86", 0.5)
 FIRST = BirthId(0, 0)
 PLAIN = Experiment(
     name="test", births=14, selection=Selection(population=6, children=4)

@@ -35,9 +35,7 @@ def judge(track, fitness):
 """
 
 
-@pytest.fixture(autouse=True)
-def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permission, "_allowed", {})
+pytestmark = pytest.mark.usefixtures("_nothing_allowed")
 
 
 @pytest.fixture

@@ -14,7 +14,6 @@ import pytest
 
 from coordinator.__main__ import plugin_kinds
 from coordinator.plugins.checks import check_apart, check_here
-from schema.plugins import permission
 
 CRITTERS = Path(__file__).parents[2] / "plugins" / "critters_lab" / "critters"
 RANDOM = '__import__("random")'
@@ -195,9 +194,7 @@ APART = ("slow", "os._exit")
 """Faults whose process ends."""
 
 
-@pytest.fixture(autouse=True)
-def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permission, "_allowed", {})
+pytestmark = pytest.mark.usefixtures("_nothing_allowed")
 
 
 @pytest.fixture

@@ -29,6 +29,9 @@ from tests.coordinator.sent_requests import (
     SentRequests,
 )
 
+ASKED = pytest.mark.parametrize(
+    "ask", [Evaluate(BIRTH, ROBOT), Vet(BIRTH, 0, ROBOT)], ids=["evaluate", "vet"]
+)
 CROWDED = replace(
     VIABLE, is_viable=False, reason="parts 0 and 1 intersect", intersections=((0, 1),)
 )
@@ -146,12 +149,11 @@ def test_a_body_that_intersects_is_no_lie(sent_requests: SentRequests) -> None:
     assert event == Vetted(BIRTH, 0, CROWDED)
 
 
-@pytest.mark.parametrize("kind", ["evaluate", "vet"])
+@ASKED
 def test_an_answer_of_30_mb_is_refused_unread(
-    sent_requests: SentRequests, kind: str
+    sent_requests: SentRequests, ask: Vet | Evaluate
 ) -> None:
     """Thirteen of them filled a journal."""
-    ask = Vet(BIRTH, 0, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
     sent_requests.requests.send(ask)
     number, agent, _ = sent_requests.sent[-1]
     message = pb.Answer(epoch=EPOCH, number=number, failure="x" * 30_000_000)
@@ -162,11 +164,10 @@ def test_an_answer_of_30_mb_is_refused_unread(
     check_refused(sent_requests, ask, lie)
 
 
-@pytest.mark.parametrize("kind", ["evaluate", "vet"])
+@ASKED
 def test_reasons_are_cut_to_one_printable_line(
-    sent_requests: SentRequests, kind: str
+    sent_requests: SentRequests, ask: Vet | Evaluate
 ) -> None:
-    ask = Vet(BIRTH, 0, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
     sent_requests.requests.send(ask)
     number, agent, _ = sent_requests.sent[-1]
     text = "\x1b[2Jgone\r\nsecond\u202e line" + "x" * (ANSWER_BYTES - 200)

@@ -9,17 +9,13 @@ import numpy as np
 import pytest
 
 from coordinator.islands.events import Record
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import BUFFERED, Recorder
 from schema.errors import RunFolderError
 from schema.tables.columns import POPULATION, TABLES
 from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path, segments_of
+from tests.coordinator.conftest import DETAILS, Check, Feed, Make
 
-DETAILS = RunDetails("a/b c", 2, 1, "{}")
-Make = Callable[..., list[Record]]
-Feed = Callable[..., Recorder]
-Check = Callable[[Path, list[Record]], None]
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 
 

@@ -1,7 +1,6 @@
 """Damaged segments: cut at the last sound batch when they are opened, written again."""
 
 import os
-from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 
@@ -9,8 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from coordinator.islands.events import Record
-from coordinator.storage.folder import RunDetails, RunFolder, read_details
+from coordinator.storage.folder import RunFolder, read_details
 from coordinator.storage.recorder import Recorder, Segment
 from coordinator.storage.removal import remove_segment
 from schema.errors import RunFolderError
@@ -23,11 +21,7 @@ from schema.tables.segments import (
     segments_of,
     warn_once,
 )
-
-DETAILS = RunDetails("a/b c", 2, 1, "{}")
-Make = Callable[..., list[Record]]
-Feed = Callable[..., Recorder]
-Check = Callable[[Path, list[Record]], None]
+from tests.coordinator.conftest import DETAILS, Check, Feed, Make
 
 
 def flip(path: Path, byte: int) -> None:

@@ -11,16 +11,11 @@ import pyarrow as pa
 import pytest
 from pyarrow.parquet import ParquetFile, ParquetWriter
 
-from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
 from schema.tables.files import campaign, parquet_path, read_table
-
-DETAILS = RunDetails("a/b c", 2, 1, "{}")
-Make = Callable[..., list[Record]]
-Feed = Callable[..., Recorder]
-Check = Callable[[Path, list[Record]], None]
+from tests.coordinator.conftest import Check, Feed, Make
 
 
 class Killed(BaseException):

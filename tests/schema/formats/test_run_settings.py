@@ -29,9 +29,7 @@ part_types = ["schema.parts:CORE", "schema.parts:ACTIVE_HINGE", "MODULE:PADDLE"]
 PART = "from schema.parts import HINGE\nfrom dataclasses import replace\n"
 
 
-@pytest.fixture(autouse=True)
-def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permission, "_allowed", {})
+pytestmark = pytest.mark.usefixtures("_nothing_allowed")
 
 
 def written(folder: Path, text: str) -> Path:

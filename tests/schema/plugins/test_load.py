@@ -29,9 +29,7 @@ def load(path: str) -> PartType:
     return load_instance(path, "key", PartType)
 
 
-@pytest.fixture(autouse=True)
-def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permission, "_allowed", {})
+pytestmark = pytest.mark.usefixtures("_nothing_allowed")
 
 
 @pytest.fixture

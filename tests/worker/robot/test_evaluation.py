@@ -20,11 +20,11 @@ from schema.errors import (
     SimulationDiverged,
 )
 from schema.experiment.document import Fitness, Simulation, Space
-from schema.experiment.settings import EvaluationSettings
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.results import Track
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode_answer, encode_request, encode_robot
+from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
     FitnessFunction,
     LoadedFitness,
@@ -38,10 +38,6 @@ from worker.serve.jobs import answer
 
 RobotOf = Callable[[int], Robot]
 WORLD = Simulation()
-
-
-def with_simulation(simulation: Simulation) -> EvaluationSettings:
-    return EvaluationSettings(space=Space(), simulation=simulation, fitness=Fitness())
 
 
 SETTINGS = with_simulation(WORLD)
@@ -100,10 +96,6 @@ def test_robot_without_a_brain_stays_at_its_place() -> None:
         Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))),
     )
     assert evaluate(robot, SETTINGS).fitness < 1e-4
-
-
-def bits(track: Track) -> bytes:
-    return track.core_position.tobytes()
 
 
 def test_simulation_is_repeatable(robot_of: RobotOf) -> None:

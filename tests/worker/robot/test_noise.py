@@ -9,12 +9,12 @@ from msgspec.structs import replace
 
 from schema.errors import MalformedMessage
 from schema.experiment.brains import widths
-from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.document import Simulation, Space
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
-from schema.experiment.settings import ArenaSettings, EvaluationSettings
+from schema.experiment.settings import ArenaSettings
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats, Track
+from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import (
@@ -25,6 +25,7 @@ from tests.worker.arena_cases import (
     settings_of,
     state_of,
 )
+from tests.worker.evaluations import IDENTITY, ORIGIN, OTHERS, bits, with_simulation
 from worker.arena.replay import alone
 from worker.arena.world import World
 from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT
@@ -33,16 +34,6 @@ from worker.robot.noise import BLOCK_TICKS, Noise, NoiseSource
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)
-ORIGIN = Origin(seed=7, run=1, island=2)
-IDENTITY = Identity(ORIGIN, BirthId(2, 5), 0)
-OTHERS = (
-    Identity(replace(ORIGIN, seed=8), BirthId(2, 5), 0),
-    Identity(replace(ORIGIN, run=2), BirthId(2, 5), 0),
-    Identity(replace(ORIGIN, island=3), BirthId(2, 5), 0),
-    Identity(ORIGIN, BirthId(3, 5), 0),
-    Identity(ORIGIN, BirthId(2, 6), 0),
-    Identity(ORIGIN, BirthId(2, 5), 1),
-)
 LOUD = Simulation(sensor_noise=0.3, actuator_noise=0.05, window_steps=800)
 NOISY = replace(
     settings_of(record_touches=True),
@@ -52,10 +43,6 @@ NOISY = replace(
     origin=ORIGIN,
 )
 WIDTH = widths(Space())
-
-
-def with_simulation(simulation: Simulation) -> EvaluationSettings:
-    return EvaluationSettings(space=Space(), simulation=simulation, fitness=Fitness())
 
 
 def noise_of(
@@ -135,10 +122,6 @@ def test_sensor_and_actuator_noise_are_independent() -> None:
 
 
 # --- off-line ---------------------------------------------------------------------
-
-
-def bits(track: Track) -> bytes:
-    return track.core_position.tobytes()
 
 
 def test_evaluations_of_one_identity_are_equal_and_others_differ(

@@ -3,17 +3,17 @@
 import mujoco
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from schema.experiment.document import Fitness, Simulation, Space, body_space
 from schema.experiment.environment import FLAT, Environment
-from schema.experiment.identity import NO_IDENTITY, Identity, Origin
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.mjcf.model import solo_spec
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from tests.worker.evaluations import IDENTITY, ORIGIN, OTHERS
 from worker.robot.evaluation import simulate
 
 CORE = Robot(
@@ -22,16 +22,6 @@ CORE = Robot(
 )
 WEIGHTLESS = Simulation(gravity=0.0, drop_m=1.0, window_steps=400)
 PUSHED = Environment(push_impulse=0.03, push_interval_s=0.5)
-ORIGIN = Origin(seed=7, run=1, island=2)
-IDENTITY = Identity(ORIGIN, BirthId(2, 5), 0)
-OTHERS = (
-    Identity(replace(ORIGIN, seed=8), BirthId(2, 5), 0),
-    Identity(replace(ORIGIN, run=2), BirthId(2, 5), 0),
-    Identity(replace(ORIGIN, island=3), BirthId(2, 5), 0),
-    Identity(ORIGIN, BirthId(3, 5), 0),
-    Identity(ORIGIN, BirthId(2, 6), 0),
-    Identity(ORIGIN, BirthId(2, 5), 1),
-)
 
 
 def velocities(
