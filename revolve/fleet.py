@@ -18,6 +18,7 @@ from coordinator.dispatch.events import Deliver
 from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
 from coordinator.run.requests import read_evaluation
+from revolve.arguments import whole_number
 from revolve.children import plugins as allowed_plugins
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
@@ -88,15 +89,14 @@ class Fleet:
                 workers that this fleet starts.
 
         Raises:
-            ExperimentError: no such module or file, or a number of workers < 1.
+            RevolveError: a number of workers that is no whole number, or too small.
+            ExperimentError: no such module or file.
             NetworkError: an invalid address or name.
         """
-        if workers is None:
-            workers = 0 if connect else cores()
-        if workers < (0 if connect else 1):
-            raise ExperimentError(f"workers: must be >= 1, got {workers}")
+        least = 0 if connect else 1
+        wanted = least * cores() if workers is None else workers
+        self._count = whole_number("workers", wanted, least)
         allow(plugins)
-        self._count = workers
         files = Tls(*tls) if tls else None
         address = hub_of(connect) if connect else ""
         self._network = Network(

@@ -210,8 +210,9 @@ def test_closed_fleet_cancels_and_refuses() -> None:
         fleet.submit(robots(1)[0])
     with pytest.raises(rv.RevolveError, match="use it in a 'with'"):
         rv.Fleet(workers=1).submit(robots(1)[0])
-    with pytest.raises(rv.ExperimentError, match="workers: must be >= 1, got 0"):
-        rv.Fleet(workers=0)
+    for workers in (0, 2.5):
+        with pytest.raises(rv.RevolveError, match=f"number from 1 .*, got {workers}"):
+            rv.Fleet(workers=workers)  # type: ignore[arg-type]
 
 
 def test_workers_of_another_hub_do_the_jobs() -> None:
