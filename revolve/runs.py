@@ -20,7 +20,6 @@ from schema.experiment.file import own_experiment
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
 from schema.tables.description import (
-    DETAILS,
     allow_plugins_of,
     read_description,
     read_state,
@@ -56,7 +55,7 @@ class Run:
             RunFolderError: there is no run, or its description is damaged.
         """
         self.folder = Path(folder)
-        details = _description(self.folder)
+        details = read_description(self.folder)
         self.name, self.number, self.seed = details.name, details.run, details.seed
         self.run_id = run_columns(self.folder)["run_id"]
         self.experiment = Experiment(own_experiment(details.document))
@@ -334,7 +333,7 @@ def resume(
         RevolveError: as for ``run``.
         KeyboardInterrupt: as for ``run``.
     """
-    _description(Path(folder))
+    read_description(Path(folder))
     words = [] if workers is None else ["--workers", str(workers)]
     words += _common(plugins, progress=progress)
     return _done(("resume", str(folder), *words), Path(folder), progress=progress)
@@ -353,16 +352,3 @@ def _done(words: tuple[str, ...], folder: Path, *, progress: bool) -> Run:
     if found.state != "finished":
         raise RevolveError(f"{folder}: not finished: revolve.resume continues it")
     return found
-
-
-def _description(folder: Path) -> Any:  # noqa: ANN401 - of schema.tables
-    """Return the description of a run.
-
-    Raises:
-        RunFolderError: there is no run, or its description is damaged.
-    """
-    below = sorted(path.parent.name for path in folder.glob(f"*/{DETAILS}"))
-    if below and not (folder / DETAILS).exists():
-        names = ", ".join([*below[:5], *(["..."] if below[5:] else [])])
-        raise RunFolderError(f"{folder}: holds several runs; read one of {names}")
-    return read_description(folder)

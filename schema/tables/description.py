@@ -75,7 +75,7 @@ def read_description(folder: Path) -> Description:
         check_folder(folder)
         why = f"no run is there ({DETAILS} is missing)"
         if runs := sorted(each.parent for each in folder.glob(f"*/{DETAILS}")):
-            why = f"is a campaign; give one of its runs, such as {runs[0]}"
+            why = f"holds several runs; give one of them, such as {runs[0]}"
         raise RunFolderError(f"{folder}: {why}") from None
     try:
         found = msgspec.json.decode(data, type=Description)

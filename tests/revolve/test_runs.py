@@ -106,7 +106,7 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
         rv.read(tmp_path)
     with pytest.raises(rv.RunFolderError, match="missing: no such folder"):
         rv.resume(tmp_path / "missing")
-    with pytest.raises(rv.RunFolderError, match="holds several runs; read one of a"):
+    with pytest.raises(rv.RunFolderError, match="several runs; give one of them, "):
         rv.read(done.folder.parent)
     with pytest.raises(rv.ExperimentError, match="did you mean 'scenario"):
         rv.run("scenario", births=3, out=tmp_path / "x")

@@ -239,7 +239,7 @@ def test_a_campaign_is_told_to_name_a_run(tmp_path: Path) -> None:
     for number in (1, 0):
         (tmp_path / f"a-{number}").mkdir()
         (tmp_path / f"a-{number}" / "run.json").touch()
-    with pytest.raises(RunFolderError, match=f"is a campaign; .* as {tmp_path}/a-0$"):
+    with pytest.raises(RunFolderError, match=f"several runs; .* as {tmp_path}/a-0$"):
         shown_run(tmp_path)
 
 

@@ -196,7 +196,7 @@ def test_a_run_without_a_recorded_platform_differs_from_none(
 
 def test_a_folder_without_a_run_is_refused(tmp_path: Path, make_records: Make) -> None:
     first = written(tmp_path / "a", make_records(3))
-    with pytest.raises(RunFolderError, match=rf"is a campaign; .* as {first}$"):
+    with pytest.raises(RunFolderError, match=rf"holds several runs; .* as {first}$"):
         compare(first, tmp_path)
     (tmp_path / "empty").mkdir()
     with pytest.raises(RunFolderError, match="no run is there"):
