@@ -13,12 +13,11 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from schema.errors import ExperimentError
+from schema.experiment.section import NotNegative, Positive
 from schema.plugins.needs import needs
 from schema.robot.results import Floats
 from schema.robot.trace import Trace
 
-_Positive = Annotated[float, Meta(gt=0)]
-_NotNegative = Annotated[float, Meta(ge=0)]
 _Place = tuple[float, float]
 
 
@@ -36,8 +35,8 @@ class Directed(_Own, frozen=True):
     """
 
     heading_deg: float = 0.0
-    drift_weight: _NotNegative = 1.0
-    limit: _Positive = 1.0
+    drift_weight: NotNegative = 1.0
+    limit: Positive = 1.0
 
 
 def directed_locomotion(trace: Trace, parameters: Directed) -> float:
@@ -74,8 +73,8 @@ class Targets(_Own, frozen=True):
     targets: Annotated[tuple[_Place, ...], Meta(min_length=1, max_length=100)] = (
         (1.0, 0.0),
     )
-    reach_m: _Positive = 0.1
-    limit: _Positive = 1.0
+    reach_m: Positive = 0.1
+    limit: Positive = 1.0
 
 
 def target(trace: Trace, parameters: Targets) -> float:
@@ -114,7 +113,7 @@ class Light(_Own, frozen=True):
         full_within_m: distance within which brightness is 1, as for light sensors [m].
     """
 
-    full_within_m: _Positive = 1.0
+    full_within_m: Positive = 1.0
 
 
 def light(trace: Trace, parameters: Light) -> float:
@@ -152,8 +151,8 @@ class Turning(_Own, frozen=True):
     """
 
     direction: Literal["either", "left", "right"] = "either"
-    wander_weight: _NotNegative = 5.0
-    limit: _Positive = 10.0
+    wander_weight: NotNegative = 5.0
+    limit: Positive = 10.0
 
 
 @needs("core_attitude")
@@ -190,8 +189,8 @@ class Balance(_Own, frozen=True):
     """
 
     tilt_deg: Annotated[float, Meta(gt=0, lt=90)] = 30.0
-    drift_weight: _NotNegative = 0.05
-    limit: _Positive = 1.0
+    drift_weight: NotNegative = 0.05
+    limit: Positive = 1.0
 
 
 @needs("core_attitude")

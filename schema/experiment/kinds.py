@@ -11,7 +11,7 @@ from typing import Any
 
 import schema.parts
 import schema.robogen_parts
-from schema.errors import ExperimentError, RevolveError
+from schema.errors import ExperimentError, RevolveError, error_text, one_line
 from schema.experiment.brains import NEURON_MEMBERS, neuron_types
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
@@ -89,10 +89,10 @@ def check_use(
             use.check_new(plugin)
     # A plug-in may call exit().
     except (Exception, SystemExit) as error:
-        story = " ".join(str(error).split())
+        story = one_line(error)
         if not isinstance(error, RevolveError):
             line = where_raised(error, file) or where
-            story = f"{line}: raised {type(error).__name__}: {story}"
+            story = f"{line}: raised {error_text(error)}"
         story = story.removeprefix(f"{use.key}: ")
         section, _, _ = use.key.partition(".")
         if isinstance(error, ExperimentError) and story.startswith(f"{section}."):

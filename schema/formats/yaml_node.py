@@ -13,7 +13,7 @@ from typing import NoReturn, TypeVar
 
 import yaml
 
-from schema.errors import InvalidRobot, cut, nearest, shown
+from schema.errors import InvalidRobot, cut, nearest, one_line, shown
 from schema.formats.yaml_compose import (
     MappingNode,
     Node,
@@ -257,8 +257,7 @@ def compose(text: str, file: str) -> Table:
         line = "" if mark is None else f":{mark.line + 1}"
         raise InvalidRobot(f"{file}{line}: not valid YAML: {error.problem}") from None
     except yaml.YAMLError as error:
-        words = " ".join(str(error).split())
-        raise InvalidRobot(f"{file}: not valid YAML: {words}") from None
+        raise InvalidRobot(f"{file}: not valid YAML: {one_line(error)}") from None
     return Table(node, "", file)
 
 

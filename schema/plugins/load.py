@@ -6,7 +6,7 @@ caller declares.
 """
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from difflib import get_close_matches
 from functools import lru_cache
 from types import ModuleType
@@ -65,10 +65,7 @@ def load_object(
     """
     if ":" not in path:
         if path not in built_in:
-            raise UnknownPlugin(
-                f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
-                f"got {shown(path)}{nearest(path, built_in)}"
-            )
+            raise _unknown(path, where, built_in)
         return built_in[path]
     found = _load(path, where)
     for member in members:
@@ -93,11 +90,15 @@ def full_name(path: str, where: str, built_in: Mapping[str, str]) -> str:
     if ":" in path:
         return path
     if path not in built_in:
-        raise UnknownPlugin(
-            f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
-            f"got {shown(path)}{nearest(path, built_in)}"
-        )
+        raise _unknown(path, where, built_in)
     return built_in[path]
+
+
+def _unknown(path: str, where: str, built_in: Collection[str]) -> UnknownPlugin:
+    return UnknownPlugin(
+        f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
+        f"got {shown(path)}{nearest(path, built_in)}"
+    )
 
 
 def load_function(

@@ -22,9 +22,9 @@ from coordinator.evolution.cppn.network import (
     Node,
     reaches,
 )
+from schema.experiment.section import Probability
 
 T = TypeVar("T")
-Probability = Annotated[float, Meta(ge=0, le=1)]
 
 _NEW_WEIGHT = 0.1
 """Share of changed weights that become new random ones."""
