@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from analysis.figures.bench import arena_speed
 from analysis.figures.courses import over_births
-from analysis.figures.robots import effects
+from analysis.figures.findings import effects
 from analysis.figures.style import in_order
 from analysis.render.stage import choose_engine
 
@@ -29,6 +29,12 @@ _DIGEST = "rows"
 _WIDTHS = {"progression.png": 1152, "findings.png": 1300, "arena-speed.png": 900,
            "gaits.jpg": 1100, "ancestry.jpg": 900}  # fmt: skip
 """Width of each picture [pixels]."""
+_EFFECT = [
+    "figure", "topic", "expected", "a", "b", "mean_b", "verdict", "near_automatic",
+    "effect", "effect_low", "effect_high",
+    "margin", "difference", "difference_low", "difference_high",
+]  # fmt: skip
+"""Columns that the picture of the findings shows."""
 _COLOURS, _QUALITY, _DPI = 256, 82, 200
 _BASELINES = ("no-reproduction", "no-selection")
 _TREE = "scenario1"
@@ -39,11 +45,10 @@ _FOUNDER_LEVEL = -1
 def _sources(tables: Tables) -> dict[str, pa.Table]:
     """Return the rows that each picture shows."""
     fitness = tables["progression"].filter(pc.field("measure") == "fitness")
-    effect = ["figure", "topic", "expected", "effect", "effect_low", "effect_high"]
     best = _families(tables)
     found = {
         "progression.png": fitness,
-        "findings.png": tables["findings"].select([*effect, "verdict"]),
+        "findings.png": tables["findings"].select(_EFFECT),
         "gaits.jpg": pa.concat_tables(best.values()),
         "ancestry.jpg": best[_TREE],
     }
@@ -106,14 +111,14 @@ def draw(tables: Tables) -> Iterator[str]:
     Raises:
         RevolveError: a robot cannot be rendered.
     """
-    plots = {
+    plots: dict[str, Callable[[], Figure]] = {
         "progression.png": lambda: over_births(
             {name: tables[name] for name in ("populations", "progression")},
             "fitness",
             "mean fitness [m/s]",
-        ),
+        ).draw(),
         "findings.png": lambda: effects(tables),
-        "arena-speed.png": lambda: arena_speed(tables),
+        "arena-speed.png": lambda: arena_speed(tables).draw(),
     }
     stale = {
         path.name: digest
@@ -121,7 +126,7 @@ def draw(tables: Tables) -> Iterator[str]:
         if digest_in(path) != digest
     }
     for name in plots.keys() & stale.keys():
-        _save(plots[name]().draw(), name, stale[name])
+        _save(plots[name](), name, stale[name])
         yield name
     robots = {"gaits.jpg", "ancestry.jpg"} & stale.keys()
     if robots:

@@ -10,6 +10,7 @@ from analysis.figures.bench import arena_speed, spider_speed
 from analysis.figures.brains import changes_over_births
 from analysis.figures.courses import course_caption, over_births
 from analysis.figures.file_names import file_name
+from analysis.figures.findings import effects
 from analysis.figures.forms import (
     Panels,
     Tables,
@@ -24,12 +25,7 @@ from analysis.figures.learning import (
     learning_gain,
 )
 from analysis.figures.named_measures import measures_over_births
-from analysis.figures.robots import (
-    effects,
-    extremities_and_fitness,
-    lineages,
-    variability,
-)
+from analysis.figures.robots import extremities_and_fitness, lineages, variability
 
 BIRTHS = "the births tables of the runs"
 """A source that is not a table of measures."""
@@ -199,10 +195,12 @@ FIGURES: tuple[Figure, ...] = (
     _spread("islands", "E", "Robots that touched another robot",
             {"touched": "share of robots"}),
     Figure("F", "The thesis's findings as effects",
-           "Cliff's delta of a over b with its 95 % interval, or the rank-biserial "
-           "correlation where an experiment is compared with a number. In brackets: "
-           "the thesis's finding (> greater, < smaller, = alike, != different). Each "
-           "mark of a line is a pair of experiments, or an experiment.",
+           "Each row is a pair of experiments A/B, with Cliff's delta and its 95 % "
+           "interval, or an experiment that is compared with a number, with the "
+           "difference divided by its margin. 1, 2 and 3 are the scenarios, random is "
+           "no reproduction, drift no selection. In brackets: what the thesis finds. "
+           "Shaded: negligible effects; within the dotted lines two experiments are "
+           "alike. † marks what follows almost by construction.",
            ("findings",), effects, "thesis"),
     Figure("H", "Measures over births",
            "Mean over the population of each measure that the experiment names. Each "

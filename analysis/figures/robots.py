@@ -1,4 +1,4 @@
-"""Figures of single robots, their ancestors, and the findings of the thesis."""
+"""Figures of single robots and their ancestors."""
 
 from typing import Any
 
@@ -31,11 +31,6 @@ _BINS = {
 """Width of a bin, distance of its point from its lower end, and label of the axis."""
 _DODGE = 0.13
 """Distance of two experiments' points, by that of two numbers of extremities."""
-_VERDICTS = {
-    "reproduced": "#0072B2",
-    "undecided": "#9A9A9A",
-    "not reproduced": "#D55E00",
-}
 
 
 def variability(tables: Tables) -> p9.ggplot:
@@ -185,46 +180,3 @@ def lineages(tables: Tables) -> p9.ggplot:
         + p9.labs(x="number of birth", y="rank (founders 1, children one more)")
         + theme_of_size(4.2)
     )
-
-
-def effects(tables: Tables) -> p9.ggplot:
-    """Return the effects by which the thesis's findings are tested.
-
-    Args:
-        tables: ``findings``.
-
-    Raises:
-        NothingToDraw: no finding could be tested.
-    """
-    rows = tables["findings"].filter(pc.field("effect").is_valid())
-    if not rows.num_rows:
-        raise NothingToDraw("no finding has two finished runs of each experiment")
-    shown = rows.filter(pc.field("expected") != "some").to_pylist()
-    if not shown:
-        raise NothingToDraw("no finding compares runs with each other or a number")
-    lines: dict[str, list[Any]] = {}
-    for row in shown:
-        text = f"{row['figure']}  {row['topic']}  ({row['expected']})"
-        lines.setdefault(text, []).append(row)
-    for height, group in enumerate(lines.values()):
-        for at, row in enumerate(group):
-            row["height"] = height + 0.7 * ((at + 0.5) / len(group) - 0.5)
-    named = pa.Table.from_pylist(shown)
-    sure = named.filter(named["effect_low"].is_valid())
-    figure = (
-        p9.ggplot(named.to_pandas(), p9.aes("effect", "height", colour="verdict"))
-        + p9.geom_vline(xintercept=0, colour="#999999", size=0.5)
-        + p9.geom_point(size=1.4)
-        + p9.scale_y_reverse(
-            breaks=list(range(len(lines))), labels=list(lines), expand=(0, 0.6)
-        )
-        + p9.scale_colour_manual(_VERDICTS, name="")
-        + p9.coord_cartesian(xlim=(-1, 1))
-        + p9.labs(x="effect", y="")
-        + theme_of_size(1.2 + 0.24 * len(lines), 9.0)
-        + p9.theme(axis_text_y=p9.element_text(size=7.5))
-    )
-    if not sure.num_rows:
-        return figure
-    ends = p9.aes(x="effect_low", xend="effect_high", yend="height")
-    return figure + p9.geom_segment(ends, data=sure.to_pandas(), size=0.5)

@@ -29,12 +29,14 @@ _THESIS = {
     "no-reproduction": "#7F7F7F",
     "no-selection": "#CC79A7",
 }
+_SHORT = {"no-reproduction": "random", "no-selection": "drift"}
+"""What the baselines are: random search and drift."""
 _GOLDEN = 0.618034
 """Golden ratio: multiples of it are far from each other on a circle."""
 _LIGHTNESS = (0.3, 0.68, 0.47)
 OTHERS = ("#D55E00", "#56B4E9", "#8C6D31", "#5254A3", "#000000", "#B2DF8A", "#E7298A")
 """Colours of experiments that are not in the thesis."""
-_INK, _FAINT = "#333333", "#E6E6E6"
+INK, _FAINT = "#333333", "#E6E6E6"
 # TrueType fonts instead of outlines, so that text in a PDF stays text.
 _SETTINGS: dict[Any, Any] = {"pdf.fonttype": 42, "savefig.facecolor": "white"}
 PICTURE_ENDING = ".png"
@@ -79,6 +81,11 @@ def label(experiment: str) -> str:
     if name in _THESIS:
         text = re.sub(r"(?<=\D)(?=\d)", " ", name).replace("-", " ")
     return f"{text} {mark}{number}" if mark else text
+
+
+def short_label(experiment: str) -> str:
+    """Return the short name of an experiment of the thesis, for example in pairs."""
+    return _SHORT.get(experiment) or re.sub(r"^scenario(?=\d)", "", experiment)
 
 
 def two_line_label(experiment: str) -> str:
@@ -128,15 +135,15 @@ def theme_of_size(height_in: float, width_in: float = WIDTH_IN) -> Any:  # noqa:
     """Return the theme for a figure of this size."""
     return p9.theme_bw(base_size=10) + p9.theme(
         figure_size=(width_in, height_in),
-        text=p9.element_text(colour=_INK),
+        text=p9.element_text(colour=INK),
         legend_position="top",
         legend_title=p9.element_blank(),
         legend_key=p9.element_blank(),
         panel_border=p9.element_blank(),
         panel_grid_minor=p9.element_blank(),
         panel_grid_major=p9.element_line(colour=_FAINT, size=0.5),
-        axis_line=p9.element_line(colour=_INK, size=0.5),
-        axis_ticks=p9.element_line(colour=_INK, size=0.5),
+        axis_line=p9.element_line(colour=INK, size=0.5),
+        axis_ticks=p9.element_line(colour=INK, size=0.5),
         strip_background=p9.element_blank(),
         strip_text=p9.element_text(weight="bold", ha="left", x=0),
         panel_spacing_x=0.04,

@@ -31,6 +31,8 @@ _SHOWN_PIXELS = 1400
 """Width of figures in the report; their files are wider."""
 _COLOURS = 128
 """Colours of plots in the report."""
+_WIDE = ("sweeps", "thesis")
+"""Sections whose figures are as wide as the page, as that of gaits is."""
 
 _COURSES = (
     "6.3",
@@ -248,7 +250,7 @@ def _figures(figures: Iterable[DrawnFigure]) -> str:
 def _figure(drawn: DrawnFigure) -> str:
     one = drawn.figure
     name = f"{one.title}."
-    is_wide = one.number == GAITS or one.section == "sweeps"
+    is_wide = one.number == GAITS or one.section in _WIDE
     wide = ' class="wide"' * is_wide
     return (
         f'<figure id="figure-{escape(one.number)}"{wide}>'
