@@ -1,5 +1,7 @@
 """Figures of the speed of an arena: random robots and spiders."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import plotnine as p9
 import pyarrow as pa
@@ -10,6 +12,9 @@ from analysis.figures.style import theme_of_size
 
 _THESIS = (-0.26, 34.78, 20.41)
 """Real-time factor a + b / p + c / p^2 on an i7-4790K. Source: Hupkes 2016, 6.1."""
+_LEAST = 0.1
+"""Least value that is drawn of the thesis's fit."""
+_TICKS = [factor * 10.0**power for power in range(-2, 5) for factor in (1, 3)]
 _OURS, _THEIRS = "this machine", "thesis, i7-4790K"
 
 
@@ -28,7 +33,12 @@ def arena_speed(tables: Tables) -> p9.ggplot:
     sizes = np.unique(np.asarray(rows["population"], np.float64))
     line = np.linspace(sizes.min(), max(sizes.max(), sizes.min() + 1), 100)
     a, b, c = _THESIS
-    fit = pa.table({"population": line, "factor": a + b / line + c / line**2})
+    factors = a + b / line + c / line**2
+    fit = pa.table({"population": line, "factor": factors})
+    # Of many robots it is negative.
+    fit = fit.filter(factors >= _LEAST)
+    if fit.num_rows <= 1:
+        return _speed(rows)
     dashes = p9.geom_line(data=fit.to_pandas().assign(of=_THEIRS), size=0.7)
     return _speed(rows) + dashes
 
@@ -65,6 +75,16 @@ def _speed(rows: pa.Table) -> p9.ggplot:
     return (
         p9.ggplot(line, p9.aes("population", "factor", colour="of", linetype="of"))
         + p9.geom_hline(yintercept=1.0, colour="#999999", size=0.5)
+        + p9.annotate(
+            "text",
+            x=line["population"].max(),
+            y=1.0,
+            label="real time",
+            ha="right",
+            va="bottom",
+            size=8,
+            colour="#555555",
+        )
         + p9.geom_line(size=0.9)
         + p9.geom_point(
             p9.aes("population", "factor"),
@@ -77,7 +97,11 @@ def _speed(rows: pa.Table) -> p9.ggplot:
         )
         + p9.scale_colour_manual({_OURS: "#0072B2", _THEIRS: "#7F7F7F"}, name="")
         + p9.scale_linetype_manual({_OURS: "-", _THEIRS: "--"}, name="")
-        + p9.expand_limits(y=0)
-        + p9.labs(x="robots", y="real-time factor")
+        + p9.scale_y_log10(breaks=_TICKS, labels=_plain)
+        + p9.labs(x="robots", y="simulated / wall time")
         + theme_of_size(3.6)
     )
+
+
+def _plain(factors: Sequence[float]) -> list[str]:
+    return [f"{factor:g}" for factor in factors]

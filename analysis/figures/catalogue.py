@@ -119,10 +119,10 @@ def _with_note(tables: Tables, text: str) -> str:
 
 FIGURES: tuple[Figure, ...] = (
     Figure("6.1", "Speed of an arena by its population",
-           "Real-time factor (simulated time by wall-clock time) of random robots in "
-           "one arena. Points are repetitions, the solid line joins their means, the "
-           "dashed line is the thesis's fit for its own machine. Values above the thin "
-           "line are faster than real time.",
+           "Simulated by wall-clock time of random robots in one arena, on a "
+           "logarithmic axis. Points are repetitions, the solid line joins their "
+           "means, the dashed line is the thesis's fit for its own machine. Values "
+           "above 1 are faster than real time.",
            (_BENCHMARK,), arena_speed, "speed"),
     _spread("fitness", "6.2", "Fitness at the end", {"fitness": "mean fitness"}),
     _course("fitness", "6.3", "Fitness over births", "fitness", "mean fitness"),
@@ -172,8 +172,8 @@ FIGURES: tuple[Figure, ...] = (
            "its parents. Each line leads to a parent.",
            (BIRTHS,), lineages, "diversity"),
     Figure("7.1", "Speed of an arena of spiders by its population",
-           "Real-time factor (simulated time by wall-clock time) of identical spiders "
-           "on a grid. Points are repetitions, the line joins their means.",
+           "Simulated by wall-clock time of identical spiders on a grid, on a "
+           "logarithmic axis. Points are repetitions, the line joins their means.",
            (_BENCHMARK,), spider_speed, "speed"),
     _spread("bodies", "A", "Connections at the end",
             {"connections": "connections",

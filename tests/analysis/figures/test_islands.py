@@ -143,4 +143,24 @@ def test_a_speed_is_drawn_beside_the_thesiss() -> None:
     fit = figure.layers[-1]._data
     # The thesis's formula at 5 and 10 robots.
     assert fit["factor"].iloc[[0, -1]].tolist() == pytest.approx([7.5124, 3.4221])
+    (axes,) = figure.draw().axes
+    assert figure.labels.y == "simulated / wall time"
+    # The axis is logarithmic, and has the line of real time.
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ["1", "3", "10"]
+    (text,) = axes.texts
+    assert text.get_text() == "real time"
+    assert text.get_position()[1] == 0
+
+
+@pytest.mark.parametrize(("sizes", "has_fit"), [((50, 300), True), ((200, 300), False)])
+def test_the_thesiss_line_ends_where_it_is_about_zero(
+    sizes: tuple[int, ...], *, has_fit: bool
+) -> None:
+    rows = [
+        {"benchmark": "arena", "population": size, "factor": 100 / size}
+        for size in sizes
+    ]
+    figure = arena_speed({"benchmark": pa.Table.from_pylist(rows)})
+    last = figure.layers[-1]._data
+    assert (last["factor"].min() >= 0.1 and last["population"].max() < 100) == has_fit
     figure.draw()
