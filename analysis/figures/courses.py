@@ -117,7 +117,8 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     sure = shown.mean.filter(pc.field("runs") >= BAND_RUNS)
     if sure.num_rows:
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
-        figure += p9.geom_ribbon(ends, data=frame(sure), alpha=0.18)
+        # Not in the legend: the interval of some experiments is narrower than a line.
+        figure += p9.geom_ribbon(ends, frame(sure), alpha=0.18, show_legend=False)
     if few:
         figure += p9.geom_line(
             p9.aes(colour="experiment", group="folder"),
