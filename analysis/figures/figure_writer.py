@@ -14,7 +14,7 @@ from analysis.figures.catalogue import BIRTHS, FIGURES, DrawnFigure, Figure
 from analysis.figures.family_tree import LINEAGE, Best, best_robots
 from analysis.figures.file_names import FileNames
 from analysis.figures.films import film
-from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.forms import NothingToDraw, Tables, fitness_units
 from analysis.figures.pictures import family_tree, gaits
 from analysis.figures.robot_pictures import (
     RobotPicture,
@@ -169,11 +169,13 @@ def draw_figures(
         writer.add(figure, given)
         bar.advance(task)
     _add_sweeps(writer, given)
-    _add_gaits(writer, list(pictures.values()), problems)
+    units = fitness_units(tables)
+    _add_gaits(writer, list(pictures.values()), problems, units)
     bar.advance(task)
     for name in trees:
         if name in pictures:
-            _add_tree(writer, pictures[name], tables["robots"])
+            unit = units.get(name, "")
+            _add_tree(writer, pictures[name], tables["robots"], unit)
         else:
             why = f"no evaluated robot of {name} is in a recorded population"
             writer.leave_out(_tree_number(name), problems.get(name, why))
@@ -239,6 +241,7 @@ def _add_gaits(
     writer: FigureWriter,
     pictures: Sequence[RobotPicture],
     problems: Mapping[str, str],
+    units: Mapping[str, str],
 ) -> None:
     number = GAITS
     for name, why in problems.items():
@@ -255,11 +258,13 @@ def _add_gaits(
         f"{PART_COLOURS}"
     )
     title = "Gaits of the best robots"
-    draw = partial(gaits, pictures)
+    draw = partial(gaits, pictures, units)
     writer.add(Figure(number, title, caption, _SOURCE, lambda _: draw(), "robots"), {})
 
 
-def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None:
+def _add_tree(
+    writer: FigureWriter, one: RobotPicture, robots: pa.Table, unit: str
+) -> None:
     """Draw one experiment's best robot and its family, or record why not."""
     best, family = one.best, one.family
     if family is None:
@@ -291,7 +296,7 @@ def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None
         f"{one.lineage.num_rows - 1} ancestors in total."
     )
     title = f"Ancestry of the best robot of {label(best.experiment)}"
-    draw = partial(family_tree, one, family, fitness)
+    draw = partial(family_tree, one, family, fitness, unit)
     subject = f"ancestry-of-{best.experiment}"
     writer.add(
         Figure(number, title, caption, _SOURCE, lambda _: draw(), "robots", subject), {}

@@ -16,7 +16,7 @@ from analysis.figures.style import (
     theme_of_size,
     two_line_label,
 )
-from analysis.measures.fitness_functions import axis_text, functions_of
+from analysis.measures.fitness_functions import axis_text, fitness_unit, functions_of
 from schema.errors import RevolveError
 
 Tables = Mapping[str, pa.Table]
@@ -65,6 +65,16 @@ def fitness_text(tables: Tables, text: str) -> str:
     """Return the label of an axis of fitness, with the unit if all runs share one."""
     names = set(functions_of(tables["runs"]).values()) if "runs" in tables else set()
     return axis_text(names.pop(), text) if len(names) == 1 else text
+
+
+def fitness_units(tables: Tables) -> dict[str, str]:
+    """Return the unit of each experiment's fitness; empty where it is not known.
+
+    Args:
+        tables: ``runs``; without it, no unit is known.
+    """
+    functions = functions_of(tables["runs"]) if "runs" in tables else {}
+    return {name: fitness_unit(function) for name, function in functions.items()}
 
 
 def fitness_note(tables: Tables) -> str:

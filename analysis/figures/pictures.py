@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import ConnectionPatch, Rectangle
 
 from analysis.figures.family_tree import ordered
@@ -12,7 +13,11 @@ from analysis.figures.style import label
 from analysis.measures.families import Family
 from schema.robot.ids import BirthId
 
-_INK, _FAINT = "#333333", "#9A9A9A"
+_NO_UNITS: Mapping[str, str] = {}
+_INK, _GREY, _FAINT = "#333333", "#666666", "#9A9A9A"
+_SMALL = 8.0
+"""Size of the texts that explain lines and numbers."""
+_DOTS = (0, (1, 3))
 _HEIGHT = 0.53
 """Height of a picture in a family tree in which each robot has a width of 1."""
 _WIDTH = 0.94
@@ -22,13 +27,18 @@ _STILL_M = 1e-4
 """Way during a gait below which a robot stands still [m]."""
 _STEP = 1.0
 """Distance of two levels."""
+_RIM, _BELOW = 0.35, 0.25
+"""Distance of the line below founders from pictures; space below the lowest robot."""
 
 
-def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
+def gaits(
+    robot_pictures: Sequence[RobotPicture], units: Mapping[str, str] = _NO_UNITS
+) -> Figure:
     """Return one row of consecutive pictures per robot.
 
     Args:
         robot_pictures: pictures of the best robots; at least one.
+        units: unit of fitness by experiment.
 
     Source: Hupkes 2016, figure 6.10.
     """
@@ -44,18 +54,28 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
             axis.set_axis_off()
         for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
             axis.imshow(picture)
-            axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
-        way = f"moved {100 * one.moved_m:.2g} cm"
-        if one.moved_m < _STILL_M:
-            way = "stood still in these pictures"
-        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}, {way}"
-        row[0].set_title("")
-        row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=12)
+            axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_GREY, pad=2)
+        row[0].annotate(
+            _heading(one, units.get(one.best.experiment, "")), (0, 1), (1, 13),
+            "axes fraction", "offset points", fontsize=8, color=_INK,
+        )  # fmt: skip
     return figure
 
 
+def _heading(one: RobotPicture, unit: str) -> str:
+    """Return what is written above the pictures of a gait."""
+    way = f"moved {100 * one.moved_m:.2g} cm in {one.times_s[-1]:.1f} s"
+    if one.moved_m < _STILL_M:
+        way = "stood still in these pictures"
+    fitness = f"{one.best.fitness:.3g} {unit}".rstrip()
+    return f"{label(one.best.experiment)}, fitness {fitness}, {way}"
+
+
 def family_tree(
-    one: RobotPicture, relatives: Family, fitness: Mapping[BirthId, float]
+    one: RobotPicture,
+    relatives: Family,
+    fitness: Mapping[BirthId, float],
+    unit: str = "",
 ) -> Figure:
     """Return a robot, its parents above it, and so on, and the founders on top.
 
@@ -63,6 +83,7 @@ def family_tree(
         one: pictures of the robot and its family.
         relatives: its family.
         fitness: fitness of its relatives.
+        unit: unit of fitness; empty if it is not known.
 
     Source: Hupkes 2016, figures 6.18 to 6.20.
     """
@@ -74,11 +95,13 @@ def family_tree(
         for at, row in enumerate(level)
     }
     top = _STEP * (len(levels) - 1) + _HEIGHT
-    figure = Figure(figsize=(8.0, 8.0 / width * (top + 1.75)))
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_axis_off()
     # As large as the space below a picture allows.
     size = max(6.5, min(10.0, 90.0 / width))
+    founders_at = top + _RIM + 0.35 + 1.5 * _SMALL / 72 * width / 8.0
+    end = founders_at + _HEIGHT + 0.1
+    figure = Figure(figsize=(8.0, 8.0 / width * (end + _BELOW)))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
     for child, parent in relatives.edges:
         _line(axes, spots[child], spots[parent])
     for row, spot in spots.items():
@@ -86,17 +109,46 @@ def family_tree(
         text = "" if known is None else f"{known:.3g}"
         text = f"{_name(one, row)}  {text}"
         _add_picture(axes, one, row, spot, text=text, size=size)
-    line = top + 0.35
-    axes.plot([0, width], [line, line], "--", color=_FAINT, linewidth=0.8)
+    if relatives.founders:
+        _add_rim(axes, width, top + _RIM)
     for at, row in enumerate(relatives.founders):
-        spot = ((at + 0.5) * width / len(relatives.founders), line + 0.35)
+        spot = ((at + 0.5) * width / len(relatives.founders), founders_at)
         colour = FOUNDERS[min(at, len(FOUNDERS) - 1)]
         text = f"founder {_name(one, row)}"
         _add_picture(axes, one, row, spot, text=text, size=size, colour=colour)
     axes.set_xlim(0, width)
-    axes.set_ylim(-0.25, line + 0.35 + _HEIGHT + 0.1)
+    axes.set_ylim(-_BELOW, end)
     axes.set_aspect("equal")
+    is_dotted = any(spots[up][1] <= spots[down][1] for down, up in relatives.edges)
+    _add_key(axes, unit, is_dotted=is_dotted)
     return figure
+
+
+def _add_rim(axes: Axes, width: float, height: float) -> None:
+    """Draw the line between founders and a robot's nearest ancestors."""
+    axes.plot([0, width], [height] * 2, "--", color=_FAINT, linewidth=0.8)
+    axes.annotate(
+        "founders whose parts these robots have", (0, height), (3, 2), "data",
+        "offset points", fontsize=_SMALL, color=_GREY,
+    )  # fmt: skip
+
+
+def _add_key(axes: Axes, unit: str, *, is_dotted: bool) -> None:
+    """Say beside the lowest robot what numbers and lines are."""
+    fitness = f"fitness [{unit}]" if unit else "fitness"
+    axes.text(
+        0.01, 0.02, f"below each robot: number of\nits birth, {fitness}", va="bottom",
+        fontsize=_SMALL, color=_GREY, transform=axes.transAxes,
+    )  # fmt: skip
+    lines = [
+        Line2D([], [], color=_FAINT, linewidth=0.9, label="parent"),
+        Line2D([], [], color=_FAINT, linewidth=1.2, linestyle=_DOTS,
+               label="parent on another level"),
+    ]  # fmt: skip
+    axes.legend(
+        handles=lines[: 1 + is_dotted], loc="lower right", frameon=False,
+        fontsize=_SMALL, labelcolor=_GREY, borderaxespad=0.4, borderpad=0.2, labelspacing=0.3,
+    )  # fmt: skip
 
 
 def _name(one: RobotPicture, row: int) -> str:
@@ -149,7 +201,7 @@ def _line(axes: Axes, child: Spot, parent: Spot) -> None:
     bend = min(0.25, 0.45 / max(away, 1.0)) * (1 if end[0] < start[0] else -1)
     axes.add_patch(
         ConnectionPatch(
-            start, end, "data", "data", linestyle=(0, (1, 3)), linewidth=1.2, zorder=1,
+            start, end, "data", "data", linestyle=_DOTS, linewidth=1.2, zorder=1,
             connectionstyle=f"arc3,rad={bend}", color=_FAINT,
         )
     )  # fmt: skip

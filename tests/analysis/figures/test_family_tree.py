@@ -1,5 +1,6 @@
 """Tests of families of robots and the figures that show them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -196,15 +197,20 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
 ) -> None:
     assert robot_picture.family is not None
     fitness = {BirthId(0, 5): 0.25}
-    (axes,) = family_tree(robot_picture, robot_picture.family, fitness).axes
+    figure = family_tree(robot_picture, robot_picture.family, fitness, "m/s")
+    (axes,) = figure.axes
     heights = [(shade(image), image.get_extent()[2]) for image in axes.images]
-    texts = {
-        text.get_text().split("  ")[0]: text.get_text().split("  ")[-1]
-        for text in axes.texts
-    }
-    assert texts["5"] == "0.25"
+    texts = [text.get_text() for text in axes.texts]
+    numbers, note = texts[:5], texts[5]
     # 0 was born on another island.
-    assert set(texts) == {"5", "4", "3", "1", "1:0", "founder 1", "founder 1:0"}
+    assert {*numbers} == {"5  0.25", "4  ", "3  ", "1  ", "1:0  "}
+    assert note == "founders whose parts these robots have"
+    assert {*texts[6:8]} == {"founder 1", "founder 1:0"}
+    assert texts[8].endswith("fitness [m/s]")
+    legend = axes.get_legend()
+    assert legend is not None
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["parent", "parent on another level"]
     by_row: dict[int, list[float]] = {}
     for row, height in heights:
         by_row.setdefault(row, []).append(height)
@@ -218,10 +224,14 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
 
 
 def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None:
-    figure = gaits([robot_picture, robot_picture])
+    other = Best("mine", Path("f"), 0, 0, 5, 0.25)
+    still = replace(robot_picture, best=other, moved_m=0.0)
+    figure = gaits([robot_picture, still], {"scenario1": "m/s"})
     assert len(figure.axes) == 4
-    assert figure.axes[0].get_title(loc="left") == (
-        "scenario 1, fitness 0.25, moved 3.1 cm"
-    )
-    assert figure.axes[3].get_title() == "0.5 s"
+    headings = [text.get_text() for axes in figure.axes for text in axes.texts]
+    assert headings == [
+        "scenario 1, fitness 0.25 m/s, moved 3.1 cm in 0.5 s",
+        "mine, fitness 0.25, stood still in these pictures",
+    ]
+    assert [axes.get_title() for axes in figure.axes] == ["0.0 s", "0.5 s"] * 2
     assert shade(figure.axes[3].images[0]) == 1

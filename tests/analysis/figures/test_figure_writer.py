@@ -92,6 +92,6 @@ def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors(
     chain = tuple((row,) for row in range(LEVELS))
     shown = replace(robot_of("a", 0), family=Family(chain, (), (), {}))
     robots = table("robots", [])
-    figure_writer._add_tree(writer, shown, robots)
+    figure_writer._add_tree(writer, shown, robots, "m/s")
     (tree,) = writer.drawn
     assert "its ancestors over four levels of reproduction" in tree.caption
