@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
+from analysis.comparison.claims import TOUCHES
 from analysis.figures.bench import arena_speed
 from analysis.figures.courses import over_births
 from analysis.figures.findings import effects
@@ -39,12 +40,15 @@ _COLOURS, _QUALITY, _DPI = 256, 82, 200
 _BASELINES = ("no-reproduction", "no-selection")
 _TREE = "scenario1"
 """Experiment whose best robot's ancestors are shown."""
+_UNIT = "m/s"
+"""Unit of fitness, which is the same in all experiments."""
 _FOUNDER_LEVEL = -1
 
 
 def _sources(tables: Tables) -> dict[str, pa.Table]:
     """Return the rows that each picture shows."""
-    fitness = tables["progression"].filter(pc.field("measure") == "fitness")
+    progression = _whole(tables["progression"])
+    fitness = progression.filter(pc.field("measure") == "fitness")
     best = _families(tables)
     found = {
         "progression.png": fitness,
@@ -57,9 +61,14 @@ def _sources(tables: Tables) -> dict[str, pa.Table]:
     return found
 
 
+def _whole(rows: pa.Table) -> pa.Table:
+    """Return the rows without those of the short runs that record touches."""
+    return rows.filter(pc.field("experiment") != TOUCHES)
+
+
 def _families(tables: Tables) -> dict[str, pa.Table]:
     """Return the rows of the family of each experiment's best robot."""
-    rows = tables["family"]
+    rows = _whole(tables["family"])
     found = {}
     for name in in_order(rows["experiment"].to_pylist()):
         mine = rows.filter(pc.field("experiment") == name)
@@ -113,9 +122,9 @@ def draw(tables: Tables) -> Iterator[str]:
     """
     plots: dict[str, Callable[[], Figure]] = {
         "progression.png": lambda: over_births(
-            {name: tables[name] for name in ("populations", "progression")},
+            {name: _whole(tables[name]) for name in ("populations", "progression")},
             "fitness",
-            "mean fitness [m/s]",
+            f"mean fitness [{_UNIT}]",
         ).draw(),
         "findings.png": lambda: effects(tables),
         "arena-speed.png": lambda: arena_speed(tables).draw(),
@@ -210,8 +219,8 @@ def _robots(tables: Tables) -> dict[str, Figure]:
         BirthId(0, birth): value for birth, value in numbers if value is not None
     }
     return {
-        "gaits.jpg": gaits(list(pictures.values())),
-        "ancestry.jpg": family_tree(pictures[_TREE], relatives[_TREE], fitness),
+        "gaits.jpg": gaits([*pictures.values()], dict.fromkeys(pictures, _UNIT)),
+        "ancestry.jpg": family_tree(pictures[_TREE], relatives[_TREE], fitness, _UNIT),
     }
 
 
