@@ -147,7 +147,8 @@ def _add_key(axes: Axes, unit: str, *, is_dotted: bool) -> None:
     ]  # fmt: skip
     axes.legend(
         handles=lines[: 1 + is_dotted], loc="lower right", frameon=False,
-        fontsize=_SMALL, labelcolor=_GREY, borderaxespad=0.4, borderpad=0.2, labelspacing=0.3,
+        fontsize=_SMALL, labelcolor=_GREY, borderaxespad=0.4, borderpad=0.2,
+        labelspacing=0.3,
     )  # fmt: skip
 
 
