@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 from analysis.comparison.claims import TOUCHES
 from analysis.comparison.equivalence import ALPHA, alike_power
 from analysis.comparison.verdicts import LARGE, SURE
-from analysis.figures.style import in_order, label
+from analysis.figures.style import in_order, label, short_label
 from docs.campaign_data import PARTS
 
 Tables = Mapping[str, pa.Table]
@@ -263,9 +263,7 @@ def _grouped(tables: Tables, chosen: Callable[[Row], bool]) -> dict[Any, list[Ro
 
 
 def _name(row: Row) -> str:
-    short = {"no-reproduction": "random", "no-selection": "drift"}
-    names = [str(row[key]) for key in "ab" if row[key]]
-    return "/".join(short.get(name, name.removeprefix("scenario")) for name in names)
+    return "/".join(short_label(row[key]) for key in "ab" if row[key])
 
 
 def _topics(tables: Tables) -> str:
