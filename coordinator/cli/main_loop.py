@@ -85,8 +85,10 @@ def execute_runs(
         ) as display:
             shown_s = done_s = -math.inf
             processes = OwnProcesses(pools)
+            wait_s = 0.0  # the first progress is shown at once
             while not (scheduler.is_finished or stop.is_set()):
-                scheduler.turn(_TURN_S, time.monotonic)
+                scheduler.turn(wait_s, time.monotonic)
+                wait_s = _TURN_S
                 now_s = time.monotonic()
                 if now_s - shown_s >= _TURN_S:
                     shown_s = now_s
