@@ -211,7 +211,7 @@ def _verdicts(tables: Tables) -> str:
     lines = [
         f"Of {len(rows)} findings: **{_counts(rows)}**.",
         f"- Without the {len(rows) - len(sure)} marked †: {_counts(sure)}.",
-        f"- Without scenario 3, {repeats} repeats: {_counts(off_line)}.",
+        f"- Without scenario 3 ({repeats} repeats): {_counts(off_line)}.",
     ]
     if untested:
         reasons = sorted({row["why"] for row in untested})
