@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 from analysis.comparison.claims import TOUCHES
 from analysis.comparison.equivalence import ALPHA, alike_power
 from analysis.comparison.verdicts import LARGE, SURE
-from analysis.figures.style import in_order, label, short_label
+from analysis.figures.style import in_order, label, pair_name
 from docs.campaign_data import PARTS
 
 Tables = Mapping[str, pa.Table]
@@ -262,10 +262,6 @@ def _grouped(tables: Tables, chosen: Callable[[Row], bool]) -> dict[Any, list[Ro
     return groups
 
 
-def _name(row: Row) -> str:
-    return "/".join(short_label(row[key]) for key in "ab" if row[key])
-
-
 def _topics(tables: Tables) -> str:
     """Return one row per finding without names: the pairs by verdict."""
     rows = []
@@ -273,11 +269,7 @@ def _topics(tables: Tables) -> str:
     verdicts = [name for name in VERDICTS if name in found]
     for (figure, topic, _), group in _grouped(tables, lambda _: True).items():
         cells = [
-            ", ".join(
-                f"{_name(row)}{'†' if row['near_automatic'] else ''}"
-                for row in group
-                if row["verdict"] == verdict
-            )
+            ", ".join(pair_name(row) for row in group if row["verdict"] == verdict)
             for verdict in verdicts
         ]
         rows.append([figure, topic, *cells])

@@ -14,7 +14,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE
 from analysis.figures.forms import NothingToDraw, Tables
-from analysis.figures.style import INK, short_label
+from analysis.figures.style import INK, pair_name
 
 Row = Mapping[str, Any]
 
@@ -214,7 +214,7 @@ def _draw_rows(axes: Axes, one: _Finding, top: float) -> None:
             axes.plot(ends, [middle] * 2, color=look["color"], lw=1.2, zorder=2)
         axes.plot([value], [middle], ls="", zorder=3, **look)
         axes.annotate(
-            _name(row), (0, middle), (-3, 0), axes.get_yaxis_transform(),
+            pair_name(row), (0, middle), (-3, 0), axes.get_yaxis_transform(),
             "offset points", ha="right", **_WORDS,
         )  # fmt: skip
 
@@ -228,12 +228,6 @@ def _shown(row: Row) -> tuple[Any, tuple[Any, Any]]:
         for name in ("difference", "difference_low", "difference_high")
     )
     return value, (low, high)
-
-
-def _name(row: Row) -> str:
-    """Return a pair of experiments, or one, by short names."""
-    names = "/".join(short_label(row[key]) for key in "ab" if row[key])
-    return names + "†" * bool(row["near_automatic"])
 
 
 def _share_limits(figure: Figure) -> None:

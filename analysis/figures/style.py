@@ -88,6 +88,16 @@ def short_label(experiment: str) -> str:
     return _SHORT.get(experiment) or re.sub(r"^scenario(?=\d)", "", experiment)
 
 
+def pair_name(finding: Mapping[str, Any]) -> str:
+    """Return the short names of a finding's experiments; † marks a near-automatic one.
+
+    Args:
+        finding: a row of ``findings``.
+    """
+    names = "/".join(short_label(finding[key]) for key in "ab" if finding[key])
+    return names + "†" * bool(finding["near_automatic"])
+
+
 def two_line_label(experiment: str) -> str:
     """Return the label of an experiment, on two lines if it is long."""
     text = label(experiment)

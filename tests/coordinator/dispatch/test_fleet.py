@@ -241,15 +241,20 @@ def test_a_job_that_was_sent_again_took_all_the_time(
     assert agents.waits_s[-1] == pytest.approx(100.0 * typical_s)
 
 
-def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
-    fleet: Fleet, agents: Agents
-) -> None:
-    shard = new_shard(fleet)
-    for now_s in (20.0, 40.0):
+def advance_until(fleet: Fleet, agents: Agents, shard: int, *times_s: float) -> None:
+    """Advance a shard several times; the answers come at these times."""
+    for now_s in times_s:
         fleet.advance(shard)
         number, agent, _ = agents.sent[-1]
         agents.news = [Returned(number, agent, "ok", b"x")]
         fleet.listen(0.0, now_s)
+
+
+def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
+    fleet: Fleet, agents: Agents
+) -> None:
+    shard = new_shard(fleet)
+    advance_until(fleet, agents, shard, 20.0, 40.0)
     fleet.advance(shard)
     # The first one holds what is needed to rebuild the state.
     assert agents.waits_s == [LONGEST_WAIT_S, LONGEST_WAIT_S, pytest.approx(2000.0)]
@@ -259,11 +264,7 @@ def test_advances_after_one_that_expired_wait_longer(
     fleet: Fleet, agents: Agents
 ) -> None:
     shard = new_shard(fleet)
-    for now_s in (1.0, 2.0):
-        fleet.advance(shard)
-        number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, "ok", b"x")]
-        fleet.listen(0.0, now_s)
+    advance_until(fleet, agents, shard, 1.0, 2.0)
     fleet.advance(shard)
     number, agent, payload = agents.sent[-1]
     fleet.tell(Ticked(302.0))
