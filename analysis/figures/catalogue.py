@@ -200,7 +200,7 @@ FIGURES: tuple[Figure, ...] = (
            "difference divided by its margin. 1, 2 and 3 are the scenarios, random is "
            "no reproduction, drift no selection. In brackets: what the thesis finds. "
            "Shaded: negligible effects; within the dotted lines two experiments are "
-           "alike. † marks what follows almost by construction.",
+           "alike. † marks what says nothing about evolution.",
            ("findings",), effects, "thesis"),
     Figure("H", "Measures over births",
            "Mean over the population of each measure that the experiment names. Each "

@@ -42,7 +42,7 @@ _GAP = 0.6
 """Space below a finding, and above the first one [lines]."""
 _NOTE = (
     "A/B are the compared experiments: 1, 2 and 3 are the scenarios, random is random "
-    "search (no reproduction), drift is no selection. † follows almost by construction."
+    "search (no reproduction), drift is no selection. † says nothing about evolution."
 )
 _DECADES = 6
 

@@ -303,7 +303,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "p_alike": "p of the equivalence test (two one-sided tests), with '='",
         "q_alike": "p_alike, corrected for all equivalence tests of the table",
         "power": "probability that this test finds equal experiments alike at 5 %",
-        "near_automatic": "whether the finding follows almost by construction",
+        "near_automatic": "whether the finding follows almost by construction, or also "
+        "holds without selection",
     },
     "left_out": {
         "folder": "path of the run folder; empty for figures",
