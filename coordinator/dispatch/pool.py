@@ -20,7 +20,7 @@ AHEAD_S = 0.8
 """Most time that these jobs may take together [s]: other agents cannot have them."""
 PAUSE_S = 0.2
 """Longest time that the coordinator lets answers collect [s]."""
-SPARE_SHARE = 0.125
+SPARE_SHARE = 0.4
 """Share of the time of an agent's spare jobs for which answers may collect."""
 BACKOFF_S = 0.05
 LONGEST_BACKOFF_S = 3.2

@@ -273,8 +273,10 @@ def test_gain_of_a_second_worker(tmp_path: Path) -> None:
             rates[workers].append(found.per_s)
             cpu_s.append(found.cpu_s)
     one, two = np.mean(rates[1]), np.mean(rates[2])
+    gains = np.divide(rates[2], rates[1])
+    error = gains.std(ddof=1) / np.sqrt(TURNS)
     print(
-        f"\none worker {one:.1f}/s, two {two:.1f}/s: {two / one:.3f}; coordinator "
-        f"{1e3 * np.median(cpu_s):.2f} ms CPU per birth"
+        f"\none worker {one:.1f}/s, two {two:.1f}/s: {two / one:.3f} +- {error:.3f}; "
+        f"coordinator {1e3 * np.median(cpu_s):.2f} ms CPU per birth"
     )
     assert two / one >= SECOND_WORKER

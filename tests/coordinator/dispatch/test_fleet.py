@@ -483,8 +483,8 @@ def test_fleet_pauses_while_all_workers_have_spare_jobs(
     fleet.listen(0.2, 0.02)
     fleet.listen(0.2, 0.03)
     # The first to be done is the one with two slots: sixteen to spare are eight jobs
-    # of 20 ms in each; it pauses for an eighth of that.
-    assert agents.pauses_s[-1] == pytest.approx(0.02)
+    # of 20 ms in each; it pauses for two fifths of that.
+    assert agents.pauses_s[-1] == pytest.approx(0.064)
     fleet.listen(0.01, 0.04)
     assert agents.pauses_s[-1] == 0.01  # at most the caller's timeout
     fleet.advance(new_shard(fleet))
