@@ -165,7 +165,8 @@ class StateHistory:
         count, self._width = states.shape
         state = states[:, start : start + self._ends[3]]
         if new := count - len(self.state):
-            self.warnings = np.pad(self.warnings, ((0, new), (0, 0)))
+            added = np.zeros((new, self.warnings.shape[1]), self.warnings.dtype)
+            self.warnings = np.concatenate((self.warnings, added))
             self._counts = self.warnings.reshape(-1).data
             self.touching += [[] for _ in range(new)]
             self.probed += [[] for _ in range(new)]

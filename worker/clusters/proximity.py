@@ -72,32 +72,34 @@ class Scene:
             found[:, number] = distance.min(axis=(1, 2))
         return found
 
-    def is_near(self, here: int, there: int, within_m: float) -> bool:
-        """Return whether the distance of two robots may fall below a limit.
-
-        Tests the x-y distance of the hulls of their bodies, at all moments.
-        """
-        robot_rows = self._layout.robot_rows
-        first, second = robot_rows.spans[here], robot_rows.spans[there]
-        gaps = self._hulls[:, :, first, None] - self._hulls[:, :, None, second]
-        gaps *= gaps
-        radii = robot_rows.hulls[3]
-        limit = (radii[first, None] + within_m) + radii[second]
-        return bool((gaps[:, 0] + gaps[:, 1] <= limit * limit).any())
-
     def may_be_near(self, pairs: Iterable[tuple[int, int]], margins: Floats) -> Pairs:
         """Return the pairs whose distance may fall below the sum of their margins.
+
+        Tests the x-y distances of the hulls of their bodies, at all moments.
 
         Args:
             pairs: of robots.
             margins: (R,) of the robots [m].
         """
-        reach: list[float] = margins.tolist()
-        return [
-            (here, there)
-            for here, there in pairs
-            if self.is_near(here, there, reach[here] + reach[there])
-        ]
+        pairs = list(pairs)
+        if not pairs:
+            return []
+        robot_rows = self._layout.robot_rows
+        bodies = [robot_rows.body_pairs(*pair) for pair in pairs]
+        counts = [both.shape[1] for both in bodies]
+        first, second = np.concatenate(bodies, axis=1)
+        gaps = self._hulls.take(first, axis=2)
+        gaps -= self._hulls.take(second, axis=2)
+        gaps *= gaps
+        here, there = np.array(pairs, dtype=np.intp).T
+        limits = np.repeat(margins[here] + margins[there], counts)
+        radii = robot_rows.hulls[3]
+        limits += radii[first]
+        limits += radii[second]
+        limits *= limits
+        is_near = (gaps[:, 0] + gaps[:, 1] <= limits).any(axis=0)
+        starts = np.cumsum(counts) - counts
+        return list(compress(pairs, np.logical_or.reduceat(is_near, starts).tolist()))
 
     def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
         """Return pairs of different clusters whose bounding boxes overlap.

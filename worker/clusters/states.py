@@ -39,7 +39,6 @@ class RobotRows:
         joint_counts: (R,) joint angles of each.
         body_counts: (R,) bodies of each.
         first_bodies: (R,) the first of each among the N of all.
-        spans: of each robot, slice of its own among the N.
         hulls: (4, N) as ``BoundingSpheres.hulls``.
         sphere_counts: (R,) spheres of each.
         first_spheres: (R,) the first of each among all spheres.
@@ -65,8 +64,7 @@ class RobotRows:
         bodies = [len(each.hulls) for each in bounds]
         self.body_counts = np.array(bodies, dtype=np.intp)
         self.first_bodies = np.cumsum(self.body_counts) - self.body_counts
-        firsts = zip(self.first_bodies.tolist(), bodies, strict=True)
-        self.spans = [slice(first, first + count) for first, count in firsts]
+        self._body_pairs: dict[tuple[int, int], Indices] = {}
         self.sphere_counts = np.array([len(b.radii) for b in bounds], dtype=np.intp)
         self.first_spheres = np.cumsum(self.sphere_counts) - self.sphere_counts
         fixed = [np.zeros(0, dtype=np.intp), *(each.bodies for each in bounds)]
@@ -75,6 +73,14 @@ class RobotRows:
         centres = [np.zeros((0, 9)), *(each.centres for each in bounds)]
         self.centres: Floats = np.concatenate(centres)
         self.radii = _joined([each.radii for each in bounds])
+
+    def body_pairs(self, here: int, there: int) -> Indices:
+        """Return all pairs of a body, of the N, of each of two robots, (2, P)."""
+        if (here, there) not in self._body_pairs:
+            firsts, counts = self.first_bodies[[here, there]], self.body_counts
+            both = np.indices((counts[here], counts[there])).reshape(2, -1)
+            self._body_pairs[here, there] = both + firsts[:, None]
+        return self._body_pairs[here, there]
 
 
 class Layout:
