@@ -33,7 +33,7 @@ from analysis.comparison.robustness import Row, percent
 from analysis.measures.load import read_run, read_tables
 from analysis.measures.measures import brains
 from analysis.measures.run_tables import RunTables
-from docs.page_parts import with_parts
+from docs.page_parts import write_parts
 from schema.errors import rounded
 
 DOCS = Path(__file__).resolve().parent
@@ -117,14 +117,10 @@ def kept() -> dict[tuple[str, int], pa.Table]:
 
 def write_page(*, is_check: bool) -> int:
     """Write the page's tables and pictures, or check the tables."""
-    old = PAGE.read_text("utf-8")
-    page = with_parts(old, parts())
+    command = "python -m docs.ablation_rows page"
+    code = write_parts(PAGE, parts(), command, is_check=is_check)
     if is_check:
-        is_old = page != old
-        if is_old:
-            print(f"{PAGE.name}: not up to date, run python -m docs.ablation_rows page")
-        return int(is_old)
-    PAGE.write_text(page, encoding="utf-8")
+        return code
     from analysis.figures.ablation import ablation  # noqa: PLC0415 - loads pandas
     from analysis.figures.brains import changes_over_births  # noqa: PLC0415
 

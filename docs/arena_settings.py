@@ -23,7 +23,7 @@ from scipy.stats import friedmanchisquare
 from analysis.comparison.statistics import mean_difference
 from analysis.figures.sweeps import sweep_map
 from docs.ablation_rows import save_small
-from docs.page_parts import with_parts
+from docs.page_parts import write_parts
 
 DOCS = Path(__file__).resolve().parent
 ROWS, PAGE = DOCS / "sweeps", DOCS / "arena_settings.md"
@@ -112,18 +112,11 @@ def drawn(name: str) -> Any:  # noqa: ANN401 - a figure
 
 def write_page(*, is_check: bool) -> int:
     """Write the page's tables and picture, or check the tables."""
-    old = PAGE.read_text(encoding="utf-8")
-    page = with_parts(old, parts())
-    if is_check:
-        is_old = page != old
-        if is_old:
-            print(
-                f"{PAGE.name}: not up to date, run python -m docs.arena_settings page"
-            )
-        return int(is_old)
-    PAGE.write_text(page, encoding="utf-8")
-    save_small(drawn(GRID), GRID)
-    return 0
+    command = "python -m docs.arena_settings page"
+    code = write_parts(PAGE, parts(), command, is_check=is_check)
+    if not is_check:
+        save_small(drawn(GRID), GRID)
+    return code
 
 
 def parts() -> dict[str, list[str]]:

@@ -22,7 +22,7 @@ import pyarrow.compute as pc
 from msgspec import structs
 
 from analysis.comparison.statistics import mean_difference, rank_sum_p
-from docs.page_parts import with_parts
+from docs.page_parts import csv_rows, write_parts
 from docs.tasks_campaign import best_robot, last_population
 from schema.experiment.document import Experiment
 from schema.experiment.settings import evaluation_settings_of
@@ -106,10 +106,7 @@ def keep(new: Sequence[Row]) -> None:
 
 def kept() -> list[Row]:
     """Return all rows."""
-    if not ROWS.exists():
-        return []
-    with ROWS.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return csv_rows(ROWS)
 
 
 def compared(experiment: str, rows: Sequence[Row]) -> Iterator[str]:
@@ -175,19 +172,11 @@ def parts() -> dict[Path, Mapping[str, list[str]]]:
 
 def write_pages(*, is_check: bool) -> int:
     """Write the tables into their pages, or return 1 if a table differs from them."""
-    is_old = False
-    for path, generated in parts().items():
-        old = path.read_text(encoding="utf-8")
-        page = with_parts(old, generated)
-        if not is_check:
-            path.write_text(page, encoding="utf-8")
-        elif page != old:
-            is_old = True
-            print(
-                f"{path.name}: not up to date, run python -m docs.equal_evaluations "
-                "page"
-            )
-    return int(is_old)
+    command = "python -m docs.equal_evaluations page"
+    return max(
+        write_parts(path, generated, command, is_check=is_check)
+        for path, generated in parts().items()
+    )
 
 
 if __name__ == "__main__":

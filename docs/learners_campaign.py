@@ -22,11 +22,13 @@ import numpy as np
 import pyarrow.parquet as pq
 from msgspec import structs
 
+from analysis.comparison.statistics import mean_difference, t_quantile
 from analyzer.report import analyze
 from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.learners.brain_parameters import BrainParameters
 from coordinator.evolution.learners.learner import Batch, NewbornLearner, Points
 from coordinator.evolution.random_streams import Purpose, stream
+from docs.page_parts import csv_rows
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Vetting, body_space
@@ -56,8 +58,6 @@ LEARNERS = {
     "(1+1)-es": Learning(learner="(1+1)-es"),
     BASE: Learning(learner="random"),
 }
-_T_QUANTILE = 2.262
-"""97.5 % quantile of Student's t with nine degrees of freedom."""
 
 
 def random_bodies(count: int) -> list[Robot]:
@@ -127,11 +127,7 @@ def search(
 
 
 def _known(bodies: str) -> list[dict[str, str]]:
-    file = DATA / f"{bodies}.csv"
-    if not file.exists():
-        return []
-    with file.open(newline="") as rows:
-        return list(csv.DictReader(rows))
+    return csv_rows(DATA / f"{bodies}.csv")
 
 
 def run(bodies: str) -> None:
@@ -194,10 +190,8 @@ def lines() -> Iterator[str]:
 
 def _interval(more: np.ndarray[tuple[int, int]]) -> str:
     """Return the mean of differences (seed, body) and its interval over seeds."""
-    means = more.mean(axis=1)
-    half = _T_QUANTILE * means.std(ddof=1) / sqrt(len(means))
-    low, high = means.mean() - half, means.mean() + half
-    return f"{means.mean():+.4f} ({low:+.4f} to {high:+.4f})"
+    middle, low, high = mean_difference(more.mean(axis=1), 0.0)
+    return f"{middle:+.4f} ({low:+.4f} to {high:+.4f})"
 
 
 def draw() -> None:
@@ -209,7 +203,7 @@ def draw() -> None:
             if (bodies, learner) not in found:
                 continue
             means = found[bodies, learner].mean(axis=1)
-            half = _T_QUANTILE * means.std(axis=0, ddof=1) / sqrt(len(means))
+            half = t_quantile(SEEDS - 1) * means.std(axis=0, ddof=1) / sqrt(SEEDS)
             middle = means.mean(axis=0)
             panel.plot(trials, middle, color=colour, label=learner)
             panel.fill_between(

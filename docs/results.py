@@ -9,7 +9,6 @@ digest of the rows that it was drawn from, so that it can be checked without dra
 """
 
 import argparse
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,11 +19,11 @@ from analysis.comparison.findings import WithBenchmark, findings
 from analysis.comparison.progression import progression
 from analysis.measures.benchmarks import read_benchmarks
 from docs.campaign_data import DATA, KeptOutcomes, kept
+from docs.page_parts import with_parts
 from docs.results_parts import parts_of
 from schema.errors import RevolveError
 
 DOCS = Path(__file__).resolve().parent
-_PART = re.compile(r"(<!-- begin: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 _TABLES = ("outcomes", "populations", "runs", "family")
 
 
@@ -79,26 +78,12 @@ def pages_of(tables: Mapping[str, pa.Table]) -> dict[Path, str]:
         tables: as ``tables_of`` returns them.
     """
     return {
-        DOCS / name: updated((DOCS / name).read_text("utf-8"), parts)
+        DOCS / name: with_parts(
+            (DOCS / name).read_text("utf-8"),
+            {part: [text] for part, text in parts.items()},
+        )
         for name, parts in parts_of(tables).items()
     }
-
-
-def updated(page: str, parts: Mapping[str, str]) -> str:
-    """Return a page with new generated parts.
-
-    Args:
-        page: the page, with each part once.
-        parts: Markdown by the name of the part.
-
-    Raises:
-        KeyError: the page names an unknown part.
-        ValueError: the page lacks a part.
-    """
-    found = [name for _, name, _ in _PART.findall(page)]
-    if sorted(found) != sorted(parts):
-        raise ValueError(f"the page must have parts {sorted(parts)}, has {found}")
-    return _PART.sub(lambda part: f"{part[1]}{parts[part[2]]}\n{part[3]}", page)
 
 
 def stale_files(pages: Mapping[Path, str], tables: Mapping[str, pa.Table]) -> list[str]:

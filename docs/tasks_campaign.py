@@ -1,7 +1,7 @@
 """Compares evolution with random search on each task of docs/tasks.md.
 
-    python docs/tasks_campaign.py run runs/tasks    # start, or go on after an end
-    python docs/tasks_campaign.py table             # write the table of docs/tasks.md
+    python -m docs.tasks_campaign run runs/tasks    # start, or go on after an end
+    python -m docs.tasks_campaign table             # write the table of docs/tasks.md
 
 Each search has the same number of births. The random one is the shipped experiment with
 ``selection.parents = "none"``, as in ``no-reproduction``. Rows are kept in
@@ -23,6 +23,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.load import read_runs
+from docs.page_parts import csv_rows, write_parts
 from schema.experiment.document import Experiment
 from schema.experiment.file import own_experiment
 from schema.experiment.identity import Identity, Origin
@@ -41,7 +42,6 @@ ROBOTS = ROOT / "docs" / "tasks_data"
 DRAWN = 1
 ROWS = ROBOTS / "results.csv"
 PAGE = ROOT / "docs" / "tasks.md"
-BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 
 TASKS = {
     "locomotion": ("scenario1", "m/s"),
@@ -217,10 +217,7 @@ def _commit() -> str:
 
 def rows() -> list[dict[str, str]]:
     """Return the rows that are kept, in the order in which runs finished."""
-    if not ROWS.exists():
-        return []
-    with ROWS.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return csv_rows(ROWS)
 
 
 def difference(first: Numbers, second: Numbers) -> tuple[float, float, float]:
@@ -274,10 +271,7 @@ def table(kept: Sequence[Mapping[str, str]]) -> Iterator[str]:
 
 def write_table() -> None:
     """Replace the table of docs/tasks.md by that of the rows."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    lines = "\n".join([BEGIN, "", *table(rows()), "", END])
-    PAGE.write_text(f"{before}{lines}{after}", encoding="utf-8")
+    write_parts(PAGE, {"results": ["", *table(rows()), ""]}, "", is_check=False)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Draws the pictures of docs/tasks.md: best robots that docs/tasks_campaign.py kept.
 
-    python docs/tasks_pictures.py
+    python -m docs.tasks_pictures
 
 Each picture shows three moments of an evaluation from a fixed camera.
 """

@@ -15,6 +15,7 @@ from analysis.comparison.claims import ARENA, CLAIMS, Claim
 from analysis.measures.population_table import Numbers
 from docs import results
 from docs.campaign_data import DATA
+from docs.page_parts import with_parts
 from docs.results_parts import _short, parts_of
 
 Row = dict[str, Any]
@@ -44,9 +45,9 @@ def test_a_changed_number_is_found(tables: dict[str, pa.Table]) -> None:
 
 def test_a_page_with_other_parts_is_refused() -> None:
     page = "<!-- begin: ends -->\nold\n<!-- end -->\n"
-    assert results.updated(page, {"ends": "new"}) == page.replace("old", "new")
+    assert with_parts(page, {"ends": ["new"]}) == page.replace("old", "new")
     with pytest.raises(ValueError, match=re.escape("must have parts ['runs']")):
-        results.updated(page, {"runs": "new"})
+        with_parts(page, {"runs": ["new"]})
 
 
 @pytest.mark.parametrize(
