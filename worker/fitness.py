@@ -19,6 +19,7 @@ from schema.errors import FitnessUndefined
 from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
 from schema.plugins.simple_traces import check_function, simple_traces
+from schema.robot.sums import sum_in_order
 from schema.robot.trace import Trace
 
 FitnessFunction = Callable[[Trace, Any], float]
@@ -92,9 +93,8 @@ def path_velocity(track: Trace) -> float:
         track: (T, 3) positions; T >= 2.
     """
     steps = np.diff(track.core_position, axis=0)
-    # Plain floats, so that the order of the sum is that of the track.
-    length = sum(map(math.hypot, steps[:, 0].tolist(), steps[:, 1].tolist()))
-    return length / _duration_s(track)
+    lengths = map(math.hypot, steps[:, 0].tolist(), steps[:, 1].tolist())
+    return sum_in_order(lengths) / _duration_s(track)
 
 
 def straight_velocity(track: Trace) -> float:

@@ -6,7 +6,7 @@ of an experiment, and returns a finite number, higher is better. A value above a
 shows each task and an experiment for it.
 """
 
-from itertools import pairwise
+from itertools import pairwise, starmap
 from math import atan2, cos, hypot, radians, sin, sqrt
 from typing import Annotated, Literal
 
@@ -16,6 +16,7 @@ from schema.errors import ExperimentError
 from schema.experiment.section import NotNegative, Positive
 from schema.plugins.needs import needs
 from schema.robot.results import Floats
+from schema.robot.sums import sum_in_order
 from schema.robot.trace import Trace
 
 _Place = tuple[float, float]
@@ -138,7 +139,7 @@ def light(trace: Trace, parameters: Light) -> float:
     squares = ((trace.core_position - trace.light) ** 2).sum(axis=1)
     full = parameters.full_within_m**2
     shares = [min(1.0, full / square) if square else 1.0 for square in squares.tolist()]
-    return sum(shares) / len(shares)
+    return sum_in_order(shares) / len(shares)
 
 
 class Turning(_Own, frozen=True):
@@ -170,7 +171,7 @@ def turning(trace: Trace, parameters: Turning) -> float:
 
     Source: own definition.
     """
-    turned = sum(_vertical_turn(a, b) for a, b in pairwise(trace.core_attitude))
+    turned = sum_in_order(starmap(_vertical_turn, pairwise(trace.core_attitude)))
     senses = {"left": turned, "right": -turned, "either": abs(turned)}
     angle, seconds = senses[parameters.direction], trace.duration_s
     if angle / seconds > parameters.limit:
@@ -249,5 +250,5 @@ def _vertical_turn(before: Floats, after: Floats) -> float:
     )
     if real < 0.0:
         real, vector = -real, (-vector[0], -vector[1], -vector[2])
-    size = sqrt(sum(each * each for each in vector))
+    size = sqrt(sum_in_order(each * each for each in vector))
     return 2.0 * atan2(size, real) * vector[2] / size if size else 0.0

@@ -27,6 +27,7 @@ from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment
 from schema.experiment.learning import Learning
 from schema.robot.robot import Robot
+from schema.robot.sums import sum_in_order
 
 
 class IslandLearning:
@@ -208,7 +209,7 @@ class NewbornLearning:
             "request": self._requests[trial],
             "fitness": outcome.evaluation and outcome.evaluation.fitness,
             "reason": outcome.reason,
-            "distance": sqrt(sum(squares) / len(squares)) if squares else 0.0,
+            "distance": sqrt(sum_in_order(squares) / len(squares)) if squares else 0.0,
             "parameters": point,
             "wall_s": outcome.provenance.wall_s,
             "worker": outcome.provenance.agent,
