@@ -2,8 +2,8 @@
 
 The body is plain MJCF, for MuJoCo's viewer and other tools. Two custom texts hold the
 robot in Protobuf form and the settings of an evaluation. Reading takes the robot from
-the text, bit for bit, because MJCF rounds numbers. A file whose body was edited by
-hand differs from its text and is refused.
+the text, bit for bit, because MJCF rounds numbers. A file whose body or world was
+edited by hand differs from its text and is refused.
 """
 
 import base64
@@ -54,13 +54,45 @@ _ONLY = {
 _SIDES = frozenset(map(str, range(1, MOST_PATCHES + 2)))
 _DIGITS = 1e-4
 """Relative difference that is greater than MJCF's rounding."""
+_INERTIA = 1e-2
+"""The same of inertia, which sums up the rounding of many positions."""
 _LENGTH_M = 1e-6
-_COMPARED = (
-    *("body_mass", "body_pos", "body_quat", "body_ipos"),
-    *("geom_type", "geom_size", "geom_pos", "geom_quat"),
-    *("jnt_type", "jnt_limited", "jnt_range", "jnt_pos", "jnt_axis"),
-    *("dof_damping", "dof_armature"),
-    *("actuator_forcerange", "actuator_gainprm", "actuator_biasprm"),
+_SIZES = (
+    *("nbody", "ngeom", "njnt", "nsite", "nu", "nq", "nv", "na", "nsensor"),
+    *("nhfield", "nhfielddata"),
+)
+_PLACES = (
+    *("body_pos", "body_quat", "body_ipos", "qpos0", "qpos_spring"),
+    *("geom_size", "geom_pos", "geom_quat", "site_size", "site_pos", "site_quat"),
+    *("jnt_range", "jnt_pos", "jnt_axis", "hfield_size", "hfield_data"),
+)
+"""Compared up to ``_LENGTH_M``; all others to the digits that MJCF has."""
+_BODY = (
+    *("body_parentid", "geom_bodyid", "jnt_bodyid", "site_bodyid"),
+    *("body_mass", "body_inertia", "body_gravcomp", "geom_type", "geom_fluid"),
+    *("jnt_type", "jnt_limited", "jnt_margin", "jnt_solref", "jnt_solimp"),
+    *("jnt_stiffness", "jnt_actfrclimited", "jnt_actfrcrange", "jnt_actgravcomp"),
+    *("dof_damping", "dof_armature", "dof_frictionloss", "dof_solref", "dof_solimp"),
+    *("actuator_trntype", "actuator_trnid", "actuator_gear", "actuator_dyntype"),
+    *("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
+    *("actuator_forcelimited", "actuator_forcerange", "actuator_delay"),
+    *("actuator_ctrllimited", "actuator_ctrlrange"),
+    *("actuator_damping", "actuator_armature"),
+    *("sensor_type", "sensor_objid", "sensor_cutoff", "sensor_noise", "sensor_delay"),
+)
+_WORLD = (
+    *("geom_contype", "geom_conaffinity", "geom_condim", "geom_priority"),
+    *("geom_friction", "geom_solref", "geom_solimp", "geom_solmix"),
+    *("geom_margin", "geom_gap", "geom_surfacevel", "geom_adhesion"),
+    *("hfield_size", "hfield_data"),
+)
+_OPTIONS = (
+    *("timestep", "gravity", "wind", "magnetic", "density", "viscosity"),
+    *("integrator", "cone", "jacobian", "solver", "impratio"),
+    *("iterations", "tolerance", "ls_iterations", "ls_tolerance"),
+    *("noslip_iterations", "noslip_tolerance", "ccd_iterations", "ccd_tolerance"),
+    *("o_margin", "o_solref", "o_solimp", "o_friction"),
+    *("disableflags", "enableflags", "disableactuator"),
 )
 
 
@@ -102,7 +134,8 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
 
     Raises:
         InvalidRobot: not MJCF, or MJCF that a robot does not need; no robot or
-            settings in it; a body that differs from the robot's.
+            settings in it; a body that differs from the robot's, or a world that
+            differs from the settings'.
     """
     try:
         root = parse_xml(text, MOST_MJCF_BYTES)
@@ -182,9 +215,15 @@ def _check_counts(root: ET.Element, built: mujoco.MjModel, where: str) -> None:
 
 
 def _differs(names: list[str], where: str) -> InvalidRobot:
+    listed = ", ".join(names)
+    if all(name in _WORLD or name.startswith("opt.") for name in names):
+        return InvalidRobot(
+            f"{where}: its world differs from the settings in its text ({listed}): "
+            "edit the experiment and convert the robot again with --experiment"
+        )
     return InvalidRobot(
-        f"{where}: its body differs from the robot in its text "
-        f"({', '.join(names)}): edit the robot's YAML and convert it again"
+        f"{where}: its body differs from the robot in its text ({listed}): edit the "
+        "robot's YAML, or the experiment, and convert it again"
     )
 
 
@@ -210,19 +249,40 @@ def _bytes(held: dict[str, str], name: str) -> bytes:
 
 
 def _check_body(found: mujoco.MjModel, built: mujoco.MjModel, where: str) -> None:
-    """Raise if the body of a file differs from the robot's by more than rounding."""
-    counts = ("nbody", "ngeom", "njnt", "nu")
-    differing = [n for n in counts if getattr(found, n) != getattr(built, n)]
-    if not differing:
-        # Earlier versions placed robots at other heights on uneven ground.
-        root = built.body("root").id
-        found.body_pos[root, 2] = built.body_pos[root, 2]
-        differing = [
-            name
-            for name in _COMPARED
-            if not np.allclose(
-                getattr(found, name), getattr(built, name), rtol=_DIGITS, atol=_LENGTH_M
-            )
-        ]
+    """Raise if body or world of a file differ from the robot's by more than rounding.
+
+    What has no effect on the robot is not compared: names, lights, the colour of the
+    ground, the size of the memory.
+    """
+    if differing := [n for n in _SIZES if getattr(found, n) != getattr(built, n)]:
+        raise _differs(differing, where)
+    # Earlier versions placed robots at other heights on uneven ground.
+    root = built.body("root").id
+    found.body_pos[root, 2] = built.body_pos[root, 2]
+    for name in ("qpos0", "qpos_spring"):
+        getattr(found, name)[2] = getattr(built, name)[2]
+    differing = [
+        name
+        for name in dict.fromkeys((*_PLACES, *_BODY, *_WORLD))
+        if not _is_close(found, built, name, _LENGTH_M if name in _PLACES else 0.0)
+    ]
+    # The ground and static scenery may have other colours.
+    parts = built.geom_bodyid > 0
+    if not np.allclose(found.geom_rgba[parts], built.geom_rgba[parts], rtol=_DIGITS):
+        differing.append("geom_rgba")
+    differing += [
+        f"opt.{name}"
+        for name in _OPTIONS
+        if not _is_close(found.opt, built.opt, name, 0.0)
+    ]
     if differing:
         raise _differs(differing, where)
+
+
+def _is_close(found: object, built: object, name: str, atol: float) -> bool:
+    values = getattr(found, name), getattr(built, name)
+    rtol = _INERTIA if name == "body_inertia" else _DIGITS
+    if np.asarray(values[0]).dtype.kind in "biu":
+        # Bits of flags and numbers of elements are not rounded.
+        rtol = 0.0
+    return np.allclose(*values, rtol=rtol, atol=atol)
