@@ -105,7 +105,8 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
 
     Raises:
         InvalidRobot: the robot is not well formed in the settings' body space, or
-            MuJoCo cannot build it.
+            MuJoCo cannot build it; MJCF beyond the limits of reading, as of about 400
+            bodies, each on the last.
     """
     space, kinds = types_of(settings)
     check_robot(robot, space, kinds)
@@ -122,7 +123,10 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
         spec.compile()
     except ValueError as error:
         raise InvalidRobot(f"cannot be built: {one_line(error)}") from None
-    return portable(spec.to_xml())
+    try:
+        return portable(parse_xml(spec.to_xml(), MOST_MJCF_BYTES))
+    except ValueError as error:
+        raise InvalidRobot(f"MJCF {error}: a .pb file holds any robot") from None
 
 
 def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
