@@ -185,6 +185,28 @@ def test_other_documents_are_refused_in_one_line(text: str) -> None:
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        (r'{"a\nb": 1}', "mine.yaml:2: body.a b: no such key"),
+        (r'{"\e[2Jid": 1}', "mine.yaml:2: body.?[2Jid: no such key"),
+        (r'{"i\u202ed": 1}', "mine.yaml:2: body.i?d: no such key"),
+        (
+            r"""{type: Core, id: "a\nb"}
+brain: {neurons: [{part: c, layer: output, type: Simple}]}""",
+            "mine.yaml:3: brain.neurons[0].part: must be one of a b, got 'c'",
+        ),
+    ],
+)
+def test_names_of_a_file_cannot_break_the_line_of_an_error(
+    inside: str, message: str
+) -> None:
+    with pytest.raises(InvalidRobot) as caught:
+        read(f"revolve_robot: 1\nbody: {inside}")
+    assert str(caught.value).startswith(message)
+    assert str(caught.value).isprintable()
+
+
 @given(text=st.text(max_size=40))
 def test_any_text_is_a_robot_or_is_refused(text: str) -> None:
     with pytest.raises(InvalidRobot):
