@@ -23,7 +23,7 @@ from schema.errors import (
     one_line,
     shown,
 )
-from schema.experiment.bounded import parse_xml
+from schema.experiment.bounded import is_finite, parse_xml
 from schema.experiment.brains import types_of
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
@@ -51,6 +51,8 @@ _ONLY = {
     "compiler": ("angle", "autolimits", "coordinate", "eulerseq"),
 }
 """Attributes of elements that could make MuJoCo reserve memory or read files."""
+_WORDS = ("name", "class", "childclass", "model", "data")
+"""Attributes whose values are not numbers."""
 _SIDES = frozenset(map(str, range(1, MOST_PATCHES + 2)))
 _DIGITS = 1e-4
 """Relative difference that is greater than MJCF's rounding."""
@@ -185,6 +187,10 @@ def _check_elements(root: ET.Element, where: str) -> None:
                 raise InvalidRobot(
                     f"{where}: <{element.tag} {key}={shown(value)}> is not allowed in "
                     "a robot's MJCF"
+                )
+            if key not in _WORDS and not is_finite(value):
+                raise InvalidRobot(
+                    f"{where}: <{element.tag} {key}={shown(value)}> must be finite"
                 )
             if key in ("nrow", "ncol") and value not in _SIDES:
                 raise InvalidRobot(

@@ -175,6 +175,20 @@ def test_each_edit_of_a_world_is_refused(written: str, edited: str, name: str) -
         robot_from_mjcf(changed, "it")
 
 
+@pytest.mark.parametrize("number", ["nan", "NaN", "-inf", "1e999"])
+def test_numbers_that_are_not_finite_are_refused(
+    number: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo would warn on the screen and in a file of the current folder."""
+    monkeypatch.chdir(tmp_path)
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    changed = text.replace('mass="0.09"', f'mass="{number}"')
+    assert changed != text
+    with pytest.raises(InvalidRobot, match=f"^it: <geom mass='{number}'> must be fin"):
+        robot_from_mjcf(changed, "it")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_does_not_move_a_robot_may_be_edited() -> None:
     text = robot_to_mjcf(WALKER, SETTINGS)
     for written, edited in (
