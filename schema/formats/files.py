@@ -138,7 +138,8 @@ def read_robot(
 def _robogen_text(path: Path) -> str:
     """Return the text of a RoboGen robot; its binary dumps are refused by name."""
     try:
-        return read_data(path).decode()
+        # Editors of Windows begin a text with a mark of its encoding.
+        return read_data(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InvalidRobot(f"{path}: {_BINARY_DUMP}") from None
 

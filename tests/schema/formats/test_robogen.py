@@ -282,6 +282,16 @@ def test_invalid_json_is_refused() -> None:
             robot_from_robogen_json(text, "it", BUILT_IN)
 
 
+def test_files_of_editors_of_windows_are_read(tmp_path: Path) -> None:
+    """They begin with a byte order mark, and their lines end in CR LF."""
+    for name, text in (("star.txt", STARFISH), ("arm.json", json.dumps(document()))):
+        (tmp_path / name).write_text(text)
+        plain = read_robot(tmp_path / name)
+        lines = text.replace("\n", "\r\n")
+        (tmp_path / name).write_text(lines, encoding="utf-8-sig", newline="")
+        assert read_robot(tmp_path / name) == plain
+
+
 def test_ending_selects_the_format(tmp_path: Path) -> None:
     (tmp_path / "star.txt").write_text(STARFISH)
     (tmp_path / "arm.json").write_text(json.dumps(document()))
