@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from schema.errors import ExperimentError, one_line, shown
+from schema.errors import ExperimentError, cut, one_line, shown
 from schema.experiment.bounded import is_finite, parse_xml
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
@@ -201,14 +201,16 @@ def _check_elements(root: ET.Element) -> None:
     for element in root.iter():
         if element.tag not in _ALLOWED:
             raise _invalid(
-                f"<{element.tag}> is not allowed in scenery; "
+                f"<{cut(element.tag)}> is not allowed in scenery; "
                 f"allowed: {', '.join(_ALLOWED)}"
             )
         for key, value in element.items():
             if key == "user":
                 raise _invalid(f"<{element.tag} user=...> is not allowed")
             if key not in _WORDS and not is_finite(value):
-                raise _invalid(f"<{element.tag} {key}={shown(value)}> must be finite")
+                raise _invalid(
+                    f"<{element.tag} {cut(key)}={shown(value)}> must be finite"
+                )
         if element.get("mocap", "false") != "false":
             name = element.get("name", "")
             raise _invalid(

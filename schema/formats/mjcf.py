@@ -8,6 +8,7 @@ edited by hand differs from its text and is refused.
 
 import base64
 import binascii
+import warnings
 from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -20,6 +21,7 @@ from schema.errors import (
     ExperimentError,
     InvalidRobot,
     MalformedMessage,
+    cut,
     one_line,
     shown,
 )
@@ -166,7 +168,10 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
     try:
         # The text that was checked, not the original one.
         checked = ET.tostring(root, encoding="unicode")
-        model = mujoco.MjSpec.from_string(checked).compile()
+        with warnings.catch_warnings():
+            # Of an edited inertia: the error below names what was edited.
+            warnings.simplefilter("ignore")
+            model = mujoco.MjSpec.from_string(checked).compile()
     except (ValueError, RecursionError) as error:
         raise InvalidRobot(f"{where}: not valid MJCF: {one_line(error)}") from None
     _check_body(model, built, where)
@@ -178,19 +183,19 @@ def _check_elements(root: ET.Element, where: str) -> None:
     for element in root.iter():
         if element.tag not in _ALLOWED:
             raise InvalidRobot(
-                f"{where}: <{element.tag}> is not allowed in a robot's MJCF; allowed: "
-                f"{', '.join(_ALLOWED)}"
+                f"{where}: <{cut(element.tag)}> is not allowed in a robot's MJCF; "
+                f"allowed: {', '.join(_ALLOWED)}"
             )
         allowed = _ONLY.get(element.tag, element.attrib)
         for key, value in element.items():
             if key.startswith("file") or key == "user" or key not in allowed:
                 raise InvalidRobot(
-                    f"{where}: <{element.tag} {key}={shown(value)}> is not allowed in "
-                    "a robot's MJCF"
+                    f"{where}: <{element.tag} {cut(key)}={shown(value)}> is not "
+                    "allowed in a robot's MJCF"
                 )
             if key not in _WORDS and not is_finite(value):
                 raise InvalidRobot(
-                    f"{where}: <{element.tag} {key}={shown(value)}> must be finite"
+                    f"{where}: <{element.tag} {cut(key)}={shown(value)}> must be finite"
                 )
             if key in ("nrow", "ncol") and value not in _SIDES:
                 raise InvalidRobot(

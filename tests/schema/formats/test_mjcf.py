@@ -189,6 +189,29 @@ def test_numbers_that_are_not_finite_are_refused(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.filterwarnings("default")
+def test_edit_that_mujoco_warns_of_is_refused_in_one_line(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    changed = text.replace('armature="0"', 'armature="-10"', 1)
+    with pytest.warns(UserWarning, match="close to singular"):
+        mujoco.MjSpec.from_string(changed).compile()
+    recwarn.clear()
+    with pytest.raises(InvalidRobot, match=r"^it: its body differs .*\(dof_armature\)"):
+        robot_from_mjcf(changed, "it")
+    assert not recwarn.list
+
+
+def test_long_names_of_elements_are_cut() -> None:
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    for edited in ("<{0}/><worldbody>", "<light {0}='nan'/><worldbody>"):
+        changed = text.replace("<worldbody>", edited.format("x" * 5000), 1)
+        with pytest.raises(InvalidRobot) as error:
+            robot_from_mjcf(changed, "it")
+        assert len(str(error.value)) < 1000
+
+
 def test_what_does_not_move_a_robot_may_be_edited() -> None:
     text = robot_to_mjcf(WALKER, SETTINGS)
     for written, edited in (
