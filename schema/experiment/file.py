@@ -330,7 +330,8 @@ def _read_sweep(document: dict[str, Any], where: str) -> None:
 def _text(source: str) -> str:
     """Return the text of a TOML file."""
     try:
-        return read_bytes(Path(source)).decode()
+        # With the byte order mark of editors of Windows, as scenery and calibrations.
+        return read_bytes(Path(source)).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         near = _near(Path(source)) if isinstance(error, FileNotFoundError) else ""
         raise ExperimentError(f"{source}: {unreadable(error)}{near}") from None

@@ -293,3 +293,11 @@ def test_attribute_without_effect_is_refused_in_new_documents_only(
     environment = structs.replace(plain.environment, scenery=scenery)
     old = experiment_text(structs.replace(plain, environment=environment))
     assert experiment_from_text(old).environment.scenery == scenery
+
+
+def test_document_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(HEAD)
+    plain = read_experiment(str(path))
+    path.write_text(HEAD, encoding="utf-8-sig")
+    assert read_experiment(str(path)) == plain
