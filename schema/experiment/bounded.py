@@ -1,6 +1,7 @@
 """Texts of other people: read from files and parsed within limits."""
 
 import errno
+from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -64,3 +65,15 @@ def parse_xml(
             raise ValueError(f"must have <= {most_depth} levels of nesting, got more")
         level = [child for element in level for child in element]
     return root
+
+
+def is_finite(value: str) -> bool:
+    """Return whether no word of a text is inf or nan, which MuJoCo accepts."""
+    return all(map(_is_finite_word, value.split()))
+
+
+def _is_finite_word(word: str) -> bool:
+    try:
+        return isfinite(float(word))
+    except ValueError:
+        return True

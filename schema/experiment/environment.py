@@ -1,5 +1,6 @@
 """The section ``[environment]``: slope, rough ground, scenery and light."""
 
+import re
 from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from math import cos, isclose, radians, sin
@@ -21,6 +22,8 @@ LIGHT_COLOUR = (1.0, 0.85, 0.1, 1.0)
 """Radius [m] and colour of the ball that shows the light."""
 MOST_IMPULSE = 1000.0
 """Greatest impulse of a push [N s]."""
+_UNUSED = re.compile(r"\s(surfacevel|adhesion|fluidshape|fluidcoef)\s*=")
+"""Attributes of geoms that MuJoCo obeys, and that scenery here has not."""
 
 
 class Environment(Section, frozen=True, dict=True):
@@ -106,6 +109,15 @@ def add_gap_contacts(environment: dict[str, Any]) -> None:
     """
     if "gap" in str(environment.get("scenery", "")):
         environment.setdefault("gap_contacts", False)
+
+
+def unused_attribute(scenery: str) -> str:
+    """Return the first attribute of scenery that has no effect, or an empty text.
+
+    Runs that were begun with one go on: only new documents are checked.
+    """
+    found = _UNUSED.search(scenery)
+    return found[1] if found else ""
 
 
 def is_mjcf(scenery: str) -> bool:

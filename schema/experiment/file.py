@@ -24,7 +24,11 @@ from schema.experiment.document import (
     island_experiment,
     references,
 )
-from schema.experiment.environment import add_gap_contacts, is_mjcf
+from schema.experiment.environment import (
+    add_gap_contacts,
+    is_mjcf,
+    unused_attribute,
+)
 from schema.experiment.sweep import (
     Point,
     Range,
@@ -326,7 +330,8 @@ def _read_sweep(document: dict[str, Any], where: str) -> None:
 def _text(source: str) -> str:
     """Return the text of a TOML file."""
     try:
-        return read_bytes(Path(source)).decode()
+        # With the byte order mark of editors of Windows, as scenery and calibrations.
+        return read_bytes(Path(source)).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         near = _near(Path(source)) if isinstance(error, FileNotFoundError) else ""
         raise ExperimentError(f"{source}: {unreadable(error)}{near}") from None
@@ -383,7 +388,7 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
         if not isinstance(named, str) or not named:
             continue
         if is_mjcf(named):
-            add_gap_contacts(environment)
+            _check_new_scenery(environment, where)
             continue
         path = Path(where).parent / named
         try:
@@ -396,7 +401,17 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
             # An empty text means no scenery.
             raise ExperimentError(f"{where}: environment.scenery: {named}: is empty")
         environment["scenery"] = text
-        add_gap_contacts(environment)
+        _check_new_scenery(environment, f"{where}: {named}")
+
+
+def _check_new_scenery(environment: dict[str, Any], where: str) -> None:
+    """Refuse what has no effect in scenery of a new document; add ``gap_contacts``."""
+    if name := unused_attribute(environment["scenery"]):
+        raise ExperimentError(
+            f"{where}: environment.scenery: <geom {name}=...> is not allowed: it has "
+            "no effect here"
+        )
+    add_gap_contacts(environment)
 
 
 def _read_calibration(document: dict[str, Any], where: str) -> None:

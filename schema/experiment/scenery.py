@@ -6,14 +6,13 @@ object, a body after those of the robot. In arenas there are no objects.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import isfinite
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
-from schema.errors import ExperimentError, one_line, shown
-from schema.experiment.bounded import parse_xml
+from schema.errors import ExperimentError, cut, one_line, shown
+from schema.experiment.bounded import is_finite, parse_xml
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.limits import MOST_GEOMS, MOST_OBJECTS, MOST_OTHERS, MOST_SCENERY_DEPTH
@@ -202,14 +201,16 @@ def _check_elements(root: ET.Element) -> None:
     for element in root.iter():
         if element.tag not in _ALLOWED:
             raise _invalid(
-                f"<{element.tag}> is not allowed in scenery; "
+                f"<{cut(element.tag)}> is not allowed in scenery; "
                 f"allowed: {', '.join(_ALLOWED)}"
             )
         for key, value in element.items():
             if key == "user":
                 raise _invalid(f"<{element.tag} user=...> is not allowed")
-            if key not in _WORDS and not all(map(_is_finite, value.split())):
-                raise _invalid(f"<{element.tag} {key}={shown(value)}> must be finite")
+            if key not in _WORDS and not is_finite(value):
+                raise _invalid(
+                    f"<{element.tag} {cut(key)}={shown(value)}> must be finite"
+                )
         if element.get("mocap", "false") != "false":
             name = element.get("name", "")
             raise _invalid(
@@ -242,14 +243,6 @@ def _replicas(element: ET.Element) -> int:
             f"<replicate count={shown(count)}> must be a whole number <= {MOST_GEOMS}"
         )
     return int(count)
-
-
-def _is_finite(word: str) -> bool:
-    """Return whether a word is not inf or nan, which MuJoCo accepts."""
-    try:
-        return isfinite(float(word))
-    except ValueError:
-        return True
 
 
 def _check_shapes(model: mujoco.MjModel) -> None:

@@ -18,6 +18,7 @@ from schema.formats.yaml import robot_to_yaml
 from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_node import compose
 from schema.formats.yaml_reader import Reader
+from schema.limits import MOST_MJCF_BYTES, MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS
@@ -137,7 +138,8 @@ def read_robot(
 def _robogen_text(path: Path) -> str:
     """Return the text of a RoboGen robot; its binary dumps are refused by name."""
     try:
-        return read_data(path).decode()
+        # Editors of Windows begin a text with a mark of its encoding.
+        return read_data(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InvalidRobot(f"{path}: {_BINARY_DUMP}") from None
 
@@ -154,30 +156,40 @@ def write_robot(
             with all built-in types (in MJCF, those of the default brain).
 
     Raises:
-        InvalidRobot: another ending, a robot that is not well formed with these types,
-            or a file that cannot be written.
+        InvalidRobot: another ending, a robot that is not well formed with these types
+            or that could not be read again, or a file that cannot be written.
     """
     ending = _ending(path, _WRITTEN)
     settings = settings or settings_of(None)
-    space, kinds = types_for(settings)
-    if ending in _YAML:
-        data = robot_to_yaml(robot, space, kinds).encode()
-    elif ending == ".pb":
-        check_robot(robot, space, kinds)
-        data = encode_robot(robot)
-    elif ending == MJCF_ENDING:
-        from schema.formats.mjcf import robot_to_mjcf  # noqa: PLC0415
-
-        data = robot_to_mjcf(robot, settings).encode()
-    else:
-        from schema.formats.urdf import robot_to_urdf  # noqa: PLC0415
-
-        check_robot(robot, space, kinds)
-        data = robot_to_urdf(robot, space, settings.simulation).encode()
+    try:
+        check_number(robot)
+        data = _written(robot, ending, settings)
+    except InvalidRobot as error:
+        raise InvalidRobot(f"{path}: {error}") from None
+    most = MOST_MJCF_BYTES if ending == MJCF_ENDING else MOST_TEXT_BYTES
+    if ending in _READ and len(data) > most:
+        raise InvalidRobot(f"{path}: must have <= {most} bytes, got {len(data)}")
     try:
         path.write_bytes(data)
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _written(robot: Robot, ending: str, settings: EvaluationSettings) -> bytes:
+    """Return the bytes of a robot in the format of an ending."""
+    space, kinds = types_for(settings)
+    if ending in _YAML:
+        return robot_to_yaml(robot, space, kinds).encode()
+    if ending == MJCF_ENDING:
+        from schema.formats.mjcf import robot_to_mjcf  # noqa: PLC0415
+
+        return robot_to_mjcf(robot, settings).encode()
+    check_robot(robot, space, kinds)
+    if ending == ".pb":
+        return encode_robot(robot)
+    from schema.formats.urdf import robot_to_urdf  # noqa: PLC0415
+
+    return robot_to_urdf(robot, space, settings.simulation).encode()
 
 
 def _ending(path: Path, endings: tuple[str, ...]) -> str:

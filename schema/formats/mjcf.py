@@ -2,12 +2,13 @@
 
 The body is plain MJCF, for MuJoCo's viewer and other tools. Two custom texts hold the
 robot in Protobuf form and the settings of an evaluation. Reading takes the robot from
-the text, bit for bit, because MJCF rounds numbers. A file whose body was edited by
-hand differs from its text and is refused.
+the text, bit for bit, because MJCF rounds numbers. A file whose body or world was
+edited by hand differs from its text and is refused.
 """
 
 import base64
 import binascii
+import warnings
 from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -20,10 +21,11 @@ from schema.errors import (
     ExperimentError,
     InvalidRobot,
     MalformedMessage,
+    cut,
     one_line,
     shown,
 )
-from schema.experiment.bounded import parse_xml
+from schema.experiment.bounded import is_finite, parse_xml
 from schema.experiment.brains import types_of
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
@@ -51,16 +53,50 @@ _ONLY = {
     "compiler": ("angle", "autolimits", "coordinate", "eulerseq"),
 }
 """Attributes of elements that could make MuJoCo reserve memory or read files."""
+_WORDS = ("name", "class", "childclass", "model", "data")
+"""Attributes whose values are not numbers."""
 _SIDES = frozenset(map(str, range(1, MOST_PATCHES + 2)))
 _DIGITS = 1e-4
 """Relative difference that is greater than MJCF's rounding."""
+_INERTIA = 1e-2
+"""The same of inertia, which sums up the rounding of many positions."""
 _LENGTH_M = 1e-6
-_COMPARED = (
-    *("body_mass", "body_pos", "body_quat", "body_ipos"),
-    *("geom_type", "geom_size", "geom_pos", "geom_quat"),
-    *("jnt_type", "jnt_limited", "jnt_range", "jnt_pos", "jnt_axis"),
-    *("dof_damping", "dof_armature"),
-    *("actuator_forcerange", "actuator_gainprm", "actuator_biasprm"),
+_SIZES = (
+    *("nbody", "ngeom", "njnt", "nsite", "nu", "nq", "nv", "na", "nsensor"),
+    *("nhfield", "nhfielddata"),
+)
+_PLACES = (
+    *("body_pos", "body_quat", "body_ipos", "qpos0", "qpos_spring"),
+    *("geom_size", "geom_pos", "geom_quat", "site_size", "site_pos", "site_quat"),
+    *("jnt_range", "jnt_pos", "jnt_axis", "hfield_size", "hfield_data"),
+)
+"""Compared up to ``_LENGTH_M``; all others to the digits that MJCF has."""
+_BODY = (
+    *("body_parentid", "geom_bodyid", "jnt_bodyid", "site_bodyid"),
+    *("body_mass", "body_inertia", "body_gravcomp", "geom_type", "geom_fluid"),
+    *("jnt_type", "jnt_limited", "jnt_margin", "jnt_solref", "jnt_solimp"),
+    *("jnt_stiffness", "jnt_actfrclimited", "jnt_actfrcrange", "jnt_actgravcomp"),
+    *("dof_damping", "dof_armature", "dof_frictionloss", "dof_solref", "dof_solimp"),
+    *("actuator_trntype", "actuator_trnid", "actuator_gear", "actuator_dyntype"),
+    *("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
+    *("actuator_forcelimited", "actuator_forcerange", "actuator_delay"),
+    *("actuator_ctrllimited", "actuator_ctrlrange"),
+    *("actuator_damping", "actuator_armature"),
+    *("sensor_type", "sensor_objid", "sensor_cutoff", "sensor_noise", "sensor_delay"),
+)
+_WORLD = (
+    *("geom_contype", "geom_conaffinity", "geom_condim", "geom_priority"),
+    *("geom_friction", "geom_solref", "geom_solimp", "geom_solmix"),
+    *("geom_margin", "geom_gap", "geom_surfacevel", "geom_adhesion"),
+    *("hfield_size", "hfield_data"),
+)
+_OPTIONS = (
+    *("timestep", "gravity", "wind", "magnetic", "density", "viscosity"),
+    *("integrator", "cone", "jacobian", "solver", "impratio"),
+    *("iterations", "tolerance", "ls_iterations", "ls_tolerance"),
+    *("noslip_iterations", "noslip_tolerance", "ccd_iterations", "ccd_tolerance"),
+    *("o_margin", "o_solref", "o_solimp", "o_friction"),
+    *("disableflags", "enableflags", "disableactuator"),
 )
 
 
@@ -73,7 +109,8 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
 
     Raises:
         InvalidRobot: the robot is not well formed in the settings' body space, or
-            MuJoCo cannot build it.
+            MuJoCo cannot build it; MJCF beyond the limits of reading, as of about 400
+            bodies, each on the last.
     """
     space, kinds = types_of(settings)
     check_robot(robot, space, kinds)
@@ -90,7 +127,10 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
         spec.compile()
     except ValueError as error:
         raise InvalidRobot(f"cannot be built: {one_line(error)}") from None
-    return portable(spec.to_xml())
+    try:
+        return portable(parse_xml(spec.to_xml(), MOST_MJCF_BYTES))
+    except ValueError as error:
+        raise InvalidRobot(f"MJCF {error}: a .pb file holds any robot") from None
 
 
 def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
@@ -102,7 +142,8 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
 
     Raises:
         InvalidRobot: not MJCF, or MJCF that a robot does not need; no robot or
-            settings in it; a body that differs from the robot's.
+            settings in it; a body that differs from the robot's, or a world that
+            differs from the settings'.
     """
     try:
         root = parse_xml(text, MOST_MJCF_BYTES)
@@ -127,7 +168,10 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
     try:
         # The text that was checked, not the original one.
         checked = ET.tostring(root, encoding="unicode")
-        model = mujoco.MjSpec.from_string(checked).compile()
+        with warnings.catch_warnings():
+            # Of an edited inertia: the error below names what was edited.
+            warnings.simplefilter("ignore")
+            model = mujoco.MjSpec.from_string(checked).compile()
     except (ValueError, RecursionError) as error:
         raise InvalidRobot(f"{where}: not valid MJCF: {one_line(error)}") from None
     _check_body(model, built, where)
@@ -139,15 +183,19 @@ def _check_elements(root: ET.Element, where: str) -> None:
     for element in root.iter():
         if element.tag not in _ALLOWED:
             raise InvalidRobot(
-                f"{where}: <{element.tag}> is not allowed in a robot's MJCF; allowed: "
-                f"{', '.join(_ALLOWED)}"
+                f"{where}: <{cut(element.tag)}> is not allowed in a robot's MJCF; "
+                f"allowed: {', '.join(_ALLOWED)}"
             )
         allowed = _ONLY.get(element.tag, element.attrib)
         for key, value in element.items():
             if key.startswith("file") or key == "user" or key not in allowed:
                 raise InvalidRobot(
-                    f"{where}: <{element.tag} {key}={shown(value)}> is not allowed in "
-                    "a robot's MJCF"
+                    f"{where}: <{element.tag} {cut(key)}={shown(value)}> is not "
+                    "allowed in a robot's MJCF"
+                )
+            if key not in _WORDS and not is_finite(value):
+                raise InvalidRobot(
+                    f"{where}: <{element.tag} {cut(key)}={shown(value)}> must be finite"
                 )
             if key in ("nrow", "ncol") and value not in _SIDES:
                 raise InvalidRobot(
@@ -182,9 +230,15 @@ def _check_counts(root: ET.Element, built: mujoco.MjModel, where: str) -> None:
 
 
 def _differs(names: list[str], where: str) -> InvalidRobot:
+    listed = ", ".join(names)
+    if all(name in _WORLD or name.startswith("opt.") for name in names):
+        return InvalidRobot(
+            f"{where}: its world differs from the settings in its text ({listed}): "
+            "edit the experiment and convert the robot again with --experiment"
+        )
     return InvalidRobot(
-        f"{where}: its body differs from the robot in its text "
-        f"({', '.join(names)}): edit the robot's YAML and convert it again"
+        f"{where}: its body differs from the robot in its text ({listed}): edit the "
+        "robot's YAML, or the experiment, and convert it again"
     )
 
 
@@ -210,19 +264,40 @@ def _bytes(held: dict[str, str], name: str) -> bytes:
 
 
 def _check_body(found: mujoco.MjModel, built: mujoco.MjModel, where: str) -> None:
-    """Raise if the body of a file differs from the robot's by more than rounding."""
-    counts = ("nbody", "ngeom", "njnt", "nu")
-    differing = [n for n in counts if getattr(found, n) != getattr(built, n)]
-    if not differing:
-        # Earlier versions placed robots at other heights on uneven ground.
-        root = built.body("root").id
-        found.body_pos[root, 2] = built.body_pos[root, 2]
-        differing = [
-            name
-            for name in _COMPARED
-            if not np.allclose(
-                getattr(found, name), getattr(built, name), rtol=_DIGITS, atol=_LENGTH_M
-            )
-        ]
+    """Raise if body or world of a file differ from the robot's by more than rounding.
+
+    What has no effect on the robot is not compared: names, lights, the colour of the
+    ground, the size of the memory.
+    """
+    if differing := [n for n in _SIZES if getattr(found, n) != getattr(built, n)]:
+        raise _differs(differing, where)
+    # Earlier versions placed robots at other heights on uneven ground.
+    root = built.body("root").id
+    found.body_pos[root, 2] = built.body_pos[root, 2]
+    for name in ("qpos0", "qpos_spring"):
+        getattr(found, name)[2] = getattr(built, name)[2]
+    differing = [
+        name
+        for name in dict.fromkeys((*_PLACES, *_BODY, *_WORLD))
+        if not _is_close(found, built, name, _LENGTH_M if name in _PLACES else 0.0)
+    ]
+    # The ground and static scenery may have other colours.
+    parts = built.geom_bodyid > 0
+    if not np.allclose(found.geom_rgba[parts], built.geom_rgba[parts], rtol=_DIGITS):
+        differing.append("geom_rgba")
+    differing += [
+        f"opt.{name}"
+        for name in _OPTIONS
+        if not _is_close(found.opt, built.opt, name, 0.0)
+    ]
     if differing:
         raise _differs(differing, where)
+
+
+def _is_close(found: object, built: object, name: str, atol: float) -> bool:
+    values = getattr(found, name), getattr(built, name)
+    rtol = _INERTIA if name == "body_inertia" else _DIGITS
+    if np.asarray(values[0]).dtype.kind in "biu":
+        # Bits of flags and numbers of elements are not rounded.
+        rtol = 0.0
+    return np.allclose(*values, rtol=rtol, atol=atol)

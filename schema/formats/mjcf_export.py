@@ -43,13 +43,15 @@ def add_sensors(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
                 _add(spec, mujoco.mjtSensor.mjSENS_TOUCH, name, name)
 
 
-def portable(text: str) -> str:
-    """Return MJCF whose servos are ``velocity`` elements.
+def portable(root: ET.Element) -> str:
+    """Return the text of MJCF whose servos are ``velocity`` elements.
 
     MuJoCo 4 writes them as ``general`` elements with an attribute ``input``, which
     MuJoCo 3.3 and earlier do not know. Both give the same model.
+
+    Args:
+        root: as MuJoCo writes it; it is changed.
     """
-    root = ET.fromstring(text)  # noqa: S314 - MuJoCo wrote it
     for servo in root.iterfind("actuator/general[@input='vel']"):
         servo.tag = "velocity"
         servo.set("kv", servo.attrib.pop("gainprm", "1"))

@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any, NoReturn, TypeVar
 
-from schema.errors import InvalidRobot, one_line, shown
+from schema.errors import InvalidRobot, nearest, one_line, shown
 from schema.formats.robogen import (
     Ending,
     RobogenPart,
@@ -30,6 +30,20 @@ _KEYS: dict[str, tuple[tuple[str, float], ...]] = {
     "Oscillator": (("period", 0.0), ("phaseOffset", 0.0), ("gain", 1.0)),
 }
 """Keys of our parameters, and their defaults."""
+_FIELDS: dict[str, tuple[str, ...]] = {
+    "": ("id", "body", "brain"),
+    "body": ("part", "connection"),
+    "body.part": ("id", "type", "root", "orientation", "evolvableParam"),
+    "evolvableParam": ("paramValue",),
+    "body.connection": ("src", "dest", "srcSlot", "destSlot"),
+    "brain": ("neuron", "connection"),
+    "brain.neuron": (
+        *("id", "layer", "type", "bodyPartId", "ioId"),
+        *("bias", "gain", "period", "phaseOffset", "tau"),
+    ),
+    "brain.connection": ("src", "dest", "weight"),
+}
+"""Keys of each object, as RoboGen writes them."""
 
 
 def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
@@ -44,7 +58,9 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
         InvalidRobot: not such JSON; the message names file and line, or the path.
     """
     try:
-        document = json.loads(text, parse_constant=_refuse)
+        document = json.loads(
+            text, parse_constant=_refuse, object_pairs_hook=_without_twins
+        )
     except json.JSONDecodeError as error:
         raise InvalidRobot(
             f"{where}:{error.lineno}: not valid JSON: {error.msg}"
@@ -52,6 +68,7 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
     except (ValueError, RecursionError) as error:
         reason = one_line(error).partition(";")[0]
         raise InvalidRobot(f"{where}: not valid JSON: {reason}") from None
+    _check_sections(document, where)
     theirs = RobogenRobot(_body(document, where))
     ends: dict[str, Ending] = {}
     taken: set[Ending] = set()
@@ -102,7 +119,7 @@ def _body(document: object, where: str) -> RobogenPart:
         )
         kind, turns = _get(entry, "type", str, at), _get(entry, "orientation", int, at)
         parts[name] = checked_part(name, kind, turns, values, at)
-        if entry.get("root") is True:
+        if _is_root(entry, at):
             roots.append(parts[name])
     if len(roots) != 1:
         raise InvalidRobot(
@@ -133,6 +150,14 @@ def _body(document: object, where: str) -> RobogenPart:
     return roots[0]
 
 
+def _is_root(entry: dict[str, Any], at: str) -> bool:
+    """Return whether a part is the root; without the key it is not."""
+    is_root = entry.get("root", False)
+    if not isinstance(is_root, bool):
+        raise InvalidRobot(f"{at}.root: must be true or false, got {shown(is_root)}")
+    return is_root
+
+
 def _check_connected(root: RobogenPart, count: int, where: str) -> None:
     """Raise if some parts form a ring that is not connected to the core."""
     if apart := count - len(root.subtree()):
@@ -157,8 +182,35 @@ def _items(
     for number, entry in enumerate(value):
         if not isinstance(entry, dict):
             raise InvalidRobot(f"{where}: {name}[{number}] must be an object")
+        _check_keys(entry, name, f"{where}: {name}[{number}]")
         entries.append((f"{where}: {name}[{number}]", entry))
     return entries
+
+
+def _check_sections(document: object, where: str) -> None:
+    """Raise unless RoboGen has all keys of a document, its body and its brain."""
+    if isinstance(document, dict):
+        _check_keys(document, "", where)
+        for name in ("body", "brain"):
+            if isinstance(section := document.get(name), dict):
+                _check_keys(section, name, f"{where}: {name}")
+
+
+def _check_keys(entry: dict[str, Any], name: str, at: str) -> None:
+    """Raise unless RoboGen has all keys of an object.
+
+    Args:
+        entry: the object.
+        name: of such objects in ``_FIELDS``.
+        at: its place, for messages.
+    """
+    for key in entry:
+        if key not in _FIELDS[name]:
+            near = nearest(key, _FIELDS[name])
+            allowed = ", ".join(_FIELDS[name])
+            raise InvalidRobot(
+                f"{at}: no such key {shown(key)}{near}; allowed: {allowed}"
+            )
 
 
 def _get(entry: dict[str, Any], key: str, kind: type[T], at: str) -> T:
@@ -186,6 +238,16 @@ def _known(named: dict[str, K], name: str, at: str) -> K:
     if name not in named:
         raise InvalidRobot(f"{at}: unknown name {shown(name)}")
     return named[name]
+
+
+def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of JSON, in which each key is given once."""
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"key {shown(key)} is given twice")
+        found[key] = value
+    return found
 
 
 def _refuse(name: str) -> NoReturn:

@@ -84,7 +84,8 @@ def read_with_settings(
 ) -> tuple[Robot, EvaluationSettings, Experiment | None]:
     """Return a file's robot, its evaluation settings and their experiment.
 
-    An MJCF file holds its settings: they apply unless the user names others.
+    An MJCF file holds its settings: they apply unless the user names others, also in
+    the folder of a run.
 
     Args:
         file: as of ``experiment_of``.
@@ -106,17 +107,26 @@ def read_with_settings(
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 
-        _allow_run_of(file)
-        return (*read_mjcf(file), None)
+        is_of_run = _allow_run_of(file)
+        robot, settings = read_mjcf(file)
+        if is_of_run or tells_default:
+            tell(f"with the settings in {file}; --experiment names others")
+        return robot, settings, None
     found = experiment_of(file, named, island, tells_default=tells_default)
     return read_robot_of(file, found), settings_of(found), found
 
 
-def _allow_run_of(file: Path) -> None:
-    """Allow the plug-ins of the run whose folder holds a robot file, if one does."""
-    if (file.parent / DETAILS).is_file():
-        allow_plugins_of(file.parent)
-        own_experiment(read_description(file.parent).document)
+def _allow_run_of(file: Path) -> bool:
+    """Allow the plug-ins of the run whose folder holds a robot file.
+
+    Returns:
+        Whether the file is in the folder of a run.
+    """
+    if not (file.parent / DETAILS).is_file():
+        return False
+    allow_plugins_of(file.parent)
+    own_experiment(read_description(file.parent).document)
+    return True
 
 
 def _differs(experiment: Experiment) -> bool:

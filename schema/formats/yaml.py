@@ -32,6 +32,7 @@ from typing import Any
 import yaml
 
 from schema.errors import InvalidRobot
+from schema.formats.yaml_node import compose
 from schema.parts import BodySpace, Parameter
 from schema.robot.brain import NeuronKinds, neuron_names
 from schema.robot.cpg import BUILT_IN_KINDS
@@ -47,7 +48,8 @@ def robot_to_yaml(
 
     Raises:
         InvalidRobot: the robot is not well formed in this body space, has neurons of
-            other kinds, or is nested too deeply: about 150 parts, each on the last.
+            other kinds, is nested too deeply (about 150 parts, each on the last), or
+            gives a text beyond the limits of reading.
     """
     check_robot(robot, space, kinds)
     entries: list[dict[str, Any]] = []
@@ -83,11 +85,15 @@ def robot_to_yaml(
         },
     }
     try:
-        return yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
+        text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
+        compose(text, "")
     except RecursionError:
         raise InvalidRobot(
             "nested too deeply for YAML: a .pb file holds any robot"
         ) from None
+    except InvalidRobot:
+        raise InvalidRobot("too large for YAML: a .pb file holds any robot") from None
+    return text
 
 
 def _part_entry(part: Part, index: int, space: BodySpace) -> dict[str, Any]:

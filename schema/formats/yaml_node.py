@@ -13,7 +13,7 @@ from typing import NoReturn, TypeVar
 
 import yaml
 
-from schema.errors import InvalidRobot, cut, nearest, one_line, shown
+from schema.errors import InvalidRobot, nearest, one_line, shown
 from schema.formats.yaml_compose import (
     MappingNode,
     Node,
@@ -21,7 +21,7 @@ from schema.formats.yaml_compose import (
     SequenceNode,
     root_node,
 )
-from schema.limits import MOST_TEXT_BYTES
+from schema.limits import MOST_TEXT_BYTES, printable
 
 T = TypeVar("T", int, float)
 
@@ -224,7 +224,7 @@ class Table:
         return int(key)
 
     def _at(self, key: str) -> str:
-        return f"{self._stem}{cut(key)}"
+        return f"{self._stem}{printable(key)}"
 
     def _node(self, key: str) -> Node:
         if key not in self._values:
@@ -262,7 +262,7 @@ def compose(text: str, file: str) -> Table:
 
 
 def _one_of(allowed: Collection[str]) -> str:
-    first = ", ".join(map(cut, islice(allowed, _MOST_WORDS)))
+    first = ", ".join(map(printable, islice(allowed, _MOST_WORDS)))
     more = ", ..." if len(allowed) > _MOST_WORDS else ""
     return f"must be one of {first}{more}"
 

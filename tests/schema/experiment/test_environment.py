@@ -273,3 +273,31 @@ def test_rough_ground_depends_on_the_ground_seed_only() -> None:
     assert np.abs(relief(one) - relief(other)).max() > 0.5
     # Written down: any machine draws the same.
     assert relief(one)[50, 50:52].tolist() == [0.7018105387687683, 0.8332703709602356]
+
+
+@pytest.mark.parametrize("name", ["surfacevel", "adhesion", "fluidshape", "fluidcoef"])
+def test_attribute_without_effect_is_refused_in_new_documents_only(
+    name: str, tmp_path: Path
+) -> None:
+    """A conveyor belt of MuJoCo 4 would stand still here."""
+    scenery = f"<mujoco><worldbody><geom size='1' {name}='1'/></worldbody></mujoco>"
+    text = f'name = "x"\n[environment]\nscenery = "{scenery}"\n'
+    message = f"environment.scenery: <geom {name}=...> is not allowed: it has no effect"
+    with pytest.raises(ExperimentError, match=rf"x\.toml: {message}"):
+        parse_experiment(text, str(tmp_path / "x.toml"))
+    (tmp_path / "belt.xml").write_text(scenery)
+    beside = 'name = "x"\n[environment]\nscenery = "belt.xml"\n'
+    with pytest.raises(ExperimentError, match=rf"x\.toml: belt\.xml: {message}"):
+        parse_experiment(beside, str(tmp_path / "x.toml"))
+    plain = parse_experiment(text.replace(f" {name}='1'", ""), "x.toml")
+    environment = structs.replace(plain.environment, scenery=scenery)
+    old = experiment_text(structs.replace(plain, environment=environment))
+    assert experiment_from_text(old).environment.scenery == scenery
+
+
+def test_document_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(HEAD)
+    plain = read_experiment(str(path))
+    path.write_text(HEAD, encoding="utf-8-sig")
+    assert read_experiment(str(path)) == plain

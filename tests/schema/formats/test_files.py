@@ -13,9 +13,9 @@ from schema.errors import InvalidRobot, MalformedMessage, RevolveError
 from schema.formats.files import read_robot, robot_from_yaml, write_robot
 from schema.formats.yaml import robot_to_yaml
 from schema.parts import BUILT_IN
-from schema.robot.brain import Connection, Neuron
+from schema.robot.brain import INPUT, Brain, Connection, Neuron
 from schema.robot.genome import Node, develop
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Part, Robot, check_robot
 from schema.wire.codec import encode_robot
 
 NodeMaker = Callable[..., Node]
@@ -185,6 +185,28 @@ def test_other_documents_are_refused_in_one_line(text: str) -> None:
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        (r'{"a\nb": 1}', "mine.yaml:2: body.a b: no such key"),
+        (r'{"\e[2Jid": 1}', "mine.yaml:2: body.?[2Jid: no such key"),
+        (r'{"i\u202ed": 1}', "mine.yaml:2: body.i?d: no such key"),
+        (
+            r"""{type: Core, id: "a\nb"}
+brain: {neurons: [{part: c, layer: output, type: Simple}]}""",
+            "mine.yaml:3: brain.neurons[0].part: must be one of a b, got 'c'",
+        ),
+    ],
+)
+def test_names_of_a_file_cannot_break_the_line_of_an_error(
+    inside: str, message: str
+) -> None:
+    with pytest.raises(InvalidRobot) as caught:
+        read(f"revolve_robot: 1\nbody: {inside}")
+    assert str(caught.value).startswith(message)
+    assert str(caught.value).isprintable()
+
+
 @given(text=st.text(max_size=40))
 def test_any_text_is_a_robot_or_is_refused(text: str) -> None:
     with pytest.raises(InvalidRobot):
@@ -267,8 +289,57 @@ def test_deeply_nested_robot_is_written_as_protobuf_only(
     tmp_path: Path, chain: Robot
 ) -> None:
     """Writing YAML recurses for each level; reading it allows 400 levels."""
-    with pytest.raises(InvalidRobot, match=r"^nested too deeply for YAML: .*\.pb"):
+    with pytest.raises(
+        InvalidRobot, match=r"it\.yaml: nested too deeply for YAML: .*\.pb"
+    ):
         write_robot(chain, tmp_path / "it.yaml")
     assert list(tmp_path.iterdir()) == []
     write_robot(chain, tmp_path / "it.pb")
     assert read_robot(tmp_path / "it.pb") == chain
+
+
+def row(kind: str, count: int) -> Robot:
+    """Return a core and parts without neurons, each on the last."""
+    grey = (0.5, 0.5, 0.5)
+    parts = [Part("Core", -1, -1, -1, 0, grey), Part(kind, 0, 2, 0, 0, grey)]
+    parts += [Part(kind, index, 1, 0, 0, grey) for index in range(1, count)]
+    return Robot(
+        tuple(parts), Brain(tuple(Neuron("input", INPUT, 0) for _ in "xyzrpy"))
+    )
+
+
+@pytest.mark.parametrize("count", [397, 999])
+def test_robot_of_too_many_bodies_is_not_written_as_mjcf(
+    count: int, tmp_path: Path
+) -> None:
+    """MuJoCo nests their bodies; reading allows 400 levels, three above the first."""
+    with pytest.raises(InvalidRobot, match=r"it\.xml: MJCF must have <= .*\.pb"):
+        write_robot(row("Hinge", count), tmp_path / "it.xml")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_longest_robot_of_mjcf_is_read_again(tmp_path: Path) -> None:
+    write_robot(row("Hinge", 396), tmp_path / "it.xml")
+    assert read_robot(tmp_path / "it.xml") == row("Hinge", 396)
+
+
+def test_robot_beyond_the_limits_of_reading_is_not_written(tmp_path: Path) -> None:
+    small = row("FixedBrick", 10)
+    hidden = [Neuron("hidden", "Simple", part, (0.0, 0.5)) for part in range(11)] * 20
+    neurons = (*small.brain.neurons, *sorted(hidden, key=lambda each: each.part))
+    edges = tuple(
+        Connection(source, target, 1 / 3)
+        for source in range(100)
+        for target in range(6, 226)
+    )
+    large = Robot(small.parts, Brain(neurons, edges))
+    with pytest.raises(InvalidRobot, match=r"it\.yaml: too large for YAML: .*\.pb"):
+        write_robot(large, tmp_path / "it.yaml")
+    for ending in ("pb", "xml"):
+        with pytest.raises(
+            InvalidRobot, match=rf"it\.{ending}: body: .* <= 1000 parts"
+        ):
+            write_robot(row("FixedBrick", 1000), tmp_path / f"it.{ending}")
+    assert list(tmp_path.iterdir()) == []
+    write_robot(large, tmp_path / "it.pb")
+    assert read_robot(tmp_path / "it.pb") == large

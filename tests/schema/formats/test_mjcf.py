@@ -126,6 +126,17 @@ WALKER = Robot(
         ('armature="0.005"', 'armature="0.01"', "dof_armature"),
         ('forcerange=".*?"', 'forcerange="-9 9"', "actuator_forcerange"),
         ('kv="1"', 'kv="77"', "actuator_gainprm"),
+        ('name="joint1"', 'name="joint1" frictionloss="0.1"', "dof_frictionloss"),
+        ('name="joint1"', 'name="joint1" stiffness="0.1"', "jnt_stiffness"),
+        ('name="joint1"', 'name="joint1" ref="0.1"', "qpos0"),
+        ('name="joint1"', 'name="joint1" damping="0.000101"', "dof_damping"),
+        ('range="-0.785398 0', 'type="ball" range="0 0', "nq"),
+        ('name="body1"', 'name="body1" gravcomp="1"', "body_gravcomp"),
+        ('name="1_servo"', 'name="1_servo" shellinertia="true"', "body_inertia"),
+        ('name="2_left"', 'name="2_left" rgba="1 0 0 1"', "geom_rgba"),
+        ("<velocity ", '<velocity gear="2" ', "actuator_gear"),
+        ('joint="joint1"', 'joint="free"', "actuator_trnid"),
+        ("<gyro ", '<gyro noise="1" ', "sensor_noise"),
     ],
 )  # fmt: skip
 def test_each_edit_of_a_body_is_refused(written: str, edited: str, name: str) -> None:
@@ -135,6 +146,82 @@ def test_each_edit_of_a_body_is_refused(written: str, edited: str, name: str) ->
     mujoco.MjModel.from_xml_string(changed)
     with pytest.raises(InvalidRobot, match=rf"^it: its body differs .*\b{name}\b"):
         robot_from_mjcf(changed, "it")
+
+
+@pytest.mark.parametrize(
+    ("written", "edited", "name"),
+    [
+        ('friction="1 0 0"', 'friction="0.1 0 0"', "geom_friction"),
+        ('solref="0.01"', 'solref="0.02"', "geom_solref"),
+        ('name="ground"', 'name="ground" condim="6"', "geom_condim"),
+        ('name="0_body"', 'name="0_body" contype="0"', "geom_contype"),
+        ('timestep="0.005"', 'timestep="0.001"', "opt.timestep"),
+        ("<option ", '<option gravity="0 0 -1.62" ', "opt.gravity"),
+        ("<option ", '<option density="1000" ', "opt.density"),
+        ("<option ", '<option solver="CG" ', "opt.solver"),
+        ('cone="elliptic"', 'cone="pyramidal"', "opt.cone"),
+        ("<flag ", '<flag contact="disable" ', "opt.disableflags"),
+        ("<flag ", '<flag override="enable" ', "opt.enableflags"),
+    ],
+)
+def test_each_edit_of_a_world_is_refused(written: str, edited: str, name: str) -> None:
+    """What MuJoCo's viewer would obey has no effect here: it is no silent loss."""
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    changed = text.replace(written, edited, 1)
+    assert changed != text
+    mujoco.MjModel.from_xml_string(changed)
+    message = rf"^it: its world differs from the settings .*\({name}\): .*--experiment$"
+    with pytest.raises(InvalidRobot, match=message):
+        robot_from_mjcf(changed, "it")
+
+
+@pytest.mark.parametrize("number", ["nan", "NaN", "-inf", "1e999"])
+def test_numbers_that_are_not_finite_are_refused(
+    number: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo would warn on the screen and in a file of the current folder."""
+    monkeypatch.chdir(tmp_path)
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    changed = text.replace('mass="0.09"', f'mass="{number}"')
+    assert changed != text
+    with pytest.raises(InvalidRobot, match=f"^it: <geom mass='{number}'> must be fin"):
+        robot_from_mjcf(changed, "it")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.filterwarnings("default")
+def test_edit_that_mujoco_warns_of_is_refused_in_one_line(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    changed = text.replace('armature="0"', 'armature="-10"', 1)
+    with pytest.warns(UserWarning, match="close to singular"):
+        mujoco.MjSpec.from_string(changed).compile()
+    recwarn.clear()
+    with pytest.raises(InvalidRobot, match=r"^it: its body differs .*\(dof_armature\)"):
+        robot_from_mjcf(changed, "it")
+    assert not recwarn.list
+
+
+def test_long_names_of_elements_are_cut() -> None:
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    for edited in ("<{0}/><worldbody>", "<light {0}='nan'/><worldbody>"):
+        changed = text.replace("<worldbody>", edited.format("x" * 5000), 1)
+        with pytest.raises(InvalidRobot) as error:
+            robot_from_mjcf(changed, "it")
+        assert len(str(error.value)) < 1000
+
+
+def test_what_does_not_move_a_robot_may_be_edited() -> None:
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    for written, edited in (
+        ('name="ground"', 'name="floor" rgba="0 1 0 1"'),
+        ('memory="1M"', 'memory="2M"'),
+        ("<worldbody>", "<worldbody><light pos='0 0 3'/>"),
+    ):
+        changed = text.replace(written, edited, 1)
+        assert changed != text
+        assert robot_from_mjcf(changed, "it") == (WALKER, SETTINGS)
 
 
 def test_robot_may_stand_at_another_height() -> None:

@@ -230,6 +230,12 @@ def test_json_and_text_give_the_same_robot() -> None:
         (("brain", "neuron", 1, "layer"), "hidden", "it: part 'H' has two neurons 0"),
         (("brain",), 3, "it: must be an object with 'neuron'"),
         (("body", "part"), 3, "it: body.part must be a list"),
+        (("body", "part", 1, "root"), "yes", "root: must be true or false, got"),
+        (("brian",), {}, "it: no such key 'brian'; did you mean 'brain'"),
+        (("brain", "neurons"), [], "it: brain: no such key 'neurons'; did"),
+        (("brain", "neuron", 1, "gian"), 2, r"neuron\[1\]: no such key 'gian'; did"),
+        (("brain", "connection", 0, "w"), 2, r"\[0\]: no such key 'w'; allowed"),
+        (("body", "part", 1, "slot"), 1, r"part\[1\]: no such key 'slot'"),
     ],
 )  # fmt: skip
 def test_errors_name_the_path(
@@ -270,9 +276,20 @@ def test_invalid_json_is_refused() -> None:
     for text, message in (
         ("{\n]", "it:2: not valid JSON"),
         ('{"a": NaN}', "NaN is not allowed"),
+        ('{"id": 1, "id": 2}', "^it: not valid JSON: key 'id' is given twice$"),
     ):
         with pytest.raises(InvalidRobot, match=message):
             robot_from_robogen_json(text, "it", BUILT_IN)
+
+
+def test_files_of_editors_of_windows_are_read(tmp_path: Path) -> None:
+    """They begin with a byte order mark, and their lines end in CR LF."""
+    for name, text in (("star.txt", STARFISH), ("arm.json", json.dumps(document()))):
+        (tmp_path / name).write_text(text)
+        plain = read_robot(tmp_path / name)
+        lines = text.replace("\n", "\r\n")
+        (tmp_path / name).write_text(lines, encoding="utf-8-sig", newline="")
+        assert read_robot(tmp_path / name) == plain
 
 
 def test_ending_selects_the_format(tmp_path: Path) -> None:

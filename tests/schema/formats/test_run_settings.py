@@ -11,10 +11,12 @@ from schema.__main__ import main
 from schema.errors import ExperimentError, InvalidRobot, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.settings import evaluation_settings_of
-from schema.formats.files import settings_of
+from schema.formats.files import settings_of, write_robot
 from schema.formats.run_settings import experiment_of, read_with_settings
 from schema.plugins import permission
 from schema.plugins.kept import kept_file, plugins_to_keep
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.robot import Part, Robot
 from schema.tables.description import Description, description_text
 from schema.tables.files import parquet_path
 from tests.analysis.tables import table
@@ -168,17 +170,37 @@ def test_own_part_types_of_the_run_are_known(
 
 
 def test_mjcf_file_of_the_run_has_its_own_settings_and_the_runs_part_types(
-    paddle: Path,
+    paddle: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mjcf = paddle.with_suffix(".xml")
     assert main(["robot", "convert", str(paddle), str(mjcf)]) == 0
     own = experiment_of(paddle, None)
     permission._allowed.clear()
-    robot, settings, found = read_with_settings(mjcf, None, tells_default=True)
+    capsys.readouterr()
+    robot, settings, found = read_with_settings(mjcf, None)
+    line = f"revolve: with the settings in {mjcf}; --experiment names others\n"
+    assert capsys.readouterr().err == line
     assert ([part.kind for part in robot.parts], found) == (["Core", "Paddle"], None)
     assert settings == settings_of(own)
     with pytest.raises(InvalidRobot, match=r"must be one of .*, got 'Paddle'"):
         read_with_settings(mjcf, "scenario1")
+    capsys.readouterr()
+    _, settings, found = read_with_settings(mjcf, None, 0)
+    assert (settings, found) == (settings_of(own), own)
+    assert "the settings of " in capsys.readouterr().err
+
+
+def test_settings_of_an_mjcf_file_elsewhere_are_named_where_they_count(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "core.xml"
+    senses = tuple(Neuron("input", INPUT, 0) for _ in range(6))
+    core = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),), Brain(senses))
+    write_robot(core, path)
+    read_with_settings(path, None)
+    assert capsys.readouterr().err == ""
+    read_with_settings(path, None, tells_default=True)
+    assert f"with the settings in {path}; --exp" in capsys.readouterr().err
 
 
 def test_plug_in_of_another_user_is_not_imported(
