@@ -43,6 +43,7 @@ from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import ExperimentError, NetworkError
+from schema.experiment.check import naming
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
@@ -166,8 +167,10 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
 
     refuse_faulty(options.experiments, options.births)
     experiments = read_experiments(options.experiments, options.births)
-    for experiment in experiments:
-        check_built_in(experiment, worker.kinds.KINDS)
+    for source in options.experiments:
+        for experiment in read_experiments([source], options.births):
+            with naming(source):
+                check_built_in(experiment, worker.kinds.KINDS)
     return experiments
 
 
