@@ -115,7 +115,10 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [
-        ({"seed": -1}, "--seed: must be a whole number >= 0, got '-1'"),
+        (
+            {"seed": -1},
+            "--seed: must be a whole number in 0..18446744073709551615, got '-1'",
+        ),
         ({"births": 0}, "--births: must be a whole number >= 1, got '0'"),
         ({"births": 2.5}, "--births: must be a whole number >= 1, got '2.5'"),
         ({"workers": True}, "--workers: must be "),
