@@ -190,8 +190,9 @@ def _deployment(
         _check_window(folder)
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
-    if options.view and options.in_process:
-        raise NetworkError("--view needs a network, but --in-process has none")
+    for flag in ("connect", "listen", "view") if options.in_process else ():
+        if getattr(options, flag):
+            raise NetworkError(f"--{flag} needs a network, but --in-process has none")
     if options.in_process and options.command != "coordinator" and options.workers:
         raise NetworkError("--workers: --in-process starts no other processes")
     listen = options.listen
