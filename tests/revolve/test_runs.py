@@ -35,6 +35,17 @@ def test_run_equals_that_of_the_command(done: rv.Run, tmp_path: Path) -> None:
     assert compare(done.folder, tmp_path / "b") == []
 
 
+def test_rows_of_another_table_are_not_births(done: rv.Run) -> None:
+    needed = "island, birth, genome, robot"
+    for rows, expected in (
+        (done.evaluations, f"with the columns {needed}, has no genome, robot$"),
+        (done.births.select(["birth", "genome"]), "has no island, robot$"),
+        (done.births.to_pylist(), "births: must be a pyarrow.Table, got a list$"),
+    ):
+        with pytest.raises(rv.RevolveError, match=expected):
+            done.robots(rows)
+
+
 def test_run_has_every_table(done: rv.Run) -> None:
     for name in TABLES:
         table = getattr(done, name)
