@@ -96,6 +96,7 @@ def test_misspelt_names_are_reported_with_the_nearest_name(
         ("exp.yaml", "exp.yaml: the file of an experiment must end in .toml, got"),
         ("gone.yaml", "got '.yaml', and there is no such file"),
         ("gone.toml", "gone.toml: cannot be read: No such file"),
+        ("scenario1.toml", "; did you mean 'scenario1', which is shipped?"),
         ("mine", "mine: no such experiment; did you mean 'mine.toml'?"),
         ("sub", "sub: is a folder; an experiment is a .toml file or a shipped name"),
     ],
