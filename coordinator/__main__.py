@@ -43,6 +43,7 @@ from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import ExperimentError, NetworkError
+from schema.experiment.check import naming
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
@@ -166,8 +167,10 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
 
     refuse_faulty(options.experiments, options.births)
     experiments = read_experiments(options.experiments, options.births)
-    for experiment in experiments:
-        check_built_in(experiment, worker.kinds.KINDS)
+    for source in options.experiments:
+        for experiment in read_experiments([source], options.births):
+            with naming(source):
+                check_built_in(experiment, worker.kinds.KINDS)
     return experiments
 
 
@@ -187,8 +190,9 @@ def _deployment(
         _check_window(folder)
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
-    if options.view and options.in_process:
-        raise NetworkError("--view needs a network, but --in-process has none")
+    for flag in ("connect", "listen", "view") if options.in_process else ():
+        if getattr(options, flag):
+            raise NetworkError(f"--{flag} needs a network, but --in-process has none")
     if options.in_process and options.command != "coordinator" and options.workers:
         raise NetworkError("--workers: --in-process starts no other processes")
     listen = options.listen

@@ -91,10 +91,10 @@ def _row(action: argparse.Action, parser: argparse.ArgumentParser) -> str:
 def _name(action: argparse.Action) -> str:
     """Return an argument as usage shows it."""
     choices: Any = action.choices
-    value = "|".join(map(str, choices)) if choices else action.metavar or action.dest
-    value = str(
-        value if action.option_strings or choices else action.metavar or action.dest
-    )
+    words = action.metavar or action.dest
+    if isinstance(words, tuple):
+        words = " ".join(words)
+    value = "|".join(map(str, choices)) if choices else words
     if action.nargs in ("+", "*"):
         value += " ..."
     if not action.option_strings:

@@ -32,6 +32,9 @@ from schema.wire.updates import individual
 
 Folder = str | Path
 
+_OF_ROBOTS = ("island", "birth", "genome", "robot")
+"""Columns of births that the robots are made from."""
+
 
 class Run:
     """A run folder: its description and its tables, as they are now.
@@ -171,8 +174,10 @@ class Run:
 
         Raises:
             RunFolderError: the table is damaged.
+            RevolveError: not a ``pyarrow.Table``, or without a column that is needed.
         """
         rows = self.births if births is None else births
+        _check_births(rows)
         return self._robots(rows, rows["island"].to_pylist())
 
     def _robots(self, births: pa.Table, homes: Sequence[int]) -> list[Robot]:
@@ -254,6 +259,23 @@ class Run:
             for key, value in rows.items()
         )
         return f"<table>{''.join(cells)}</table>"
+
+
+def _check_births(rows: object) -> None:
+    """Raise unless an argument has rows of the table ``births``.
+
+    Raises:
+        RevolveError: anything else.
+    """
+    if not isinstance(rows, pa.Table):
+        kind = type(rows).__name__
+        raise RevolveError(f"births: must be a pyarrow.Table, got a {kind}")
+    missing = [name for name in _OF_ROBOTS if name not in rows.column_names]
+    if missing:
+        raise RevolveError(
+            "births: must be rows of the table births with the columns "
+            f"{', '.join(_OF_ROBOTS)}, has no {', '.join(missing)}"
+        )
 
 
 def read(folder: Folder) -> Run:

@@ -6,7 +6,7 @@ import plotnine as p9
 
 from analysis.figures.courses import FEW_RUNS
 from analysis.figures.forms import NothingToDraw, Tables
-from analysis.figures.style import in_order, scales, theme_of_size
+from analysis.figures.style import in_order, lone_points, scales, theme_of_size
 
 _PANELS = {
     "body_change": "body: tree edit distance [edits]",
@@ -52,6 +52,7 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
     return (
         figure
         + p9.geom_line(size=0.9)
+        + lone_points(means, ["experiment", "panel"])
         + p9.facet_wrap("panel", scales="free_y", ncol=2)
         + scales(tables, in_order(sizes.index), is_filled=False)
         + p9.expand_limits(y=0)

@@ -18,7 +18,13 @@ from analysis.figures.forms import (
     fitness_panels,
     fitness_text,
 )
-from analysis.figures.style import in_order, label, scales, theme_of_size
+from analysis.figures.style import (
+    in_order,
+    label,
+    lone_points,
+    scales,
+    theme_of_size,
+)
 
 FEW_RUNS = 10
 """Runs of an experiment up to which each is drawn."""
@@ -113,7 +119,8 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
 
     runs = frame(shown.by_run)
     few = [name for name, size in shown.sizes.items() if 1 < size <= FEW_RUNS]
-    figure = p9.ggplot(frame(shown.mean), p9.aes("births", "mean"))
+    mean = frame(shown.mean)
+    figure = p9.ggplot(mean, p9.aes("births", "mean"))
     sure = shown.mean.filter(pc.field("runs") >= BAND_RUNS)
     if sure.num_rows:
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
@@ -128,6 +135,7 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
             show_legend=False,
         )
     figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
+    figure += lone_points(mean, ["experiment"])
     figure = figure + scales(tables, shown.sizes, is_filled=sure.num_rows > 0)
     figure += p9.expand_limits(y=0)
     if functions:

@@ -18,6 +18,7 @@ from analysis.figures.style import (
     in_order,
     integer_breaks,
     label,
+    lone_points,
     scales,
     theme_of_size,
 )
@@ -50,6 +51,7 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
     return (
         p9.ggplot(frame, p9.aes("births", "fitness"))
         + p9.geom_line(p9.aes(colour="island", group="line"), size=0.7, alpha=0.85)
+        + lone_points(frame, ["island", "line"])
         + p9.facet_wrap("experiment", labeller=label, scales=heights)
         + p9.scale_colour_manual(hues[: len(names)], limits=names)
         + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))

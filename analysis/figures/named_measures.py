@@ -3,7 +3,7 @@
 import plotnine as p9
 
 from analysis.figures.forms import NothingToDraw, Tables
-from analysis.figures.style import in_order, scales, theme_of_size
+from analysis.figures.style import in_order, lone_points, scales, theme_of_size
 
 _NARROW = 3
 """Panels in a row."""
@@ -37,6 +37,7 @@ def measures_over_births(tables: Tables) -> p9.ggplot:
     return (
         p9.ggplot(frame, p9.aes("births", "mean"))
         + p9.geom_line(p9.aes(colour="experiment", group="line"), size=0.6, alpha=0.8)
+        + lone_points(frame, ["experiment", "line", "measure"])
         + p9.facet_wrap("measure", ncol=_NARROW, scales="free_y", labeller=_with_unit)
         + scales(tables, experiments, is_filled=False)
         + p9.labs(x="births on the island", y="mean of the population")

@@ -136,6 +136,20 @@ def scales(
     return [*lines, p9.scale_fill_manual(**settings)] if is_filled else lines
 
 
+def lone_points(lines: Any, keys: list[str]) -> list[p9.geom_point]:  # noqa: ANN401 - pandas
+    """Return a layer with the points that are alone in their line, if there are some.
+
+    A line of one point is not drawn.
+
+    Args:
+        lines: data of a layer of lines.
+        keys: columns that tell lines and panels apart; the first is their colour.
+    """
+    alone = lines[lines.groupby(keys)[keys[0]].transform("size") == 1]
+    points = p9.geom_point(p9.aes(colour=keys[0]), data=alone, size=1.5)
+    return [points] if len(alone) else []
+
+
 def integer_breaks(limits: tuple[float, float]) -> list[float]:
     """Return the breaks of a scale of integers."""
     return list(MaxNLocator(nbins=6, integer=True).tick_values(*limits))
@@ -169,7 +183,7 @@ def save(figure: p9.ggplot | Figure, stem: Path) -> None:
         stem: path without an ending.
     """
     with warnings.catch_warnings():
-        # A line of one point is not drawn: nothing that a user can mend.
+        # A line of one point is not drawn: see ``lone_points``.
         warnings.simplefilter("ignore", PlotnineWarning)
         drawn = figure.draw() if isinstance(figure, p9.ggplot) else figure
     with rc_context(_SETTINGS):

@@ -17,9 +17,9 @@ from schema.agent.flags import (
     Flags,
     add_count,
     add_plugins,
+    add_seed,
     positive_number,
     share,
-    whole_number,
 )
 from schema.agent.network import DEFAULT_FLEET
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S
@@ -165,9 +165,7 @@ def _add_experiments(flags: argparse.ArgumentParser) -> None:
         metavar="EXPERIMENT",
         help=f"a .toml file, or one of {names}; several make a campaign",
     )
-    flags.add_argument(
-        "--seed", type=_seed, default=0, metavar="N", help="random seed (default: 0)"
-    )
+    add_seed(flags, default=0)
     add_count(flags, "--repeats", None, "repeat each experiment N times, as a campaign")
     add_count(
         flags,
@@ -272,11 +270,3 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     flags.add_argument(
         "--fsync", action="store_true", help="survive power loss, too; slower"
     )
-
-
-def _seed(text: str) -> int:
-    """Return a seed that fits into 64 bits, as messages and tables need it."""
-    value = whole_number(0)(text)
-    if value >> 64:
-        raise argparse.ArgumentTypeError(f"must be < 2^64, got {text!r}")
-    return value

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from coordinator.evolution.breeding import Breeder
-from schema.agent.flags import Flags, add_count
+from schema.agent.flags import Flags, add_count, add_seed
 from schema.errors import counted
 from schema.experiment.file import read_experiment
 from schema.formats.files import settings_of, write_robot
@@ -58,7 +58,7 @@ def parser(_command: str = "robot random") -> Flags:
         metavar="FILE",
         help="robot file, to be written: .yaml, .pb, .xml, ...",
     )
-    add_count(flags, "--seed", 1, "random seed", least=0)
+    add_seed(flags, default=1)
     add_count(flags, "--count", 1, "number of robots", least=0)
     flags.add_argument(
         "--experiment",

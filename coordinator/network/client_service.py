@@ -52,10 +52,8 @@ def ask_coordinators(
     if not replies_of:
         # The hub drops what a certificate may not send, without an answer.
         role = "; only an operator's certificate may ask" * connect.startswith("tls/")
-        raise NetworkError(
-            f"{connect}: none of {len(there)} coordinators of fleet {fleet} replies"
-            f"{role}"
-        )
+        who = f"none of {len(there)} coordinators" if there else "no coordinator"
+        raise NetworkError(f"{connect}: {who} of fleet {fleet} replies{role}")
     return replies_of
 
 

@@ -35,6 +35,7 @@ from schema.errors import (
     one_line,
     shown,
 )
+from schema.experiment.check import naming
 from schema.experiment.document import (
     Arena,
     Experiment,
@@ -309,7 +310,7 @@ def _check_document(
 ) -> Iterator[str]:
     """Raise what a run would refuse besides own plug-ins; yield warnings."""
     for experiment in read_experiments((source,), births):
-        with _time_limit(limit_s):
+        with _time_limit(limit_s), naming(source):
             check_built_in(experiment, kinds)
             for number in range(island_count(experiment)):
                 check_fitness_keys(island_experiment(experiment, number).fitness)

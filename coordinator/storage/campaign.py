@@ -26,6 +26,7 @@ from coordinator.storage.folder import (
 )
 from coordinator.storage.hints import command
 from schema.errors import ExperimentError, RunFolderError
+from schema.experiment.check import naming
 from schema.experiment.document import Experiment
 from schema.experiment.file import (
     check_source,
@@ -103,9 +104,14 @@ def read_experiments(
     for source in sources:
         check_source(source, [*shipped_experiments(), *shipped])
     words = [word for source in sources for word in shipped.get(source, (source,))]
-    experiments = tuple(each for word in words for each in experiments_of(word, births))
-    _check_names(experiments)
-    return experiments
+    experiments: list[Experiment] = []
+    for word in words:
+        found = experiments_of(word, births)
+        with naming(word):
+            _check_folders(found)
+        experiments += found
+    _check_distinct(experiments)
+    return tuple(experiments)
 
 
 def joined_name(experiments: Sequence[Experiment]) -> str:
@@ -127,11 +133,25 @@ def joined_name(experiments: Sequence[Experiment]) -> str:
     return "+".join([*names[:most], *rest])
 
 
-def _check_names(experiments: Sequence[Experiment]) -> None:
-    """Raise unless names differ and can be those of folders.
+def _check_folders(experiments: Sequence[Experiment]) -> None:
+    """Raise unless names can be those of folders.
 
     Raises:
-        ExperimentError: two experiments have the same name, or one is no folder's.
+        ExperimentError: one cannot.
+    """
+    for name in (experiment.name for experiment in experiments):
+        if "/" in name or name.startswith("."):
+            raise ExperimentError(
+                f"name: must have no '/' and not start with '.', as a folder is named "
+                f"after it, got {name!r}"
+            )
+
+
+def _check_distinct(experiments: Sequence[Experiment]) -> None:
+    """Raise unless names differ.
+
+    Raises:
+        ExperimentError: two experiments have the same name.
     """
     names = [experiment.name for experiment in experiments]
     for name in names:
@@ -139,11 +159,6 @@ def _check_names(experiments: Sequence[Experiment]) -> None:
             raise ExperimentError(
                 f"name: the experiments of a campaign must have different names, but "
                 f"{names.count(name)} are called {name!r}"
-            )
-        if "/" in name or name.startswith("."):
-            raise ExperimentError(
-                f"name: must have no '/' and not start with '.', as a folder is named "
-                f"after it, got {name!r}"
             )
 
 
@@ -208,7 +223,8 @@ def read_campaign(folder: Path) -> Campaign:
     documents = [each.document for each in found.experiments]
     try:
         experiments = tuple(map(experiment_from_text, documents))
-        _check_names(experiments)
+        _check_folders(experiments)
+        _check_distinct(experiments)
     except ExperimentError as error:
         raise _damaged(folder, str(error)) from None
     return Campaign(experiments, found.repeats, found.seed, found.first)

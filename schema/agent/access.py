@@ -179,7 +179,9 @@ def read_certificates(file: Path) -> list[Certificate]:
         # A longer file is cut, so that it does not decode.
         found = msgspec.json.decode(data, type=list[Certificate])
         check_certificates(found)
-    except (OSError, ValueError, RecursionError, NetworkError) as error:
+    except OSError as error:
+        raise NetworkError(f"{file}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError, NetworkError) as error:
         raise NetworkError(
             f"{file}: must be a JSON list of objects with name and role: {error}"
         ) from None

@@ -80,6 +80,17 @@ def whole_number(least: int = 1, most: int | None = None) -> Callable[[str], int
     return read
 
 
+def add_seed(flags: argparse.ArgumentParser, default: int) -> None:
+    """Add the flag for a seed of evolution, which has 64 bits."""
+    flags.add_argument(
+        "--seed",
+        type=whole_number(0, 2**64 - 1),
+        default=default,
+        metavar="N",
+        help="random seed (default: %(default)s)",
+    )
+
+
 def birth_name(text: str) -> tuple[int | None, int]:
     """Return island and number of a birth; the island is None if it is not given."""
     island, colon, number = text.rpartition(":")

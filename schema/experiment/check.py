@@ -1,6 +1,7 @@
 """Checks that the sections of an experiment are consistent."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from math import isclose, lcm
 from urllib.parse import quote
 
@@ -49,8 +50,18 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             learning with re-evaluations, or in an arena with windows that end between
             two ticks.
     """
-    if problem := next(_problems(experiment), ""):
-        raise ExperimentError(f"{where}: {problem}")
+    with naming(where):
+        if problem := next(_problems(experiment), ""):
+            raise ExperimentError(problem)
+
+
+@contextmanager
+def naming(where: str) -> Iterator[None]:
+    """Add the file of an experiment to the message of an error."""
+    try:
+        yield
+    except ExperimentError as error:
+        raise type(error)(f"{where}: {error}") from error
 
 
 def _problems(experiment: Experiment) -> Iterator[str]:

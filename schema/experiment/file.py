@@ -329,11 +329,16 @@ def _read_sweep(document: dict[str, Any], where: str) -> None:
 
 def _text(source: str) -> str:
     """Return the text of a TOML file."""
+    path = Path(source)
     try:
         # With the byte order mark of editors of Windows, as scenery and calibrations.
-        return read_bytes(Path(source)).decode("utf-8-sig")
+        return read_bytes(path).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        near = _near(Path(source)) if isinstance(error, FileNotFoundError) else ""
+        near = ""
+        if isinstance(error, FileNotFoundError):
+            is_shipped = path.stem in shipped_experiments()
+            name = f"; did you mean {path.stem!r}, which is shipped?"
+            near = name if is_shipped else _near(path)
         raise ExperimentError(f"{source}: {unreadable(error)}{near}") from None
 
 

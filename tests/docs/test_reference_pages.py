@@ -126,6 +126,10 @@ def test_every_flag_of_every_command_is_listed() -> None:
     assert row in page.splitlines()
 
 
+def test_a_flag_of_two_values_is_shown_as_usage_shows_it() -> None:
+    assert "| `--place X Y` |" in _page("commands.md")
+
+
 def test_every_column_of_every_table_is_listed() -> None:
     parts = re.split(r"^## ", _page("columns.md"), flags=re.MULTILINE)
     for name, schema in TABLES.items():

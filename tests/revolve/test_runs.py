@@ -35,6 +35,17 @@ def test_run_equals_that_of_the_command(done: rv.Run, tmp_path: Path) -> None:
     assert compare(done.folder, tmp_path / "b") == []
 
 
+def test_rows_of_another_table_are_not_births(done: rv.Run) -> None:
+    needed = "island, birth, genome, robot"
+    for rows, expected in (
+        (done.evaluations, f"with the columns {needed}, has no genome, robot$"),
+        (done.births.select(["birth", "genome"]), "has no island, robot$"),
+        (done.births.to_pylist(), "births: must be a pyarrow.Table, got a list$"),
+    ):
+        with pytest.raises(rv.RevolveError, match=expected):
+            done.robots(rows)
+
+
 def test_run_has_every_table(done: rv.Run) -> None:
     for name in TABLES:
         table = getattr(done, name)
@@ -115,7 +126,10 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [
-        ({"seed": -1}, "--seed: must be a whole number >= 0, got '-1'"),
+        (
+            {"seed": -1},
+            "--seed: must be a whole number in 0..18446744073709551615, got '-1'",
+        ),
         ({"births": 0}, "--births: must be a whole number >= 1, got '0'"),
         ({"births": 2.5}, "--births: must be a whole number >= 1, got '2.5'"),
         ({"workers": True}, "--workers: must be "),

@@ -50,7 +50,7 @@ def test_invalid_experiment_is_refused(
     output = _refused(
         workspace, "run", _document(workspace, text), "--out", "x", "--quiet"
     )
-    assert "mine.toml" in output or message in output
+    assert "mine.toml" in output
     assert message in output
     assert not (workspace.folder / "x").exists()
 
@@ -66,7 +66,18 @@ def test_restriction_that_no_robot_satisfies_ends_the_run_with_the_reason(
 
 def test_a_seed_above_64_bits_is_refused(workspace: Workspace) -> None:
     words = ("scenario1", "--seed", str(2**64), "--out", "x", "--quiet")
-    assert "--seed: must be < 2^64" in _refused(workspace, "run", *words)
+    limits = "--seed: must be a whole number in 0..18446744073709551615, got"
+    assert limits in _refused(workspace, "run", *words)
+
+
+@pytest.mark.parametrize("flag", ["--connect", "--listen"])
+def test_an_address_is_refused_where_nothing_is_sent(
+    workspace: Workspace, flag: str
+) -> None:
+    words = ("scenario1", flag, "tcp/127.0.0.1:1", "--in-process", "--out", "x")
+    message = f"{flag} needs a network, but --in-process has none"
+    assert message in _refused(workspace, "run", *words)
+    assert not (workspace.folder / "x").exists()
 
 
 def test_misspelt_names_are_reported_with_the_nearest_name(
@@ -85,6 +96,7 @@ def test_misspelt_names_are_reported_with_the_nearest_name(
         ("exp.yaml", "exp.yaml: the file of an experiment must end in .toml, got"),
         ("gone.yaml", "got '.yaml', and there is no such file"),
         ("gone.toml", "gone.toml: cannot be read: No such file"),
+        ("scenario1.toml", "; did you mean 'scenario1', which is shipped?"),
         ("mine", "mine: no such experiment; did you mean 'mine.toml'?"),
         ("sub", "sub: is a folder; an experiment is a .toml file or a shipped name"),
     ],

@@ -180,6 +180,13 @@ def test_single_runs_are_drawn_without_bands() -> None:
     assert figure.data["mean"].tolist() == [0.1, 0.2]
 
 
+def test_a_mean_of_one_point_is_a_dot() -> None:
+    runs = [("a", "a-0", (0.1,)), ("b", "b-0", (0.2, 0.5)), ("b", "b-1", (0.4,))]
+    drawn = layers(over_births(courses(*runs), "fitness", "f"))["geom_point"]
+    assert drawn["experiment"] == ["a", "b"]
+    assert drawn["mean"] == pytest.approx([0.1, 0.3])
+
+
 def test_a_mean_ends_where_the_first_run_ends_and_the_caption_says_so() -> None:
     longer = [("b", "b-3", (0.2, 0.5, 9.0, 9.5))]
     tables = courses(*THREE, *longer)

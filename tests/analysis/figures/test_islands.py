@@ -41,6 +41,9 @@ def test_each_island_has_a_line() -> None:
     assert figure.data["island"].tolist() == ["0", "0", "1", "1"]
     assert figure.data["fitness"].tolist() == pytest.approx([15, 30, 15.1, 30.1])
     figure.draw()
+    assert "geom_point" not in layers(figure)
+    young = {"runs": table("runs", runs), "populations": table("populations", rows[:3])}
+    assert layers(fitness_by_island(young))["geom_point"]["island"] == ["1"]
     alone = {"runs": table("runs", [{"folder": "f", "islands": 1}])}
     with pytest.raises(NothingToDraw, match="several islands"):
         fitness_by_island({**alone, "populations": table("populations", rows)})

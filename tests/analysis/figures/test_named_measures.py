@@ -4,6 +4,7 @@ import pyarrow as pa
 from matplotlib.text import Text
 
 from analysis.figures import named_measures
+from tests.analysis.drawn import layers
 from worker.measures.functions import BUILT_IN
 
 
@@ -19,6 +20,15 @@ def test_figure_is_drawn_without_a_warning() -> None:
     (line,) = drawn.axes[0].lines or drawn.axes[0].collections
     assert line is not None
     assert "height [m]" in {text.get_text() for text in drawn.findobj(Text)}
+
+
+def test_a_measure_at_one_number_of_births_is_a_dot() -> None:
+    row = {"experiment": "a", "folder": "a-1", "island": 0, "births": 15, "mean": 0.1}
+    rows = [{**row, "measure": "height"}]
+    figure = named_measures.measures_over_births(
+        {"named_measures": pa.Table.from_pylist(rows)}
+    )
+    assert layers(figure)["geom_point"]["mean"] == [0.1]
 
 
 def test_units_are_those_of_the_docstrings() -> None:

@@ -19,6 +19,7 @@ from schema.robot.brain import INPUT, Brain, Connection, Layer, Neuron
 from schema.robot.genome import ConnectionGene, NeuronGene, Node, develop
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import encode_genome, encode_robot
+from tests.analysis.drawn import layers
 from tests.analysis.tables import births, population, run
 
 GREY = (0.5, 0.5, 0.5)
@@ -206,7 +207,8 @@ def test_table_of_a_run() -> None:
 
     named = found.append_column("experiment", [["a"] * 3])
     named = named.append_column("folder", [["runs/a"] * 3])
-    shown = changes_over_births({"brains": named}).data
+    # A line of one point is a dot.
+    shown = layers(changes_over_births({"brains": named}))["geom_point"]
     panels = dict(zip(shown["panel"], shown["value"], strict=True))
     assert panels == {
         "body: tree edit distance [edits]": 0.0,

@@ -18,14 +18,24 @@ def test_random_robots_differ_and_repeat_with_the_seed(tmp_path: Path) -> None:
     assert read_robot(tmp_path / "one.pb") == robots[0]
 
 
-@pytest.mark.parametrize(("flag", "value"), [("--seed", "-1"), ("--count", "1.5")])
+@pytest.mark.parametrize(
+    ("flag", "value", "limits"),
+    [
+        ("--seed", "-1", "in 0..18446744073709551615"),
+        ("--seed", str(2**64), "in 0..18446744073709551615"),
+        ("--count", "1.5", ">= 0"),
+    ],
+)
 def test_invalid_numbers_are_refused(
-    flag: str, value: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    flag: str,
+    value: str,
+    limits: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     with pytest.raises(SystemExit) as end:
         main(["robot random", str(tmp_path / "r.yaml"), flag, value])
     assert end.value.code == 2
-    assert (
-        f"{flag}: must be a whole number >= 0, got '{value}'" in capsys.readouterr().err
-    )
+    message = f"{flag}: must be a whole number {limits}, got '{value}'"
+    assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -31,6 +31,7 @@ from coordinator.dispatch.events import (
     Returned,
     Ticked,
 )
+from coordinator.network.client_service import ask_coordinators
 from coordinator.network.operator_service import Order
 from coordinator.network.service import Network
 from schema.agent.network import client_config
@@ -486,3 +487,9 @@ def test_a_query_of_hostile_length_is_counted_and_dropped(network: Network) -> N
         until(network, lambda _: network.malformed > 0)
         assert list(replies) == []
     assert network.queries.orders() == []
+
+
+def test_a_hub_without_a_coordinator_of_the_fleet_is_told(network: Network) -> None:
+    expected = ": no coordinator of fleet other replies$"
+    with pytest.raises(NetworkError, match=expected):
+        ask_coordinators(b"", connect=network.address, fleet="other")

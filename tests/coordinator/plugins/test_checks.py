@@ -233,7 +233,7 @@ def test_unknown_built_in_plug_in_is_a_fault(
     document = tmp_path / "odd.toml"
     document.write_text(f'name = "odd"\nbirths = 20\n{tables}\n')
     (problem,) = check_apart([str(document)])
-    assert re.search(fault, problem)
+    assert re.search(rf"^{re.escape(str(document))}: .*{fault}", problem)
 
 
 def test_file_of_another_folder_may_have_the_name_of_one_here(
@@ -278,7 +278,7 @@ def test_name_that_no_folder_can_have_is_a_fault(tmp_path: Path) -> None:
     document = tmp_path / "odd.toml"
     document.write_text('name = "a/b"\nbirths = 20\n')
     (problem,) = check_apart([str(document)])
-    assert problem.startswith("name: must have no '/'")
+    assert problem.startswith(f"{document}: name: must have no '/'")
 
 
 def test_file_without_a_name_is_asked_for_one(lab: Callable[[str], Path]) -> None:
@@ -409,6 +409,7 @@ def test_a_key_of_fitness_without_effect_is_refused(
         step, line = checked(str(document))[-1]
         assert step == ("fault" if why else "fine"), line
         assert re.search(why, line)
+        assert not why or line.startswith(f"{document}: fitness.")
 
 
 def test_births_outside_the_wall_are_refused(tmp_path: Path) -> None:

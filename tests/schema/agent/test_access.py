@@ -117,3 +117,10 @@ def test_invalid_file_is_refused_in_one_line(tmp_path: Path, content: bytes) -> 
     with pytest.raises(NetworkError, match="must be a JSON list") as caught:
         read_certificates(file)
     assert "\n" not in str(caught.value)
+
+
+def test_missing_file_is_not_called_invalid(tmp_path: Path) -> None:
+    file = tmp_path / "access.json"
+    with pytest.raises(NetworkError) as caught:
+        read_certificates(file)
+    assert str(caught.value) == f"{file}: cannot be read: No such file or directory"
