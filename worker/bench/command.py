@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
 
-from schema.agent.flags import Flags, add_count
+from schema.agent.flags import Flags, add_count, add_plugins
 from schema.errors import (
     FitnessUndefined,
     RevolveError,
@@ -38,6 +38,7 @@ from schema.experiment.file import (
 )
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
+from schema.plugins.permission import allow
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity
@@ -211,6 +212,7 @@ def parser() -> Flags:
         metavar="KEY=VALUE",
         help="compare with this simulation setting instead of a finer time step",
     )
+    add_plugins(study)
     arena_bench.add_commands(kinds)
     return flags
 
@@ -241,6 +243,7 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
 
 
 def _fidelity(options: argparse.Namespace) -> int:
+    allow(options.plugins)
     population = fidelity.read_population(options.run)
     change: fidelity.Change = partial(_changed, options.against)
     chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)

@@ -5,12 +5,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from analyzer.report import analyze
 from coordinator.evolution.generation import generate
 from schema.errors import ExperimentError, RevolveError, counted
-from schema.experiment.document import Experiment, Simulation
+from schema.experiment.document import Experiment, Fitness, Simulation
+from schema.experiment.file import experiment_text
+from schema.plugins.kept import KeptPlugin, kept_file
+from schema.plugins.source import digest_of_bytes
 from schema.robot.robot import Robot
+from schema.tables.description import DETAILS, Description, description_text
 from tests.worker.bench.run_folder import write_run
 from worker.bench.arena_bench import RobotSource
 from worker.bench.command import main
@@ -130,3 +135,30 @@ def test_robots_whose_plug_ins_fail_are_left_out_of_timing_and_counted(
     assert 0 < timed < 4
     start = f"left out: {counted(4 - timed, 'robot')} whose evaluation failed; "
     assert re.fullmatch(f"{start}the first one: {reason}", last)
+
+
+def test_fidelity_uses_the_plug_ins_that_a_run_keeps(
+    run: Path, robot_of: Callable[[int], Robot], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A run keeps a copy of each plug-in file, which no other file has to be."""
+    source = b"def still(trace, _fitness):\n    return 0.5\n"
+    file = kept_file(run, "bench_kept")
+    file.parent.mkdir()
+    file.write_bytes(source)
+    own = replace(SHORT, fitness=Fitness(function="bench_kept:still"))
+    numbers = range(3)
+    write_run(
+        run,
+        own,
+        births=[(0, number, robot_of(number)) for number in numbers],
+        evaluations=[(0, number, None, 5.5, 0.1 * number) for number in numbers],
+    )
+    note = KeptPlugin(digest_of_bytes(source), str(file))
+    known = Description("test", 0, 1, experiment_text(own))
+    known = replace(known, plugins={"bench_kept": note})
+    (run / DETAILS).write_text(description_text(known))
+    arguments = ["bench", "fidelity", str(run), "--per-third", "1"]
+    with pytest.raises(ExperimentError, match=f"add --plugins {file}$"):
+        main(arguments, ROBOTS)
+    main([*arguments, "--plugins", str(file)], ROBOTS)
+    assert "mean 0.5000 here, 0.5000 there" in capsys.readouterr().out
