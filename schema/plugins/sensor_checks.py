@@ -7,7 +7,7 @@ from typing import SupportsFloat
 
 import numpy as np
 
-from schema.errors import ExperimentError, cut, shown
+from schema.errors import ExperimentError, cut, error_text, shown
 from schema.parts import Box, OwnSensor, Shape, Vector
 from schema.plugins.origin import where_defined
 from schema.robot.results import Floats
@@ -116,8 +116,7 @@ def _read(sensor: OwnSensor, view: HandMadeView, at: str) -> list[float]:
         return values_of(sensor, sensor.read(view))
     except Exception as error:
         # A ValueError of ``values_of`` says what was expected.
-        story = f"{type(error).__name__}: {error}"
-        raise ExperimentError(f"{at}: {cut(story)}") from error
+        raise ExperimentError(f"{at}: {cut(error_text(error))}") from error
 
 
 def values_of(sensor: OwnSensor, found: Iterable[object]) -> list[float]:

@@ -82,6 +82,12 @@ def _raising(values: tuple[float, ...]) -> Shape:
     return _thin((1.0 / values[0],))
 
 
+def _wordy(values: tuple[float, ...]) -> Shape:
+    if values[0] == 0.0:
+        raise ValueError("two\nlines")
+    return _thin(values)
+
+
 _TURN = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """A mirror image, no rotation."""
 _TAILS = tuple(box for box in HINGED.boxes if box.segment == 1)
@@ -169,6 +175,10 @@ WRONG = {
     "raising corner": (
         replace(measured(_SIZE), shape=_raising),
         r"shape raised ZeroDivisionError: .* \(with size = 0, then three colours\)",
+    ),
+    "wordy corner": (
+        replace(measured(_SIZE), shape=_wordy),
+        r"shape raised ValueError: two lines \(with size = 0",
     ),
     "sensor": (
         replace(TOUCH_SENSOR, sensors=(Sensor("touch", "middle"),)),
@@ -327,6 +337,13 @@ class Blind(Nose):
         return (float(view.light[2]),)
 
 
+class Wordy(Nose):
+    """Sensor that raises with a message of two lines."""
+
+    def read(self, _view: Any) -> Sequence[float]:  # noqa: ANN401
+        raise RuntimeError("two\nlines")
+
+
 class Reaching(Nose):
     """Sensor of a box that the part may not have."""
 
@@ -353,6 +370,7 @@ BAD: dict[str, tuple[Any, str]] = {
         r"must return the same for the same view, got \[1.0\] and \[2.0\]",
     ),
     "raises": (Blind(), r"Blind.read of a part at birth: TypeError"),
+    "raises lines": (Wordy(), r"Wordy.read of a part at birth: .*: two lines$"),
     "direction": (
         Longsighted(),
         r"direction must have length 1, got \(1.0, 1.0, 0.0\)",
