@@ -69,7 +69,8 @@ class HandMadeView:
 
 def ray_problem(direction: Vector, reach: float, start: Vector) -> None:
     """Raise ValueError unless a sensor's ray is well defined."""
-    if abs(math.hypot(*direction) - 1.0) > 1e-6:  # noqa: PLR2004
+    # A length that is not a number is not close to 1.
+    if not math.isclose(math.hypot(*direction), 1.0, rel_tol=0.0, abs_tol=1e-6):
         raise ValueError(f"direction must have length 1, got {direction}")
     if not (math.isfinite(reach) and reach > 0.0):
         raise ValueError(f"reach must be finite and > 0, got {reach}")

@@ -29,7 +29,7 @@ from schema.plugins.part_checks import (
     check_sensed_boxes,
     check_slot_directions,
 )
-from schema.plugins.sensor_checks import check_sensor
+from schema.plugins.sensor_checks import check_sensor, ray_problem
 
 HINGED = ACTIVE_HINGE.shape(())
 BRICK = FIXED_BRICK.shape(())
@@ -387,6 +387,12 @@ def test_wrong_sensors_are_refused(name: str) -> None:
     assert str(caught.value).startswith("here: test_part_checks.py:" if sensor.__class__
                                         is not object else "here: ")  # fmt: skip
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("x", [math.nan, math.inf, 1.1])
+def test_the_direction_of_a_ray_has_length_1(x: float) -> None:
+    with pytest.raises(ValueError, match="direction must have length 1, got"):
+        ray_problem((x, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0))
 
 
 def test_sensors_of_a_part_type_read_views_of_its_boxes() -> None:
