@@ -25,7 +25,7 @@ from analysis.measures.load import LeftOut, Run, read_runs
 from analysis.measures.outputs import OUTPUTS, schema
 from analysis.measures.study import concatenated, measure_runs
 from analysis.measures.trees import SlotRule
-from analysis.progress import bars
+from analysis.progress import bars, replaced
 from analysis.render.picture import Simulate
 from analysis.report.page import report
 from analysis.summary import show
@@ -64,7 +64,9 @@ def analyze(
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
     for folder in (options.out, options.out / FIGURES):
         make_folder(folder)
-    _tell_replaced(options.out / REPORT)
+    file = options.out / REPORT
+    for line in replaced(file, "the report", "its figures and measures"):
+        print(line)
     with bars(
         f"measuring {counted(len(runs), 'run')}", *columns, TimeRemainingColumn()
     ) as bar:
@@ -140,14 +142,6 @@ def _listed(figures: Sequence[DrawnFigure]) -> str:
         return "no figure could be drawn; see the line 'left out: figures'"
     numbers = ", ".join(one.figure.number for one in figures)
     return f"figures {numbers} as PDF and PNG"
-
-
-def _tell_replaced(report: Path) -> None:
-    """Say that an earlier report is replaced, before it is."""
-    if report.is_file():
-        written = datetime.fromtimestamp(report.stat().st_mtime, UTC)
-        text = f"replaces the report of {written:%Y-%m-%d %H:%M} UTC, its figures and"
-        print(f"{report}: {text} measures; to keep them, give another folder: --out")
 
 
 def _versions() -> dict[str, str]:

@@ -1,8 +1,10 @@
-"""Progress of long commands on standard error: bars on a terminal, lines in a log."""
+"""Progress of long commands: bars on a terminal, lines in a log, what is replaced."""
 
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from datetime import UTC, datetime
+from pathlib import Path
 from threading import Event, Thread
 from typing import Self
 
@@ -13,6 +15,20 @@ from rich.text import Text
 
 SPAN_S = 10.0
 """Time between two lines in a log [s]."""
+
+
+def replaced(file: Path, what: str, others: str) -> Iterator[str]:
+    """Yield a line that a file of an earlier command is replaced, if there is one.
+
+    Args:
+        file: that this command will write.
+        what: it is.
+        others: what else is replaced.
+    """
+    if file.is_file():
+        written = datetime.fromtimestamp(file.stat().st_mtime, UTC)
+        text = f"replaces {what} of {written:%Y-%m-%d %H:%M} UTC, {others}"
+        yield f"{file}: {text}; to keep them, give another folder: --out"
 
 
 @contextmanager

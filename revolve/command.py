@@ -65,8 +65,9 @@ def main(
 
 
 def _tell(error: Exception) -> None:
-    """Write a user's error to standard error."""
-    import_module("schema.agent.log").tell_error(f"revolve: {error}")
+    """Write a user's error to standard error, as one line."""
+    message = import_module("schema.errors").one_line(error)
+    import_module("schema.agent.log").tell_error(f"revolve: {message}")
 
 
 def _run(words: list[str], tell: Callable[[Exception], None]) -> int:

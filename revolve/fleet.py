@@ -29,7 +29,7 @@ from schema.agent.address import hub_of
 from schema.agent.network import DEFAULT_FLEET, Tls
 from schema.agent.supervisor import cores
 from schema.agent.topics import unique_name
-from schema.errors import ExperimentError, JobRefused, RevolveError
+from schema.errors import ExperimentError, JobRefused, RevolveError, shown
 from schema.experiment.brains import types_of
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
@@ -365,10 +365,15 @@ def _path_of(function: str | Callable[[Any], Any]) -> str:
     """Return the name by which workers import a function.
 
     Raises:
-        ExperimentError: it has no such name.
+        ExperimentError: it is no function, or has no such name.
     """
     if isinstance(function, str):
         return function
+    given: object = function
+    if not callable(given):
+        raise ExperimentError(
+            f"function: must be a function or 'module:attribute', got {shown(given)}"
+        )
     home = str(getattr(function, "__module__", None))
     name = str(getattr(function, "__qualname__", None))
     if home == "__main__" or not name.isidentifier():

@@ -102,22 +102,29 @@ class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
 
 
 def one_line(error: BaseException) -> str:
-    """Return the message of an error as one line."""
-    return " ".join(str(error).split())
+    """Return the message of an error as one line that can be printed.
+
+    The error may be that of a plug-in: any text, or none because it raises itself.
+    """
+    try:
+        text = str(error)
+    except Exception as fault:  # noqa: BLE001 - of the code of a user
+        return f"(no message: its __str__ raises {type(fault).__name__})"
+    return printable(text, len(text))
 
 
 def error_text(error: BaseException) -> str:
-    """Return the type and the message of an error as one line."""
-    return f"{type(error).__name__}: {one_line(error)}"
+    """Return the type and the message of any error as one line, cut if it is long."""
+    return f"{type(error).__name__}: {printable(one_line(error), LONGEST_REASON)}"
 
 
 def shown(value: object) -> str:
     """Return a value for a message: as in Python, cut if it is long."""
     try:
         text = repr(value)
-    except ValueError:
-        # Python writes no integer of more than 4300 digits.
-        return f"a {type(value).__name__} that is too long to show"
+    except Exception:  # noqa: BLE001 - a value of a plug-in may raise anything
+        # Python writes no integer of more than 4300 digits, for example.
+        return f"a {type(value).__name__} that cannot be shown"
     return cut(text)
 
 

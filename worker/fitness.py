@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from schema.errors import FitnessUndefined
+from schema.errors import FitnessUndefined, error_text
 from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
 from schema.plugins.simple_traces import check_function, simple_traces
@@ -40,9 +40,7 @@ def finite_value(name: str, function: Callable[..., Any], *arguments: object) ->
     try:
         value = float(function(*arguments))
     except Exception as error:
-        raise FitnessUndefined(
-            f"{name} raised {type(error).__name__}: {error}"
-        ) from error
+        raise FitnessUndefined(f"{name} raised {error_text(error)}") from error
     if not math.isfinite(value):
         raise FitnessUndefined(f"{name} must return a finite number, got {value}")
     return value

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, dist, isfinite, sin, tau
+from types import MappingProxyType
 from typing import NamedTuple
 
 from coordinator.evolution.breeding import Candidate, Individual
@@ -212,7 +213,9 @@ class LivingRobots:
             robot.individual = replace(
                 robot.individual,
                 fitness=judgement.fitness,
-                measures=dict(zip(self._labels, judgement.measures, strict=False)),
+                measures=MappingProxyType(
+                    dict(zip(self._labels, judgement.measures, strict=False))
+                ),
             )
 
     def sample(self, moment: Moment) -> list[Record]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
+from types import MappingProxyType
 
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose, stream
@@ -24,6 +25,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 
+NO_MEASURES: Mapping[str, float] = MappingProxyType({})
 _COUPLES = 100
 """Number of couples that may fail at one birth before `Breeder` gives up."""
 
@@ -41,7 +43,7 @@ class Individual:
         has_failed: its evaluation ended without a fitness.
         parents: birth ids of its parents; empty for a random robot.
         size: number of parts of its body.
-        measures: of its evaluation, by name.
+        measures: of its evaluation, by name; a selection function cannot change them.
         learnt: the robot with the brain that it learnt, if it did and its genome has
             another one.
     """
@@ -54,7 +56,9 @@ class Individual:
     has_failed: bool = False
     parents: tuple[BirthId, ...] = ()
     size: int = 0
-    measures: Mapping[str, float] = field(default_factory=dict, hash=False)
+    measures: Mapping[str, float] = field(
+        default_factory=lambda: NO_MEASURES, hash=False
+    )
     learnt: Robot | None = None
 
     def evaluated(
@@ -67,12 +71,14 @@ class Individual:
             labels: names of its measures.
         """
         if evaluation is None:
-            return replace(self, fitness=0.0, has_failed=True, measures={})
+            return replace(self, fitness=0.0, has_failed=True, measures=NO_MEASURES)
         return replace(
             self,
             fitness=evaluation.fitness,
             has_failed=False,
-            measures=dict(zip(labels, evaluation.measures, strict=True)),
+            measures=MappingProxyType(
+                dict(zip(labels, evaluation.measures, strict=True))
+            ),
         )
 
     @property

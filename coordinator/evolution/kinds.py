@@ -5,11 +5,13 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from coordinator.evolution.brains import BUILT_IN as BRAINS
+from coordinator.evolution.breeding import NO_MEASURES
 from coordinator.evolution.check_encoding import check_encoding
 from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
 from coordinator.evolution.encodings import METHODS, WHERE
@@ -61,7 +63,8 @@ def _example(number: int, fitness: float, labels: Labels) -> _Example:
     if labels is not None:
         measures = dict.fromkeys(labels, number / 7)
     size, rank = 3 + number % 5, 1 + number // 4
-    return _Example(BirthId(0, number), parents, fitness, size, rank, measures)
+    seen = MappingProxyType(measures)
+    return _Example(BirthId(0, number), parents, fitness, size, rank, seen)
 
 
 def _populations(least: int, labels: Labels) -> Iterator[list[_Example]]:
@@ -134,7 +137,9 @@ def _advise(name: str, function: Callable[..., Any], parameters: object) -> str:
     """
     *_, population = _populations(_CHILDREN + 1, None)
     mixed = [
-        replace(one, fitness=0.0, measures={}) if number % _FAILED == 0 else one
+        replace(one, fitness=0.0, measures=NO_MEASURES)
+        if number % _FAILED == 0
+        else one
         for number, one in enumerate(population)
     ]
     is_parents = name == "parents"

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.style import save
-from analysis.progress import bars
+from analysis.progress import bars, replaced
 from revolve.cli.winners import Chosen
 from revolve.evaluation import Result
 from revolve.fleet import Fleet
@@ -88,6 +88,8 @@ def write_results(
 ) -> None:
     """Write a table and its figure; print a line about each run and each file.
 
+    An earlier table in the folder is replaced, as the report of ``analyze`` is.
+
     Args:
         rows: returns the table, once its folder can be written.
         folders: of the runs, as in the table's column ``folder``.
@@ -99,7 +101,10 @@ def write_results(
         RunFolderError: the folder cannot be written.
     """
     make_folder(stem.parent)
-    table, path = rows(), stem.with_suffix(".parquet")
+    path = stem.with_suffix(".parquet")
+    for line in replaced(path, "the table", "its runs and its figure"):
+        print(line, flush=True)
+    table = rows()
     pq.write_table(table, path)
     for folder in folders:
         own = table.filter(pc.field("folder") == str(folder))

@@ -18,7 +18,13 @@ from typing import Generic, TypeVar
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.supervision import JobWatch, ProcessSlot, Task, thread_clock
-from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
+from schema.errors import (
+    MalformedMessage,
+    PluginDiffers,
+    RevolveError,
+    UnknownPlugin,
+    error_text,
+)
 from schema.limits import (
     ADVANCE_REQUEST_BYTES,
     LONGEST_REASON,
@@ -258,8 +264,7 @@ class Server:
             return Reply(reason=printable(str(error), LONGEST_REASON))
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
             self.counts.refused += 1
-            why = f"{type(error).__name__}: {error}"
-            return Reply(reason=printable(why, LONGEST_REASON))
+            return Reply(reason=printable(error_text(error), LONGEST_REASON))
         finally:
             self.watch.end()
         self.counts.answered += 1

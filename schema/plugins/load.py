@@ -12,7 +12,14 @@ from functools import lru_cache
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
-from schema.errors import ExperimentError, UnknownPlugin, counted, nearest, shown
+from schema.errors import (
+    ExperimentError,
+    UnknownPlugin,
+    counted,
+    error_text,
+    nearest,
+    shown,
+)
 from schema.plugins.origin import where_named, where_raised
 from schema.plugins.permission import (
     how_to_allow,
@@ -219,9 +226,10 @@ def _imported(name: str, where: str, path: str) -> ModuleType:
         ) from None
     # A module may call exit().
     except (Exception, SystemExit) as error:
-        story = f"{type(error).__name__}: {error}"
         place = _line_of(error, name)
-        raise ExperimentError(f"{where}: {place}{path!r}: {story}") from error
+        raise ExperimentError(
+            f"{where}: {place}{path!r}: {error_text(error)}"
+        ) from error
 
 
 def place_of(path: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from schema.errors import ExperimentError, cut, shown
+from schema.errors import ExperimentError, cut, error_text, shown
 from schema.parts import (
     Box,
     Joint,
@@ -228,7 +228,7 @@ def _shape(kind: PartType, values: tuple[float, ...]) -> tuple[Shape, str]:
     try:
         found: list[object] = [kind.shape(values), kind.shape(values)]
     except Exception as error:  # noqa: BLE001 - any error of the user's code
-        return _EMPTY, cut(f"shape raised {type(error).__name__}: {error}")
+        return _EMPTY, cut(f"shape raised {error_text(error)}")
     shape = found[0]
     if not isinstance(shape, Shape):
         return _EMPTY, f"shape: must return a Shape, got {shown(shape)}"

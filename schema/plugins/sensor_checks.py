@@ -7,7 +7,7 @@ from typing import SupportsFloat
 
 import numpy as np
 
-from schema.errors import ExperimentError, cut, shown
+from schema.errors import ExperimentError, cut, error_text, shown
 from schema.parts import Box, OwnSensor, Shape, Vector
 from schema.plugins.origin import where_defined
 from schema.robot.results import Floats
@@ -69,7 +69,8 @@ class HandMadeView:
 
 def ray_problem(direction: Vector, reach: float, start: Vector) -> None:
     """Raise ValueError unless a sensor's ray is well defined."""
-    if abs(math.hypot(*direction) - 1.0) > 1e-6:  # noqa: PLR2004
+    # A length that is not a number is not close to 1.
+    if not math.isclose(math.hypot(*direction), 1.0, rel_tol=0.0, abs_tol=1e-6):
         raise ValueError(f"direction must have length 1, got {direction}")
     if not (math.isfinite(reach) and reach > 0.0):
         raise ValueError(f"reach must be finite and > 0, got {reach}")
@@ -116,8 +117,7 @@ def _read(sensor: OwnSensor, view: HandMadeView, at: str) -> list[float]:
         return values_of(sensor, sensor.read(view))
     except Exception as error:
         # A ValueError of ``values_of`` says what was expected.
-        story = f"{type(error).__name__}: {error}"
-        raise ExperimentError(f"{at}: {cut(story)}") from error
+        raise ExperimentError(f"{at}: {cut(error_text(error))}") from error
 
 
 def values_of(sensor: OwnSensor, found: Iterable[object]) -> list[float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, error_text
 from schema.plugins.needs import channels_of
 from schema.plugins.origin import where_defined, where_raised
 from schema.robot.robot import Part, Robot
@@ -61,7 +61,7 @@ def check_function(
     if len(raised) == len(traces):
         first = raised[0]
         line = where_raised(first, place.partition(":")[0])
-        story = f"{type(first).__name__}: {first}" + (f" ({line})" if line else "")
+        story = error_text(first) + (f" ({line})" if line else "")
         raise ExperimentError(
             f"{where}: {place}: must return a number, raised {story}"
         ) from first

@@ -143,6 +143,14 @@ def test_a_misspelt_flag_is_named_with_the_nearest(
         assert said.count("\n") == 1
 
 
+def test_an_error_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    """It may quote what a plug-in raised, or a file's name."""
+    assert main(["robot", "check", "two\nlines.yaml"]) == 2
+    said = capsys.readouterr().err
+    assert "two lines.yaml" in said
+    assert said.count("\n") == 1
+
+
 def test_actions_are_those_of_the_command() -> None:
     assert list(actions(parser_of("robot"))) == ["check", "convert", "show"]
     assert actions(parser_of("status")) == {}

@@ -12,6 +12,7 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -175,6 +176,10 @@ def test_map_calls_a_function_by_name(
         fleet.map(os.path.getsize, items)
     with pytest.raises(rv.ExperimentError, match="workers cannot import"):
         fleet.map(lambda item: item, items)
+    other: Any = 3
+    message = "^function: must be a function or 'module:attribute', got 3$"
+    with pytest.raises(rv.ExperimentError, match=message):
+        fleet.map(other, items)
 
 
 def test_map_runs_only_what_the_owner_of_a_worker_allows(

@@ -1,5 +1,6 @@
 """``revolve robustness`` and ``ablate`` against evaluations of the robots here."""
 
+import re
 from pathlib import Path
 
 import pyarrow.compute as pc
@@ -61,6 +62,15 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
     assert lines[0].startswith("a: the best, 0:")
     rows = pq.read_table("out/robustness.parquet").to_pylist()
     assert Path("out/robustness.png").stat().st_size > 10_000
+    assert not any("replaces" in line for line in lines)
+    assert main(["robustness", "a", "--workers", "1", "--out", "out"]) == 0
+    again = capsys.readouterr().out.splitlines()
+    assert re.match(
+        r"out/robustness\.parquet: replaces the table of .* UTC, its runs and its "
+        r"figure; to keep them, give another folder: --out$",
+        again[0],
+    )
+    assert again[1:] == lines
 
     run = rv.read("a")
     changes = all_changes(settings_of(0))

@@ -2,7 +2,8 @@
 
 import pytest
 
-from schema.errors import rounded
+from schema.errors import error_text, one_line, rounded, shown
+from schema.limits import LONGEST_REASON
 
 
 @pytest.mark.parametrize(
@@ -25,3 +26,39 @@ def test_numbers_keep_four_significant_digits(value: float, expected: str) -> No
 
 def test_number_of_digits_may_be_chosen() -> None:
     assert rounded(0.51234, 3) == "0.512"
+
+
+class Mute(Exception):  # noqa: N818 - reads as what it says
+    """Error of a plug-in that cannot be shown."""
+
+    def __str__(self) -> str:
+        raise KeyError("code")
+
+    __repr__ = __str__
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (ValueError("two\n  lines"), "two lines"),
+        (ValueError("\x1b[31m red \ud800 ü"), "?[31m red ? ü"),
+        (ValueError("x" * 2000), "x" * 2000),
+        (ValueError(), ""),
+        (Mute(), "(no message: its __str__ raises KeyError)"),
+    ],
+)
+def test_any_error_is_one_line_that_can_be_printed(
+    error: Exception, expected: str
+) -> None:
+    assert one_line(error) == expected
+
+
+def test_the_text_of_a_foreign_error_is_cut() -> None:
+    text = error_text(ValueError("x" * 1_000_000))
+    assert len(text) == len("ValueError: ") + LONGEST_REASON
+    assert error_text(Mute()).startswith("Mute: (no message")
+
+
+def test_a_value_that_cannot_be_shown_is_named_by_its_type() -> None:
+    assert shown(Mute()) == "a Mute that cannot be shown"
+    assert shown(10**5000) == "a int that cannot be shown"

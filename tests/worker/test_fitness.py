@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import Struct
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, FitnessUndefined
 from schema.experiment.document import Experiment, Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
 from schema.robot.results import Track
@@ -15,6 +15,7 @@ from worker.fitness import (
     FitnessFunction,
     advise_fitness,
     check_fitness,
+    finite_value,
     path_velocity,
     straight_velocity,
     thesis,
@@ -143,6 +144,15 @@ def test_message_names_file_and_line_that_raised() -> None:
     line = rf"{place}: must return a number, raised .*by nothing \({line}\)$"
     with pytest.raises(ExperimentError, match=line):
         check_fitness(_always_raises, WEIGHTS)
+
+
+def test_the_reason_of_a_failure_is_one_line() -> None:
+    def raises(_trace: Trace) -> float:
+        raise ValueError("two\n  lines")
+
+    message = "^own raised ValueError: two lines$"
+    with pytest.raises(FitnessUndefined, match=message):
+        finite_value("own", raises, None)
 
 
 def test_a_negative_fitness_is_advised_against() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Collection
 import mujoco
 import numpy as np
 
-from schema.errors import UnexpectedEvent, one_line
+from schema.errors import SimulationDiverged, UnexpectedEvent, one_line
 from schema.experiment.document import body_space
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -68,7 +68,7 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
     controls = population.model_cache.controls
     for robot in robots.values():
         check_robot(robot, body_space(settings.space), controls.neurons)
-        controls.pack(robot.brain)
+        controls.check(robot.brain)
 
 
 def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
@@ -123,7 +123,10 @@ def newborn(
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
     window = Window(cache.settings.simulation, step)
-    return ArenaRobot(insertion.birth, body, cache.controls, window, place)
+    try:
+        return ArenaRobot(insertion.birth, body, cache.controls, window, place)
+    except SimulationDiverged as error:
+        return Casualty(insertion.birth, step, str(error), place)
 
 
 def diverged(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from schema.robot.results import Floats
-from worker.robot.brains import Controls, story_of
+from worker.robot.brains import Controls, outputs_of, story_of
 
 
 class GuardedBank:
@@ -41,9 +41,12 @@ class GuardedBank:
         self.failed = {}
         before = self.states.copy()
         try:
-            return self._bank.step(readings, age_ticks)
+            return self._outputs(self._bank.step(readings, age_ticks), len(readings))
         except Exception:  # noqa: BLE001 - any fault of a user's code
             return self._step_alone(before, readings, age_ticks)
+
+    def _outputs(self, found: object, robots: int) -> Floats:
+        return outputs_of(found, robots, self._controls.width.outputs)
 
     def _step_alone(
         self, before: Floats, readings: Floats, age_ticks: Floats | float
@@ -56,7 +59,7 @@ class GuardedBank:
             one, bank = slice(row, row + 1), self._controls.bank([packed])
             bank.states[...] = before[one]
             try:
-                outputs[one] = bank.step(readings[one], ages[one])
+                outputs[one] = self._outputs(bank.step(readings[one], ages[one]), 1)
             except Exception as error:  # noqa: BLE001 - any fault of a user's code
                 self.failed[row] = f"brain failed: {story_of(error)}"
             self.states[one] = bank.states

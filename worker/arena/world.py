@@ -13,13 +13,20 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Self
 
-from schema.errors import UnexpectedEvent
+from schema.errors import SimulationDiverged, UnexpectedEvent
 from schema.experiment.document import body_space
 from schema.experiment.environment import gravity_vector
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
+from schema.wire.arena import (
+    Advance,
+    BrainChange,
+    Casualty,
+    Changes,
+    Insertion,
+    Judgement,
+)
 from worker.arena.batched_control import BatchedControllers, BatchedIO
 from worker.arena.changes import check_changes, diverged, newborn
 from worker.arena.light import read_lights
@@ -89,10 +96,11 @@ class World:
     def apply(self, changes: Changes) -> None:
         """Remove robots, insert robots, replace brains, in this order.
 
-        A robot that the engine cannot build, or fails on at once, is a casualty of
-        the next advance. A new brain starts at rest at the next tick, until which the
-        motors hold their commands; body and motion of the robot go on. A window that
-        is restarted has the present sample as its first.
+        A robot that the engine cannot build, or fails on at once, or whose brain the
+        code of a user does not take, is a casualty of the next advance. A new brain
+        starts at rest at the next tick, until which the motors hold their commands;
+        body and motion of the robot go on. A window that is restarted has the present
+        sample as its first.
 
         Args:
             changes: made before the next advance.
@@ -109,11 +117,8 @@ class World:
         if changes.insertions:
             self._insert(changes.insertions)
         for change in changes.brains:
-            robot = self.population.find(change.birth)
-            start = self._schedule.next_tick(self.step)
-            robot.set_brain(change.brain, self.population.model_cache.controls, start)
-            if change.restarts_window:
-                robot.window.restart()
+            if change.birth in self.population:
+                self._replace_brain(change)
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 
@@ -267,6 +272,18 @@ class World:
                 self._samples.first(self.step, robot)
         self.population.kinematics()
         self.population.merge()
+
+    def _replace_brain(self, change: BrainChange) -> None:
+        robot = self.population.find(change.birth)
+        start = self._schedule.next_tick(self.step)
+        controls = self.population.model_cache.controls
+        try:
+            robot.set_brain(change.brain, controls, start)
+        except SimulationDiverged as error:
+            self._remove_broken([(robot, str(error))])
+            return
+        if change.restarts_window:
+            robot.window.restart()
 
     def _remove(self, casualties: Sequence[Casualty]) -> None:
         """Remove robots, to be reported by the present advance."""

@@ -21,8 +21,14 @@ from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
 
-from schema.agent.flags import Flags, add_count
-from schema.errors import SimulationDiverged
+from schema.agent.flags import Flags, add_count, add_plugins
+from schema.errors import (
+    FitnessUndefined,
+    RevolveError,
+    SensorFailed,
+    SimulationDiverged,
+    counted,
+)
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, Simulation, body_space
 from schema.experiment.file import (
@@ -32,6 +38,7 @@ from schema.experiment.file import (
 )
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
+from schema.plugins.permission import allow
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity
@@ -54,11 +61,13 @@ class Timing:
         robots: number of robots.
         evaluation_s: build, control, sensors, fitness and steps [s].
         engine_s: the same steps with the same controls only [s].
+        failures: why the evaluations of further robots failed.
     """
 
     robots: int
     evaluation_s: float
     engine_s: float
+    failures: tuple[str, ...] = ()
 
     @property
     def ratio(self) -> float:
@@ -70,28 +79,30 @@ def time_evaluations(robots: Iterable[Robot], settings: EvaluationSettings) -> T
     """Return the time of evaluations and of their bare engine steps.
 
     Both are timed alternately, and the least time of each counts, as other load on the
-    machine only adds time. Robots that diverge are left out.
+    machine only adds time. Robots whose evaluation fails are left out.
 
     Args:
         robots: checked robots.
         settings: of their evaluation.
     """
     count, whole, bare = 0, 0.0, 0.0
+    failures: list[str] = []
     for robot in robots:
+        wholes, bares = [], []
         try:
             commands = _commands(robot, settings)
-        except SimulationDiverged:
+            for turn in range(2 * _REPEATS):
+                if turn % 4 in {0, 3}:
+                    wholes.append(_whole(robot, settings))
+                else:
+                    bares.append(_replay(robot, settings, commands))
+        except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
+            failures.append(str(error))
             continue
-        wholes, bares = [], []
-        for turn in range(2 * _REPEATS):
-            if turn % 4 in {0, 3}:
-                wholes.append(_whole(robot, settings))
-            else:
-                bares.append(_replay(robot, settings, commands))
         count += 1
         whole += min(wholes)
         bare += min(bares)
-    return Timing(count, whole, bare)
+    return Timing(count, whole, bare, tuple(failures))
 
 
 def _whole(robot: Robot, settings: EvaluationSettings) -> float:
@@ -141,7 +152,7 @@ def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
         ExperimentError: an invalid experiment, a changed setting that does not fit the
             run, or a run with too few robots.
         RunFolderError: no run, or a damaged one.
-        SimulationDiverged: of all robots whose evaluation was to be timed.
+        RevolveError: the evaluation of all robots that were to be timed failed.
     """
     options = parser().parse_args(arguments[1:])
     if options.what == "evaluate":
@@ -201,6 +212,7 @@ def parser() -> Flags:
         metavar="KEY=VALUE",
         help="compare with this simulation setting instead of a finer time step",
     )
+    add_plugins(study)
     arena_bench.add_commands(kinds)
     return flags
 
@@ -210,9 +222,11 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
     robots = source.robots(experiment, options.robots, options.seed, is_vetted=False)
     settings = evaluation_settings_of(experiment)
     timing = time_evaluations(_shown(robots, "random robots"), settings)
+    failed = len(timing.failures)
     if not timing.robots:
-        raise SimulationDiverged(
-            f"all {len(robots)} random robots diverged: there is nothing to time"
+        raise RevolveError(
+            f"nothing to time: no evaluation succeeded, {counted(failed, 'robot')} "
+            f"failed; the first one: {timing.failures[0]}"
         )
     each_s = timing.evaluation_s / timing.robots
     print(
@@ -220,10 +234,16 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
         f"{1 / each_s:.0f} per second and core"
     )
     print(f"bare engine / evaluation: {timing.ratio:.3f} (promised: {LEAST_RATIO})")
+    if failed:
+        print(
+            f"left out: {counted(failed, 'robot')} whose evaluation failed; the first "
+            f"one: {timing.failures[0]}"
+        )
     return 0 if timing.ratio >= LEAST_RATIO else 1
 
 
 def _fidelity(options: argparse.Namespace) -> int:
+    allow(options.plugins)
     population = fidelity.read_population(options.run)
     change: fidelity.Change = partial(_changed, options.against)
     chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)

@@ -31,6 +31,7 @@ from schema.experiment.file import own_experiment
 from schema.experiment.settings import evaluation_settings_of, lasting
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual
@@ -67,11 +68,13 @@ def read_population(folder: Path) -> Population:
 
     Raises:
         RunFolderError: no such folder, or not of a run that has started.
+        ExperimentError: a plug-in of the run that is not allowed, or differs.
         MalformedMessage: an invalid genome.
     """
     runs = read_table(folder, "runs")
     if not runs.num_rows:
         raise RunFolderError(f"{folder}: no run is there, or none that has begun")
+    allow_plugins_of(folder)
     experiment = own_experiment(runs["document"][0].as_py())
     names = ["island", "birth", "genome", "robot"]
     births = read_table(folder, "births").select(names).to_pylist()

@@ -131,10 +131,13 @@ class ArenaRobot:
             controls: brains of the arena.
             start: step of its first tick, until which commands are held and from
                 which its age counts.
+
+        Raises:
+            SimulationDiverged: the code of a user does not take the brain.
         """
+        self.packed = controls.pack(brain)
         self.robot = Robot(self.body.robot.parts, brain)
         self.encoded = encode_robot(self.robot)
-        self.packed = controls.pack(brain)
         self.states = controls.rest()
         self.brain_start = start
 

@@ -266,19 +266,20 @@ class SoloBank:
         readings: (1, I) sensor readings, which the caller writes before each tick.
     """
 
-    def __init__(self, bank: BankProtocol, inputs: int, tick_s: float) -> None:
-        self.readings: Floats = np.zeros((1, inputs))
-        self._bank, self._tick_s = bank, tick_s
+    def __init__(self, bank: BankProtocol, width: Widths, tick_s: float) -> None:
+        self.readings: Floats = np.zeros((1, width.inputs))
+        self._bank, self._outputs, self._tick_s = bank, width.outputs, tick_s
 
     def step(self, tick: int) -> Floats:
         """Update the brain and return its outputs, (O,), not clipped.
 
         Raises:
-            SimulationDiverged: code of a user that raised, or a state or output that
-                is not finite.
+            SimulationDiverged: code of a user that raised or gave no such array, or a
+                state or output that is not finite.
         """
         try:
-            outputs = np.asarray(self._bank.step(self.readings, float(tick)))
+            found = self._bank.step(self.readings, float(tick))
+            outputs = outputs_of(found, 1, self._outputs)
         except Exception as error:
             raise SimulationDiverged(
                 f"brain failed by {tick * self._tick_s:.3f} s: {story_of(error)}"
@@ -287,8 +288,22 @@ class SoloBank:
             raise SimulationDiverged(
                 f"brain diverged by {tick * self._tick_s:.3f} s: state not finite"
             )
-        found: Floats = outputs[0]
-        return found
+        first: Floats = outputs[0]
+        return first
+
+
+def outputs_of(found: object, robots: int, outputs: int) -> Floats:
+    """Return what a bank's ``step`` has returned, (R, O).
+
+    Raises:
+        ValueError: another shape, or no numbers.
+    """
+    numbers = np.asarray(found, dtype=np.float64)
+    if numbers.shape != (robots, outputs):
+        raise ValueError(
+            f"step must return (R, O) = {(robots, outputs)}, got {numbers.shape}"
+        )
+    return numbers
 
 
 def story_of(error: Exception) -> str:
@@ -341,15 +356,27 @@ class Controls:
         """
         check_new_controls(self, self._place)
 
-    def pack(self, brain: Brain) -> Any:  # noqa: ANN401 - a brain type's own
-        """Return a checked brain in the form that ``bank`` and ``solo`` take.
+    def check(self, brain: Brain) -> None:
+        """Raise unless a checked brain has neurons of these types and widths.
 
         Raises:
             InvalidRobot: neurons of other types than the experiment's, or too many.
         """
         check_neurons(brain, self.neurons)
         check_widths(brain, self.width)
-        return self._control.pack(brain, self.width)
+
+    def pack(self, brain: Brain) -> Any:  # noqa: ANN401 - a brain type's own
+        """Return a checked brain in the form that ``bank`` and ``solo`` take.
+
+        Raises:
+            InvalidRobot: as of ``check``.
+            SimulationDiverged: code of a user that raised.
+        """
+        self.check(brain)
+        try:
+            return self._control.pack(brain, self.width)
+        except Exception as error:
+            raise SimulationDiverged(f"brain failed: {story_of(error)}") from error
 
     def bank(self, packed: Sequence[Any]) -> BankProtocol:
         """Return brains at rest that are updated together."""
@@ -367,12 +394,16 @@ class Controls:
             ticks: greatest number of ticks.
 
         Raises:
-            InvalidRobot: as in ``pack``.
+            InvalidRobot, SimulationDiverged: as in ``pack``.
         """
         packed = self.pack(brain)
         if isinstance(packed, Network) and not packed.own:
             return SoloNetwork(packed, self.width, self._tick_s, ticks)
-        return SoloBank(self.bank([packed]), self.width.inputs, self._tick_s)
+        try:
+            bank = self.bank([packed])
+        except Exception as error:
+            raise SimulationDiverged(f"brain failed: {story_of(error)}") from error
+        return SoloBank(bank, self.width, self._tick_s)
 
 
 @lru_cache(maxsize=64)

@@ -2,7 +2,7 @@
 
 import time
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, error_text
 from schema.plugins.load import load_function
 from schema.wire.calls import (
     Failed,
@@ -31,5 +31,5 @@ def answer_call(request: bytes) -> bytes:
     except ExperimentError as error:
         value = Failed(f"{call.function}: its value {error}")
     except Exception as error:  # noqa: BLE001 - a user's function may raise anything
-        value = Failed(f"{call.function} raised {type(error).__name__}: {error}")
+        value = Failed(f"{call.function} raised {error_text(error)}")
     return encode_call_answer(call, time.perf_counter() - start, value)

@@ -11,6 +11,7 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Culling, Experiment, Selection, Space
 from schema.robot.genome import NeuronGene, Node
 from schema.robot.ids import BirthId
+from schema.robot.results import Evaluation
 
 GREY = (0.5, 0.5, 0.5)
 CHILD = BirthId(0, 40)
@@ -124,3 +125,12 @@ def test_with_culling_weak_robots_are_removed_at_the_interval() -> None:
     assert culling.survivors(living[:4], living[4:5]) == tuple(living[:5])
     found = culling.survivors(living[:5], living[5:])
     assert [one.birth.number for one in found] == [0, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize("found", [Evaluation(0.1, 0.1, 0.1, 12.0, (2.0,)), None])
+def test_a_selection_function_cannot_change_measures(found: Evaluation | None) -> None:
+    (founder,) = individuals([None])
+    one: Any = founder.evaluated(found, ["height"])
+    assert one.measures == ({} if found is None else {"height": 2.0})
+    with pytest.raises(TypeError, match="item assignment"):
+        one.measures["height"] = 1.0

@@ -61,6 +61,7 @@ ANSWERS = {
     "return 'ab'": "must return 2 different .* got 'ab'",
     "return population[5], 1": r"raised IndexError: .* \(NAME.py:3\)",
     "return rng.choice(2, 2) + open('no').read()": "raised FileNotFoundError",
+    "population[0].measures['height'] = 1.0; return 0, 1": "raised TypeError: .* item",
     "COUNT[0] += 1; return COUNT[0] % 2, 1 - COUNT[0] % 2": "must return the same for",
 }
 

@@ -29,7 +29,7 @@ from schema.plugins.part_checks import (
     check_sensed_boxes,
     check_slot_directions,
 )
-from schema.plugins.sensor_checks import check_sensor
+from schema.plugins.sensor_checks import check_sensor, ray_problem
 
 HINGED = ACTIVE_HINGE.shape(())
 BRICK = FIXED_BRICK.shape(())
@@ -80,6 +80,12 @@ def _thin(values: tuple[float, ...]) -> Shape:
 
 def _raising(values: tuple[float, ...]) -> Shape:
     return _thin((1.0 / values[0],))
+
+
+def _wordy(values: tuple[float, ...]) -> Shape:
+    if values[0] == 0.0:
+        raise ValueError("two\nlines")
+    return _thin(values)
 
 
 _TURN = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -169,6 +175,10 @@ WRONG = {
     "raising corner": (
         replace(measured(_SIZE), shape=_raising),
         r"shape raised ZeroDivisionError: .* \(with size = 0, then three colours\)",
+    ),
+    "wordy corner": (
+        replace(measured(_SIZE), shape=_wordy),
+        r"shape raised ValueError: two lines \(with size = 0",
     ),
     "sensor": (
         replace(TOUCH_SENSOR, sensors=(Sensor("touch", "middle"),)),
@@ -327,6 +337,13 @@ class Blind(Nose):
         return (float(view.light[2]),)
 
 
+class Wordy(Nose):
+    """Sensor that raises with a message of two lines."""
+
+    def read(self, _view: Any) -> Sequence[float]:  # noqa: ANN401
+        raise RuntimeError("two\nlines")
+
+
 class Reaching(Nose):
     """Sensor of a box that the part may not have."""
 
@@ -353,6 +370,7 @@ BAD: dict[str, tuple[Any, str]] = {
         r"must return the same for the same view, got \[1.0\] and \[2.0\]",
     ),
     "raises": (Blind(), r"Blind.read of a part at birth: TypeError"),
+    "raises lines": (Wordy(), r"Wordy.read of a part at birth: .*: two lines$"),
     "direction": (
         Longsighted(),
         r"direction must have length 1, got \(1.0, 1.0, 0.0\)",
@@ -369,6 +387,12 @@ def test_wrong_sensors_are_refused(name: str) -> None:
     assert str(caught.value).startswith("here: test_part_checks.py:" if sensor.__class__
                                         is not object else "here: ")  # fmt: skip
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("x", [math.nan, math.inf, 1.1])
+def test_the_direction_of_a_ray_has_length_1(x: float) -> None:
+    with pytest.raises(ValueError, match="direction must have length 1, got"):
+        ray_problem((x, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0))
 
 
 def test_sensors_of_a_part_type_read_views_of_its_boxes() -> None:

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schema.errors import MalformedMessage
+from schema.errors import MalformedMessage, SimulationDiverged
 from schema.experiment.document import BrainSection
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.parts import Parameter
 from schema.plugins import load
-from schema.robot.brain import Brain, Connection, Neuron
+from schema.robot.brain import Brain, Connection, Neuron, Widths
 from schema.robot.cpg import PHASE_OSCILLATOR
 from schema.robot.ids import BirthId
 from schema.robot.neurons import Tick
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from schema.wire.arena import Changes, Insertion
+from schema.wire.arena import BrainChange, Changes, Insertion
 from tests.worker.arena_cases import SETTINGS, populated, seconds, state_of
 from worker.arena.world import World
 from worker.robot.evaluation import simulate
@@ -185,6 +185,70 @@ def test_robot_whose_brain_raises_at_birth_is_a_casualty(
     assert world.births == ()
     (casualty,) = seconds(world, 1.0).casualties
     assert casualty.reason == "brain failed: KeyError: 'gone'"
+
+
+@pytest.mark.usefixtures("_own_brains")
+def test_robot_whose_brain_cannot_be_packed_is_a_casualty(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A newborn, and a robot that gets such a brain; its neighbour lives on."""
+    settings, make = OSCILLATING["brain"]
+    first, second = robots(turtle, make)
+    a, b, c = (BirthId(0, number) for number in range(3))
+    world = populated(
+        settings,
+        [Insertion(a, first, (0.0, 0.0), 0.0), Insertion(b, first, (0.5, 0.0), 0.0)],
+    )
+    control = world.population.model_cache.controls._control
+    pack = type(control).pack
+
+    def fails(own: Any, brain: Brain, width: Widths) -> Any:  # noqa: ANN401
+        if brain == second.brain:
+            raise KeyError("gone")
+        return pack(own, brain, width)
+
+    monkeypatch.setattr(type(control), "pack", fails)
+    changes = Changes(
+        insertions=(Insertion(c, second, (1.0, 0.0), 0.0),),
+        brains=(BrainChange(b, second.brain),),
+    )
+    world.apply(changes)
+    assert world.births == (a,)
+    found = seconds(world, 1.0).casualties
+    reason = "brain failed: KeyError: 'gone'"
+    assert [(one.birth, one.reason) for one in found] == [(c, reason), (b, reason)]
+    off_line = EvaluationSettings(
+        space=settings.space,
+        simulation=settings.simulation,
+        fitness=settings.fitness,
+        brain=settings.brain,
+    )
+    with pytest.raises(SimulationDiverged, match=f"^{reason}$"):
+        simulate(second, off_line)
+
+
+@pytest.mark.usefixtures("_own_brains")
+def test_outputs_of_a_wrong_shape_are_a_failure(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings, make = OSCILLATING["brain"]
+    robot = robots(turtle, make)[0]
+    world = populated(settings, [Insertion(BirthId(0, 0), robot, (0.0, 0.0), 0.0)])
+    bank = world.population.model_cache.controls.bank(())
+    monkeypatch.setattr(type(bank), "step", lambda *_: np.zeros((1, 2)))
+    (casualty,) = seconds(world, 1.0).casualties
+    outputs = world.population.model_cache.controls.width.outputs
+    story = f"ValueError: step must return (R, O) = (1, {outputs}), got (1, 2)"
+    assert casualty.reason == f"brain failed: {story}"
+    off_line = EvaluationSettings(
+        space=settings.space,
+        simulation=settings.simulation,
+        fitness=settings.fitness,
+        brain=settings.brain,
+    )
+    with pytest.raises(SimulationDiverged) as caught:
+        simulate(robot, off_line)
+    assert str(caught.value) == f"brain failed by 0.000 s: {story}"
 
 
 def test_snapshot_with_a_brain_of_another_type_is_refused(turtle: Robot) -> None:

@@ -158,7 +158,7 @@ def test_off_line_a_state_that_is_not_finite_is_a_failed_result() -> None:
     control = NetworkControl(NoParameters(), (Growing(np.nan),))
     brain = Brain((Neuron("output", "Growing", 0),))
     bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
-    solo = SoloBank(bank, 10, TICK_S)
+    solo = SoloBank(bank, WIDTH, TICK_S)
     for tick in range(9):
         solo.step(tick)
     with pytest.raises(SimulationDiverged, match=r"brain diverged by 1\.125 s"):
@@ -186,7 +186,7 @@ def test_off_line_a_type_that_raises_is_a_failed_result_in_one_line() -> None:
     neurons = (Neuron("input", INPUT, 0), Neuron("output", "Picky", 0))
     brain = Brain(neurons, (Connection(0, 1, 1.0),))
     bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
-    solo = SoloBank(bank, 10, TICK_S)
+    solo = SoloBank(bank, WIDTH, TICK_S)
     assert solo.step(0)[0] == 0.5
     solo.readings[0, 0] = 2.0
     with pytest.raises(SimulationDiverged) as caught:
