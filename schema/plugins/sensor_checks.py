@@ -114,17 +114,17 @@ def check_sensor(sensor: OwnSensor, where: str, shape: Shape | None = None) -> N
 
 def _read(sensor: OwnSensor, view: HandMadeView, at: str) -> list[float]:
     try:
-        return values_of(sensor, sensor.read(view))
+        return values_of(sensor.inputs, sensor.read(view))
     except Exception as error:
         # A ValueError of ``values_of`` says what was expected.
         raise ExperimentError(f"{at}: {cut(error_text(error))}") from error
 
 
-def values_of(sensor: OwnSensor, found: Iterable[object]) -> list[float]:
+def values_of(inputs: int, found: Iterable[object]) -> list[float]:
     """Return the values that a sensor has read as plain floats.
 
     Args:
-        sensor: that has read them.
+        inputs: of the sensor.
         found: what its ``read`` returned.
 
     Raises:
@@ -134,10 +134,8 @@ def values_of(sensor: OwnSensor, found: Iterable[object]) -> list[float]:
         values = [_number(value) for value in found]
     except TypeError:
         raise ValueError(f"must return numbers, got {shown(found)}") from None
-    if len(values) != sensor.inputs:
-        raise ValueError(
-            f"must return {sensor.inputs} values, its inputs, got {len(values)}"
-        )
+    if len(values) != inputs:
+        raise ValueError(f"must return {inputs} values, its inputs, got {len(values)}")
     if not all(map(math.isfinite, values)):
         raise ValueError(f"must return finite numbers, got {shown(values)}")
     return values

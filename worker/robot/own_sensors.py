@@ -148,8 +148,14 @@ class OwnSensors:
             state: model and data that hold the robot.
             prefix: of the robot's names in the model.
         """
+        # Its code may change the number of inputs of a sensor; the brain has these.
         self._sensors = [
-            (PartView(state, index, prefix), sensor, place, f"part {index} ({kind})")
+            (
+                PartView(state, index, prefix),
+                sensor,
+                slice(place, place + sensor.inputs),
+                f"part {index} ({kind})",
+            )
             for index, kind, sensor, place in sensors
         ]
 
@@ -164,14 +170,14 @@ class OwnSensors:
             SensorFailed: a sensor raised, or gave a wrong number of values or one
                 that is not finite.
         """
-        for view, sensor, place, where in self._sensors:
+        for view, sensor, cells, where in self._sensors:
             view.around = around
             seen: SensorView = view
             try:
-                values = values_of(sensor, sensor.read(seen))
+                values = values_of(cells.stop - cells.start, sensor.read(seen))
             except Exception as error:
                 story = cut(error_text(error))
                 raise SensorFailed(
                     f"sensor {type(sensor).__name__} of {where}: {story}"
                 ) from error
-            readings[place : place + sensor.inputs] = values
+            readings[cells] = values

@@ -304,3 +304,17 @@ def test_a_sensor_that_fails_at_birth_is_a_casualty_of_the_next_advance(
     assert {each.step for each in found} == {0}
     reason = "sensor Fragile of part 2 (Piston): OSError: no such whisker"
     assert {each.reason for each in found} == {reason}
+
+
+def test_a_sensor_that_changes_its_inputs_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    world = populated(arena("FRAGILE"), [Insertion(A, crawler(), (0.0, 0.0))])
+    kind = sys.modules["crawlers"].Fragile
+    inputs = kind.inputs
+    monkeypatch.setattr(kind, "inputs", inputs + 1)
+    monkeypatch.setattr(kind, "read", lambda *_: [0.5] * (inputs + 1))
+    [casualty] = seconds(world, 1.0).casualties
+    assert casualty.reason.endswith(
+        f"ValueError: must return {inputs} values, its inputs, got {inputs + 1}"
+    )
