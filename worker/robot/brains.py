@@ -366,17 +366,20 @@ class Controls:
         check_widths(brain, self.width)
 
     def pack(self, brain: Brain) -> Any:  # noqa: ANN401 - a brain type's own
-        """Return a checked brain in the form that ``bank`` and ``solo`` take.
+        """Return a checked brain in the form that ``bank`` takes.
 
         Raises:
             InvalidRobot: as of ``check``.
-            SimulationDiverged: code of a user that raised.
+            SimulationDiverged: code of a user that raised, here or in ``bank``.
         """
         self.check(brain)
         try:
-            return self._control.pack(brain, self.width)
+            packed = self._control.pack(brain, self.width)
+            if self.is_checked:
+                self.bank([packed])
         except Exception as error:
             raise SimulationDiverged(f"brain failed: {story_of(error)}") from error
+        return packed
 
     def bank(self, packed: Sequence[Any]) -> BankProtocol:
         """Return brains at rest that are updated together."""
@@ -399,11 +402,7 @@ class Controls:
         packed = self.pack(brain)
         if isinstance(packed, Network) and not packed.own:
             return SoloNetwork(packed, self.width, self._tick_s, ticks)
-        try:
-            bank = self.bank([packed])
-        except Exception as error:
-            raise SimulationDiverged(f"brain failed: {story_of(error)}") from error
-        return SoloBank(bank, self.width, self._tick_s)
+        return SoloBank(self.bank([packed]), self.width, self._tick_s)
 
 
 @lru_cache(maxsize=64)

@@ -187,9 +187,10 @@ def test_robot_whose_brain_raises_at_birth_is_a_casualty(
     assert casualty.reason == "brain failed: KeyError: 'gone'"
 
 
+@pytest.mark.parametrize("method", ["pack", "bank"])
 @pytest.mark.usefixtures("_own_brains")
-def test_robot_whose_brain_cannot_be_packed_is_a_casualty(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+def test_robot_whose_brain_cannot_be_made_is_a_casualty(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     """A newborn, and a robot that gets such a brain; its neighbour lives on."""
     settings, make = OSCILLATING["brain"]
@@ -200,14 +201,23 @@ def test_robot_whose_brain_cannot_be_packed_is_a_casualty(
         [Insertion(a, first, (0.0, 0.0), 0.0), Insertion(b, first, (0.5, 0.0), 0.0)],
     )
     control = world.population.model_cache.controls._control
-    pack = type(control).pack
+    pack, bank, bad = type(control).pack, type(control).bank, list[Any]()
 
-    def fails(own: Any, brain: Brain, width: Widths) -> Any:  # noqa: ANN401
+    def fails_to_pack(own: Any, brain: Brain, width: Widths) -> Any:  # noqa: ANN401
+        packed = pack(own, brain, width)
         if brain == second.brain:
-            raise KeyError("gone")
-        return pack(own, brain, width)
+            if method == "pack":
+                raise KeyError("gone")
+            bad.append(packed)
+        return packed
 
-    monkeypatch.setattr(type(control), "pack", fails)
+    def fails_to_start(own: Any, packed: Any, *rest: Any) -> Any:  # noqa: ANN401
+        if any(one is other for one in packed for other in bad):
+            raise KeyError("gone")
+        return bank(own, packed, *rest)
+
+    monkeypatch.setattr(type(control), "pack", fails_to_pack)
+    monkeypatch.setattr(type(control), "bank", fails_to_start)
     changes = Changes(
         insertions=(Insertion(c, second, (1.0, 0.0), 0.0),),
         brains=(BrainChange(b, second.brain),),
