@@ -190,7 +190,8 @@ def _deployment(
         _check_window(folder)
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
-    for flag in ("connect", "listen", "view") if options.in_process else ():
+    of_network = ("access", "connect", "listen", "view")
+    for flag in of_network if options.in_process else ():
         if getattr(options, flag):
             raise NetworkError(f"--{flag} needs a network, but --in-process has none")
     if options.in_process and options.command != "coordinator" and options.workers:

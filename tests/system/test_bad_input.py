@@ -70,8 +70,8 @@ def test_a_seed_above_64_bits_is_refused(workspace: Workspace) -> None:
     assert limits in _refused(workspace, "run", *words)
 
 
-@pytest.mark.parametrize("flag", ["--connect", "--listen"])
-def test_an_address_is_refused_where_nothing_is_sent(
+@pytest.mark.parametrize("flag", ["--access", "--connect", "--listen"])
+def test_a_flag_of_the_network_is_refused_where_nothing_is_sent(
     workspace: Workspace, flag: str
 ) -> None:
     words = ("scenario1", flag, "tcp/127.0.0.1:1", "--in-process", "--out", "x")
