@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -43,7 +44,6 @@ from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import ExperimentError, NetworkError
-from schema.experiment.check import naming
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
@@ -166,12 +166,8 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     import worker.kinds
 
     refuse_faulty(options.experiments, options.births)
-    experiments = read_experiments(options.experiments, options.births)
-    for source in options.experiments:
-        for experiment in read_experiments([source], options.births):
-            with naming(source):
-                check_built_in(experiment, worker.kinds.KINDS)
-    return experiments
+    check = partial(check_built_in, kinds=worker.kinds.KINDS)
+    return read_experiments(options.experiments, options.births, check)
 
 
 def _deployment(

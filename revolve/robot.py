@@ -24,7 +24,7 @@ from schema.experiment.brains import types_of
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, types_for, write_robot
 from schema.formats.yaml_reader import OTHER_TYPES
-from schema.limits import MOST_PIXELS
+from schema.limits import MOST_PIXELS, MOST_SEED
 from schema.parts import BodySpace
 from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
@@ -107,7 +107,7 @@ class Robot:
             ExperimentError: no such experiment, or it allows (nearly) no robot.
             RevolveError: a seed or a number that is none of these.
         """
-        seed = whole_number("seed", seed, most=2**64 - 1)
+        seed = whole_number("seed", seed, most=MOST_SEED)
         number = whole_number("number", number)
         own = as_experiment(experiment)
         breeder = Breeder(document_of(own), seed, run=0)

@@ -91,6 +91,8 @@ MOST_PIXELS = 4096
 
 # Agents and what they say
 
+MOST_SEED = 2**64 - 1
+"""Greatest random seed: messages and tables hold it in 64 bits."""
 MOST_EPOCH = 2**32
 """Greatest epoch: a run is never resumed more often."""
 MOST_RUN_NAME = 5000

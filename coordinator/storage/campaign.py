@@ -7,7 +7,7 @@ experiment and repeat; a run that was made separately is used as it is.
 
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib import resources
@@ -88,17 +88,20 @@ def shipped_campaigns() -> dict[str, tuple[str, ...]]:
 
 
 def read_experiments(
-    sources: Sequence[str], births: int | None = None
+    sources: Sequence[str],
+    births: int | None = None,
+    check: Callable[[Experiment], None] = lambda _experiment: None,
 ) -> tuple[Experiment, ...]:
     """Return the experiments of some names; a campaign stands for its experiments.
 
     Args:
         sources: names of shipped experiments or campaigns, or paths to .toml files.
         births: of ``--births``, in place of those of the documents.
+        check: raises ``ExperimentError`` for an experiment that is refused.
 
     Raises:
-        ExperimentError: there is no such experiment, its document is invalid, or two
-            experiments have the same name.
+        ExperimentError: there is no such experiment, its document is invalid or
+            refused, or two experiments have the same name.
     """
     shipped = shipped_campaigns()
     for source in sources:
@@ -109,6 +112,8 @@ def read_experiments(
         found = experiments_of(word, births)
         with naming(word):
             _check_folders(found)
+            for experiment in found:
+                check(experiment)
         experiments += found
     _check_distinct(experiments)
     return tuple(experiments)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from schema.errors import nearest
+from schema.limits import MOST_SEED
 
 # Those of 2^64; the interpreter reads no number of more than 4300.
 _MOST_DIGITS = 20
@@ -84,7 +85,7 @@ def add_seed(flags: argparse.ArgumentParser, default: int) -> None:
     """Add the flag for a seed of evolution, which has 64 bits."""
     flags.add_argument(
         "--seed",
-        type=whole_number(0, 2**64 - 1),
+        type=whole_number(0, MOST_SEED),
         default=default,
         metavar="N",
         help="random seed (default: %(default)s)",
