@@ -18,6 +18,7 @@ import numpy as np
 import pyarrow as pa
 
 from schema.errors import RunFolderError
+from schema.tables.checksums import sound_messages, sums_path, sums_size
 from schema.tables.columns import TABLES
 from schema.tables.files import campaign, read_table
 
@@ -91,9 +92,23 @@ def read_apart(folder: Path, truth: dict[str, pa.Table]) -> str:
 
 
 def table_files(folder: Path) -> list[Path]:
-    """Return all files of a run's tables that are not empty."""
+    """Return all files of a run's tables that have bytes that count."""
     found = (path for path in sorted(folder.rglob("*")) if path.suffix in SUFFIXES)
-    return [path for path in found if path.stat().st_size]
+    return [path for path in found if size_of(path)]
+
+
+def size_of(path: Path) -> int:
+    """Return how many bytes of an undamaged file count.
+
+    What is behind them is a write that a kill cut: no reader looks at it.
+    """
+    if path.suffix == ".parquet":
+        return path.stat().st_size
+    segment = path.with_suffix(".arrows")
+    ends = [end for end, _ in sound_messages(segment, sums_path(segment).read_bytes())]
+    if path.suffix == ".sums":
+        return min(sums_size(len(ends)), path.stat().st_size)
+    return ends[-1] if ends else 0
 
 
 def flip(path: Path, bit: int) -> None:
@@ -112,7 +127,7 @@ def flips(folders: list[Path], count: int, seed: int) -> Iterator[tuple[Path, in
     for number in range(count):
         own = files[number % len(folders)]
         path = own[rng.integers(len(own))]
-        yield path, int(rng.integers(8 * path.stat().st_size))
+        yield path, int(rng.integers(8 * size_of(path)))
 
 
 def main(count: int, seed: int, folders: list[Path]) -> None:

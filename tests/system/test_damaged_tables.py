@@ -21,6 +21,8 @@ pytestmark = pytest.mark.system
 Once = Callable[[str, Callable[[Workspace], object]], Path]
 FLIPPING = Path(__file__).with_name("flipping.py")
 BIRTHS = 150
+CUT = 100_000
+"""Length of a message that a kill cut [bytes]."""
 FLAGS = ("--in-process", "--threads", "1", "--quiet")
 OFFLINE = ("scenario1", "--seed", "5", "--births", str(BIRTHS))
 ARENA = ("mine.toml", "--seed", "4")
@@ -148,6 +150,9 @@ def read_flipped(kinds: dict[str, Path], place: Path, count: int, seed: int) -> 
         for state in ("finished", "killed"):
             folders.append(place / f"{kind}-{state}")
             shutil.copytree(folder / state, folders[-1])
+        # As a kill in the middle of a write leaves it.
+        for segment in folders[-1].rglob("*.arrows"):
+            segment.write_bytes(segment.read_bytes() + bytes(CUT))
     done = subprocess.run(
         [sys.executable, str(FLIPPING), str(count), str(seed), *map(str, folders)],
         capture_output=True, text=True, check=True,
