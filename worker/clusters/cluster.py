@@ -48,7 +48,7 @@ class EngineView:
         model, data: of the cluster.
         joints, dofs: its slices of the cluster's qpos and qvel.
         qpos, qvel, ctrl: its part of the state, live.
-        offsets: where its part of each of ``Cluster.live`` starts.
+        offsets: where its numbers start in each part of ``Cluster.live``.
         geoms: first and last + 1 of its geoms.
         sensors, servos: of the robot.
         probe: of its work, torques and contacts; None if nothing needs them.
@@ -135,12 +135,13 @@ class StateHistory:
     def __init__(self, cluster: "Cluster") -> None:
         """Initialise without rows."""
         warnings = cluster.data.warning.number
-        ends = np.cumsum(cluster.sizes).tolist()
         # Copies between memory views are faster than between arrays, and one view of
         # all rows is faster than one of each, as few of them stay in the caches.
-        self._live = [array.data for array in (*cluster.live, warnings)]
-        self._ends = *ends, len(warnings)
-        self.state = np.zeros((0, ends[-1]))
+        self._live, self._warnings = cluster.live.data, warnings.data
+        first, velocity, *_ = cluster.parts
+        self._positions = slice(first, first + cluster.model.nq)
+        self._velocities = slice(velocity, velocity + cluster.model.nv)
+        self.state = np.zeros((0, len(cluster.live)))
         self.warnings = np.zeros((0, len(warnings)), dtype=warnings.dtype)
         self.touching: list[list[tuple[int, int]]] = []
         self.probed: list[list[Floats]] = []
@@ -148,12 +149,12 @@ class StateHistory:
     @property
     def qpos(self) -> Floats:
         """Positions, (K, Q)."""
-        return self.state[:, : self._ends[0]]
+        return self.state[:, self._positions]
 
     @property
     def qvel(self) -> Floats:
         """Velocities, (K, V)."""
-        return self.state[:, self._ends[0] : self._ends[1]]
+        return self.state[:, self._velocities]
 
     def move(self, states: Floats, start: int) -> None:
         """Move the rows to columns of an array of all clusters' states.
@@ -163,7 +164,7 @@ class StateHistory:
             start: first column of the cluster.
         """
         count, self._width = states.shape
-        state = states[:, start : start + self._ends[3]]
+        state = states[:, start : start + len(self._live)]
         if new := count - len(self.state):
             added = np.zeros((new, self.warnings.shape[1]), self.warnings.dtype)
             self.warnings = np.concatenate((self.warnings, added))
@@ -176,16 +177,10 @@ class StateHistory:
 
     def keep(self, moment: int) -> None:
         """Copy the present state and warnings to the rows of a moment."""
-        cells, counts = self._cells, self._counts
-        qpos, qvel, xpos, xmat, warnings = self._live
-        first, second, third, end, kinds = self._ends
         at = moment * self._width + self._start
-        cells[at : at + first] = qpos
-        cells[at + first : at + second] = qvel
-        cells[at + second : at + third] = xpos
-        cells[at + third : at + end] = xmat
-        at = moment * kinds
-        counts[at : at + kinds] = warnings
+        self._cells[at : at + len(self._live)] = self._live
+        at = moment * len(self._warnings)
+        self._counts[at : at + len(self._warnings)] = self._warnings
 
 
 class Cluster:
@@ -194,9 +189,9 @@ class Cluster:
     Attributes:
         members: births of its robots, ascending.
         views: of the members, in that order.
-        live: live views of the state: positions, velocities, positions of all bodies
-            and their rotations, as of the last step, each in one row.
-        sizes: of these four.
+        live: (W,) live view of the state, as of the last step: positions, velocities,
+            positions of all bodies and their rotations, and what lies between them.
+        parts: where these four start.
         history: states at the moments of the last interval.
         cost: of a step, in arbitrary units; orders clusters for threads.
         failure: the engine's error; empty if there was none.
@@ -228,9 +223,7 @@ class Cluster:
         for number, view in enumerate(self.views):
             first, end = view.geoms
             self._owners[first:end] = [number] * (end - first)
-        frames = self.data.xpos.reshape(-1), self.data.xmat.reshape(-1)
-        self.live: tuple[Floats, ...] = (self.data.qpos, self.data.qvel, *frames)
-        self.sizes = tuple(len(array) for array in self.live)
+        self.live, self.parts = _live(self.data)
         self.probes = [view.probe for view in self.views if view.probe is not None]
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
@@ -254,23 +247,25 @@ class Cluster:
             first: moment to start with; the rows before it stay unchanged.
         """
         model, data, keep = self.model, self.data, self.history.keep
+        # Looked up once, as this loop runs thousands of times a second.
+        working, probes, records = self._working, self.probes, self._records_contacts
         for moment in range(first, len(plan)):
             try:
-                step_with(self._working, model, data, plan[moment])
+                step_with(working, model, data, plan[moment])
             except mujoco.FatalError as error:
                 self.failure, self.failed_at = one_line(error), moment
                 self.keep(range(moment, len(plan)))
                 break
             keep(moment)
-            if self.probes:
-                for probe in self.probes:
+            if probes:
+                for probe in probes:
                     probe.read()
                 self._keep_probed(moment)
-            if self._records_contacts:
+            if records:
                 self.history.touching[moment] = self.touching()
         # A cluster formed at the last moment has its members' earlier contacts.
-        if first < len(plan):
-            self._read_touched()
+        if self._has_pads and first < len(plan):
+            self.touched = frozenset(chain.from_iterable(self._contacts()))
 
     def keep(self, moments: range) -> None:
         """Copy the present state to the rows of some moments."""
@@ -305,11 +300,27 @@ class Cluster:
         pairs = {(owners[first], owners[second]) for first, second in self._contacts()}
         return sorted({(min(p), max(p)) for p in pairs if p[0] != p[1] and min(p) >= 0})
 
-    def _read_touched(self) -> None:
-        if self._has_pads:
-            self.touched = frozenset(chain.from_iterable(self._contacts()))
-
     def reset(self) -> None:
         """Reset the state to the model's initial one."""
         mujoco.mj_resetData(self.model, self.data)
         self.failure, self.failed_at = "", NEVER
+
+
+def _live(data: mujoco.MjData) -> tuple[Floats, tuple[int, int, int, int]]:
+    """Return ``live`` and ``parts`` of a cluster.
+
+    The engine keeps all its arrays in one block of memory, in a fixed order. To copy
+    everything from the first to the last that is wanted is twice as fast as to copy
+    four arrays, although half of it is not wanted.
+    """
+    wanted = data.qpos, data.qvel, data.xpos, data.xmat
+    start = data.qpos.ctypes.data
+    first, second, third, last = (
+        (array.ctypes.data - start) // array.itemsize for array in wanted
+    )
+    if not 0 == first < second < third < last:
+        raise AssertionError("this version of MuJoCo orders its arrays otherwise")
+    live = np.lib.stride_tricks.as_strided(
+        data.qpos, (last + data.xmat.size,), writeable=False
+    )
+    return live, (first, second, third, last)

@@ -6,7 +6,6 @@ with their speed, so that falling robots merge in time. Bounding boxes exclude a
 all pairs; only the others are measured.
 """
 
-from collections.abc import Iterable
 from functools import cached_property
 from itertools import compress
 
@@ -15,7 +14,8 @@ import numpy.typing as npt
 
 from schema.experiment.settings import ArenaSettings
 from schema.robot.results import Floats
-from worker.clusters.states import Layout, Pairs, runs
+from worker.clusters.models import Indices
+from worker.clusters.states import Layout, Pairs
 
 FASTEST = 10.0
 """Speed above which the physics is broken; bounds the margin of a robot [m/s]."""
@@ -46,60 +46,72 @@ class Scene:
     def _hulls(self) -> Floats:
         return self._layout.hulls(self._states)
 
-    def distances(self, pairs: Pairs) -> Floats:
-        """Return the distances of P > 0 pairs of robots, (L, P) [m].
+    def are_near(self, pairs: Pairs, margins: Floats, gap_m: float) -> Mask:
+        """Return whether P pairs of robots are near at each moment, (L, P).
 
-        The distance is the least one between a sphere of each.
-        """
-        robot_rows = self._layout.robot_rows
-        rows = sorted({row for pair in pairs for row in pair})
-        counts = robot_rows.sphere_counts[rows]
-        wanted = runs(robot_rows.first_spheres[rows], counts)
-        radii = robot_rows.radii[wanted]
-        spheres = self._layout.spheres(self._states, wanted)
-        ends = np.cumsum(counts).tolist()
-        spans = dict(zip(rows, map(slice, [0, *ends], ends), strict=False))
-        found = np.empty((len(spheres), len(pairs)))
-        for number, (here, there) in enumerate(pairs):
-            first, second = spans[here], spans[there]
-            difference = spheres[:, :, first, None] - spheres[:, :, None, second]
-            np.multiply(difference, difference, out=difference)
-            distance = difference[:, 0] + difference[:, 1]
-            distance += difference[:, 2]
-            np.sqrt(distance, out=distance)
-            distance -= radii[first, None]
-            distance -= radii[second]
-            found[:, number] = distance.min(axis=(1, 2))
-        return found
-
-    def may_be_near(self, pairs: Iterable[tuple[int, int]], margins: Floats) -> Pairs:
-        """Return the pairs whose distance may fall below the sum of their margins.
-
-        Tests the x-y distances of the hulls of their bodies, at all moments.
+        They are if the distance of a sphere of each is less than the sum of both
+        margins and a gap. Only spheres are measured whose bodies' hulls are near, seen
+        from above.
 
         Args:
             pairs: of robots.
-            margins: (R,) of the robots [m].
+            margins: (L, R) of the robots [m].
+            gap_m: the gap.
         """
-        pairs = list(pairs)
+        found = np.zeros((len(margins), len(pairs)), dtype=np.bool_)
         if not pairs:
-            return []
+            return found
+        here, there = np.array(pairs, dtype=np.intp).T
+        limits = margins[:, here] + margins[:, there] + gap_m
+        bodies, numbers = self._near_bodies(pairs, limits.max(axis=0) + _ROUNDING_M)
+        if not len(numbers):
+            return found
+        first, second, counts = self._layout.robot_rows.sphere_pairs(*bodies)
+        numbers = np.repeat(numbers, counts)
+        moments, spheres = (self._distances(first, second) < limits[:, numbers]).nonzero()
+        found[moments, numbers[spheres]] = True
+        return found
+
+    def _near_bodies(self, pairs: Pairs, limits: Floats) -> tuple[Indices, Indices]:
+        """Return the bodies whose hulls may be near at a moment, seen from above.
+
+        Args:
+            pairs: P > 0 of robots.
+            limits: (P,) distance of two hulls [m].
+
+        Returns:
+            (2, N) pairs of bodies, and the pair of robots of each.
+        """
         robot_rows = self._layout.robot_rows
         bodies = [robot_rows.body_pairs(*pair) for pair in pairs]
-        counts = [both.shape[1] for both in bodies]
-        first, second = np.concatenate(bodies, axis=1)
-        gaps = self._hulls.take(first, axis=2)
-        gaps -= self._hulls.take(second, axis=2)
+        numbers = np.repeat(np.arange(len(pairs)), [both.shape[1] for both in bodies])
+        both = np.concatenate(bodies, axis=1)
+        gaps = self._hulls.take(both[0], axis=2)
+        gaps -= self._hulls.take(both[1], axis=2)
         gaps *= gaps
-        here, there = np.array(pairs, dtype=np.intp).T
-        limits = np.repeat(margins[here] + margins[there], counts)
-        radii = robot_rows.hulls[3]
-        limits += radii[first]
-        limits += radii[second]
-        limits *= limits
-        is_near = (gaps[:, 0] + gaps[:, 1] <= limits).any(axis=0)
-        starts = np.cumsum(counts) - counts
-        return list(compress(pairs, np.logical_or.reduceat(is_near, starts).tolist()))
+        reach = limits[numbers]
+        reach += robot_rows.hulls[3].take(both).sum(axis=0)
+        reach *= reach
+        near = (gaps[:, 0] + gaps[:, 1] <= reach).any(axis=0).nonzero()[0]
+        return both[:, near], numbers[near]
+
+    def _distances(self, first: Indices, second: Indices) -> Floats:
+        """Return the distances of pairs of spheres, (L, S) [m]."""
+        radii = self._layout.robot_rows.radii
+        # Most spheres occur in several pairs: each is computed once.
+        is_wanted = np.zeros(len(radii), dtype=np.bool_)
+        is_wanted[first] = is_wanted[second] = True
+        spheres = self._layout.spheres(self._states, is_wanted.nonzero()[0])
+        places = np.cumsum(is_wanted) - 1
+        difference = spheres.take(places[first], axis=2)
+        difference -= spheres.take(places[second], axis=2)
+        difference *= difference
+        distances = difference[:, 0] + difference[:, 1]
+        distances += difference[:, 2]
+        np.sqrt(distances, out=distances)
+        distances -= radii[first]
+        distances -= radii[second]
+        return distances
 
     def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
         """Return pairs of different clusters whose bounding boxes overlap.
@@ -157,11 +169,8 @@ class Proximity:
         """
         margins = self._margins(scene)
         most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
-        neighbours = zip(*scene.neighbours(most), strict=True)
-        pairs = scene.may_be_near(neighbours, most)
-        if not pairs:
-            return [[] for _ in margins]
-        is_near = _are_near(scene, margins, pairs, self._merge_m)
+        pairs = list(zip(*scene.neighbours(most), strict=True))
+        is_near = scene.are_near(pairs, margins, self._merge_m)
         return [list(compress(pairs, row)) for row in is_near.tolist()]
 
     def pairs_to_keep(self, scene: Scene, pairs: Pairs) -> Pairs:
@@ -174,20 +183,10 @@ class Proximity:
         margins = self._margins(scene)
         most = margins[0] + (0.5 * self._split_m + _ROUNDING_M)
         overlaps = scene.overlaps(most)[*zip(*pairs, strict=True)]
-        pairs = scene.may_be_near(compress(pairs, overlaps.tolist()), most)
-        if not pairs:
-            return []
-        is_near = _are_near(scene, margins, pairs, self._split_m)[0]
+        pairs = list(compress(pairs, overlaps.tolist()))
+        is_near = scene.are_near(pairs, margins, self._split_m)[0]
         return list(compress(pairs, is_near.tolist()))
 
     def _margins(self, scene: Scene) -> Floats:
         """Return how far each robot may move until the next check, (L, R) [m]."""
         return np.asarray(np.minimum(scene.speeds, FASTEST) * self._ahead_s)
-
-
-def _are_near(scene: Scene, margins: Floats, pairs: Pairs, gap_m: float) -> Mask:
-    """Return whether P pairs may come within a gap before the next check, (L, P)."""
-    here, there = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-    return np.asarray(
-        scene.distances(pairs) < margins[:, here] + margins[:, there] + gap_m
-    )

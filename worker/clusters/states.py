@@ -19,7 +19,7 @@ from worker.clusters.robot import ArenaRobot
 _FREE, _FREE_DOFS = 7, 6
 """Numbers of a free joint's position and orientation, and of its velocity."""
 _PARTS = 4
-"""Parts of a cluster's state."""
+"""Parts of a cluster's state that are read."""
 Pairs = list[tuple[int, int]]
 """Pairs of rows of robots, the lesser row first."""
 MERGES_PER_SPLIT = 25
@@ -40,8 +40,6 @@ class RobotRows:
         body_counts: (R,) bodies of each.
         first_bodies: (R,) the first of each among the N of all.
         hulls: (4, N) as ``BoundingSpheres.hulls``.
-        sphere_counts: (R,) spheres of each.
-        first_spheres: (R,) the first of each among all spheres.
         sphere_bodies: body, of the N, that each sphere is fixed to.
         centres, radii: of all spheres, as in ``BoundingSpheres``.
         weights: of the absolute velocities of all, as ``BoundingSpheres.weights``.
@@ -65,11 +63,14 @@ class RobotRows:
         self.body_counts = np.array(bodies, dtype=np.intp)
         self.first_bodies = np.cumsum(self.body_counts) - self.body_counts
         self._body_pairs: dict[tuple[int, int], Indices] = {}
-        self.sphere_counts = np.array([len(b.radii) for b in bounds], dtype=np.intp)
-        self.first_spheres = np.cumsum(self.sphere_counts) - self.sphere_counts
         fixed = [np.zeros(0, dtype=np.intp), *(each.bodies for each in bounds)]
         self.sphere_bodies: Indices = np.concatenate(fixed)
-        self.sphere_bodies += np.repeat(self.first_bodies, self.sphere_counts)
+        counts = [len(each.radii) for each in bounds]
+        self.sphere_bodies += np.repeat(self.first_bodies, counts)
+        # Spheres are ordered by body.
+        count = self.hulls.shape[1]
+        self._sphere_counts = np.bincount(self.sphere_bodies, minlength=count)
+        self._first_spheres = np.cumsum(self._sphere_counts) - self._sphere_counts
         centres = [np.zeros((0, 9)), *(each.centres for each in bounds)]
         self.centres: Floats = np.concatenate(centres)
         self.radii = _joined([each.radii for each in bounds])
@@ -81,6 +82,25 @@ class RobotRows:
             both = np.indices((counts[here], counts[there])).reshape(2, -1)
             self._body_pairs[here, there] = both + firsts[:, None]
         return self._body_pairs[here, there]
+
+    def sphere_pairs(
+        self, first: Indices, second: Indices
+    ) -> tuple[Indices, Indices, Indices]:
+        """Return all pairs of a sphere of each of two bodies.
+
+        Args:
+            first, second: (P,) bodies, of the N.
+
+        Returns:
+            (S,) first and second spheres, and (P,) numbers of pairs.
+        """
+        across = self._sphere_counts[second]
+        counts = self._sphere_counts[first] * across
+        place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        rows, columns = np.divmod(place, np.repeat(across, counts))
+        rows += np.repeat(self._first_spheres[first], counts)
+        columns += np.repeat(self._first_spheres[second], counts)
+        return rows, columns, counts
 
 
 class Layout:
@@ -116,14 +136,15 @@ class Layout:
             robot_rows.rows[birth] for cluster in clusters for birth in cluster.members
         ]
         own = [view.offsets for cluster in clusters for view in cluster.views]
-        sizes = np.array([c.sizes for c in clusters], dtype=np.intp).reshape(-1)
-        # Where each cluster's four parts start, for each of its members.
-        blocks = (np.cumsum(sizes) - sizes).reshape(-1, _PARTS)
+        sizes = np.array([len(cluster.live) for cluster in clusters], dtype=np.intp)
+        starts = np.cumsum(sizes) - sizes
         self.states = np.zeros((moments, int(sizes.sum())))
-        for cluster, start in zip(clusters, blocks[:, 0].tolist(), strict=True):
+        for cluster, start in zip(clusters, starts.tolist(), strict=True):
             cluster.history.move(self.states, start)
         counts = [len(cluster.members) for cluster in clusters]
-        offsets = np.repeat(blocks, counts, axis=0)
+        parts = [cluster.parts for cluster in clusters]
+        offsets = np.array(parts, dtype=np.intp).reshape(-1, _PARTS) + starts[:, None]
+        offsets = np.repeat(offsets, counts, axis=0)
         offsets += np.array(own, dtype=np.intp).reshape(-1, _PARTS)
         order = np.argsort(np.array(rows, dtype=np.intp))
         self.starts, dofs, first_places, first_rotations = offsets[order].T
@@ -142,7 +163,7 @@ class Layout:
 
     def read(self) -> Floats:
         """Return a copy of the present state, (W,)."""
-        return _joined([part for cluster in self.clusters for part in cluster.live])
+        return _joined([cluster.live for cluster in self.clusters])
 
     def speeds(self, states: Floats) -> Floats:
         """Return an upper bound on the speed of each robot's points, (L, R) [m/s].
@@ -273,7 +294,7 @@ class Rollout:
 
         Only the present one if the physics breaks in the interval.
         """
-        if not np.abs(self.states).max(initial=0.0) <= PLAUSIBLE:
+        if not self.max_velocity <= PLAUSIBLE:
             return [self.moment]
         moments = range(self.moment, len(self.plan))
         return [moment for moment in moments if self._is_merge[moment]]
