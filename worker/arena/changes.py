@@ -145,7 +145,7 @@ def diverged(
     """
     is_plausible = _is_plausible(rollout.max_velocity)
     if not is_plausible:
-        velocities = np.abs(rollout.state[population.layout.velocities])
+        velocities = rollout.velocities[rollout.moment]
         is_plausible = _is_plausible(float(velocities.max(initial=0.0)))
     if is_plausible and not reads_warnings and not rollout.has_failures:
         return []

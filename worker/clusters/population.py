@@ -224,10 +224,11 @@ class ArenaPopulation:
     def _merge_pairs(self, rollout: Rollout) -> Pairs:
         """Return the pairs to merge now; computes them for all checks ahead."""
         if rollout.moment not in rollout.merge_pairs:
-            moments = rollout.merges_ahead()
-            scene = Scene(self.layout, rollout.states[moments])
+            ahead = rollout.merges_ahead()
+            span = slice(ahead.start, ahead.stop)
+            scene = Scene(self.layout, rollout.states[span], rollout.velocities[span])
             found = self._proximity.pairs_to_merge(scene)
-            rollout.merge_pairs = dict(zip(moments, found, strict=True))
+            rollout.merge_pairs = dict(zip(ahead, found, strict=True))
         return rollout.merge_pairs[rollout.moment]
 
     def _links(self, pairs: Pairs) -> Links:

@@ -32,15 +32,20 @@ class Scene:
         speeds: (L, R) upper bound on the speed of each robot's points [m/s].
     """
 
-    def __init__(self, layout: Layout, states: Floats) -> None:
+    def __init__(
+        self, layout: Layout, states: Floats, velocities: Floats | None = None
+    ) -> None:
         """Compute the speeds.
 
         Args:
             layout: of the states.
             states: (L, W).
+            velocities: of these, if they are known: (L, V) as ``Layout.velocities``.
         """
         self._layout, self._states = layout, states
-        self.speeds = layout.speeds(states)
+        if velocities is None:
+            velocities = layout.velocities(states)
+        self.speeds = layout.speeds(velocities)
 
     @cached_property
     def _hulls(self) -> Floats:
@@ -68,7 +73,8 @@ class Scene:
             return found
         first, second, counts = self._layout.robot_rows.sphere_pairs(*bodies)
         numbers = np.repeat(numbers, counts)
-        moments, spheres = (self._distances(first, second) < limits[:, numbers]).nonzero()
+        is_near = self._distances(first, second) < limits[:, numbers]
+        moments, spheres = is_near.nonzero()
         found[moments, numbers[spheres]] = True
         return found
 

@@ -89,7 +89,8 @@ class RobotRows:
         """Return all pairs of a sphere of each of two bodies.
 
         Args:
-            first, second: (P,) bodies, of the N.
+            first: (P,) bodies, of the N.
+            second: likewise.
 
         Returns:
             (S,) first and second spheres, and (P,) numbers of pairs.
@@ -116,7 +117,6 @@ class Layout:
         roots: (R, 7) of position and quaternion of the core.
         motions: (R, 6) of velocity and angular velocity of the core.
         joints: of the joint angles, robot by robot.
-        velocities: of all velocities, robot by robot.
         states: (K, W) at the moments of an interval, in which the clusters keep them.
     """
 
@@ -153,7 +153,7 @@ class Layout:
         self.motions = dofs[:, None] + np.arange(_FREE_DOFS)
         self.joints = runs(self.starts + _FREE, robot_rows.sizes - _FREE)
         degrees = robot_rows.sizes - (_FREE - _FREE_DOFS)
-        self.velocities = runs(dofs, degrees)
+        self._velocities = runs(dofs, degrees)
         self._first_velocities = np.cumsum(degrees) - degrees
         self._places = runs(first_places, robot_rows.body_counts, 3)
         self._rotations = runs(first_rotations, robot_rows.body_counts, 9)
@@ -165,16 +165,24 @@ class Layout:
         """Return a copy of the present state, (W,)."""
         return _joined([cluster.live for cluster in self.clusters])
 
-    def speeds(self, states: Floats) -> Floats:
-        """Return an upper bound on the speed of each robot's points, (L, R) [m/s].
+    def velocities(self, states: Floats) -> Floats:
+        """Return the absolute velocities of all robots, one after another, (L, V).
 
         Args:
             states: (L, W).
         """
+        found = states.take(self._velocities, axis=1)
+        return np.asarray(np.abs(found, out=found))
+
+    def speeds(self, velocities: Floats) -> Floats:
+        """Return an upper bound on the speed of each robot's points, (L, R) [m/s].
+
+        Args:
+            velocities: (L, V) absolute.
+        """
         if not len(self._first_velocities):
-            return np.zeros((len(states), 0))
-        terms = np.abs(states.take(self.velocities, axis=1))
-        terms *= self.robot_rows.weights
+            return np.zeros((len(velocities), 0))
+        terms = velocities * self.robot_rows.weights
         return np.asarray(np.add.reduceat(terms, self._first_velocities, axis=1))
 
     def hulls(self, states: Floats) -> Floats:
@@ -265,7 +273,8 @@ class Rollout:
         plan: steps to each moment from the one before.
         moment: the one that is being handled.
         states: (K, W) in the order of the layout.
-        max_velocity: greatest absolute velocity of all; NaN if one is not a number.
+        velocities: (K, V) absolute, as ``Layout.velocities``.
+        max_velocity: greatest of them; NaN if one is not a number.
         has_failures: whether the engine failed on a cluster.
         merge_pairs: pairs of rows to merge, by moment; computed on demand.
     """
@@ -277,9 +286,11 @@ class Rollout:
             plan: steps to each moment from the one before.
             is_merge: whether each moment is a check for merges.
         """
-        self.plan, self._is_merge = plan, is_merge
+        self.plan = plan
+        checks = [moment for moment, is_due in enumerate(is_merge) if is_due]
+        self._after_merges = max(checks, default=-1) + 1
         self.moment = 0
-        self.states = np.zeros((len(plan), 0))
+        self.states = self.velocities = np.zeros((len(plan), 0))
         self.max_velocity = 0.0
         self.has_failures = False
         self.merge_pairs: dict[int, Pairs] = {}
@@ -289,21 +300,20 @@ class Rollout:
         """All clusters' state at the present moment, (W,)."""
         return np.asarray(self.states[self.moment])
 
-    def merges_ahead(self) -> list[int]:
-        """Return the checks for merges from the present moment on.
+    def merges_ahead(self) -> range:
+        """Return the moments from the present one to the last check for merges.
 
         Only the present one if the physics breaks in the interval.
         """
         if not self.max_velocity <= PLAUSIBLE:
-            return [self.moment]
-        moments = range(self.moment, len(self.plan))
-        return [moment for moment in moments if self._is_merge[moment]]
+            return range(self.moment, self.moment + 1)
+        return range(self.moment, self._after_merges)
 
     def read(self, layout: Layout) -> None:
         """Read all states; drops pairs that were computed from the old ones."""
         self.states = layout.states[: len(self.plan)]
-        velocities = np.abs(self.states.take(layout.velocities, axis=1))
-        self.max_velocity = float(velocities.max(initial=0.0))
+        self.velocities = layout.velocities(self.states)
+        self.max_velocity = float(self.velocities.max(initial=0.0))
         self.has_failures = any(cluster.failure for cluster in layout.clusters)
         self.merge_pairs = {}
 
