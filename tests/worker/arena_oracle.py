@@ -8,7 +8,7 @@ from schema.mjcf.model import robot_spec, shared_model
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.arena.world import World
-from worker.clusters.states import Rollout
+from worker.clusters.states import Rollout, StateColumns
 
 
 class Oracle:
@@ -28,7 +28,7 @@ class Oracle:
         schedule = world._schedule
         self._moments, self._arrive = schedule.moments, world._arrive
         schedule.moments = self._every_step  # type: ignore[method-assign]
-        world.population._most_moments = schedule.tick_steps
+        world.population._columns = StateColumns(schedule.tick_steps)
         world._arrive = self._observed_arrive  # type: ignore[method-assign]
 
     def _every_step(self, step: int, until: int) -> tuple[int, ...]:

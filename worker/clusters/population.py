@@ -23,6 +23,7 @@ from worker.clusters.states import (
     RobotRows,
     Rollout,
     Schedule,
+    StateColumns,
 )
 
 Group = tuple[BirthId, ...]
@@ -52,8 +53,8 @@ class ArenaPopulation:
         self.clusters: tuple[Cluster, ...] = ()
         self.by_cost: list[Cluster] = []
         self.cluster_of: dict[BirthId, Cluster] = {}
-        self._most_moments = Schedule(settings).most_moments
-        self.layout = Layout((), self.robot_rows, self._most_moments)
+        self._columns = StateColumns(Schedule(settings).most_moments)
+        self.layout = Layout((), self.robot_rows, self._columns)
         self.rollout: Rollout | None = None
         self.merges = self.splits = 0
         self._proximity = Proximity(settings)
@@ -207,7 +208,7 @@ class ArenaPopulation:
         self.cluster_of = {
             birth: cluster for cluster in self.clusters for birth in cluster.members
         }
-        self.layout = Layout(self.clusters, self.robot_rows, self._most_moments)
+        self.layout = Layout(self.clusters, self.robot_rows, self._columns)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
         if self.rollout is not None:
             moment, count = self.rollout.moment, len(self.rollout.plan)

@@ -6,7 +6,7 @@ Clusters do not interact, so each is stepped to the end of an interval at once; 
 the moments of the interval are handled one by one, for all clusters together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,6 +20,8 @@ _FREE, _FREE_DOFS = 7, 6
 """Numbers of a free joint's position and orientation, and of its velocity."""
 _PARTS = 4
 """Parts of a cluster's state that are read."""
+_SPARE = 2
+"""Columns for the states of clusters, for each that is needed."""
 Pairs = list[tuple[int, int]]
 """Pairs of rows of robots, the lesser row first."""
 MERGES_PER_SPLIT = 25
@@ -104,10 +106,50 @@ class RobotRows:
         return rows, columns, counts
 
 
-class Layout:
-    """Indices into the concatenated states of R robots in their clusters.
+class StateColumns:
+    """Array in which clusters keep their states at the moments of an interval.
 
-    A state has W numbers: of each cluster all of ``Cluster.live``.
+    Columns of clusters that are gone stay unused until the array is full.
+
+    Attributes:
+        states: (K, W), columns of each cluster are all of its ``live``.
+    """
+
+    def __init__(self, moments: int) -> None:
+        """Initialise without clusters.
+
+        Args:
+            moments: K, the most that an interval has.
+        """
+        self.states = np.zeros((moments, 0))
+        self._starts: dict[Cluster, int] = {}
+        self._end = 0
+
+    def place(self, clusters: Sequence[Cluster]) -> list[int]:
+        """Return the first column of each cluster; those of all others are free.
+
+        The histories of new clusters move to their columns.
+        """
+        new = [cluster for cluster in clusters if cluster not in self._starts]
+        if self._end + _size(new) > self.states.shape[1]:
+            new, self._end = list(clusters), 0
+            self.states = np.zeros((len(self.states), _SPARE * _size(new)))
+        for cluster in new:
+            cluster.history.move(self.states, self._end)
+            self._starts[cluster] = self._end
+            self._end += len(cluster.live)
+        self._starts = {cluster: self._starts[cluster] for cluster in clusters}
+        return list(self._starts.values())
+
+
+def _size(clusters: Iterable[Cluster]) -> int:
+    return sum(len(cluster.live) for cluster in clusters)
+
+
+class Layout:
+    """Indices into the states of R robots in their clusters.
+
+    A state has W numbers, as ``StateColumns``.
 
     Attributes:
         robot_rows: the robots.
@@ -121,14 +163,14 @@ class Layout:
     """
 
     def __init__(
-        self, clusters: Sequence[Cluster], robot_rows: RobotRows, moments: int
+        self, clusters: Sequence[Cluster], robot_rows: RobotRows, columns: StateColumns
     ) -> None:
-        """Compute the indices, and move the clusters' histories to ``states``.
+        """Place the clusters and compute the indices.
 
         Args:
-            clusters: all of an arena, in a fixed order.
+            clusters: all of an arena, each once.
             robot_rows: all robots.
-            moments: K, the most that an interval has.
+            columns: of all clusters.
         """
         self.robot_rows = robot_rows
         self.clusters = tuple(clusters)
@@ -136,14 +178,12 @@ class Layout:
             robot_rows.rows[birth] for cluster in clusters for birth in cluster.members
         ]
         own = [view.offsets for cluster in clusters for view in cluster.views]
-        sizes = np.array([len(cluster.live) for cluster in clusters], dtype=np.intp)
-        starts = np.cumsum(sizes) - sizes
-        self.states = np.zeros((moments, int(sizes.sum())))
-        for cluster, start in zip(clusters, starts.tolist(), strict=True):
-            cluster.history.move(self.states, start)
+        self._columns = columns.place(clusters)
+        self.states = columns.states
         counts = [len(cluster.members) for cluster in clusters]
         parts = [cluster.parts for cluster in clusters]
-        offsets = np.array(parts, dtype=np.intp).reshape(-1, _PARTS) + starts[:, None]
+        offsets = np.array(parts, dtype=np.intp).reshape(-1, _PARTS)
+        offsets += np.array(self._columns, dtype=np.intp)[:, None]
         offsets = np.repeat(offsets, counts, axis=0)
         offsets += np.array(own, dtype=np.intp).reshape(-1, _PARTS)
         order = np.argsort(np.array(rows, dtype=np.intp))
@@ -163,7 +203,10 @@ class Layout:
 
     def read(self) -> Floats:
         """Return a copy of the present state, (W,)."""
-        return _joined([cluster.live for cluster in self.clusters])
+        found = np.zeros(self.states.shape[1])
+        for cluster, start in zip(self.clusters, self._columns, strict=True):
+            found[start : start + len(cluster.live)] = cluster.live
+        return found
 
     def velocities(self, states: Floats) -> Floats:
         """Return the absolute velocities of all robots, one after another, (L, V).
