@@ -149,6 +149,7 @@ class BatchedIO:
         self._tick_s = simulation.brain_steps * simulation.timestep_s
         self._gravity = np.array(gravity)
         self._layout: Layout | None = None
+        self._views: Sequence[EngineView | None] = ()
 
     def settle(self, layout: Layout) -> None:
         """Adapt to a layout; robots may have been born, died or changed cluster."""
@@ -156,11 +157,16 @@ class BatchedIO:
         if layout is before:
             return
         views = [robot.view for robot in layout.robot_rows.robots]
+        known = self._views
         if before is None or layout.robot_rows is not before.robot_rows:
             self._gather(views)
-        for row, view in enumerate(views):
-            view.sensors.write_to(self.readings[row : row + 1])
-        self._controls = [view.ctrl for view in views]
+            known = [None] * len(views)
+        self._views = views
+        for row, (view, other) in enumerate(zip(views, known, strict=True)):
+            if view is not other:
+                view.sensors.write_to(self.readings[row : row + 1])
+        # Memory views are copied faster than arrays.
+        self._controls = [view.ctrl.data for view in views]
         self._read_alone = [views[row].sensors for row in self._others]
         self._cores = [views[row].sensors for row in self._simple.tolist()]
         self._orientations = layout.roots[self._simple, 3:]
@@ -168,8 +174,9 @@ class BatchedIO:
         self._angles = layout.starts[self._motor_rows] + self._motor_offsets
         cluster_indices = layout.cluster_indices.tolist()
         self._pads = [
-            (row, views[row].sensors.pads, layout.clusters[cluster_indices[row]])
+            (layout.clusters[cluster_indices[row]], geom)
             for row in self._padded
+            for geom, _ in views[row].sensors.pads
         ]
 
     def read(self, state: Floats) -> None:
@@ -181,9 +188,8 @@ class BatchedIO:
         self._read_cores(state)
         for sensors in self._read_alone:
             sensors.read(self._tick_s)
-        for row, pads, cluster in self._pads:
-            for geom, place in pads:
-                self.readings[row, place] = geom in cluster.touched
+        touches = [geom in cluster.touched for cluster, geom in self._pads]
+        self.readings.reshape(-1)[self._pad_places] = touches
 
     def drive(self, state: Floats, outputs: Floats) -> None:
         """Command all motors, until the next tick.
@@ -202,19 +208,28 @@ class BatchedIO:
         np.minimum(command, fastest, out=command)
         if len(self._free):
             command[self._free] = target[self._free]
-        start = 0
+        commands, start = command.data, 0
         for controls in self._controls:
             end = start + len(controls)
-            controls[:] = command[start:end]
+            controls[:] = commands[start:end]
             start = end
 
     def _gather(self, views: Sequence[EngineView]) -> None:
         """Build the arrays of all robots."""
         readings = [view.sensors.readings for view in views]
         self.readings = np.concatenate([np.zeros((0, self._width.inputs)), *readings])
+        width = self._width.inputs
+        self._padded = [row for row, view in enumerate(views) if view.sensors.pads]
+        self._pad_places: Indices = np.array(
+            [
+                row * width + p
+                for row in self._padded
+                for _, p in views[row].sensors.pads
+            ],
+            dtype=np.intp,
+        )
         simple = [row for row, view in enumerate(views) if view.sensors.is_simple]
         self._others = sorted(set(range(len(views))).difference(simple))
-        self._padded = [row for row, view in enumerate(views) if view.sensors.pads]
         self._simple = np.array(simple, dtype=np.intp)
         before = [views[row].sensors.velocities[0] for row in simple]
         self._velocities: Floats = np.array(before).reshape(-1, 3)
