@@ -1,7 +1,6 @@
 """Commands of the coordinator: runs, their comparison, plug-ins, bench dispatch."""
 
 import argparse
-import sys
 from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
@@ -286,9 +285,3 @@ def _compare(options: argparse.Namespace) -> int:
     if not differences:
         print("equal in all repeatable columns")
     return 1 if differences else 0
-
-
-if __name__ == "__main__":
-    from revolve.command import main as revolve
-
-    sys.exit(revolve())
