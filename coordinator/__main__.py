@@ -43,7 +43,7 @@ from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import ExperimentError, NetworkError
-from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow
@@ -249,13 +249,12 @@ def _check_window(folder: Path) -> None:
 
 
 def _has_arena(experiment: Experiment) -> bool:
-    numbers = range(island_count(experiment))
-    return any(island_experiment(experiment, one).arena is not None for one in numbers)
+    return any(own.arena is not None for own in island_experiments(experiment))
 
 
 def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
     is_alone = island_count(experiment) == 1 and not _is_repeated(options)
-    return is_alone and island_experiment(experiment, 0).arena is not None
+    return is_alone and _has_arena(experiment)
 
 
 def _is_repeated(options: argparse.Namespace) -> bool:

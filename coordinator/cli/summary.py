@@ -20,12 +20,7 @@ from schema.agent.log import tell_user, warn_user
 from schema.agent.screen import missing_screen
 from schema.errors import ExperimentError, InvalidRobot, counted, rounded
 from schema.experiment.brains import types_of
-from schema.experiment.document import (
-    Experiment,
-    body_space,
-    island_count,
-    island_experiment,
-)
+from schema.experiment.document import Experiment, body_space, island_experiments
 from schema.experiment.file import own_experiment
 from schema.experiment.fitness_keys import fitness_text
 from schema.formats.files import BEST
@@ -100,13 +95,9 @@ def restore_best(folder: Path) -> None:
 def _is_extinct(folder: Path, experiment: Experiment) -> bool:
     """Return whether all islands of a finished run are extinct arenas."""
     born = Counter(read_table(folder, "births")["island"].to_pylist())
-    islands = [
-        island_experiment(experiment, number)
-        for number in range(island_count(experiment))
-    ]
     return all(
         own.arena is not None and born[number] < own.births
-        for number, own in enumerate(islands)
+        for number, own in enumerate(island_experiments(experiment))
     )
 
 
@@ -184,8 +175,7 @@ def _counted_as_zero(run: RunSession, last: Sequence[Row]) -> list[str]:
 def judged_apart(experiment: Experiment) -> list[str]:
     """Return a line if the fitness of different islands cannot be compared."""
     each: dict[str, list[str]] = {}
-    for number in range(island_count(experiment)):
-        own = island_experiment(experiment, number)
+    for number, own in enumerate(island_experiments(experiment)):
         text = fitness_text({"fitness": to_builtins(own.fitness)})
         text += " in an arena" * (own.arena is not None)
         each.setdefault(text, []).append(str(number))

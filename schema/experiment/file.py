@@ -18,12 +18,7 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError, cut, expectation, nearest, shown, unreadable
 from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
-from schema.experiment.document import (
-    Experiment,
-    island_count,
-    island_experiment,
-    references,
-)
+from schema.experiment.document import Experiment, island_experiments, references
 from schema.experiment.environment import (
     add_gap_contacts,
     is_mjcf,
@@ -250,7 +245,7 @@ def _refuse_equal(experiments: Sequence[Experiment], where: str) -> None:
     """Raise if every island replaces what the experiments of a sweep differ in."""
     first: dict[bytes, str] = {}
     for one in experiments:
-        islands = [island_experiment(one, n) for n in range(island_count(one))]
+        islands = island_experiments(one)
         plain = [replace(each, name="", sweep=None) for each in islands]
         known = first.setdefault(msgspec.json.encode(plain), one.name)
         if known != one.name:
