@@ -248,11 +248,10 @@ def _windows(folder: Path, arenas: Sequence[Experiment]) -> list[str]:
     if not best.num_rows:
         return [line]
     (row,) = best.slice(0, 1).to_pylist()
-    birth = individual(row)
     return [
         (
             f"{line}; the best window of the whole run is that of robot "
-            f"{birth.island}:{birth.number} that ended at {row['sim_time_s']:g} s: "
+            f"{individual(row).name} that ended at {row['sim_time_s']:g} s: "
             f"fitness {rounded(row['fitness'])}"
         )
     ]
