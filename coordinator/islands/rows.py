@@ -94,7 +94,6 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     Source: thesis section 6.3; the code of the original.
     """
     kinds = [space[part.kind] for part in robot.parts]
-    layers = [neuron.layer for neuron in robot.brain.neurons]
     connections = len(robot.brain.connections)
     if isinstance(genome, Node):
         connections = sum(len(node.connections) for node, _, _ in walk(genome))
@@ -108,9 +107,9 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
         ),
         "motors": sum(kind.outputs for kind in kinds),
         "extremities": len(robot.parts) + 1 - len(parents),
-        "inputs": layers.count("input"),
-        "outputs": layers.count("output"),
-        "hidden": layers.count("hidden"),
+        "inputs": robot.brain.count("input"),
+        "outputs": robot.brain.count("output"),
+        "hidden": robot.brain.count("hidden"),
         "connections": connections,
     }
 

@@ -243,8 +243,7 @@ class _ControlLoop:
         if settings.environment.push_impulse:
             environment = settings.environment
             self._pushes = Pushes(environment, simulation, identity, model, self.data)
-        inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
-        self.inputs = self._controller.readings[:, :inputs]
+        self.inputs = self._controller.readings[:, : robot.brain.count("input")]
         self._channels = Channels(robot, model, settings)
         self._recorder: Recorder | None = None
         if self._channels.names:
