@@ -25,7 +25,7 @@ from schema.experiment.file import own_experiment
 from schema.experiment.fitness_keys import fitness_text
 from schema.formats.files import BEST
 from schema.formats.yaml import robot_to_yaml
-from schema.robot.robot import Robot
+from schema.robot.robot import Robot, motor_count
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import born_as, read_table
 from schema.tables.last_populations import Row, best_of, last_populations
@@ -193,7 +193,7 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
     birth = individual(best)
     folder, space = run.held.path, body_space(run.experiment.space)
     rank, robot = _read_best(folder, best, run.experiment)
-    motors = sum(space[part.kind].outputs for part in robot.parts)
+    motors = motor_count(robot, space)
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
     lives = f" on island {best['island']}" if best["island"] != birth.island else ""
     what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
