@@ -245,7 +245,7 @@ def check_here(
         kind: name of the kind that the words are of; None: detected.
         output: gets the steps as lines of JSON.
         limit_s: time after which an import or a check ends this process [s].
-        births: as for ``read_experiment``.
+        births: as for ``experiments_of``.
     """
     is_fine = True
 
