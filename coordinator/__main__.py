@@ -175,8 +175,10 @@ def _deployment(
     """Return processes and network; imports the rooms of worker and analyzer."""
     import analyzer.report
     import analyzer.service
-    import worker.serve.jobs
     import worker.serve.service
+    from worker.arena.world import World
+    from worker.serve.jobs import Jobs
+    from worker.serve.shards import Shards
 
     if options.speed is not None and not any(map(_has_arena, experiments)):
         names = ", ".join(experiment.name for experiment in experiments)
@@ -200,11 +202,11 @@ def _deployment(
     # One arena runs in one process; several arenas, or robots, spread over them.
     is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
     threads = options.threads or (cores() if is_one_arena else 1)
-    shards = shards_that_fit(memory_bytes(), processes=1)
-    in_process = worker.serve.jobs.Jobs(most_shards=shards, threads=threads)
+    most_held = shards_that_fit(memory_bytes(), processes=1)
+    shards = Shards(World, most_held=most_held, threads=threads)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
         "analyzer": analyzer.report.answer,
-        "worker": in_process.answer,
+        "worker": Jobs(shards).answer,
     }
     return Deployment(
         workers=workers,
