@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -132,7 +131,3 @@ def _view(options: argparse.Namespace) -> int:
     from worker.arena.replay import alone, together
 
     return view(options, Simulators(alone, arena_history, together))
-
-
-if __name__ == "__main__":
-    sys.exit(main(["analyze", *sys.argv[1:]]))

@@ -1,9 +1,6 @@
 """``revolve analyzer``: vet bodies for a coordinator."""
 
-import sys
-
 from schema.agent.flags import Flags
-from schema.agent.supervisor import prepare_process
 
 
 def main(arguments: list[str]) -> int:
@@ -15,7 +12,6 @@ def main(arguments: list[str]) -> int:
     Returns:
         0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
     """
-    prepare_process()  # before anything imports numpy
     from analyzer.service import process
     from schema.agent.command import run_pool
 
@@ -27,7 +23,3 @@ def parser(_command: str) -> Flags:
     from schema.agent.command import parser as agent
 
     return agent("analyzer", 1)
-
-
-if __name__ == "__main__":
-    sys.exit(main(["analyzer", *sys.argv[1:]]))

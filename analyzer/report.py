@@ -8,7 +8,7 @@ from schema.experiment.document import Vetting, body_space
 from schema.experiment.settings import read_vetting_settings
 from schema.parts import BodySpace
 from schema.robot.results import Report
-from schema.robot.robot import Robot, check_body
+from schema.robot.robot import Robot, check_body, motor_count
 from schema.wire.codec import Answer, decode_body, decode_request, encode_answer
 
 
@@ -57,7 +57,7 @@ def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:
     """
     boxes = place_boxes(robot, space)
     intersections = intersecting_parts(boxes, robot, vetting)
-    motors = sum(space[part.kind].outputs for part in robot.parts)
+    motors = motor_count(robot, space)
     lower, upper = bounding_box(boxes)
     reason = _reason(robot, intersections, motors)
     return Report(

@@ -1,7 +1,6 @@
 """Commands of the coordinator: runs, their comparison, plug-ins, bench dispatch."""
 
 import argparse
-import sys
 from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
@@ -44,7 +43,7 @@ from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import ExperimentError, NetworkError
-from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow
@@ -176,8 +175,10 @@ def _deployment(
     """Return processes and network; imports the rooms of worker and analyzer."""
     import analyzer.report
     import analyzer.service
-    import worker.serve.jobs
     import worker.serve.service
+    from worker.arena.world import World
+    from worker.serve.jobs import Jobs
+    from worker.serve.shards import Shards
 
     if options.speed is not None and not any(map(_has_arena, experiments)):
         names = ", ".join(experiment.name for experiment in experiments)
@@ -201,11 +202,11 @@ def _deployment(
     # One arena runs in one process; several arenas, or robots, spread over them.
     is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
     threads = options.threads or (cores() if is_one_arena else 1)
-    shards = shards_that_fit(memory_bytes(), processes=1)
-    in_process = worker.serve.jobs.Jobs(most_shards=shards, threads=threads)
+    most_held = shards_that_fit(memory_bytes(), processes=1)
+    shards = Shards(World, most_held=most_held, threads=threads)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
         "analyzer": analyzer.report.answer,
-        "worker": in_process.answer,
+        "worker": Jobs(shards).answer,
     }
     return Deployment(
         workers=workers,
@@ -250,13 +251,12 @@ def _check_window(folder: Path) -> None:
 
 
 def _has_arena(experiment: Experiment) -> bool:
-    numbers = range(island_count(experiment))
-    return any(island_experiment(experiment, one).arena is not None for one in numbers)
+    return any(own.arena is not None for own in island_experiments(experiment))
 
 
 def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
     is_alone = island_count(experiment) == 1 and not _is_repeated(options)
-    return is_alone and island_experiment(experiment, 0).arena is not None
+    return is_alone and _has_arena(experiment)
 
 
 def _is_repeated(options: argparse.Namespace) -> bool:
@@ -286,9 +286,3 @@ def _compare(options: argparse.Namespace) -> int:
     if not differences:
         print("equal in all repeatable columns")
     return 1 if differences else 0
-
-
-if __name__ == "__main__":
-    from revolve.command import main as revolve
-
-    sys.exit(revolve())

@@ -26,6 +26,7 @@ from revolve.experiment import Experiment
 from revolve.robot import Robot, checked
 from revolve.workers import Workers
 from schema.agent.address import hub_of
+from schema.agent.command import name_at
 from schema.agent.network import DEFAULT_FLEET, Tls
 from schema.agent.supervisor import cores
 from schema.agent.topics import unique_name
@@ -100,7 +101,7 @@ class Fleet:
         files = Tls(*tls) if tls else None
         address = hub_of(connect) if connect else ""
         self._network = Network(
-            name=unique_name(_own_name(address, files)),
+            name=unique_name(name_at(address, files, "python")),
             fleet=fleet,
             connect=address,
             tls=files,
@@ -403,12 +404,3 @@ def refusal(end: Deliver) -> JobRefused:
     return JobRefused(
         f"several workers cannot do a job, the last of them {end.agent}: {end.reason}"
     )
-
-
-def _own_name(address: str, tls: Tls | None) -> str:
-    """Return the name of this process: that of its certificate at a hub with TLS."""
-    if tls and address.startswith("tls/"):
-        from schema.agent.certificate import certificate_name  # noqa: PLC0415
-
-        return certificate_name(tls.certificate)
-    return "python"

@@ -15,7 +15,7 @@ from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError, nearest, rounded, shown
-from schema.experiment.document import island_count, island_experiment
+from schema.experiment.document import island_experiment, island_experiments
 from schema.experiment.file import own_experiment
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
@@ -241,10 +241,7 @@ class Run:
         """Return the summary that a notebook shows."""
         fitness = pc.max(self._judged()["fitness"]).as_py()
         document = document_of(self.experiment)
-        planned = sum(
-            island_experiment(document, island).births
-            for island in range(island_count(document))
-        )
+        planned = sum(own.births for own in island_experiments(document))
         rows: dict[str, Any] = {
             "folder": self.folder,
             "experiment": self.name,

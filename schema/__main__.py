@@ -1,10 +1,9 @@
 """``revolve robot``: robot files on the command line."""
 
-import sys
 from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins, add_settings
-from schema.errors import RevolveError, counted
+from schema.errors import counted
 from schema.formats.files import types_for, write_robot
 from schema.formats.run_settings import read_with_settings
 from schema.parts import BodySpace
@@ -13,11 +12,11 @@ from schema.robot.brain import NeuronKinds, neuron_names
 from schema.robot.robot import Robot
 
 
-def main(argv: list[str] | None = None) -> int:
+def main(arguments: list[str]) -> int:
     """Run ``revolve robot ...`` and return its exit code.
 
     Args:
-        argv: arguments after ``revolve``; those of the process by default.
+        arguments: the command's name, ``robot``, first.
 
     Returns:
         0 if done.
@@ -25,8 +24,7 @@ def main(argv: list[str] | None = None) -> int:
     Raises:
         RevolveError: a file does not hold a robot, or cannot be read or written.
     """
-    words = ["robot", *sys.argv[1:]] if argv is None else argv
-    options = parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
+    options = parser().parse_args(arguments[1:])
     allow(options.plugins)
     robot, settings, _ = read_with_settings(
         options.file, options.experiment, options.island
@@ -131,11 +129,3 @@ def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> Non
     console = Console()
     console.print(Text(f"{title}: {_summary(robot)}"))
     console.print(trees[0])
-
-
-if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except RevolveError as error:
-        print(f"revolve: {error}", file=sys.stderr)
-        sys.exit(2)

@@ -1,9 +1,7 @@
 """``revolve worker`` and ``revolve bench``: serve jobs, and benchmark this machine."""
 
-import sys
-
 from schema.agent.flags import Flags
-from schema.agent.supervisor import cores, prepare_process
+from schema.agent.supervisor import cores
 
 
 def main(arguments: list[str]) -> int:
@@ -16,7 +14,6 @@ def main(arguments: list[str]) -> int:
         ``worker``: 0 after Ctrl-C or SIGTERM, 130 after a second Ctrl-C; ``bench``: 0
         if the measurement meets its requirement, 1 if not.
     """
-    prepare_process()  # before anything imports numpy
     if arguments[0] == "bench":
         return _bench(arguments)
     from schema.agent.command import run_pool
@@ -44,7 +41,3 @@ def _bench(arguments: list[str]) -> int:
     from worker.bench.command import main as bench
 
     return bench(arguments, RobotSource(generate, analyze))
-
-
-if __name__ == "__main__":
-    sys.exit(main(["worker", *sys.argv[1:]]))

@@ -92,7 +92,7 @@ def path_velocity(track: Trace) -> float:
     """
     steps = np.diff(track.core_position, axis=0)
     lengths = map(math.hypot, steps[:, 0].tolist(), steps[:, 1].tolist())
-    return sum_in_order(lengths) / _duration_s(track)
+    return sum_in_order(lengths) / track.duration_s
 
 
 def straight_velocity(track: Trace) -> float:
@@ -102,11 +102,7 @@ def straight_velocity(track: Trace) -> float:
         track: (T, 3) positions; T >= 2.
     """
     x, y = (track.core_position[-1, :2] - track.core_position[0, :2]).tolist()
-    return math.hypot(x, y) / _duration_s(track)
-
-
-def _duration_s(track: Trace) -> float:
-    return (len(track.core_position) - 1) * track.interval_s
+    return math.hypot(x, y) / track.duration_s
 
 
 def thesis(track: Trace, fitness: Fitness) -> float:

@@ -1,6 +1,5 @@
 """``revolve robot simulate``: simulate and evaluate the robot of a file."""
 
-import sys
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -129,7 +128,3 @@ def parser(_command: str = "robot simulate") -> Flags:
     )
     add_plugins(flags)
     return flags
-
-
-if __name__ == "__main__":
-    sys.exit(main(["robot simulate", *sys.argv[1:]]))

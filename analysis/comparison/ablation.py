@@ -15,8 +15,6 @@ from analysis.comparison.robustness import (
     Row,
     line_of,
     percent,
-    schema_of,
-    with_shares,
 )
 from schema.errors import rounded
 
@@ -26,7 +24,7 @@ ONE, KIND, ALL = "one", "kind", "all"
 _SHOWN = 3
 """Motors that the line about a run names."""
 
-_COLUMNS: Columns = {
+COLUMNS: Columns = {
     **ROBOT,
     "is_last": (
         pa.bool_(),
@@ -55,16 +53,6 @@ _COLUMNS: Columns = {
     "change": (pa.string(), "the change in words"),
     **RESULT,
 }
-
-
-def schema() -> pa.Schema:
-    """Return the Arrow schema, with ``meaning`` in each field's metadata."""
-    return schema_of(_COLUMNS)
-
-
-def table_of(rows: Iterable[Row]) -> pa.Table:
-    """Return the table of some rows, with their shares."""
-    return with_shares(rows, schema())
 
 
 def shares(rows: Iterable[Row], group: str, scope: str, kind: str = "") -> list[float]:

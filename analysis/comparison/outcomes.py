@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.statistics import ranks
-from analysis.measures.load import IslandSettings, settings_of
+from analysis.measures.load import IslandSettings, island_settings
 from analysis.measures.outputs import OWN, POPULATION
 from analysis.measures.population_table import Numbers
 from analysis.measures.populations import RETENTION_BIRTHS
@@ -41,7 +41,7 @@ def outcome(
         rows = np.flatnonzero((islands == island) & (counts <= births))
         if len(rows):
             columns = {name: _column(populations, name)[rows] for name in POPULATION}
-            founders = settings_of(island, settings).founders
+            founders = island_settings(island, settings).founders
             each.append(_of_island(columns, counts[rows], births, founders))
     found = {"births": float(births)}
     for name in each[0] if each else ():
@@ -52,7 +52,7 @@ def outcome(
         judged_again = [
             island
             for island in going_on
-            if (own := settings_of(island, settings)).is_online or own.reevaluation
+            if (own := island_settings(island, settings)).is_online or own.reevaluation
         ]
         judged = _without(tables["robots"], judged_again)
         found |= _correlations(judged.filter(pc.field("birth") < births))

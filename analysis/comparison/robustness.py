@@ -39,7 +39,7 @@ RESULT: Columns = {
 }
 """Columns of the result of an evaluation under a change."""
 
-_COLUMNS: Columns = {
+COLUMNS: Columns = {
     **ROBOT,
     "group": (pa.string(), "what is changed"),
     "change": (pa.string(), "the change in words"),
@@ -47,31 +47,20 @@ _COLUMNS: Columns = {
 }
 
 
-def schema() -> pa.Schema:
-    """Return the Arrow schema, with ``meaning`` in each field's metadata."""
-    return schema_of(_COLUMNS)
+def table_of(rows: Iterable[Row], columns: Columns) -> pa.Table:
+    """Return the table of some rows, whose shares are computed here.
 
-
-def schema_of(columns: Columns) -> pa.Schema:
-    """Return the Arrow schema of columns, with ``meaning`` in their metadata."""
-    return pa.schema(
+    Args:
+        rows: with all columns but ``share``.
+        columns: of the table; the meaning of each becomes metadata of its field.
+    """
+    schema = pa.schema(
         [
             pa.field(name, kind, metadata={"meaning": meaning})
             for name, (kind, meaning) in columns.items()
         ]
     )
-
-
-def table_of(rows: Iterable[Row]) -> pa.Table:
-    """Return the table of some rows, with their shares."""
-    return with_shares(rows, schema())
-
-
-def with_shares(rows: Iterable[Row], columns: pa.Schema) -> pa.Table:
-    """Return the table of some rows, whose shares are computed here."""
-    return pa.Table.from_pylist(
-        [{**row, "share": _share(row)} for row in rows], columns
-    )
+    return pa.Table.from_pylist([{**row, "share": _share(row)} for row in rows], schema)
 
 
 def _share(row: Row) -> float | None:

@@ -1,6 +1,6 @@
 """Findings of the thesis as effects: one row per pair of experiments."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from textwrap import wrap
 from typing import Any, NamedTuple
@@ -13,10 +13,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE
-from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.forms import NothingToDraw, Row, Tables
 from analysis.figures.style import INK, pair_name
-
-Row = Mapping[str, Any]
 
 _MARKS: dict[str, dict[str, Any]] = {
     "reproduced": {"color": "#0072B2", "marker": "o", "markersize": 4.2},

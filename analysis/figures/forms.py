@@ -22,6 +22,9 @@ from schema.errors import RevolveError
 Tables = Mapping[str, pa.Table]
 """Measures by name, with the columns of ``outputs``."""
 
+Row = Mapping[str, Any]
+"""Row of one of these tables."""
+
 Panels = Mapping[str, str]
 """Text of the axis or heading of each measure of a figure."""
 

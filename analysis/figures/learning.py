@@ -74,8 +74,7 @@ def learning_gain(tables: Tables) -> p9.ggplot:
     found = grouped.quantile([0.25, 0.5, 0.75]).unstack().reset_index()
     found.columns = ["experiment", "births", "when", "low", "median", "high"]
     found = _in_lines(found, "births", f"births in two intervals of {_WIDTH}")
-    count = found["experiment"].nunique()
-    figure = (
+    return (
         p9.ggplot(found, p9.aes("births", "median", fill="when", colour="when"))
         + p9.geom_ribbon(p9.aes(ymin="low", ymax="high"), alpha=0.25, colour="none")
         + p9.geom_line(size=0.9)
@@ -83,9 +82,8 @@ def learning_gain(tables: Tables) -> p9.ggplot:
         + p9.scale_colour_manual(["#D55E00", "#0072B2"], name="")
         + p9.expand_limits(y=0)
         + p9.labs(x="births", y=fitness_text(tables, "fitness of newborns"))
-        + theme_of_size(3.6 if count == 1 else 1.2 + 2.4 * -(-count // 2))
+        + _panels(found)
     )
-    return figure if count == 1 else figure + _panels(found)
 
 
 def bodies_saved(tables: Tables) -> p9.ggplot:
@@ -110,16 +108,14 @@ def bodies_saved(tables: Tables) -> p9.ggplot:
     ].mean()
     long = found.melt(["experiment", "births", "width"], var_name="how")
     long["how"] = _ordered(long["how"], [_SAVED, _KEPT])
-    count = found["experiment"].nunique()
-    figure = (
+    return (
         p9.ggplot(long, p9.aes("births", "value", fill="how"))
         + p9.geom_col(p9.aes(width="width"), colour="white", size=0.3)
         + p9.scale_fill_manual(["#E69F00", "#7F9FBF"], name="")
         + p9.expand_limits(y=[0, 1])
         + p9.labs(x="births", y="share in the next population")
-        + theme_of_size(3.6 if count == 1 else 1.2 + 2.4 * -(-count // 2))
+        + _panels(found)
     )
-    return figure if count == 1 else figure + _panels(found)
 
 
 def _in_lines(frame: Any, along: str, needed: str) -> Any:  # noqa: ANN401 - pandas
@@ -136,6 +132,10 @@ def _ordered(names: Any, order: list[str]) -> Any:  # noqa: ANN401 - pandas
     return names.astype("category").cat.set_categories(order)
 
 
-def _panels(frame: Any) -> p9.facet_wrap:  # noqa: ANN401 - pandas
+def _panels(frame: Any) -> list[Any]:  # noqa: ANN401 - pandas
+    """Return theme and panels of a figure: a panel for each experiment, if several."""
     names = {name: label(name) for name in in_order(frame["experiment"])}
-    return p9.facet_wrap("experiment", ncol=2, labeller=p9.as_labeller(names))
+    if len(names) == 1:
+        return [theme_of_size(3.6)]
+    panels = p9.facet_wrap("experiment", ncol=2, labeller=p9.as_labeller(names))
+    return [theme_of_size(1.2 + 2.4 * -(-len(names) // 2)), panels]

@@ -155,10 +155,10 @@ def integer_breaks(limits: tuple[float, float]) -> list[float]:
     return list(MaxNLocator(nbins=6, integer=True).tick_values(*limits))
 
 
-def theme_of_size(height_in: float, width_in: float = WIDTH_IN) -> Any:  # noqa: ANN401 - untyped
-    """Return the theme for a figure of this size."""
+def theme_of_size(height_in: float) -> Any:  # noqa: ANN401 - untyped
+    """Return the theme for a figure of this height [inches]."""
     return p9.theme_bw(base_size=10) + p9.theme(
-        figure_size=(width_in, height_in),
+        figure_size=(WIDTH_IN, height_in),
         text=p9.element_text(colour=INK),
         legend_position="top",
         legend_title=p9.element_blank(),

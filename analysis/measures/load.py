@@ -67,7 +67,7 @@ class IslandSettings:
     reevaluation: str = ""
 
 
-def settings_of(island: int, islands: Sequence[IslandSettings]) -> IslandSettings:
+def island_settings(island: int, islands: Sequence[IslandSettings]) -> IslandSettings:
     """Return the settings of an island; the last ones if it is not in the document.
 
     Args:

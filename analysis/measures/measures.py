@@ -17,7 +17,7 @@ from analysis.measures.diversity import mean_distances
 from analysis.measures.families import families
 from analysis.measures.interactions import interactions
 from analysis.measures.learning import learning, learning_curves
-from analysis.measures.load import settings_of
+from analysis.measures.load import island_settings
 from analysis.measures.named_measures import named_measures
 from analysis.measures.population_table import (
     Booleans,
@@ -139,7 +139,7 @@ def _evaluations(run: RunTables) -> pa.Table:
     averaged = [
         island
         for island in np.unique(islands).tolist()
-        if run.islands and settings_of(island, run.islands).reevaluation == "mean"
+        if run.islands and island_settings(island, run.islands).reevaluation == "mean"
     ]
     if not averaged:
         return last

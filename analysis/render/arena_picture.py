@@ -72,7 +72,7 @@ class ArenaRenderer:
             furnish(size, settings.light, reach_m, spec)
 
         specs = [
-            (f"{birth.island}:{birth.number}/", mjcf.robot_spec(one, space, world).spec)
+            (f"{birth.name}/", mjcf.robot_spec(one, space, world).spec)
             for birth, one in robots.items()
         ]
         model = mjcf.shared_model(

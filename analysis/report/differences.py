@@ -1,12 +1,10 @@
 """Differences of fitness and of all measures between experiments."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from html import escape
 from math import comb
-from typing import Any
 
-import pyarrow as pa
-
+from analysis.figures.forms import Row, Tables
 from analysis.figures.style import label
 from analysis.measures.fitness_functions import (
     by_function,
@@ -15,9 +13,6 @@ from analysis.measures.fitness_functions import (
 )
 from analysis.measures.outputs import OUTCOME, meaning
 from analysis.report.html import cell, folded, number, plural, table
-
-Tables = Mapping[str, pa.Table]
-Row = Mapping[str, Any]
 
 _MOST_PAIRS = 3
 """Pairs of experiments on the first screen, those with the smallest p."""

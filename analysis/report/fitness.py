@@ -2,22 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.courses import Course, course
-from analysis.figures.forms import BAND_RUNS, NothingToDraw
+from analysis.figures.forms import BAND_RUNS, NothingToDraw, Row, Tables
 from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import by_function, functions_of
 from analysis.report.html import legend
 from analysis.report.plots import Axes, band, dot, line, painted, plot, with_margin
 from schema.errors import counted
-
-Tables = Mapping[str, pa.Table]
-Row = Mapping[str, Any]
 
 _MANY_RUNS = 40
 """Runs from which on only the best robot of each is marked."""

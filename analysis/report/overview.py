@@ -3,10 +3,10 @@
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from statistics import mean
-from typing import Any
 
 import pyarrow as pa
 
+from analysis.figures.forms import Row, Tables
 from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import (
     fitness_unit,
@@ -15,9 +15,6 @@ from analysis.measures.fitness_functions import (
 from analysis.measures.populations import failures_as_best, last_rows
 from analysis.report.fitness import run_names
 from analysis.report.html import capitalised, cell, duration, folded, plural, table
-
-Tables = Mapping[str, pa.Table]
-Row = Mapping[str, Any]
 
 _MOST_LINES = 3
 """Differing experiments, or runs of arenas, that are described without a fold."""

@@ -7,12 +7,12 @@ from datetime import datetime
 from html import escape
 from importlib.resources import files
 
-import pyarrow as pa
 import pyarrow.compute as pc
 from PIL import Image
 
 from analysis.figures.catalogue import DrawnFigure, Section
 from analysis.figures.figure_writer import GAITS, PART_COLOURS, Drawings, Film
+from analysis.figures.forms import Tables
 from analysis.figures.style import in_order, label
 from analysis.measures.fitness_functions import axis_text
 from analysis.measures.outputs import OUTPUTS
@@ -59,8 +59,6 @@ _LAST = (
     ),
 )
 """Number of the figure, title and text of the interactive plots."""
-
-Tables = Mapping[str, pa.Table]
 
 
 def report(

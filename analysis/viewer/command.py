@@ -7,7 +7,7 @@ from analysis.measures.load import Run
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
-from analysis.viewer.entities import name_of, recording_name
+from analysis.viewer.entities import recording_name
 from analysis.viewer.flags import LAST_S
 from analysis.viewer.live import LiveSource
 from analysis.viewer.motion import (
@@ -125,7 +125,7 @@ def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) 
     if not is_online and (options.start, options.until) != (None, None):
         raise ViewerError("--from and --until: this run has no arena and no poses")
     if options.follow and options.follow not in born:
-        name = name_of(options.follow)
+        name = options.follow.name
         raise ViewerError(f"--follow {name}: no robot of that name was born")
 
 
@@ -152,7 +152,7 @@ def _wanted(options: argparse.Namespace) -> list[BirthId]:
     if None not in options.robot:
         return list(options.robot)
     best, island, fitness = best_evaluated(options.run)
-    line = f"best ever evaluated: {name_of(best)}, fitness {rounded(fitness)}"
+    line = f"best ever evaluated: {best.name}, fitness {rounded(fitness)}"
     if island != best.island:
         line += f" on island {island}; shown as on its island of birth"
     tell_user(line)

@@ -23,11 +23,6 @@ class AncestryNode:
     is_alive: bool = True
 
 
-def name_of(birth: BirthId) -> str:
-    """Return the name of an individual as ISLAND:BIRTH."""
-    return f"{birth.island}:{birth.number}"
-
-
 def recording_name(experiment: str, folder: str) -> str:
     """Return the name of a run's recording.
 

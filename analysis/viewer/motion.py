@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.viewer.body import BoxModel, place_rows
-from analysis.viewer.entities import TimePoint, motion_path, name_of
+from analysis.viewer.entities import TimePoint, motion_path
 from analysis.viewer.recording import Recording, ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
@@ -50,8 +50,7 @@ def selected_robots(
     found: dict[BirthId, None] = {}
     for birth in wanted:
         if birth not in parents:
-            name = name_of(birth)
-            raise ViewerError(f"--robot {name}: no robot of that name was born")
+            raise ViewerError(f"--robot {birth.name}: no robot of that name was born")
         found[birth] = None
         last = birth
         while has_ancestry and parents[last]:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from analysis.viewer.body import BoxModel, Float32s
-from analysis.viewer.entities import AncestryNode, TimePoint, island_path, name_of
+from analysis.viewer.entities import AncestryNode, TimePoint, island_path
 from analysis.viewer.ground import Surface
 from analysis.viewer.scene import Scene
 from schema.errors import RevolveError
@@ -216,7 +216,7 @@ class Recording:
         self._at(when)
         births = [each.birth for each in entries]
         shown = {one.birth for one in births}
-        names = [name_of(one.birth) for one in births]
+        names = [one.birth.name for one in births]
         columns = [each.order - entries[0].order for each in entries]
         ranks = [one.rank for one in births]
         nodes = rr.GraphNodes(
@@ -228,7 +228,7 @@ class Recording:
             show_labels=False,
         )
         edges = [
-            (name_of(parent), name_of(one.birth))
+            (parent.name, one.birth.name)
             for one in births
             for parent in one.parents
             if parent in shown

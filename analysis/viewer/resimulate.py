@@ -13,7 +13,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.load import Run
-from analysis.viewer.entities import name_of
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
 from schema.agent.platform_tag import platform_tag
@@ -105,7 +104,7 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
     settings = read_evaluation_settings(evaluation_settings(own))
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
-        raise ViewerError(f"robot {name_of(birth)}: no evaluation is recorded")
+        raise ViewerError(f"robot {birth.name}: no evaluation is recorded")
     number = _fittest(rows)
     recorded = rows[number]
     if recorded["simulated_s"] is not None:
@@ -123,7 +122,7 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
         for name in _COMPARED
         if recorded[name] != getattr(evaluation, name)
     ]
-    name = name_of(birth)
+    name = birth.name
     if len(rows) > 1:
         name += f", evaluation {number + 1} of {len(rows)}, the fittest"
     if own.robust is None:
@@ -151,7 +150,7 @@ def _in_arena(
     recorded = {birth: _rows_of(folder, "poses", birth) for birth in here}
     for birth, rows in recorded.items():
         if not rows.num_rows:
-            raise ViewerError(f"robot {name_of(birth)}: no pose is recorded")
+            raise ViewerError(f"robot {birth.name}: no pose is recorded")
     span = pc.min_max(pa.concat_tables(recorded.values())["sim_time_s"]).as_py()
     settings, past = simulators.history(folder, island, span["min"])
     samples, motion = [], []
@@ -171,7 +170,7 @@ def _in_arena(
     for birth, rows in recorded.items():
         again = replayed.filter(born_as(birth))
         differing = _differences(rows, again, is_equal=is_equal)
-        verdict = _verdict(name_of(birth), differing, platform)
+        verdict = _verdict(birth.name, differing, platform)
         motions[birth] = Motion(birth, frames.filter(born_as(birth)), verdict)
     return motions
 

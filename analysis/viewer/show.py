@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from analysis.viewer.body import BoxModel, Float32s, box_model, place_rows
-from analysis.viewer.entities import TimePoint, name_of, robot_path
+from analysis.viewer.entities import TimePoint, robot_path
 from analysis.viewer.gallery import Gallery
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.recording import Recording
@@ -198,8 +198,8 @@ class Show:
             return
         if one.sim_time_s is not None:
             self._clocks[one.birth.island].add(one.births, one.sim_time_s)
-        parents = " and ".join(map(name_of, one.parents))
-        text = f"{name_of(one.birth)} is born{' to ' if parents else ''}{parents}"
+        parents = " and ".join(parent.name for parent in one.parents)
+        text = f"{one.birth.name} is born{' to ' if parents else ''}{parents}"
         self._recording.log_line(text, TimePoint(one.sim_time_s, one.births), "INFO")
 
     def _departed(self, gone: Death) -> None:
@@ -208,7 +208,7 @@ class Show:
         self._gone[gone.island, gone.birth] = gone
         self._leave(gone)
         self._lineage.remove(gone)
-        text = f"{name_of(gone.birth)} is gone: {gone.reason}"
+        text = f"{gone.birth.name} is gone: {gone.reason}"
         self._recording.log_line(text, TimePoint(gone.sim_time_s, gone.births), "WARN")
 
     def _level(self, level: Level) -> None:
@@ -228,7 +228,7 @@ class Show:
         if key in self._moves:
             return
         self._moves.add(key)
-        name = name_of(migrant.birth)
+        name = migrant.birth.name
         text = f"{name} migrates from island {migrant.island} to {migrant.to}"
         when = TimePoint(migrant.sim_time_s, migrant.births)
         self._recording.log_line(text, when, "INFO")

@@ -16,6 +16,7 @@ from coordinator.storage.disk import replace_text
 from coordinator.storage.hints import keep_flags
 from schema.agent.access import Certificate
 from schema.agent.address import ADDRESS
+from schema.agent.command import name_at
 from schema.agent.log import tell_user
 from schema.agent.network import Agent, Tls
 from schema.agent.platform_tag import platform_tag
@@ -92,12 +93,13 @@ def connected_agents(
         yield LocalAgents(deployment.answers, platform_tag()), {}
         return
     with ExitStack() as stack:
+        hub = deployment.connect or ""
         network = stack.enter_context(
             Network(
-                name=unique_name(_own_name(deployment)),
+                name=unique_name(name_at(hub, deployment.tls, "coordinator")),
                 fleet=deployment.fleet,
                 listen=(deployment.listen,) if deployment.listen else (),
-                connect=deployment.connect or "",
+                connect=hub,
                 tls=deployment.tls,
                 certificates=deployment.certificates,
                 give_up_after_s=deployment.give_up_after_s,
@@ -134,15 +136,6 @@ def connected_agents(
 def _terminate(pools: Iterable[ProcessPool]) -> None:
     for pool in pools:
         pool.terminate()
-
-
-def _own_name(deployment: Deployment) -> str:
-    """Return the coordinator's name: that of its certificate at a hub with TLS."""
-    if deployment.tls and (deployment.connect or "").startswith("tls/"):
-        from schema.agent.certificate import certificate_name
-
-        return certificate_name(deployment.tls.certificate)
-    return "coordinator"
 
 
 def _remove(file: Path, text: str) -> None:

@@ -27,10 +27,10 @@ def duration(seconds: float | None) -> str:
 
 def run_details(run: RunStatus) -> str:
     """Return the best fitness of a run, and the state of its arenas."""
-    return f"{best_of(run)}{about_arenas(run)}"
+    return f"{best_text(run)}{about_arenas(run)}"
 
 
-def best_of(counted: RunStatus | IslandStatus) -> str:
+def best_text(counted: RunStatus | IslandStatus) -> str:
     """Return the best fitness of the living robots, per island if there are few."""
     islands = counted.islands if isinstance(counted, RunStatus) else (counted,)
     bests = [island.best for island in islands]

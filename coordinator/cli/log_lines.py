@@ -102,7 +102,7 @@ def _head(event: JournalledEvent, island: int, birth: BirthId | None) -> Fields:
     is_order = isinstance(event, Commanded)
     name = "operator-order" if is_order else _words(event).replace(" ", "-")
     head: Fields = {"event": name, "island": island}
-    return head if birth is None else {**head, "birth": _id(birth)}
+    return head if birth is None else {**head, "birth": birth.name}
 
 
 def _words(named: object) -> str:
@@ -143,7 +143,7 @@ def _advance(event: Advanced) -> Fields:
     """Return the fields of an advance; counts of zero are left out."""
     advance = event.advance
     counts = {
-        "diverged": [_id(one.birth) for one in advance.casualties],
+        "diverged": [one.birth.name for one in advance.casualties],
         "contacts": len(advance.touches),
         "pose_rows": event.pose_rows,
     }
@@ -185,10 +185,6 @@ def _worker(provenance: Provenance) -> Fields:
     """Return the fields of a provenance; the agent is a worker."""
     fields = asdict(provenance)
     return {"worker": fields.pop("agent"), **fields}
-
-
-def _id(birth: BirthId) -> str:
-    return f"{birth.island}:{birth.number}"
 
 
 def line(fields: Fields) -> str:

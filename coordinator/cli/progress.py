@@ -17,7 +17,7 @@ from rich.table import Column
 
 from coordinator.cli.format import (
     about_arenas,
-    best_of,
+    best_text,
     duration,
     missing_agents,
     run_details,
@@ -130,10 +130,10 @@ class Display:
         else:
             (run,) = status.runs
             name = run.name
-            rows[""] = (run, f"{left}, {best_of(run)}, {rates}{about_arenas(run)}")
+            rows[""] = (run, f"{left}, {best_text(run)}, {rates}{about_arenas(run)}")
             islands = run.islands if 1 < len(run.islands) <= MOST_BARS else ()
             for number, island in enumerate(islands):
-                rows[f"  island {number}"] = (island, best_of(island))
+                rows[f"  island {number}"] = (island, best_text(island))
         for gone in [key for key in self._tasks if key not in rows]:
             self._progress.remove_task(self._tasks.pop(gone))
         for key, (shown, what) in rows.items():

@@ -1,6 +1,5 @@
 """``revolve robot random``: random robots as evolution starts with."""
 
-import sys
 from pathlib import Path
 
 from coordinator.evolution.breeding import Breeder
@@ -67,7 +66,3 @@ def parser(_command: str = "robot random") -> Flags:
         help="experiment whose settings to use (default: %(default)s)",
     )
     return flags
-
-
-if __name__ == "__main__":
-    sys.exit(main(["robot random", *sys.argv[1:]]))

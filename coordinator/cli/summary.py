@@ -20,17 +20,12 @@ from schema.agent.log import tell_user, warn_user
 from schema.agent.screen import missing_screen
 from schema.errors import ExperimentError, InvalidRobot, counted, rounded
 from schema.experiment.brains import types_of
-from schema.experiment.document import (
-    Experiment,
-    body_space,
-    island_count,
-    island_experiment,
-)
+from schema.experiment.document import Experiment, body_space, island_experiments
 from schema.experiment.file import own_experiment
 from schema.experiment.fitness_keys import fitness_text
 from schema.formats.files import BEST
 from schema.formats.yaml import robot_to_yaml
-from schema.robot.robot import Robot
+from schema.robot.robot import Robot, motor_count
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import born_as, read_table
 from schema.tables.last_populations import Row, best_of, last_populations
@@ -100,13 +95,9 @@ def restore_best(folder: Path) -> None:
 def _is_extinct(folder: Path, experiment: Experiment) -> bool:
     """Return whether all islands of a finished run are extinct arenas."""
     born = Counter(read_table(folder, "births")["island"].to_pylist())
-    islands = [
-        island_experiment(experiment, number)
-        for number in range(island_count(experiment))
-    ]
     return all(
         own.arena is not None and born[number] < own.births
-        for number, own in enumerate(islands)
+        for number, own in enumerate(island_experiments(experiment))
     )
 
 
@@ -184,8 +175,7 @@ def _counted_as_zero(run: RunSession, last: Sequence[Row]) -> list[str]:
 def judged_apart(experiment: Experiment) -> list[str]:
     """Return a line if the fitness of different islands cannot be compared."""
     each: dict[str, list[str]] = {}
-    for number in range(island_count(experiment)):
-        own = island_experiment(experiment, number)
+    for number, own in enumerate(island_experiments(experiment)):
         text = fitness_text({"fitness": to_builtins(own.fitness)})
         text += " in an arena" * (own.arena is not None)
         each.setdefault(text, []).append(str(number))
@@ -203,7 +193,7 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
     birth = individual(best)
     folder, space = run.held.path, body_space(run.experiment.space)
     rank, robot = _read_best(folder, best, run.experiment)
-    motors = sum(space[part.kind].outputs for part in robot.parts)
+    motors = motor_count(robot, space)
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
     lives = f" on island {best['island']}" if best["island"] != birth.island else ""
     what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
@@ -258,11 +248,10 @@ def _windows(folder: Path, arenas: Sequence[Experiment]) -> list[str]:
     if not best.num_rows:
         return [line]
     (row,) = best.slice(0, 1).to_pylist()
-    birth = individual(row)
     return [
         (
             f"{line}; the best window of the whole run is that of robot "
-            f"{birth.island}:{birth.number} that ended at {row['sim_time_s']:g} s: "
+            f"{individual(row).name} that ended at {row['sim_time_s']:g} s: "
             f"fitness {rounded(row['fitness'])}"
         )
     ]

@@ -108,11 +108,6 @@ class Dispatch:
         }
 
     @property
-    def malformed(self) -> int:
-        """Answers that did not decode or did not fit their job."""
-        return self._faults.total("malformed")
-
-    @property
     def pending(self) -> int:
         """Number of jobs that are requested and not delivered."""
         return len(self._jobs)

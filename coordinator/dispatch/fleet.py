@@ -137,16 +137,6 @@ class Fleet:
         self._advancing: set[int] = set()
 
     @property
-    def malformed(self) -> int:
-        """Answers that did not decode or did not fit their request."""
-        return self.faults.total("malformed")
-
-    @property
-    def late(self) -> int:
-        """Answers that came after another agent's, or after their run had ended."""
-        return self.faults.total("late")
-
-    @property
     def open(self) -> int:
         """How many jobs and advances are requested and not done."""
         return self.dispatch.pending + len(self._advancing)

@@ -27,8 +27,7 @@ from schema.experiment.document import (
     Encoding,
     Experiment,
     Selection,
-    island_count,
-    island_experiment,
+    island_experiments,
 )
 from schema.experiment.kinds import Kind, Use
 from schema.experiment.learning import Learning
@@ -215,8 +214,7 @@ def _encoding_by_hand(path: str) -> Use:
 
 
 def _encodings(experiment: Experiment) -> Iterator[Use]:
-    numbers = range(island_count(experiment))
-    for own in dict.fromkeys(island_experiment(experiment, each) for each in numbers):
+    for own in dict.fromkeys(island_experiments(experiment)):
         yield _encoding(experiment, own)
 
 

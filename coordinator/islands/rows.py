@@ -9,7 +9,7 @@ from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.parts import BodySpace
 from schema.robot.genome import Node, walk
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
+from schema.robot.robot import Robot, motor_count
 from schema.tables.columns import Row
 
 
@@ -93,8 +93,6 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
 
     Source: thesis section 6.3; the code of the original.
     """
-    kinds = [space[part.kind] for part in robot.parts]
-    layers = [neuron.layer for neuron in robot.brain.neurons]
     connections = len(robot.brain.connections)
     if isinstance(genome, Node):
         connections = sum(len(node.connections) for node, _, _ in walk(genome))
@@ -103,14 +101,14 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     return {
         "parts": len(robot.parts),
         "joints": sum(
-            kind.shape(part.parameters).joint is not None
-            for kind, part in zip(kinds, robot.parts, strict=True)
+            space[part.kind].shape(part.parameters).joint is not None
+            for part in robot.parts
         ),
-        "motors": sum(kind.outputs for kind in kinds),
+        "motors": motor_count(robot, space),
         "extremities": len(robot.parts) + 1 - len(parents),
-        "inputs": layers.count("input"),
-        "outputs": layers.count("output"),
-        "hidden": layers.count("hidden"),
+        "inputs": robot.brain.count("input"),
+        "outputs": robot.brain.count("output"),
+        "hidden": robot.brain.count("hidden"),
         "connections": connections,
     }
 

@@ -197,11 +197,6 @@ class Network:
         self._outlet = Outlet()
 
     @property
-    def malformed(self) -> int:
-        """Messages that did not decode and were dropped."""
-        return self.faults.total("malformed")
-
-    @property
     def refused(self) -> Mapping[str, str]:
         """Agents that may not take part, and why."""
         return self._membership.refused

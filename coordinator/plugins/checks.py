@@ -40,8 +40,7 @@ from schema.experiment.document import (
     Arena,
     Experiment,
     body_space,
-    island_count,
-    island_experiment,
+    island_experiments,
     references,
 )
 from schema.experiment.file import (
@@ -145,8 +144,7 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
                 use.check(use.load())
             except ExperimentError as error:
                 raise _with_hint(error, experiment) from None
-    for number in range(island_count(experiment)):
-        own = island_experiment(experiment, number)
+    for own in island_experiments(experiment):
         _check_births(own.arena)
         if not is_own(own.fitness.function):
             check_fitness_keys(own.fitness)
@@ -247,7 +245,7 @@ def check_here(
         kind: name of the kind that the words are of; None: detected.
         output: gets the steps as lines of JSON.
         limit_s: time after which an import or a check ends this process [s].
-        births: as for ``read_experiment``.
+        births: as for ``experiments_of``.
     """
     is_fine = True
 
@@ -312,8 +310,8 @@ def _check_document(
     for experiment in read_experiments((source,), births):
         with _time_limit(limit_s), naming(source):
             check_built_in(experiment, kinds)
-            for number in range(island_count(experiment)):
-                check_fitness_keys(island_experiment(experiment, number).fitness)
+            for own in island_experiments(experiment):
+                check_fitness_keys(own.fitness)
             types = body_space(experiment.space)
         for kind in types.values():
             for name in kind.not_on:

@@ -4,7 +4,7 @@ from coordinator.arena.arena import Arena
 from coordinator.islands.island import Island
 from coordinator.islands.migration import MigrationEpochs, Neighbours
 from coordinator.islands.topology import Edge, connections
-from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.document import Experiment, island_experiments
 from schema.experiment.settings import evaluation_settings
 
 
@@ -21,11 +21,10 @@ def archipelago(
     Raises:
         ExperimentError: no graph meets the topology.
     """
-    count = island_count(experiment)
-    owns = [island_experiment(experiment, number) for number in range(count)]
+    owns = island_experiments(experiment)
     edges: tuple[Edge, ...] = ()
     if experiment.migration is not None:
-        edges = connections(experiment.migration, count, seed, run)
+        edges = connections(experiment.migration, len(owns), seed, run)
     # Islands that differ in these evaluate robots differently.
     worlds = [(own.arena is None, evaluation_settings(own)) for own in owns]
     islands: dict[int, Island | Arena] = {}

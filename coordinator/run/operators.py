@@ -172,8 +172,7 @@ def _check_place(place: tuple[float, float] | None, experiment: Experiment) -> N
 
 def _birth_name(birth: BirthId, island: int) -> str:
     """Return the name of an arena's robot: that of an immigrant has its island."""
-    origin = "" if birth.island == island else f"{birth.island}:"
-    return f"{origin}{birth.number}"
+    return str(birth.number) if birth.island == island else birth.name
 
 
 def _list(arena: Arena, island: int) -> str:

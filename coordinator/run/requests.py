@@ -37,7 +37,7 @@ from schema.parts import BodySpace
 from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
-from schema.robot.robot import Robot
+from schema.robot.robot import Robot, motor_count
 from schema.wire.codec import (
     Answer,
     decode_answer,
@@ -332,7 +332,7 @@ def _check_report(report: Report, robot: Robot, space: BodySpace) -> None:
         raise impossible(
             f"report: intersections must be ascending pairs of 0..{count - 1}"
         )
-    motors = sum(space[part.kind].outputs for part in robot.parts)
+    motors = motor_count(robot, space)
     if report.motors != motors:
         raise impossible(f"report: motors must be {motors}, got {report.motors}")
     if report.is_viable == bool(pairs or not motors) or (

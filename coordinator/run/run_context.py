@@ -7,12 +7,7 @@ from typing import Self
 from msgspec import structs
 
 from coordinator.dispatch.events import Client
-from schema.experiment.document import (
-    Experiment,
-    body_space,
-    island_count,
-    island_experiment,
-)
+from schema.experiment.document import Experiment, body_space, island_experiments
 from schema.experiment.identity import Origin
 from schema.experiment.settings import (
     arena_settings,
@@ -46,10 +41,7 @@ class RunContext:
     @classmethod
     def of(cls, run: str, epoch: int, experiment: Experiment, origin: Origin) -> Self:
         """Return the context of a run of an experiment."""
-        experiments = {
-            number: island_experiment(experiment, number)
-            for number in range(island_count(experiment))
-        }
+        experiments = dict(enumerate(island_experiments(experiment)))
         return cls(
             Client(run, epoch),
             origin,

@@ -10,7 +10,7 @@ from coordinator.storage.hints import command
 from coordinator.storage.journal import is_begun
 from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
-from schema.experiment.document import island_count, island_experiment
+from schema.experiment.document import island_experiments
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
 from schema.tables.description import STATE, read_state
@@ -95,8 +95,7 @@ def unbegun_status(folder: Path, details: RunDetails) -> RunStatus:
     """
     experiment = experiment_from_text(details.document)
     islands = tuple(
-        IslandStatus(0, island_experiment(experiment, number).births, None, 0)
-        for number in range(island_count(experiment))
+        IslandStatus(0, own.births, None, 0) for own in island_experiments(experiment)
     )
     where = str(folder.resolve())
     return RunStatus(where, details.name, details.run, "waiting", islands=islands)

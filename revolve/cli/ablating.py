@@ -5,7 +5,8 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from analysis.comparison.ablation import RANDOM, summary, table_of
+from analysis.comparison.ablation import COLUMNS, RANDOM, summary
+from analysis.comparison.robustness import table_of
 from analysis.figures.ablation import ablation
 from coordinator.evolution.generation import random_brain
 from coordinator.evolution.random_streams import Purpose, stream
@@ -44,7 +45,7 @@ def ablate_runs(
             )
     jobs = [job for one in chosen for job in _jobs(one, brains)]
     write_results(
-        lambda: table_of(reevaluated(jobs, workers)),
+        lambda: table_of(reevaluated(jobs, workers), COLUMNS),
         folders,
         out / STEM,
         summary,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from analysis.comparison.robustness import summary, table_of
+from analysis.comparison.robustness import COLUMNS, summary, table_of
 from analysis.figures.robustness import robustness
 from revolve.cli.reevaluation import Job, reevaluated, write_results
 from revolve.cli.winners import Chosen, chosen_robots
@@ -28,7 +28,7 @@ def rejudge_runs(folders: Sequence[Path], out: Path, workers: int) -> None:
     """
     jobs = [job for one in chosen_robots(folders) for job in _jobs(one)]
     write_results(
-        lambda: table_of(reevaluated(jobs, workers)),
+        lambda: table_of(reevaluated(jobs, workers), COLUMNS),
         folders,
         out / STEM,
         summary,

@@ -25,7 +25,6 @@ _ALL = (
 _OWN = ("put", "delete", "reply", "declare_queryable", "liveliness_token")
 _SERVE = ("reply", "declare_queryable", "liveliness_token", "declare_subscriber")
 _WATCH = ("liveliness_query", "declare_liveliness_subscriber")
-_HEAR = ("put", "delete", "declare_subscriber")
 _MOST_BYTES = 1 << 20
 
 Flow = Literal["ingress", "egress"]

@@ -1,4 +1,4 @@
-"""Name, expiry and validity of a certificate file.
+"""Name and validity of a certificate file.
 
 Importing this module raises ``NetworkError`` where ``cryptography`` is not installed:
 import it only where there are certificates.
@@ -32,15 +32,6 @@ def certificate_name(file: str) -> str:
     if not names:
         raise NetworkError(f"{file}: the certificate has no common name")
     return str(names[0].value)
-
-
-def expiry(file: str) -> datetime:
-    """Return when a certificate expires, in UTC.
-
-    Raises:
-        NetworkError: the file holds no certificate.
-    """
-    return _read(file).not_valid_after_utc
 
 
 @dataclass(frozen=True, slots=True)

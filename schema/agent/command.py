@@ -292,6 +292,19 @@ def _name(given: str | None, connect: str, tls: Tls | None) -> str:
     return check_name(name, tls.certificate)
 
 
+def name_at(hub: str, tls: Tls | None, default: str) -> str:
+    """Return the name of a process: at a hub with TLS that of its certificate.
+
+    Raises:
+        NetworkError: the file holds no certificate with a common name.
+    """
+    if tls is None or not hub.startswith("tls/"):
+        return default
+    from schema.agent.certificate import certificate_name
+
+    return certificate_name(tls.certificate)
+
+
 def tell_restart(role: Role) -> str:
     """Return a line about a process that ended.
 

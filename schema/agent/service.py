@@ -20,11 +20,12 @@ from typing import Any
 import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
+from schema.agent.fair_queue import FairQueue
 from schema.agent.inbox import Inbox
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
-from schema.agent.request_handler import FairQueue, ReplyCounts, Server
+from schema.agent.request_handler import ReplyCounts, Server
 from schema.agent.supervision import LOOK_S, ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import chain
 from math import ceil
 
-from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.migration import Migration, migrant_count
 
 _UNCONNECTED = (
@@ -32,7 +32,7 @@ def migration_problems(experiment: Experiment) -> Iterator[str]:
         yield "migration: needs at least two islands; add [[islands]]"
     yield from _edges_problems(migration, count)
     yield from _degree_problems(migration, count)
-    islands = [island_experiment(experiment, number) for number in range(count)]
+    islands = island_experiments(experiment)
     for number, island in enumerate(islands):
         yield from _island_problems(island, migration, number)
     if migration.epoch_s is not None and not any(island.arena for island in islands):

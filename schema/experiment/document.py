@@ -548,6 +548,12 @@ def island_experiment(experiment: Experiment, number: int) -> Experiment:
     return structs.replace(experiment, islands=(), **changes)
 
 
+def island_experiments(experiment: Experiment) -> tuple[Experiment, ...]:
+    """Return the settings of all islands, by number; see ``island_experiment``."""
+    numbers = range(island_count(experiment))
+    return tuple(island_experiment(experiment, number) for number in numbers)
+
+
 def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
     """Return the position of the light of a world [m]; None is no light."""
     own = None if arena is None else arena.light

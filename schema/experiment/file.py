@@ -18,12 +18,7 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError, cut, expectation, nearest, shown, unreadable
 from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
-from schema.experiment.document import (
-    Experiment,
-    island_count,
-    island_experiment,
-    references,
-)
+from schema.experiment.document import Experiment, island_experiments, references
 from schema.experiment.environment import (
     add_gap_contacts,
     is_mjcf,
@@ -56,19 +51,17 @@ _LONG_NUMBER = re.compile(rf"(?<!\w)[0-9][0-9A-Fa-f_xob]{{{MOST_DIGITS}}}")
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_KEY_PART}){{{MOST_KEY_PARTS}}}")
 
 
-def read_experiment(source: str, births: int | None = None) -> Experiment:
+def read_experiment(source: str) -> Experiment:
     """Return a shipped experiment by its name, or one from a TOML file.
 
     Args:
         source: ``scenario1``, or a path that ends in ``.toml``.
-        births: of ``--births``, in place of those of the document.
 
     Raises:
         ExperimentError: no such experiment or file, or an invalid document.
     """
-    tables, where = _tables(source, births)
-    named = where if births is None else f"{where} with --births {births}"
-    return _checked(_converted(tables, where), where, named)
+    text, where = source_text(source)
+    return experiment_from_tables(parse_toml(text, where), where)
 
 
 def _tables(source: str, births: int | None) -> tuple[dict[str, Any], str]:
@@ -89,7 +82,7 @@ def experiments_of(source: str, births: int | None = None) -> tuple[Experiment, 
 
     Args:
         source: as for ``read_experiment``.
-        births: as for ``read_experiment``.
+        births: of ``--births``, in place of those of the document.
 
     Raises:
         ExperimentError: as of ``read_experiment``, at any point of the sweep.
@@ -177,13 +170,9 @@ def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
         ExperimentError: an unknown key (the nearest is named); a value of a wrong type
             or outside its range; inconsistent values.
     """
-    return _checked(_converted(document, where), where, where)
-
-
-def _checked(experiment: Experiment, where: str, named: str) -> Experiment:
-    """Return an experiment after the checks across its keys."""
+    experiment = _converted(document, where)
     allow_references(references(experiment), Path(where).parent)
-    check_experiment(experiment, named)
+    check_experiment(experiment, where)
     return experiment
 
 
@@ -207,7 +196,7 @@ def draft_experiments(source: str, births: int | None = None) -> tuple[Experimen
 
     Args:
         source: as for ``read_experiment``.
-        births: as for ``read_experiment``.
+        births: as for ``experiments_of``.
 
     Raises:
         ExperimentError: as of ``own_references``.
@@ -250,7 +239,7 @@ def _refuse_equal(experiments: Sequence[Experiment], where: str) -> None:
     """Raise if every island replaces what the experiments of a sweep differ in."""
     first: dict[bytes, str] = {}
     for one in experiments:
-        islands = [island_experiment(one, n) for n in range(island_count(one))]
+        islands = island_experiments(one)
         plain = [replace(each, name="", sweep=None) for each in islands]
         known = first.setdefault(msgspec.json.encode(plain), one.name)
         if known != one.name:
@@ -277,7 +266,7 @@ def own_references(source: str, births: int | None = None) -> list[str]:
 
     Args:
         source: as for ``read_experiment``; a shipped one has none of its own.
-        births: as for ``read_experiment``.
+        births: as for ``experiments_of``.
 
     Raises:
         ExperimentError: the file cannot be read, or has an unknown key or a value of a

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from schema.errors import ExperimentError
 from schema.experiment.brains import types_of
-from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.document import Experiment, island_experiment, island_experiments
 from schema.experiment.file import own_experiment, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.files import BEST, MJCF_ENDING, read_robot, settings_of
@@ -131,10 +131,7 @@ def _allow_run_of(file: Path) -> bool:
 
 def _differs(experiment: Experiment) -> bool:
     """Return whether robots are evaluated in different ways on two islands."""
-    each = [
-        island_experiment(experiment, number)
-        for number in range(island_count(experiment))
-    ]
+    each = island_experiments(experiment)
     first = (evaluation_settings_of(each[0]), each[0].arena)
     return any((evaluation_settings_of(one), one.arena) != first for one in each[1:])
 

@@ -13,3 +13,8 @@ class BirthId(NamedTuple):
 
     island: IslandNumber
     number: BirthNumber
+
+    @property
+    def name(self) -> str:
+        """ISLAND:NUMBER, as commands and pictures name an individual."""
+        return f"{self.island}:{self.number}"

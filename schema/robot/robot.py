@@ -52,6 +52,11 @@ class Robot:
     brain: Brain = NO_BRAIN
 
 
+def motor_count(robot: Robot, space: BodySpace) -> int:
+    """Return the number of motors of a robot of these part types."""
+    return sum(space[part.kind].outputs for part in robot.parts)
+
+
 def check_tree(parts: Sequence[Part]) -> None:
     """Raise unless parts form a tree; types are not checked.
 

@@ -16,7 +16,7 @@ from queue import Empty
 import zenoh
 
 from schema.agent.inbox import Inbox
-from schema.agent.network import Agent, client_config
+from schema.agent.network import client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.service import session_config
 from schema.agent.supervisor import prepare_process
@@ -31,21 +31,23 @@ GOOD_ANSWERS = 3
 def main(address: str, behaviour: str) -> None:
     """Serve until SIGTERM."""
     prepare_process()
-    from worker.serve.jobs import Jobs  # noqa: PLC0415 - imports numpy
+    # They import numpy.
+    from worker.arena.world import World  # noqa: PLC0415
+    from worker.serve.jobs import Jobs  # noqa: PLC0415
+    from worker.serve.shards import Shards  # noqa: PLC0415
 
-    answer = Jobs().answer
+    answer = Jobs(Shards(World)).answer
 
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
     name = unique_name("odd")
     member = Member("default", "worker", name)
-    agent = Agent("worker", name, address, version=wire_version())
     info = pb.AgentInfo(
-        agent=agent.name,
-        kind=agent.role,
+        agent=name,
+        kind="worker",
         slots=1,
         platform=platform_tag(),
-        version=agent.version,
+        version=wire_version(),
         shards=8,
         cores=1,
     ).SerializeToString()

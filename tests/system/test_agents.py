@@ -27,7 +27,7 @@ ROLES = ["worker", "analyzer"]
 @contextmanager
 def command(*words: str) -> Iterator[subprocess.Popen[str]]:
     with subprocess.Popen(
-        [sys.executable, "-m", *words],
+        [sys.executable, "-m", "revolve", *words],
         cwd=ROOT,
         stdin=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -144,7 +144,7 @@ def test_wrong_flag_is_reported_in_one_line(
     role: str, flags: str, complaint: str
 ) -> None:
     result = subprocess.run(
-        [sys.executable, "-m", role, *flags.split()],
+        [sys.executable, "-m", "revolve", role, *flags.split()],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -157,7 +157,7 @@ def test_wrong_flag_is_reported_in_one_line(
 
 def test_help_shows_an_example() -> None:
     result = subprocess.run(
-        [sys.executable, "-m", "worker", "--help"],
+        [sys.executable, "-m", "revolve", "worker", "--help"],
         cwd=ROOT,
         capture_output=True,
         text=True,

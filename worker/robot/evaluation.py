@@ -37,6 +37,7 @@ from worker.robot.noise import Noise, NoiseSource
 from worker.robot.own_sensors import Surroundings
 from worker.robot.pushes import Pushes
 from worker.robot.recording import Channels, Recorder
+from worker.robot.solo_brains import solo_brain
 
 Watch = Callable[[mujoco.MjData], None]
 
@@ -224,7 +225,7 @@ class _ControlLoop:
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.evaluation_steps
         ticks = steps // simulation.brain_steps + 1
-        self._controller = controls.solo(robot.brain, ticks)
+        self._controller = solo_brain(controls, robot.brain, ticks)
         self._sensors.write_to(self._controller.readings)
         self._calibrated: Calibrated | None = None
         further: tuple[Floats, Floats] | None = None
@@ -242,8 +243,7 @@ class _ControlLoop:
         if settings.environment.push_impulse:
             environment = settings.environment
             self._pushes = Pushes(environment, simulation, identity, model, self.data)
-        inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
-        self.inputs = self._controller.readings[:, :inputs]
+        self.inputs = self._controller.readings[:, : robot.brain.count("input")]
         self._channels = Channels(robot, model, settings)
         self._recorder: Recorder | None = None
         if self._channels.names:

@@ -63,7 +63,7 @@ class Channels:
         free = model.joint("free").id
         # Without the free joints of the robot and of objects in scenery.
         joints = int((model.jnt_type != mujoco.mjtJoint.mjJNT_FREE).sum())
-        inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
+        inputs = robot.brain.count("input")
         sizes = {
             "core_attitude": 4,
             "joint_angle": joints,

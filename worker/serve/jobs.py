@@ -1,7 +1,7 @@
 """Requests of all kinds and their answers, as bytes."""
 
 import time
-from collections.abc import Callable
+from dataclasses import dataclass
 
 from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import body_space
@@ -14,39 +14,17 @@ from schema.wire.codec import (
     encode_answer,
     request_kind,
 )
-from worker.arena.world import World
 from worker.robot.evaluation import evaluate
 from worker.serve.calls import answer_call
 from worker.serve.checks import checked_evaluation
-from worker.serve.shards import Outlet, Shards
+from worker.serve.shards import Shards
 
 
+@dataclass(frozen=True, slots=True)
 class Jobs:
     """Evaluations and arena shards of one worker process."""
 
-    def __init__(
-        self,
-        *,
-        most_shards: int = 16,
-        threads: int = 1,
-        outlet: Outlet | None = None,
-        key_of: Callable[[int], str] = str,
-    ) -> None:
-        """Initialise without shards.
-
-        Args:
-            most_shards: arena shards to keep.
-            threads: that step clusters of an arena; results do not depend on it.
-            outlet: publishes each advance for live viewers.
-            key_of: returns the key of a shard's advances.
-        """
-        self._shards = Shards(
-            World,
-            most_held=most_shards,
-            threads=threads,
-            outlet=outlet,
-            key_of=key_of,
-        )
+    shards: Shards
 
     def answer(self, request: bytes) -> bytes:
         """Return the encoded answer to an encoded request of any kind.
@@ -56,7 +34,7 @@ class Jobs:
         """
         match request_kind(request):
             case "advance":
-                return self._shards.answer(request)
+                return self.shards.answer(request)
             case "call":
                 return answer_call(request)
             case "evaluation":

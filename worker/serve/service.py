@@ -7,7 +7,9 @@ from schema.agent.service import Outlet, own_agent, serve_as_process
 from schema.agent.supervision import ProcessSlot
 from schema.agent.topics import Member
 from schema.tables.arrow import skip_pandas
+from worker.arena.world import World
 from worker.serve.jobs import Jobs
+from worker.serve.shards import Shards
 
 
 def process(agent: Agent, slot: ProcessSlot) -> None:
@@ -16,10 +18,11 @@ def process(agent: Agent, slot: ProcessSlot) -> None:
     member = Member(own.fleet, own.role, own.name)
     outlet = Outlet()
     skip_pandas()
-    jobs = Jobs(
-        most_shards=own.shards,
+    shards = Shards(
+        World,
+        most_held=own.shards,
         threads=own.threads,
         outlet=outlet,
         key_of=lru_cache(member.poses),
     )
-    serve_as_process(jobs.answer, own, slot, outlet)
+    serve_as_process(Jobs(shards).answer, own, slot, outlet)

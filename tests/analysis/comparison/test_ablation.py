@@ -5,8 +5,8 @@ from typing import Any
 import plotnine as p9
 import pytest
 
-from analysis.comparison.ablation import schema, shares, summary, table_of
-from analysis.comparison.robustness import Row
+from analysis.comparison.ablation import COLUMNS, shares, summary
+from analysis.comparison.robustness import Row, table_of
 from analysis.figures.ablation import ablation
 from analysis.figures.forms import NothingToDraw
 
@@ -53,8 +53,8 @@ ROWS = [
 
 
 def test_shares_are_of_the_fitness_without_changes() -> None:
-    table = table_of(ROWS)
-    assert table.schema.equals(schema())
+    table = table_of(ROWS, COLUMNS)
+    assert table.schema.names == [*COLUMNS]
     assert all(field.metadata[b"meaning"] for field in table.schema)
     rows = table.to_pylist()
     assert rows[6]["share"] is None
@@ -64,7 +64,7 @@ def test_shares_are_of_the_fitness_without_changes() -> None:
 
 
 def test_line_about_a_run() -> None:
-    assert summary(table_of(ROWS)) == (
+    assert summary(table_of(ROWS, COLUMNS)) == (
         "the best, 0:7 (fitness 0.1000), keeps 96 % without touch, 50 % without imu, "
         "40 % without sensors, 80 % with sensors at their mean, 20 % with a random "
         "brain; the motor of part 4 carries 41 %, the motor of part 8 carries 0 %; "
@@ -73,20 +73,22 @@ def test_line_about_a_run() -> None:
         "1 of 18 evaluations failed"
     )
     arena = [row(7, HELD, "all", 0.1, recorded=0.3)]
-    assert summary(table_of(arena)) == (
+    assert summary(table_of(arena, COLUMNS)) == (
         "the best, 0:7 (fitness 0.1000 alone, 0.3000 recorded), keeps 100 % without "
         "sensors"
     )
     failed = [row(7, HELD, "all", None, undisturbed=None)]
-    assert summary(table_of(failed)) == (
+    assert summary(table_of(failed, COLUMNS)) == (
         "the best, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
     )
     still = [row(7, HELD, "all", 0.1, undisturbed=-0.2)]
-    assert summary(table_of(still)) == "the best, 0:7, has a fitness of -0.2000"
+    assert (
+        summary(table_of(still, COLUMNS)) == "the best, 0:7, has a fitness of -0.2000"
+    )
 
 
 def test_figure_orders_motors_by_what_robots_lose() -> None:
-    figure = ablation(table_of(ROWS))
+    figure = ablation(table_of(ROWS, COLUMNS))
     assert figure.scales[1].limits == [
         "random brains", "all motors dead", "2nd motor dead",
         "most important motor dead", "all sensors at mean", "all sensors at 0",
@@ -106,7 +108,7 @@ def test_figure_orders_motors_by_what_robots_lose() -> None:
     many = [
         row(7, DEAD, "one", 0.01 * n, "ActiveHinge", channel=n) for n in range(1, 23)
     ]
-    labels = ablation(table_of(many)).scales[1].limits
+    labels = ablation(table_of(many, COLUMNS)).scales[1].limits
     assert labels[-3:] == [
         "3rd motor dead",
         "2nd motor dead",
@@ -115,4 +117,4 @@ def test_figure_orders_motors_by_what_robots_lose() -> None:
     assert labels[0] == "22nd motor dead"
     assert {f"{n}th motor dead" for n in (11, 12, 13)} < set(labels)
     with pytest.raises(NothingToDraw, match="positive fitness"):
-        ablation(table_of([row(7, HELD, "all", 0.1, undisturbed=0.0)]))
+        ablation(table_of([row(7, HELD, "all", 0.1, undisturbed=0.0)], COLUMNS))

@@ -5,7 +5,7 @@ from typing import Any
 import plotnine as p9
 import pytest
 
-from analysis.comparison.robustness import Row, kept, schema, summary, table_of
+from analysis.comparison.robustness import COLUMNS, Row, kept, summary, table_of
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.robustness import robustness
 
@@ -32,8 +32,8 @@ ROWS = [
 
 
 def test_shares_are_of_the_fitness_without_changes() -> None:
-    table = table_of(ROWS)
-    assert table.schema.equals(schema())
+    table = table_of(ROWS, COLUMNS)
+    assert table.schema.names == [*COLUMNS]
     assert all(field.metadata[b"meaning"] for field in table.schema)
     shares = table["share"].to_pylist()
     assert shares[:4] == pytest.approx([1.0, 0.6, 0.4, 1.0])
@@ -43,24 +43,24 @@ def test_shares_are_of_the_fitness_without_changes() -> None:
 
 
 def test_groups_count_equally() -> None:
-    rows = table_of(ROWS).to_pylist()
+    rows = table_of(ROWS, COLUMNS).to_pylist()
     assert kept(rows[:3]) == pytest.approx((0.8 + 0.4) / 2)
     assert kept(rows[3:6]) == pytest.approx((1.0 + 1.2) / 2)
     assert kept(rows[6:]) is None
 
 
 def test_line_about_a_run() -> None:
-    assert summary(table_of(ROWS)) == (
+    assert summary(table_of(ROWS, COLUMNS)) == (
         "the best, 0:7, keeps 60 % of its fitness (0.1000) on average, from 40 % "
         "under friction changed to 100 % under start changed; the last population of 3 "
         "keeps 85 % in the median, 60 % to 110 %; 1 of 9 evaluations failed"
     )
     failed = [row(7, "start", None, None, is_last=False)]
-    assert summary(table_of(failed)) == (
+    assert summary(table_of(failed, COLUMNS)) == (
         "the best, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
     )
     still = [row(7, "start", 0.1, -0.2)]
-    assert summary(table_of(still)) == (
+    assert summary(table_of(still, COLUMNS)) == (
         "the best, 0:7, has a fitness of -0.2000 undisturbed"
     )
 
@@ -69,10 +69,10 @@ def test_figure_has_a_point_for_each_share() -> None:
     rows = [*ROWS, row(7, "start", 0.09, change="start 0.1 mm higher")]
     last, best = (
         sorted(layer._data["share"])
-        for layer in robustness(table_of(rows)).layers
+        for layer in robustness(table_of(rows, COLUMNS)).layers
         if isinstance(layer.geom, p9.geom_point)
     )
     assert last == pytest.approx([0.4, 0.6, 0.9, 1.0, 1.0, 1.2])
     assert best == pytest.approx([0.4, 0.6, 0.9, 1.0])
     with pytest.raises(NothingToDraw, match="positive fitness"):
-        robustness(table_of(ROWS[6:]))
+        robustness(table_of(ROWS[6:], COLUMNS))

@@ -207,7 +207,7 @@ def test_a_job_whose_wait_is_over_stays_with_its_worker(
     (delivered,), (done,) = fleet.listen(0.0, 4000.0).values()
     assert isinstance(delivered, Deliver)
     assert done == ShardDone(shard, first[1][1], b"x")
-    assert (fleet.late, fleet.open) == (0, 0)
+    assert (fleet.faults.total("late"), fleet.open) == (0, 0)
 
 
 def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
@@ -357,7 +357,7 @@ def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
             else Returned(number, agent, "error", reason="no such plug-in")
         ]
         ends = fleet.listen(0.0, float(10 * now_s))
-        assert fleet.malformed == (now_s if is_answer else 0)
+        assert fleet.faults.total("malformed") == (now_s if is_answer else 0)
         fleet.tell(Ticked(10 * now_s + 5.0))
     assert set(tried) == {"one", "two"}
     if not is_answer:
@@ -511,7 +511,11 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
     (moved, other, payload) = agents.sent[1]
     assert (other, payload) == ("two", b"whole True")
     fleet.tell(Returned(number, "one", "ok", b"bad"))
-    assert (fleet.late, fleet.malformed, fleet.open) == (1, 0, 1)
+    assert (
+        fleet.faults.total("late"),
+        fleet.faults.total("malformed"),
+        fleet.open,
+    ) == (1, 0, 1)
     agents.news = [Returned(moved, "two", "ok", b"x")]
     assert fleet.listen(0.0, 100.0) == {ARENA: [ShardDone(0, "two", b"x")]}
 

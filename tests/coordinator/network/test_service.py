@@ -210,7 +210,7 @@ def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
         network.ask("busy")
         assert until(network, has(1)) == [Progressed("busy")]
         assert network.receive(0.5) == []
-        assert network.malformed == 0
+        assert network.faults.total("malformed") == 0
 
 
 def test_a_worker_told_to_end_finishes_its_job_and_drops_the_next(
@@ -423,8 +423,8 @@ def test_a_malformed_message_is_counted_and_dropped(
             session.declare_queryable(peer.info, told, complete=True),
             session.liveliness().declare_token(peer.alive),
         ):
-            assert until(network, lambda _: network.malformed > 0) == []
-            assert network.malformed == 1
+            assert until(network, lambda _: network.faults.total("malformed") > 0) == []
+            assert network.faults.total("malformed") == 1
             with agent(network, "w"):
                 assert until(network, has(1)) == [Joined("w", "worker", 1, "p")]
 
@@ -484,7 +484,7 @@ def test_a_query_of_hostile_length_is_counted_and_dropped(network: Network) -> N
     config = zenoh.Config.from_json5(client_config(network.address))
     with zenoh.open(config) as session:
         replies = session.get(member.command, payload=bytes(OPERATOR_REQUEST_BYTES + 1))
-        until(network, lambda _: network.malformed > 0)
+        until(network, lambda _: network.faults.total("malformed") > 0)
         assert list(replies) == []
     assert network.queries.orders() == []
 

@@ -277,10 +277,10 @@ def test_false_advance_is_refused(lie: AnswerChange) -> None:
     liar = two.sent[-1][1]
     if true.advance and lie is LIES["no state, though it came along"]:
         two.answer(replace(true, advance=None, snapshot=b""))  # it lost its state
-        assert two.fleet.malformed == 0
+        assert two.fleet.faults.total("malformed") == 0
         true = replace(true, number=true.number + 1)
     assert two.answer(lie(true)) == []
-    assert two.fleet.malformed == 1
+    assert two.fleet.faults.total("malformed") == 1
     # The liar backs off. The other worker is given the state, and its answer counts.
     assert two.sent[-1][1] != liar
     request = decode_advance_request(two.sent[-1][2])
@@ -296,7 +296,7 @@ def test_true_answers_are_taken() -> None:
     two = Two()
     (end,) = two.answer(two.true_answer())
     assert event_of(end).provenance.agent == two.sent[-1][1]
-    assert two.fleet.malformed == 0
+    assert two.fleet.faults.total("malformed") == 0
 
 
 def test_a_robot_that_diverged_is_no_lie() -> None:
@@ -314,7 +314,7 @@ def test_a_snapshot_that_nobody_wanted_is_refused() -> None:
     true = two.true_answer()
     assert true.snapshot == b""
     assert two.answer(replace(true, snapshot=b"x")) == []
-    assert two.fleet.malformed == 1
+    assert two.fleet.faults.total("malformed") == 1
 
 
 TOUCH = Touch(SECOND, THIRD, 0.5)
@@ -338,7 +338,7 @@ def test_touches_are_of_robots_that_live(
 ) -> None:
     two = Two(has_touches=True)
     assert len(two.answer(in_advance(touches=touches)(two.true_answer()))) == is_true
-    assert two.fleet.malformed == (not is_true)
+    assert two.fleet.faults.total("malformed") == (not is_true)
 
 
 @pytest.mark.parametrize(
@@ -375,7 +375,7 @@ def test_malformed_advances_never_stop_a_run() -> None:
     two = Two()
     for count in range(1, 6):
         assert two.answer(b"\xff") == []
-        assert two.fleet.malformed == count
+        assert two.fleet.faults.total("malformed") == count
         two.wait(10.0)
     (end,) = two.answer(two.true_answer())
     assert event_of(end).advance.step == NEXT

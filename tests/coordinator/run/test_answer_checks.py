@@ -71,7 +71,7 @@ def check_refused(
     """Fail unless a lie is counted, its agent backs off, and another gets the job."""
     liar, honest = lie.agent, {"one": "two", "judge": "juror"}[lie.agent]
     assert sent_requests.tell(lie) == []
-    assert sent_requests.fleet.malformed == 1
+    assert sent_requests.fleet.faults.total("malformed") == 1
     assert [agent for _, agent, _ in sent_requests.sent] == [liar, honest]
     result = VIABLE if isinstance(ask, Vet) else JUDGED
     (event,) = sent_requests.tell(sent_requests.reply(result))
@@ -185,7 +185,7 @@ def test_malformed_answers_never_stop_a_run(sent_requests: SentRequests) -> None
     sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
     for count in range(1, 8):
         assert sent_requests.tell(sent_requests.reply(VIABLE)) == []
-        assert sent_requests.fleet.malformed == count
+        assert sent_requests.fleet.faults.total("malformed") == count
         sent_requests.wait(10.0)
     (event,) = sent_requests.tell(sent_requests.reply(JUDGED))
     assert isinstance(event, Evaluated)

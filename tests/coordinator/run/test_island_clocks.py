@@ -11,7 +11,9 @@ from coordinator.run.history import arena_history
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.experiment.file import experiment_text, experiments_of
+from worker.arena.world import World
 from worker.serve.jobs import Jobs
+from worker.serve.shards import Shards
 
 DOCUMENT = """
 name = "clocks"
@@ -37,7 +39,7 @@ def advanced(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float
     (place / "clocks.toml").write_text(DOCUMENT)
     (document,) = experiments_of(str(place / "clocks.toml"), None)
     details = RunDetails(document.name, 0, 1, experiment_text(document))
-    worker = Jobs()
+    worker = Jobs(Shards(World))
     fleet = Fleet(
         LocalAgents(
             {"analyzer": analyzer.report.answer, "worker": worker.answer}, "any"

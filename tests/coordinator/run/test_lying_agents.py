@@ -125,7 +125,7 @@ def test_lies_change_no_table_and_leave_the_journal_alone(
             one.turn(float(turns))
             turns += 1
         one.rows.finish()
-        assert one.fleet.malformed > 0
+        assert one.fleet.faults.total("malformed") > 0
     assert compare(calm, path) == []
     events = journalled(path)
     assert events == journalled(calm)

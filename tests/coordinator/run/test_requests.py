@@ -237,7 +237,7 @@ def test_malformed_answer_is_counted_and_the_job_goes_to_another_agent(
 ) -> None:
     sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
     assert sent_requests.tell(spoil(sent_requests)) == []
-    assert sent_requests.fleet.dispatch.malformed == 1
+    assert sent_requests.fleet.faults.total("malformed") == 1
     assert [agent for _, agent, _ in sent_requests.sent] == ["one", "two"]
     (event,) = sent_requests.tell(sent_requests.reply(JUDGED))
     assert isinstance(event, Evaluated)

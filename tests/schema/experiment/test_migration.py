@@ -9,7 +9,7 @@ from schema.experiment.document import Experiment, island_count, island_experime
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    read_experiment,
+    experiments_of,
 )
 from schema.experiment.migration import Migration, migrant_count
 from tests.documents import parse_experiment
@@ -76,10 +76,10 @@ def test_births_of_a_flag_replace_those_of_each_island(tmp_path: Path) -> None:
     """Those of the document, which the flag replaces, are invalid."""
     text = TWO_KINDS.replace("births = 90", 'births = "x"').replace("= 40", "= 1")
     (tmp_path / "two.toml").write_text(text)
-    experiment = read_experiment(str(tmp_path / "two.toml"), 70)
+    (experiment,) = experiments_of(str(tmp_path / "two.toml"), 70)
     assert {island_experiment(experiment, each).births for each in range(5)} == {70}
     with pytest.raises(ExperimentError, match=r"two\.toml with --births 14: .*births"):
-        read_experiment(str(tmp_path / "two.toml"), 14)
+        experiments_of(str(tmp_path / "two.toml"), 14)
 
 
 @pytest.mark.parametrize(

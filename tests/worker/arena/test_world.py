@@ -28,8 +28,9 @@ from tests.worker.arena_cases import (
     state_of,
 )
 from worker.arena.world import World
-from worker.robot.brains import Controls, Solo
+from worker.robot.brains import Controls
 from worker.robot.evaluation import simulate
+from worker.robot.solo_brains import Solo, solo_brain
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)
@@ -189,10 +190,10 @@ def test_exchanged_brain_moves_a_robot_as_two_brains_by_hand(
     plain = simulate(robot, off_line).core_position
 
     def solo(controls: Controls, brain: Brain, ticks: int) -> Switching:
-        return Switching(*(made(controls, each, ticks) for each in (brain, learnt)))
+        both = (solo_brain(controls, each, ticks) for each in (brain, learnt))
+        return Switching(*both)
 
-    made = Controls.solo
-    monkeypatch.setattr(Controls, "solo", solo)
+    monkeypatch.setattr("worker.robot.evaluation.solo_brain", solo)
     by_hand = simulate(robot, off_line).core_position
     assert not np.array_equal(by_hand, plain)
 

@@ -11,6 +11,7 @@ from schema.robot.brain import INPUT, Brain, Connection, Neuron
 from schema.robot.cpg import PHASE_OSCILLATOR
 from worker.robot.brains import Controls
 from worker.robot.check_controls import check_controls
+from worker.robot.solo_brains import solo_brain
 
 TICK_S = 0.125
 
@@ -30,7 +31,7 @@ def pair(first: Neuron, second: Neuron, weight: float) -> Brain:
 
 def test_free_oscillator_has_its_frequency_offset_amplitude_and_centre() -> None:
     brain = Brain((Neuron("input", INPUT, 0), oscillator(0.7, 0.2, 0.6, 0.4)))
-    solo = controls_of().solo(brain, 100)
+    solo = solo_brain(controls_of(), brain, 100)
     solo.readings[:] = 9.0
     found = [float(solo.step(tick)[0]) for tick in range(100)]
     expected = [
@@ -93,7 +94,7 @@ def test_brains_are_independent_of_the_batch_and_can_be_restored() -> None:
 
 def test_numbers_of_files_beyond_all_ranges_stay_finite() -> None:
     huge = Neuron("output", PHASE_OSCILLATOR, 0, (1e308, -1e308, 1e308, 1e308))
-    solo = controls_of().solo(pair(huge, huge, -1e308), 50)
+    solo = solo_brain(controls_of(), pair(huge, huge, -1e308), 50)
     assert all(np.isfinite(solo.step(tick)).all() for tick in range(50))
 
 

@@ -12,8 +12,9 @@ from schema.parts import Parameter
 from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
 from schema.robot.neurons import BUILT_IN_NEURONS, Tick
 from schema.robot.results import Floats
-from worker.robot.brains import Bank, Controls, NetworkControl, SoloBank, pack
+from worker.robot.brains import Bank, Controls, NetworkControl, pack
 from worker.robot.own_neurons import STATE_LIMIT
+from worker.robot.solo_brains import SoloBank, solo_brain
 
 WIDTH = widths(Space())
 TICK_S = 0.125
@@ -77,7 +78,7 @@ def test_an_adapting_neuron_by_hand() -> None:
         ),
         (Connection(0, 1, 0.5), Connection(1, 2, 1.0)),
     )
-    solo = Controls(NETWORK, MIXED, TICK_S).solo(brain, 5)
+    solo = solo_brain(Controls(NETWORK, MIXED, TICK_S), brain, 5)
     solo.readings[0, 0] = 2.0
     # Half of the way to 1 + 0.5 - 2 tired; tired follows by a tenth.
     assert solo.step(0)[0] == pytest.approx(0.75)
@@ -113,9 +114,10 @@ def test_own_neurons_are_independent_of_the_batch_and_can_be_moved() -> None:
 @own
 def test_a_robot_of_built_in_neurons_only_costs_nothing_more() -> None:
     controls = Controls(NETWORK, MIXED, TICK_S)
-    solo = controls.solo(Brain((Neuron("output", "Simple", 0, (0.0, 1.0)),)), 3)
+    simple = Neuron("output", "Simple", 0, (0.0, 1.0))
+    solo = solo_brain(controls, Brain((simple,)), 3)
     assert type(solo).__name__ == "SoloNetwork"
-    assert controls.solo(Brain(), 3).step(0).shape == (10,)
+    assert solo_brain(controls, Brain(), 3).step(0).shape == (10,)
 
 
 def test_a_neuron_of_another_type_is_refused() -> None:

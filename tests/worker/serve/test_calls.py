@@ -13,8 +13,10 @@ from schema.wire.calls import (
     pack_value,
     read_call_answer,
 )
+from worker.arena.world import World
 from worker.serve.calls import answer_call
 from worker.serve.jobs import Jobs
+from worker.serve.shards import Shards
 
 LAB = """
 def double(value):
@@ -59,7 +61,7 @@ def value(function: str, argument: object) -> object:
 def test_value_is_that_of_the_function() -> None:
     assert value("lab_of_calls:double", 21) == 42
     assert value("lab_of_calls:double", [1]) == [1, 1]
-    answer = Jobs().answer(request("lab_of_calls:double", 21))
+    answer = Jobs(Shards(World)).answer(request("lab_of_calls:double", 21))
     assert read_call_answer(answer, (3, 17)) == 42
 
 
