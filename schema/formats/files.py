@@ -5,6 +5,7 @@ into each other without loss. URDF (.urdf) holds the body only and is written, n
 read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 """
 
+import os
 from pathlib import Path
 
 from schema.errors import InvalidRobot, MalformedMessage
@@ -23,6 +24,7 @@ from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot, check_number, check_robot
+from schema.tables.replacement import replace_file
 from schema.wire.codec import decode_robot, encode_robot
 
 
@@ -147,7 +149,7 @@ def _robogen_text(path: Path) -> str:
 def write_robot(
     robot: Robot, path: Path, settings: EvaluationSettings | None = None
 ) -> None:
-    """Write a robot to a file.
+    """Write a robot to a file; a file that is there is replaced as a whole.
 
     Args:
         robot: the robot.
@@ -170,7 +172,9 @@ def write_robot(
     if ending in _READ and len(data) > most:
         raise InvalidRobot(f"{path}: must have <= {most} bytes, got {len(data)}")
     try:
-        path.write_bytes(data)
+        # Where a link leads: the link itself stays.
+        target = Path(os.path.realpath(path))
+        replace_file(target, lambda new: new.write_bytes(data))
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be written: {error.strerror}") from None
 
