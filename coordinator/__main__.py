@@ -33,9 +33,15 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import holds_run
 from coordinator.storage.hints import command as command_line
 from coordinator.storage.hints import stopped
-from schema.agent.address import HUB, listen_address
+from schema.agent.address import HUB
 from schema.agent.capacity import memory_bytes, shards_that_fit
-from schema.agent.command import access_of, check_load, connect_of, tls_of
+from schema.agent.command import (
+    access_of,
+    check_load,
+    connect_of,
+    listen_of,
+    tls_of,
+)
 from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
 from schema.agent.log import start_log, tell_user
@@ -43,6 +49,7 @@ from schema.agent.screen import missing_screen
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
+from schema.agent.topics import check_name
 from schema.errors import ExperimentError, NetworkError
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.kinds import Kind
@@ -192,7 +199,7 @@ def _deployment(
             raise NetworkError(f"--{flag} needs a network, but --in-process has none")
     if options.in_process and options.command != "coordinator" and options.workers:
         raise NetworkError("--workers: --in-process starts no other processes")
-    listen = options.listen
+    tls, listen = tls_of(options), options.listen
     if options.command == "coordinator" and not options.connect:
         listen = listen or HUB
     workers: int | None = options.workers
@@ -214,10 +221,10 @@ def _deployment(
             "worker": worker.serve.service.process,
         },
         answers=answers if options.in_process else None,
-        listen=listen_address(listen) if listen else None,
+        listen=listen_of([listen], tls)[0] if listen else None,
         connect=connect_of(options) if options.connect else None,
-        fleet=options.fleet,
-        tls=tls_of(options),
+        fleet=check_name(options.fleet, "--fleet"),
+        tls=tls,
         certificates=access_of(options),
         quiet=options.quiet,
         fsync=options.fsync,

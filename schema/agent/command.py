@@ -10,7 +10,7 @@ import math
 import os
 import re
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from schema.agent.access import Certificate, read_certificates
@@ -19,11 +19,12 @@ from schema.agent.address import (
     FORMS,
     default_connect,
     hub_of,
+    listen_address,
     parse_address,
 )
 from schema.agent.flags import Flags, add_plugins, positive_number, whole_number
 from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
-from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
+from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config, hub_config
 from schema.agent.service import GAVE_UP, gave_up
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import (
@@ -76,6 +77,20 @@ def connect_of(options: argparse.Namespace) -> str:
     except NetworkError as error:
         where = "--connect" if given else f"${CONNECT_VARIABLE}"
         raise NetworkError(f"{where}: {error}") from None
+
+
+def listen_of(places: Iterable[str], tls: Tls | None) -> tuple[str, ...]:
+    """Return the addresses that ``--listen`` means.
+
+    Raises:
+        NetworkError: an address of no allowed form, or that must not be listened on.
+    """
+    addresses = tuple(map(listen_address, places))
+    try:
+        hub_config(addresses, tls)
+    except NetworkError as error:
+        raise NetworkError(f"--listen: {error}") from None
+    return addresses
 
 
 def add_network_flags(flags: argparse.ArgumentParser) -> None:

@@ -137,6 +137,27 @@ MISTAKES = {
         "was written by another version of Revolve",
         2,
     ),
+    "listen": (
+        "run scenario1 --listen here --out x",
+        "--listen: an address must be tcp/HOST:PORT, tls/HOST:PORT, ",
+        2,
+    ),
+    "listen beyond this machine": (
+        "run scenario1 --listen tcp/0.0.0.0:1 --out x",
+        "--listen: tcp/0.0.0.0:1 would listen beyond this machine",
+        2,
+    ),
+    "listen as hub": ("hub --listen here", "--listen: an address must be tcp/", 2),
+    "metrics": (
+        "run scenario1 --metrics here --out x",
+        "--metrics: must be PORT or HOST:PORT, got 'here'",
+        2,
+    ),
+    "fleet": (
+        "run scenario1 --fleet a/b --out x",
+        "--fleet: must be 1 to 96 letters, digits",
+        2,
+    ),
     "speed without arena": (
         "run scenario1 --speed 2",
         "--speed: limits arenas, and there is none in scenario1",
