@@ -249,3 +249,32 @@ def test_closed_pipe_prints_no_error(workspace: Workspace) -> None:
     process.stdout = None
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors) == (1, "")
+
+
+ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+def test_any_text_is_printed_in_an_encoding_that_lacks_it(workspace: Workspace) -> None:
+    file = workspace.folder / "Größe" / "r.yaml"
+    file.parent.mkdir()
+    for words in (("random",), ("check",), ("show", "--experiment", "scenario1")):
+        action, *flags = words
+        process = workspace.start(
+            "robot", action, "Größe/r.yaml", *flags, environment=ASCII
+        )
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, err) == (0, "")
+    assert out.startswith("r.yaml: ")
+    assert "orientation 0?" in out
+
+
+def test_a_run_folder_with_a_name_of_another_encoding_is_one_line(
+    workspace: Workspace,
+) -> None:
+    words = ("run", "scenario1", "--births", "15", "--in-process", "--quiet")
+    process = workspace.start(*words, "--out", "Größe", environment=ASCII)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    line = "text in this locale's encoding, ascii: rename it, or set PYTHONUTF8=1\n"
+    assert err.endswith(line)
+    assert err.count("\n") == 1
