@@ -57,6 +57,12 @@ from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow
 from schema.tables.arrow import skip_pandas
 
+# Flags that --in-process excludes.
+_OF_NETWORK = (
+    *("access", "connect", "listen", "view"),
+    *("tls-ca", "tls-certificate", "tls-key"),
+)
+
 
 def main(arguments: list[str]) -> int:
     """Run one of the coordinator's commands and return its exit code.
@@ -193,13 +199,13 @@ def _deployment(
         _check_window(folder)
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
-    of_network = ("access", "connect", "listen", "view")
-    for flag in of_network if options.in_process else ():
-        if getattr(options, flag):
+    for flag in _OF_NETWORK if options.in_process else ():
+        if getattr(options, flag.replace("-", "_")):
             raise NetworkError(f"--{flag} needs a network, but --in-process has none")
     if options.in_process and options.command != "coordinator" and options.workers:
         raise NetworkError("--workers: --in-process starts no other processes")
-    tls, listen = tls_of(options), options.listen
+    tls = None if options.in_process else tls_of(options)
+    listen = options.listen
     if options.command == "coordinator" and not options.connect:
         listen = listen or HUB
     workers: int | None = options.workers

@@ -13,6 +13,7 @@ from schema.agent.command import (
     add_log,
     add_network_flags,
     add_oversubscribe,
+    tls_files,
 )
 from schema.agent.flags import (
     Flags,
@@ -113,9 +114,7 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
         "--connect": options.connect,
         "--fleet": None if options.fleet == DEFAULT_FLEET else options.fleet,
         "--access": options.access,
-        "--tls-ca": options.tls_ca,
-        "--tls-certificate": options.tls_certificate,
-        "--tls-key": options.tls_key,
+        **({} if options.in_process else tls_files(options)),
         "--speed": None if options.speed is None else f"{options.speed:g}",
         "--threads": options.threads,
         "--cpu-limit": _changed(options.cpu_limit, CPU_LIMIT_S),

@@ -102,12 +102,8 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
         help=f"name of the fleet (default: {DEFAULT_FLEET})",
     )
     for flag, what in _TLS_FILES.items():
-        variable = _variable(flag)
         flags.add_argument(
-            flag,
-            metavar="FILE",
-            default=os.environ.get(variable),
-            help=f"{what} (default: ${variable})",
+            flag, metavar="FILE", help=f"{what} (default: ${_variable(flag)})"
         )
 
 
@@ -204,14 +200,22 @@ def check_load(
         )
 
 
+def tls_files(options: argparse.Namespace) -> dict[str, str | None]:
+    """Return the certificate files by flag: the flags', else the environment's."""
+    given = (options.tls_ca, options.tls_certificate, options.tls_key)
+    return {
+        flag: file or os.environ.get(_variable(flag))
+        for flag, file in zip(_TLS_FILES, given, strict=True)
+    }
+
+
 def tls_of(options: argparse.Namespace) -> Tls | None:
-    """Return the files that flags name; None if they name none.
+    """Return the files that flags or the environment name; None if they name none.
 
     Raises:
         NetworkError: one is not named, or not there.
     """
-    given = (options.tls_ca, options.tls_certificate, options.tls_key)
-    files = dict(zip(_TLS_FILES, given, strict=True))
+    files = tls_files(options)
     if not any(files.values()):
         return None
     for flag, file in files.items():
@@ -219,7 +223,7 @@ def tls_of(options: argparse.Namespace) -> Tls | None:
             raise NetworkError(f"{flag} is missing: {', '.join(files)} go together")
         if not Path(file).is_file():
             raise NetworkError(f"{flag}: no such file: {file}")
-    return Tls(*given)
+    return Tls(*map(str, files.values()))
 
 
 def host_name() -> str:

@@ -70,7 +70,10 @@ def test_a_seed_above_64_bits_is_refused(workspace: Workspace) -> None:
     assert limits in _refused(workspace, "run", *words)
 
 
-@pytest.mark.parametrize("flag", ["--access", "--connect", "--listen"])
+@pytest.mark.parametrize(
+    "flag",
+    ["--access", "--connect", "--listen", "--tls-ca", "--tls-certificate", "--tls-key"],
+)
 def test_a_flag_of_the_network_is_refused_where_nothing_is_sent(
     workspace: Workspace, flag: str
 ) -> None:
@@ -78,6 +81,15 @@ def test_a_flag_of_the_network_is_refused_where_nothing_is_sent(
     message = f"{flag} needs a network, but --in-process has none"
     assert message in _refused(workspace, "run", *words)
     assert not (workspace.folder / "x").exists()
+
+
+def test_certificates_of_the_environment_are_not_those_of_a_run_in_one_process(
+    workspace: Workspace,
+) -> None:
+    words = ("run", "scenario1", "--births", "15", "--in-process", "--quiet")
+    gone = {"REVOLVE_TLS_CA": "gone"}
+    process = workspace.start(*words, "--out", "x", environment=gone)
+    assert process.wait(60) == 0
 
 
 def test_misspelt_names_are_reported_with_the_nearest_name(

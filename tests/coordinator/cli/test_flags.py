@@ -60,6 +60,18 @@ def test_resumed_run_has_the_same_agents_and_limits(line: str, expected: str) ->
     assert resume_flags(options) == flags
 
 
+def test_resumed_run_has_the_certificates_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("REVOLVE_TLS_CA", "ca.pem")
+    run = parser("run")
+    shared = run.parse_args(["scenario1", "--connect", "hub", "--tls-key", "key.pem"])
+    expected = "--connect hub --tls-ca ca.pem --tls-key key.pem"
+    assert " ".join(resume_flags(shared)) == expected
+    alone = run.parse_args(["scenario1", "--in-process"])
+    assert resume_flags(alone) == ["--in-process"]
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
