@@ -8,7 +8,7 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 import os
 from pathlib import Path
 
-from schema.errors import InvalidRobot, MalformedMessage
+from schema.errors import InvalidRobot, MalformedMessage, unreadable
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -95,6 +95,24 @@ def types_for(settings: EvaluationSettings) -> tuple[BodySpace, NeuronKinds]:
     return types_of(settings)
 
 
+def check_file(path: Path) -> str:
+    """Return the ending of the file of a robot, in lower case.
+
+    Raises:
+        InvalidRobot: another ending, a folder, or a missing file.
+    """
+    if path.is_dir():
+        best = path / BEST
+        hint = f"; its best robot is {best}" if best.is_file() else ""
+        raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
+    ending = _ending(path, _READ)
+    try:
+        path.stat()
+    except OSError as error:
+        raise InvalidRobot(f"{path}: {unreadable(error)}") from None
+    return ending
+
+
 def read_robot(
     path: Path, space: BodySpace = BUILT_IN, kinds: NeuronKinds = BUILT_IN_KINDS
 ) -> Robot:
@@ -110,11 +128,7 @@ def read_robot(
             is not a robot, or a robot that is not well formed in this body space.
         MalformedMessage: a .pb file that does not hold a robot.
     """
-    if path.is_dir():
-        best = path / BEST
-        hint = f"; its best robot is {best}" if best.is_file() else ""
-        raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
-    ending = _ending(path, _READ)
+    ending = check_file(path)
     if ending in _YAML:
         return robot_from_yaml(read_text(path), str(path), space, kinds)
     if ending in _ROBOGEN:

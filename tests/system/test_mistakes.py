@@ -115,6 +115,21 @@ MISTAKES = {
         2,
     ),
     "no robot file": ("robot check nowhere.yaml", "nowhere.yaml: cannot be read", 2),
+    "no robot file to simulate": (
+        "robot simulate nowhere.yaml",
+        "nowhere.yaml: cannot be read: No such file",
+        2,
+    ),
+    "folder to simulate": (
+        "robot simulate run",
+        "run: must be the file of a robot, got a folder; its best robot is run/best",
+        2,
+    ),
+    "other file to simulate": (
+        "robot simulate key.toml",
+        "key.toml: must end in one of .yaml, .yml, ",
+        2,
+    ),
     "not a robot": ("robot check exp.yaml", "exp.yaml", 2),
     "action misspelt": ("robot chek a.yaml", "did you mean 'check'?; allowed: ", 2),
     "address": (
