@@ -1,20 +1,15 @@
 """Progress of long commands: bars on a terminal, lines in a log, what is replaced."""
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event, Thread
-from typing import Self
 
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn, Task
-from rich.status import Status
-from rich.text import Text
 
-SPAN_S = 10.0
-"""Time between two lines in a log [s]."""
+from schema.agent.terminal.progress_line import SPAN_S, print_line
 
 
 def replaced(file: Path, what: str, others: str) -> Iterator[str]:
@@ -88,46 +83,3 @@ def _count(task: Task) -> str:
     if task.completed % 1.0:
         return f"{task.description}: {task.percentage:.0f} %"
     return f"{task.description}: {task.completed:g} of {task.total:g}"
-
-
-class ProgressLine:
-    """Progress of a task of unknown length; a context manager.
-
-    A line that is updated on a terminal; in a log, a line every ``SPAN_S`` if it has
-    changed.
-
-    Args:
-        console: console to print on; standard error by default.
-    """
-
-    def __init__(self, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True)
-        self._line = Status("", console=self._console)
-        self._next_s = -math.inf
-        self._last = ""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._line.stop()
-
-    def update(self, text: str, now_s: float) -> None:
-        """Show the progress.
-
-        Args:
-            text: the progress in words.
-            now_s: time of a monotonic clock [s].
-        """
-        if self._console.is_terminal:
-            self._line.start()
-            self._line.update(Text(text))
-        elif now_s >= self._next_s and text != self._last:
-            self._next_s = now_s + SPAN_S
-            self._last = text
-            print_line(self._console, text)
-
-
-def print_line(console: Console, line: str) -> None:
-    """Print a line without markup; a terminal wraps it, a file does not."""
-    console.print(line, soft_wrap=True, markup=False, highlight=False)

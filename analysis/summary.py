@@ -16,7 +16,7 @@ from analysis.measures.fitness_functions import (
     measured_apart,
 )
 from analysis.measures.populations import failures_as_best, last_rows
-from analysis.progress import print_line
+from schema.agent.terminal.progress_line import print_line
 from schema.errors import rounded
 
 _FITNESS = ("fitness", "fitness_best")

@@ -32,22 +32,35 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import holds_run
 from coordinator.storage.hints import command as command_line
 from coordinator.storage.hints import stopped
-from schema.agent.address import HUB, listen_address
+from schema.agent.address import HUB
 from schema.agent.capacity import memory_bytes, shards_that_fit
-from schema.agent.command import access_of, check_load, connect_of, tls_of
+from schema.agent.command import (
+    access_of,
+    check_load,
+    connect_of,
+    listen_of,
+    tls_of,
+)
 from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
 from schema.agent.log import start_log, tell_user
-from schema.agent.screen import missing_screen
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
+from schema.agent.terminal.screen import missing_screen
+from schema.agent.topics import check_name
 from schema.errors import ExperimentError, NetworkError
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow
 from schema.tables.arrow import skip_pandas
+
+# Flags that --in-process excludes.
+_OF_NETWORK = (
+    *("access", "connect", "listen", "view"),
+    *("tls-ca", "tls-certificate", "tls-key"),
+)
 
 
 def main(arguments: list[str]) -> int:
@@ -187,12 +200,12 @@ def _deployment(
         _check_window(folder)
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
-    of_network = ("access", "connect", "listen", "view")
-    for flag in of_network if options.in_process else ():
-        if getattr(options, flag):
+    for flag in _OF_NETWORK if options.in_process else ():
+        if getattr(options, flag.replace("-", "_")):
             raise NetworkError(f"--{flag} needs a network, but --in-process has none")
     if options.in_process and options.command != "coordinator" and options.workers:
         raise NetworkError("--workers: --in-process starts no other processes")
+    tls = None if options.in_process else tls_of(options)
     listen = options.listen
     if options.command == "coordinator" and not options.connect:
         listen = listen or HUB
@@ -215,10 +228,10 @@ def _deployment(
             "worker": worker.serve.service.process,
         },
         answers=answers if options.in_process else None,
-        listen=listen_address(listen) if listen else None,
+        listen=listen_of([listen], tls)[0] if listen else None,
         connect=connect_of(options) if options.connect else None,
-        fleet=options.fleet,
-        tls=tls_of(options),
+        fleet=check_name(options.fleet, "--fleet"),
+        tls=tls,
         certificates=access_of(options),
         quiet=options.quiet,
         fsync=options.fsync,

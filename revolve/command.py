@@ -1,5 +1,6 @@
 """The command ``revolve``: dispatches to the commands of all rooms."""
 
+import codecs
 import io
 import os
 import sys
@@ -9,6 +10,11 @@ from types import ModuleType
 
 from revolve.cli.commands import COMMANDS
 from revolve.strangers import stranger
+
+_UNDECODED = (
+    "a name of a file or folder must be text in this locale's encoding, "
+    f"{sys.getfilesystemencoding()}: rename it, or set PYTHONUTF8=1"
+)
 
 
 def main(
@@ -34,6 +40,7 @@ def main(
     _ensure_buffer()
     stopping = None
     if arguments is None:
+        _accept_all_text()
         _separate_engine_log()
         stopping = import_module("schema.agent.stopping")
         stopping.prepare_stop(sys.argv[1:])
@@ -92,6 +99,11 @@ def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
         )
         return 2
     _show_start(words)
+    return _run_command(words, tell)
+
+
+def _run_command(words: list[str], tell: Callable[[Exception], None]) -> int:
+    """Run a known command and return its exit code."""
     # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
     import_module("schema.agent.supervisor").prepare_process()
     error_type = import_module("schema.errors").RevolveError
@@ -103,6 +115,11 @@ def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
         return int(room.main(words))
     except error_type as error:
         tell(error)
+        return 2
+    except UnicodeEncodeError as error:
+        if "surrogates" not in error.reason:
+            raise
+        tell(error_type(f"{error.object}: {_UNDECODED}"))
         return 2
     finally:
         if words[1:] in (["-h"], ["--help"]):
@@ -154,6 +171,25 @@ def _ensure_buffer() -> None:
             errors=sys.stdout.errors,
             closefd=False,
         )
+
+
+def _accept_all_text() -> None:
+    """Let standard output take any text; ``?`` is what its encoding does not have.
+
+    Names of files that are not text in that encoding are written byte by byte.
+    """
+
+    def replaced(error: UnicodeError) -> tuple[bytes, int]:
+        if not isinstance(error, UnicodeEncodeError):
+            raise error
+        text = error.object[error.start : error.end]
+        escaped = "".join(c if "\udc80" <= c <= "\udcff" else "?" for c in text)
+        return escaped.encode("ascii", "surrogateescape"), error.end
+
+    is_default = sys.stdout.errors in ("strict", "surrogateescape")
+    if is_default and isinstance(sys.stdout, io.TextIOWrapper):
+        codecs.register_error("revolve", replaced)
+        sys.stdout.reconfigure(errors="revolve")
 
 
 def _separate_engine_log() -> None:

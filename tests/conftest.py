@@ -2,7 +2,9 @@
 
 import logging
 import os
-from collections.abc import Iterator
+import resource
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
@@ -66,3 +68,20 @@ def chain() -> Robot:
     )
     senses = tuple(Neuron("input", INPUT, 0) for _ in range(6))
     return Robot((Part("Core", -1, -1, -1, 0, grey), *bricks), Brain(senses))
+
+
+@contextmanager
+def no_file_beyond(size: int) -> Iterator[None]:
+    """Limit the size of this process's files, to imitate a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.fixture
+def full_beyond() -> Callable[[int], AbstractContextManager[None]]:
+    """Return a context that limits the size of files."""
+    return no_file_beyond

@@ -5,10 +5,12 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from schema.agent.flags import Flags, add_plugins, add_settings
+from schema.agent.terminal.progress_line import progress_if_long
 from schema.errors import rounded
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.run_settings import read_with_settings, tell
 from schema.plugins.permission import allow
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import Judged, rejudge, small_changes, summary
@@ -33,7 +35,7 @@ def main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
     robot, settings = _read(options.file, options.experiment, options.island)
-    found = evaluate(robot, settings)
+    found = _evaluate(robot, settings)
     labels = settings.measures.labels
     for name, value, unit in (
         ("fitness", found.fitness, ""),
@@ -52,16 +54,28 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
+def _evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
+    """Return the evaluation of a robot; show progress if it takes long."""
+    clock = settings.simulation
+    all_s = f"{clock.evaluation_steps * clock.timestep_s:g} s"
+    with progress_if_long(f"simulated 0.0 of {all_s}") as tell_progress:
+        return evaluate(
+            robot,
+            settings,
+            watch=lambda data: tell_progress(f"simulated {data.time:.1f} of {all_s}"),
+        )
+
+
 def _show_robustness(
     robot: Robot, settings: EvaluationSettings, fitness: float
 ) -> None:
     """Print the robot's fitness under each small change, then one line of all."""
     if settings.robust is not None:
         settings = replace(settings, robust=None)
-        fitness = evaluate(robot, settings).fitness
+        fitness = _evaluate(robot, settings).fitness
         print(f"{'undisturbed:':26}{rounded(fitness)}")
     judged: list[Judged] = []
-    for one in rejudge(robot, small_changes(settings)):
+    for one in rejudge(robot, small_changes(settings), _evaluate):
         print(f"{one.change.name + ':':26}{_share(one.fitness, fitness)}", flush=True)
         judged.append(one)
     print(summary(fitness, judged))

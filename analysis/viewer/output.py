@@ -14,7 +14,7 @@ from analysis.viewer.flags import FILM_ENDING, HOST
 from analysis.viewer.recording import Recording, ViewerError
 from schema.agent.import_path import python_command
 from schema.agent.log import tell_user
-from schema.agent.screen import missing_screen
+from schema.agent.terminal.screen import missing_screen
 
 WITHOUT_SCREEN = (
     "use --save FILE.rrd for a recording that 'rerun FILE.rrd' opens elsewhere, or "

@@ -6,7 +6,6 @@ from collections import deque
 
 import pyarrow as pa
 
-from analysis.progress import ProgressLine
 from analysis.viewer.blueprint import layout
 from analysis.viewer.entities import recording_name
 from analysis.viewer.live import Ended, LiveMessage, LiveSource
@@ -16,6 +15,7 @@ from analysis.viewer.recording import Recording
 from analysis.viewer.scene import Scene, scene_of
 from analysis.viewer.show import Show
 from schema.agent.log import tell_user
+from schema.agent.terminal.progress_line import ProgressLine
 from schema.errors import MalformedMessage, NetworkError, RevolveError, counted
 from schema.experiment.file import experiment_from_text
 from schema.limits import printable

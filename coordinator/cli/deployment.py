@@ -49,7 +49,7 @@ class Deployment:
         checks: cross-checks of workers, and the reaction to quarantined robots.
         give_up_after_s: time without the hub at ``connect`` after which to stop [s].
         allows_drift: an arena may continue on another platform if its own is gone.
-        metrics: address at which to serve metrics; None: nowhere.
+        metrics: host and port at which to serve metrics; None: nowhere.
         resume_flags: with which ``revolve resume`` has the same agents again.
     """
 
@@ -71,7 +71,7 @@ class Deployment:
     certificates: tuple[Certificate, ...] | None = None
     allows_drift: bool = False
     give_up_after_s: float = math.inf
-    metrics: str | None = None
+    metrics: tuple[str, int] | None = None
     resume_flags: tuple[str, ...] = ()
 
 

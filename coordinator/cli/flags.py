@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import re
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS, HUB
@@ -12,6 +13,7 @@ from schema.agent.command import (
     add_log,
     add_network_flags,
     add_oversubscribe,
+    tls_files,
 )
 from schema.agent.flags import (
     Flags,
@@ -68,6 +70,11 @@ _COMMANDS = {
 """Description and examples of each command."""
 
 
+_ADDRESS = re.compile(r"(?:(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):)?([0-9]{1,5})")
+_LAST_PORT = 65535
+_LOOPBACK = "127.0.0.1"
+
+
 def parser(command: str) -> Flags:
     """Return the parser of a command's arguments."""
     description, examples = _COMMANDS[command]
@@ -107,9 +114,7 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
         "--connect": options.connect,
         "--fleet": None if options.fleet == DEFAULT_FLEET else options.fleet,
         "--access": options.access,
-        "--tls-ca": options.tls_ca,
-        "--tls-certificate": options.tls_certificate,
-        "--tls-key": options.tls_key,
+        **({} if options.in_process else tls_files(options)),
         "--speed": None if options.speed is None else f"{options.speed:g}",
         "--threads": options.threads,
         "--cpu-limit": _changed(options.cpu_limit, CPU_LIMIT_S),
@@ -137,6 +142,16 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
         for word in (flag, value)
     ]
     return [*words, *(flag for flag, is_on in switches.items() if is_on)]
+
+
+def _host_and_port(text: str) -> tuple[str, int]:
+    """Return host and port of a flag's value; a port alone is of this machine."""
+    match = _ADDRESS.fullmatch(text)
+    if match is None or int(match[2]) > _LAST_PORT:
+        raise argparse.ArgumentTypeError(
+            f"must be PORT or HOST:PORT, got {text[:200]!r}"
+        )
+    return match[1] or _LOOPBACK, int(match[2])
 
 
 def _changed(value: float, default: float) -> str | None:
@@ -263,6 +278,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     add_log(flags)
     flags.add_argument(
         "--metrics",
+        type=_host_and_port,
         metavar="ADDRESS",
         help="serve metrics for Prometheus at PORT of this machine, or at HOST:PORT, "
         "where every host that reaches it can read them (default: no metrics)",

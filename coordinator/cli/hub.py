@@ -4,12 +4,13 @@ Coordinators connect to it like workers, and may come and go.
 """
 
 from coordinator.network.hub_service import serve_hub
-from schema.agent.address import FORMS, HUB, listen_address, parse_address
+from schema.agent.address import FORMS, HUB, parse_address
 from schema.agent.command import (
     access_of,
     add_access,
     add_log,
     add_network_flags,
+    listen_of,
     tls_of,
 )
 from schema.agent.flags import Flags
@@ -30,7 +31,7 @@ def main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments[1:])
     start_log("hub", as_json=options.log_json)
     tls, certificates = tls_of(options), access_of(options)
-    addresses = tuple(map(listen_address, options.listen or [HUB]))
+    addresses = listen_of(options.listen or [HUB], tls)
     config = hub_config(addresses, tls, certificates)
     if options.print_config:
         print(config)

@@ -125,7 +125,7 @@ def _place_to_join(folder: Path, deployment: Deployment) -> str:
 
 
 def _open_metrics(
-    address: str | None, stack: ExitStack
+    address: tuple[str, int] | None, stack: ExitStack
 ) -> Callable[[Status, int], None] | None:
     """Serve metrics until the stack is closed; return what publishes a snapshot.
 
@@ -136,7 +136,7 @@ def _open_metrics(
         return None
     from coordinator.cli.metrics import MetricsServer
 
-    metrics = stack.enter_context(MetricsServer(address))
+    metrics = stack.enter_context(MetricsServer(*address))
     tell_user(f"metrics at {metrics.url}")
     return metrics.publish
 

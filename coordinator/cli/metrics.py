@@ -4,7 +4,6 @@ The main loop publishes an immutable snapshot; the server's threads read only th
 that no request can disturb or delay a run.
 """
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 from typing import Protocol, Self
@@ -23,9 +22,6 @@ except ImportError:
         f"--metrics needs the package prometheus-client: {install_advice('cluster')}"
     ) from None
 
-_ADDRESS = re.compile(r"(?:(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):)?(\d{1,5})")
-_LAST_PORT = 65535
-_LOOPBACK = "127.0.0.1"
 _STATES = ("waiting", "running", "stopped", "finished", "failed", "damaged")
 _NOTHING = Status((), 0, 0, 0.0)
 
@@ -37,17 +33,16 @@ class MetricsServer:
         url: where the metrics are.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, host: str, port: int) -> None:
         """Listen.
 
         Args:
-            address: ``PORT`` of this machine, or ``HOST:PORT``; port 0 lets the system
-                choose.
+            host: name or IP address, IPv6 in brackets.
+            port: 0 lets the system choose.
 
         Raises:
-            NetworkError: an invalid address, or one that cannot be listened on.
+            NetworkError: an address that cannot be listened on.
         """
-        host, port = _parse(address)
         self._collector = _Collector()
         registry = CollectorRegistry()
         registry.register(self._collector)
@@ -77,20 +72,6 @@ class MetricsServer:
             refused_agents: number of agents that may not join.
         """
         self._collector.snapshot = (status, refused_agents)
-
-
-def _parse(address: str) -> tuple[str, int]:
-    """Return host and port of an address.
-
-    Raises:
-        NetworkError: an invalid address.
-    """
-    match = _ADDRESS.fullmatch(address)
-    if match is None or int(match[2]) > _LAST_PORT:
-        raise NetworkError(
-            f"--metrics: must be PORT or HOST:PORT, got {address[:200]!r}"
-        )
-    return match[1] or _LOOPBACK, int(match[2])
 
 
 class _Family(Protocol):

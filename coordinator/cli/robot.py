@@ -58,7 +58,7 @@ def parser(_command: str = "robot random") -> Flags:
         help="robot file, to be written: .yaml, .pb, .xml, ...",
     )
     add_seed(flags, default=1)
-    add_count(flags, "--count", 1, "number of robots", least=0)
+    add_count(flags, "--count", 1, "number of robots")
     flags.add_argument(
         "--experiment",
         default="scenario1",

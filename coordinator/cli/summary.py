@@ -17,7 +17,7 @@ from coordinator.storage.disk import replace_durably, storage_errors
 from coordinator.storage.folder import read_details
 from coordinator.storage.hints import command
 from schema.agent.log import tell_user, warn_user
-from schema.agent.screen import missing_screen
+from schema.agent.terminal.screen import missing_screen
 from schema.errors import ExperimentError, InvalidRobot, counted, rounded
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, body_space, island_experiments

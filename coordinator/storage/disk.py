@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from schema.errors import RunFolderError
+from schema.tables.replacement import replace_file, sync_folder
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -35,7 +36,7 @@ class AppendedFile:
             self._descriptor = os.open(path, flags, 0o644)
             self.size = os.fstat(self._descriptor).st_size
             if fsync:
-                _sync_folder(path.parent)
+                sync_folder(path.parent)
 
     def append(self, piece: bytes | memoryview) -> None:
         """Append a piece; remove it again if a part of it cannot be written.
@@ -79,57 +80,14 @@ class AppendedFile:
 
 
 def replace_durably(path: Path, write: Callable[[Path], object]) -> None:
-    """Create or replace a file atomically, even across a power loss.
-
-    Args:
-        path: the file.
-        write: function that writes the content to the path it is given.
+    """Create or replace a file as ``replace_file`` does; create its folder.
 
     Raises:
         RunFolderError: the disk is full or failed; an old file is unchanged.
     """
-    write_durably(path, write)
-    install_durably(path)
-
-
-def write_durably(path: Path, write: Callable[[Path], object]) -> None:
-    """Write the new content of a file under another name, for ``install_durably``.
-
-    Raises:
-        RunFolderError: the disk is full or failed; an old file is unchanged.
-    """
-    temporary = new_path(path)
     with storage_errors(path):
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write(temporary)
-            _sync(temporary, os.O_RDONLY)
-        except OSError:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            raise
-
-
-def install_durably(path: Path) -> None:
-    """Give a file its new content, which ``write_durably`` wrote.
-
-    Raises:
-        RunFolderError: the disk failed; an old file is unchanged.
-    """
-    temporary = new_path(path)
-    with storage_errors(path):
-        try:
-            temporary.replace(path)
-            _sync_folder(path.parent)
-        except OSError:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            raise
-
-
-def new_path(path: Path) -> Path:
-    """Return where the new content of a file is written."""
-    return path.with_name(f".{path.name}.new")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, write)
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -139,19 +97,6 @@ def replace_text(path: Path, text: str) -> None:
         RunFolderError: the disk is full or failed; an old file is unchanged.
     """
     replace_durably(path, lambda file: file.write_text(text, encoding="utf-8"))
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make the names in a folder durable."""
-    _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
-
-
-def _sync(path: Path, flags: int) -> None:
-    descriptor = os.open(path, flags | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 @contextlib.contextmanager

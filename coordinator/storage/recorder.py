@@ -15,13 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from coordinator.islands.events import Append, Record
-from coordinator.storage.disk import (
-    AppendedFile,
-    install_durably,
-    new_path,
-    storage_errors,
-    write_durably,
-)
+from coordinator.storage.disk import AppendedFile, storage_errors
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.removal import cut_segment, remove_rows, remove_segment
 from schema.errors import MalformedMessage, RunFolderError
@@ -36,6 +30,7 @@ from schema.tables.files import (
     stored_rows,
 )
 from schema.tables.received import read_columns
+from schema.tables.replacement import install_new, new_path, write_new
 from schema.tables.segments import SEGMENTS, segment_path, segments_of
 
 _LOG = logging.getLogger(__name__)
@@ -284,15 +279,17 @@ class TableFile:
                 f"{self._folder / SEGMENTS}: {self._name}: must hold {self._stored} "
                 f"rows, got {rows}: resume the run to write them again"
             )
-        write_durably(self._parquet, self._write_parquet)
+        with storage_errors(self._parquet):
+            self._parquet.parent.mkdir(parents=True, exist_ok=True)
+            write_new(self._parquet, self._write_parquet)
         return digest_of(new_path(self._parquet))
 
     def finish(self) -> None:
         """Give the Parquet file its final name."""
-        if not self._parquet.exists():
-            install_durably(self._parquet)
         aside = _aside(self._parquet)
-        with storage_errors(aside):
+        with storage_errors(self._parquet):
+            if not self._parquet.exists():
+                install_new(self._parquet)
             if aside.exists():
                 aside.unlink()
 

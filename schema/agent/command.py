@@ -10,7 +10,7 @@ import math
 import os
 import re
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from schema.agent.access import Certificate, read_certificates
@@ -19,11 +19,12 @@ from schema.agent.address import (
     FORMS,
     default_connect,
     hub_of,
+    listen_address,
     parse_address,
 )
 from schema.agent.flags import Flags, add_plugins, positive_number, whole_number
 from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
-from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
+from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config, hub_config
 from schema.agent.service import GAVE_UP, gave_up
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import (
@@ -78,6 +79,20 @@ def connect_of(options: argparse.Namespace) -> str:
         raise NetworkError(f"{where}: {error}") from None
 
 
+def listen_of(places: Iterable[str], tls: Tls | None) -> tuple[str, ...]:
+    """Return the addresses that ``--listen`` means.
+
+    Raises:
+        NetworkError: an address of no allowed form, or that must not be listened on.
+    """
+    addresses = tuple(map(listen_address, places))
+    try:
+        hub_config(addresses, tls)
+    except NetworkError as error:
+        raise NetworkError(f"--listen: {error}") from None
+    return addresses
+
+
 def add_network_flags(flags: argparse.ArgumentParser) -> None:
     """Add the flags for the fleet and its certificates."""
     flags.add_argument(
@@ -87,12 +102,8 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
         help=f"name of the fleet (default: {DEFAULT_FLEET})",
     )
     for flag, what in _TLS_FILES.items():
-        variable = _variable(flag)
         flags.add_argument(
-            flag,
-            metavar="FILE",
-            default=os.environ.get(variable),
-            help=f"{what} (default: ${variable})",
+            flag, metavar="FILE", help=f"{what} (default: ${_variable(flag)})"
         )
 
 
@@ -189,14 +200,22 @@ def check_load(
         )
 
 
+def tls_files(options: argparse.Namespace) -> dict[str, str | None]:
+    """Return the certificate files by flag: the flags', else the environment's."""
+    given = (options.tls_ca, options.tls_certificate, options.tls_key)
+    return {
+        flag: file or os.environ.get(_variable(flag))
+        for flag, file in zip(_TLS_FILES, given, strict=True)
+    }
+
+
 def tls_of(options: argparse.Namespace) -> Tls | None:
-    """Return the files that flags name; None if they name none.
+    """Return the files that flags or the environment name; None if they name none.
 
     Raises:
         NetworkError: one is not named, or not there.
     """
-    given = (options.tls_ca, options.tls_certificate, options.tls_key)
-    files = dict(zip(_TLS_FILES, given, strict=True))
+    files = tls_files(options)
     if not any(files.values()):
         return None
     for flag, file in files.items():
@@ -204,7 +223,7 @@ def tls_of(options: argparse.Namespace) -> Tls | None:
             raise NetworkError(f"{flag} is missing: {', '.join(files)} go together")
         if not Path(file).is_file():
             raise NetworkError(f"{flag}: no such file: {file}")
-    return Tls(*given)
+    return Tls(*map(str, files.values()))
 
 
 def host_name() -> str:

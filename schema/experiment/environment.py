@@ -2,8 +2,9 @@
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property, lru_cache
-from math import cos, isclose, radians, sin
+from math import cos, inf, isclose, radians, sin
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -24,6 +25,10 @@ MOST_IMPULSE = 1000.0
 """Greatest impulse of a push [N s]."""
 _UNUSED = re.compile(r"\s(surfacevel|adhesion|fluidshape|fluidcoef)\s*=")
 """Attributes of geoms that MuJoCo obeys, and that scenery here has not."""
+
+MOST_LENGTH_M = 1e6
+"""Greatest length in scenery [m]: beyond it contacts lose their precision."""
+_LENGTHS = re.compile(r"\s(?:size|pos|fromto|offset)\s*=\s*[\"']([^\"']*)[\"']")
 
 
 class Environment(Section, frozen=True, dict=True):
@@ -118,6 +123,20 @@ def unused_attribute(scenery: str) -> str:
     """
     found = _UNUSED.search(scenery)
     return found[1] if found else ""
+
+
+def too_long(scenery: str) -> str:
+    """Return the first attribute with a length beyond ``MOST_LENGTH_M``, or no text.
+
+    Only new documents are checked, as for attributes without effect.
+    """
+    for found in _LENGTHS.finditer(scenery):
+        for word in found[1].split():
+            # What is no finite number is refused with its element.
+            with suppress(ValueError):
+                if MOST_LENGTH_M < abs(float(word)) < inf:
+                    return found[0].strip()
+    return ""
 
 
 def is_mjcf(scenery: str) -> bool:

@@ -20,8 +20,10 @@ from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, island_experiments, references
 from schema.experiment.environment import (
+    MOST_LENGTH_M,
     add_gap_contacts,
     is_mjcf,
+    too_long,
     unused_attribute,
 )
 from schema.experiment.sweep import (
@@ -399,11 +401,16 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
 
 
 def _check_new_scenery(environment: dict[str, Any], where: str) -> None:
-    """Refuse what has no effect in scenery of a new document; add ``gap_contacts``."""
+    """Refuse what scenery of a new document must not have; add ``gap_contacts``."""
     if name := unused_attribute(environment["scenery"]):
         raise ExperimentError(
             f"{where}: environment.scenery: <geom {name}=...> is not allowed: it has "
             "no effect here"
+        )
+    if found := too_long(environment["scenery"]):
+        raise ExperimentError(
+            f"{where}: environment.scenery: {cut(found)}: lengths must be <= "
+            f"{MOST_LENGTH_M:g} m"
         )
     add_gap_contacts(environment)
 

@@ -5,9 +5,10 @@ into each other without loss. URDF (.urdf) holds the body only and is written, n
 read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 """
 
+import os
 from pathlib import Path
 
-from schema.errors import InvalidRobot, MalformedMessage
+from schema.errors import InvalidRobot, MalformedMessage, unreadable
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -23,6 +24,7 @@ from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot, check_number, check_robot
+from schema.tables.replacement import replace_file
 from schema.wire.codec import decode_robot, encode_robot
 
 
@@ -93,6 +95,24 @@ def types_for(settings: EvaluationSettings) -> tuple[BodySpace, NeuronKinds]:
     return types_of(settings)
 
 
+def check_file(path: Path) -> str:
+    """Return the ending of the file of a robot, in lower case.
+
+    Raises:
+        InvalidRobot: another ending, a folder, or a missing file.
+    """
+    if path.is_dir():
+        best = path / BEST
+        hint = f"; its best robot is {best}" if best.is_file() else ""
+        raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
+    ending = _ending(path, _READ)
+    try:
+        path.stat()
+    except OSError as error:
+        raise InvalidRobot(f"{path}: {unreadable(error)}") from None
+    return ending
+
+
 def read_robot(
     path: Path, space: BodySpace = BUILT_IN, kinds: NeuronKinds = BUILT_IN_KINDS
 ) -> Robot:
@@ -108,11 +128,7 @@ def read_robot(
             is not a robot, or a robot that is not well formed in this body space.
         MalformedMessage: a .pb file that does not hold a robot.
     """
-    if path.is_dir():
-        best = path / BEST
-        hint = f"; its best robot is {best}" if best.is_file() else ""
-        raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
-    ending = _ending(path, _READ)
+    ending = check_file(path)
     if ending in _YAML:
         return robot_from_yaml(read_text(path), str(path), space, kinds)
     if ending in _ROBOGEN:
@@ -147,7 +163,7 @@ def _robogen_text(path: Path) -> str:
 def write_robot(
     robot: Robot, path: Path, settings: EvaluationSettings | None = None
 ) -> None:
-    """Write a robot to a file.
+    """Write a robot to a file; a file that is there is replaced as a whole.
 
     Args:
         robot: the robot.
@@ -170,7 +186,9 @@ def write_robot(
     if ending in _READ and len(data) > most:
         raise InvalidRobot(f"{path}: must have <= {most} bytes, got {len(data)}")
     try:
-        path.write_bytes(data)
+        # Where a link leads: the link itself stays.
+        target = Path(os.path.realpath(path))
+        replace_file(target, lambda new: new.write_bytes(data))
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be written: {error.strerror}") from None
 

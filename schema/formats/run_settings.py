@@ -8,7 +8,13 @@ from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, island_experiment, island_experiments
 from schema.experiment.file import own_experiment, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.formats.files import BEST, MJCF_ENDING, read_robot, settings_of
+from schema.formats.files import (
+    BEST,
+    MJCF_ENDING,
+    check_file,
+    read_robot,
+    settings_of,
+)
 from schema.robot.robot import Robot
 from schema.tables.description import DETAILS, allow_plugins_of, read_description
 from schema.tables.last_populations import best_of, last_populations
@@ -98,12 +104,13 @@ def read_with_settings(
         of the default ones, the experiment is None.
 
     Raises:
-        InvalidRobot: the file holds no robot that is well formed.
+        InvalidRobot: the file is missing, or holds no robot that is well formed.
         MalformedMessage: a .pb file that does not hold a robot.
         ExperimentError: as of ``experiment_of``.
         RunFolderError: as of ``experiment_of``.
     """
-    if file.suffix.lower() == MJCF_ENDING and named is None and island is None:
+    # First: nothing is said about the settings of a file that is not there.
+    if check_file(file) == MJCF_ENDING and named is None and island is None:
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 

@@ -1,1 +1,1 @@
-"""Arrow tables of a run: columns and files."""
+"""Files of a run: Arrow tables, description; how a file is replaced."""

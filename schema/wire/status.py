@@ -63,7 +63,7 @@ class RunStatus(Message, frozen=True):
 
     @property
     def left_s(self) -> float | None:
-        """Estimated time to the end at the present rate [s]; None if the rate is 0."""
+        """Estimated time to the end at the present rate [s]; None if unknown."""
         return _left_s((self,), self.births_per_s)
 
 
@@ -126,20 +126,22 @@ class Status(Message, frozen=True):
 
     @property
     def left_s(self) -> float | None:
-        """Estimated time to the end at the present rate [s]; None if the rate is 0."""
+        """Estimated time to the end at the present rate [s]; None if unknown."""
         return _left_s(self.runs, self.births_per_s)
 
 
 def _left_s(runs: Iterable[RunStatus], births_per_s: float) -> float | None:
-    """Return the time to the end of runs at a rate [s]; None if the rate is 0.
+    """Return the time to the end of runs at a rate [s]; None if it is unknown.
 
-    It is no less than that of any single run at its own rate.
+    It is unknown if the rate is 0, or while an arena is paused. It is no less than that
+    of any single run at its own rate.
     """
     open_runs = [run for run in runs if run.state in ("waiting", "running")]
     lefts = [run.wanted - run.births for run in open_runs]
     if not sum(lefts):
         return 0.0
-    if not births_per_s:
+    are_paused = (island.is_paused for run in open_runs for island in run.islands)
+    if not births_per_s or any(are_paused):
         return None
     own = zip(lefts, (run.births_per_s for run in open_runs), strict=True)
     return max(sum(lefts) / births_per_s, *(n / rate for n, rate in own if rate), 0.0)

@@ -1,12 +1,10 @@
 """Tests of progress on a terminal and in a log."""
 
-import io
 from threading import Event
 
 import pytest
-from rich.console import Console
 
-from analysis.progress import SPAN_S, ProgressLine, bars
+from analysis.progress import bars
 
 
 def test_a_log_shows_the_title_once(
@@ -58,29 +56,3 @@ def test_a_log_repeats_no_line_while_nothing_moves(lines: list[str]) -> None:
         bar.update(task, completed=1)
         wait_for("rendering: 1 of 2", lines)
     assert lines == ["two robots", "rendering: 0 of 2", "rendering: 1 of 2"]
-
-
-def test_a_log_of_one_line_repeats_it_only_if_it_has_changed() -> None:
-    log = io.StringIO()
-    with ProgressLine(Console(file=log)) as line:
-        for text, now_s in (("a", 0.0), ("a", SPAN_S), ("b", SPAN_S + 1.0)):
-            line.update(text, now_s)
-    assert log.getvalue() == "a\nb\n"
-
-
-def test_a_log_shows_progress_at_intervals() -> None:
-    log = io.StringIO()
-    with ProgressLine(Console(file=log)) as line:
-        for number, now_s in enumerate((5.0, 5.2, 4.9 + SPAN_S, 5.0 + SPAN_S)):
-            line.update(f"[{number}] so far", now_s)
-    assert log.getvalue() == "[0] so far\n[3] so far\n"
-
-
-def test_a_terminal_shows_the_newest_progress() -> None:
-    screen = io.StringIO()
-    console = Console(file=screen, force_terminal=True, width=60)
-    with ProgressLine(console) as line:
-        line.update("[1] so far", 0.0)
-        line.update("[2] so far", 0.1)
-        line.update("[3] so far", 0.2)
-    assert "[3] so far" in screen.getvalue()

@@ -1,8 +1,6 @@
-"""Hand-made rows and a full disk, for tests of storage."""
+"""Hand-made rows, for tests of storage."""
 
-import resource
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -129,17 +127,6 @@ def assert_complete(folder: Path, rows: list[Record]) -> None:
         assert found.equals(expected(rows, name), check_metadata=True), name
 
 
-@contextmanager
-def no_file_beyond(size: int) -> Iterator[None]:
-    """Limit the size of this process's files, to imitate a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-
 @pytest.fixture
 def feed_rows() -> Callable[..., Recorder]:
     """Return a function (folder, rows, every=10) -> recorder that took them."""
@@ -150,9 +137,3 @@ def feed_rows() -> Callable[..., Recorder]:
 def check_complete() -> Callable[[Path, list[Record]], None]:
     """Return a function that fails unless a folder's tables hold these rows."""
     return assert_complete
-
-
-@pytest.fixture
-def full_beyond() -> Callable[[int], AbstractContextManager[None]]:
-    """Return a context that limits the size of files."""
-    return no_file_beyond

@@ -70,7 +70,10 @@ def test_a_seed_above_64_bits_is_refused(workspace: Workspace) -> None:
     assert limits in _refused(workspace, "run", *words)
 
 
-@pytest.mark.parametrize("flag", ["--access", "--connect", "--listen"])
+@pytest.mark.parametrize(
+    "flag",
+    ["--access", "--connect", "--listen", "--tls-ca", "--tls-certificate", "--tls-key"],
+)
 def test_a_flag_of_the_network_is_refused_where_nothing_is_sent(
     workspace: Workspace, flag: str
 ) -> None:
@@ -78,6 +81,15 @@ def test_a_flag_of_the_network_is_refused_where_nothing_is_sent(
     message = f"{flag} needs a network, but --in-process has none"
     assert message in _refused(workspace, "run", *words)
     assert not (workspace.folder / "x").exists()
+
+
+def test_certificates_of_the_environment_are_not_those_of_a_run_in_one_process(
+    workspace: Workspace,
+) -> None:
+    words = ("run", "scenario1", "--births", "15", "--in-process", "--quiet")
+    gone = {"REVOLVE_TLS_CA": "gone"}
+    process = workspace.start(*words, "--out", "x", environment=gone)
+    assert process.wait(60) == 0
 
 
 def test_misspelt_names_are_reported_with_the_nearest_name(
@@ -249,3 +261,32 @@ def test_closed_pipe_prints_no_error(workspace: Workspace) -> None:
     process.stdout = None
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors) == (1, "")
+
+
+ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+def test_any_text_is_printed_in_an_encoding_that_lacks_it(workspace: Workspace) -> None:
+    file = workspace.folder / "Größe" / "r.yaml"
+    file.parent.mkdir()
+    for words in (("random",), ("check",), ("show", "--experiment", "scenario1")):
+        action, *flags = words
+        process = workspace.start(
+            "robot", action, "Größe/r.yaml", *flags, environment=ASCII
+        )
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, err) == (0, "")
+    assert out.startswith("r.yaml: ")
+    assert "orientation 0?" in out
+
+
+def test_a_run_folder_with_a_name_of_another_encoding_is_one_line(
+    workspace: Workspace,
+) -> None:
+    words = ("run", "scenario1", "--births", "15", "--in-process", "--quiet")
+    process = workspace.start(*words, "--out", "Größe", environment=ASCII)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    line = "text in this locale's encoding, ascii: rename it, or set PYTHONUTF8=1\n"
+    assert err.endswith(line)
+    assert err.count("\n") == 1

@@ -115,6 +115,21 @@ MISTAKES = {
         2,
     ),
     "no robot file": ("robot check nowhere.yaml", "nowhere.yaml: cannot be read", 2),
+    "no robot file to simulate": (
+        "robot simulate nowhere.yaml",
+        "nowhere.yaml: cannot be read: No such file",
+        2,
+    ),
+    "folder to simulate": (
+        "robot simulate run",
+        "run: must be the file of a robot, got a folder; its best robot is run/best",
+        2,
+    ),
+    "other file to simulate": (
+        "robot simulate key.toml",
+        "key.toml: must end in one of .yaml, .yml, ",
+        2,
+    ),
     "not a robot": ("robot check exp.yaml", "exp.yaml", 2),
     "action misspelt": ("robot chek a.yaml", "did you mean 'check'?; allowed: ", 2),
     "address": (
@@ -135,6 +150,27 @@ MISTAKES = {
     "table of another version": (
         "compare later later",
         "was written by another version of Revolve",
+        2,
+    ),
+    "listen": (
+        "run scenario1 --listen here --out x",
+        "--listen: an address must be tcp/HOST:PORT, tls/HOST:PORT, ",
+        2,
+    ),
+    "listen beyond this machine": (
+        "run scenario1 --listen tcp/0.0.0.0:1 --out x",
+        "--listen: tcp/0.0.0.0:1 would listen beyond this machine",
+        2,
+    ),
+    "listen as hub": ("hub --listen here", "--listen: an address must be tcp/", 2),
+    "metrics": (
+        "run scenario1 --metrics here --out x",
+        "--metrics: must be PORT or HOST:PORT, got 'here'",
+        2,
+    ),
+    "fleet": (
+        "run scenario1 --fleet a/b --out x",
+        "--fleet: must be 1 to 96 letters, digits",
         2,
     ),
     "speed without arena": (

@@ -1,5 +1,6 @@
 """``revolve robot simulate``: equal results from all file formats."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -91,3 +92,23 @@ def test_robustness_is_shown_by_change_and_in_one_line(
     shares = [int(line.split("(")[1].split()[0]) for line in lines[4:-1]]
     text = f"keeps {min(shares)} to {max(shares)} % of its fitness"
     assert lines[-1].startswith(text)
+
+
+def test_a_long_simulation_shows_its_progress(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("schema.agent.terminal.progress_line.SOON_S", 0.0)
+    monkeypatch.setattr("schema.agent.terminal.progress_line.SPAN_S", 0.0)
+    write_robot(spider(), tmp_path / "spider.yaml")
+    long = tmp_path / "long.toml"
+    long.write_text(
+        'name = "long"\n[simulation]\nwarmup_steps = 0\nwindow_steps = 20000\n'
+    )
+    words = [str(tmp_path / "spider.yaml"), "--experiment", str(long)]
+    assert main(["robot simulate", *words]) == 0
+    said = capsys.readouterr()
+    *_, line = said.err.splitlines()
+    found = re.fullmatch(r"simulated (\d+\.\d) of 100 s", line)
+    assert found
+    assert float(found[1]) > 0
+    assert "simulated:         100.0 s" in said.out

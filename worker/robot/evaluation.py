@@ -43,7 +43,11 @@ Watch = Callable[[mujoco.MjData], None]
 
 
 def evaluate(
-    robot: Robot, settings: EvaluationSettings, identity: Identity = NO_IDENTITY
+    robot: Robot,
+    settings: EvaluationSettings,
+    identity: Identity = NO_IDENTITY,
+    *,
+    watch: Watch | None = None,
 ) -> Evaluation:
     """Return the evaluation of a robot: a pure function of the arguments.
 
@@ -53,6 +57,7 @@ def evaluate(
         robot: a robot that passes ``check_robot`` in the settings' body space.
         settings: body space, simulation, environment, fitness and measures.
         identity: of the evaluation; noise, pushes and disturbances depend on it.
+        watch: as for ``simulate``, of each simulation.
 
     Raises:
         SimulationDiverged: the physics diverged; with reason and simulated time.
@@ -64,11 +69,14 @@ def evaluate(
         InvalidRobot: more neurons than the limits.
     """
     if settings.robust is None:
-        return judge(simulate(robot, settings, identity=identity), settings)
+        return judge(
+            simulate(robot, settings, watch=watch, identity=identity), settings
+        )
     found: list[Evaluation] = []
     for drawn, own in disturbances(settings, settings.robust, identity):
         try:
-            found.append(judge(simulate(robot, drawn, identity=own), drawn))
+            trace = simulate(robot, drawn, watch=watch, identity=own)
+            found.append(judge(trace, drawn))
         except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
             number = f"draw {len(found) + 1} of {settings.robust.draws}"
             raise type(error)(f"{number}: {error}") from None

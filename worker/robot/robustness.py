@@ -5,7 +5,7 @@ loses fitness when the simulation changes by less than any two machines of the r
 world differ.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import Simulation
 from schema.experiment.robust import Robust
 from schema.experiment.settings import EvaluationSettings
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
 
@@ -173,16 +174,21 @@ def _as_changes(
     )
 
 
-def rejudge(robot: Robot, changes: Sequence[Change]) -> Iterator[Judged]:
+def rejudge(
+    robot: Robot,
+    changes: Sequence[Change],
+    evaluator: Callable[[Robot, EvaluationSettings], Evaluation] = evaluate,
+) -> Iterator[Judged]:
     """Evaluate a robot under each change, in their order.
 
     Args:
         robot: a checked robot.
         changes: changed settings.
+        evaluator: function that returns the evaluation of a robot.
     """
     for change in changes:
         try:
-            fitness = evaluate(robot, change.settings).fitness
+            fitness = evaluator(robot, change.settings).fitness
         except (SimulationDiverged, SensorFailed, FitnessUndefined):
             yield Judged(change, None)
         else:

@@ -1,4 +1,7 @@
-"""Advice how to resume a run has the flags of its agents, limits and checks."""
+"""Advice how to resume a run has the flags of its agents, limits and checks.
+
+The address of metrics is read with the flags.
+"""
 
 import pytest
 
@@ -55,3 +58,41 @@ def test_resumed_run_has_the_same_agents_and_limits(line: str, expected: str) ->
     options = resume.parse_args(["runs/a", *flags])
     check_load(resume, "--workers", options.workers or 0, options)
     assert resume_flags(options) == flags
+
+
+def test_resumed_run_has_the_certificates_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("REVOLVE_TLS_CA", "ca.pem")
+    run = parser("run")
+    shared = run.parse_args(["scenario1", "--connect", "hub", "--tls-key", "key.pem"])
+    expected = "--connect hub --tls-ca ca.pem --tls-key key.pem"
+    assert " ".join(resume_flags(shared)) == expected
+    alone = run.parse_args(["scenario1", "--in-process"])
+    assert resume_flags(alone) == ["--in-process"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("9100", ("127.0.0.1", 9100)),
+        ("h:0", ("h", 0)),
+        ("[::1]:65535", ("[::1]", 65535)),
+    ],
+)
+def test_an_address_of_metrics_is_host_and_port(
+    text: str, expected: tuple[str, int]
+) -> None:
+    options = parser("run").parse_args(["scenario1", "--metrics", text])
+    assert options.metrics == expected
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x", ":1", "a:b", "1:2:3", "70000", "h:70000", "\u0663"]
+)
+def test_an_invalid_address_of_metrics_is_refused(
+    text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        parser("run").parse_args(["scenario1", "--metrics", text])
+    assert "--metrics: must be PORT or HOST:PORT, got" in capsys.readouterr().err

@@ -23,7 +23,8 @@ def test_random_robots_differ_and_repeat_with_the_seed(tmp_path: Path) -> None:
     [
         ("--seed", "-1", "in 0..18446744073709551615"),
         ("--seed", str(2**64), "in 0..18446744073709551615"),
-        ("--count", "1.5", ">= 0"),
+        ("--count", "1.5", ">= 1"),
+        ("--count", "0", ">= 1"),
     ],
 )
 def test_invalid_numbers_are_refused(

@@ -1,6 +1,7 @@
 """Ground and scenery in experiment documents."""
 
 import math
+import re
 from pathlib import Path
 
 import msgspec
@@ -290,6 +291,29 @@ def test_attribute_without_effect_is_refused_in_new_documents_only(
     with pytest.raises(ExperimentError, match=rf"x\.toml: belt\.xml: {message}"):
         parse_experiment(beside, str(tmp_path / "x.toml"))
     plain = parse_experiment(text.replace(f" {name}='1'", ""), "x.toml")
+    environment = structs.replace(plain.environment, scenery=scenery)
+    old = experiment_text(structs.replace(plain, environment=environment))
+    assert experiment_from_text(old).environment.scenery == scenery
+
+
+@pytest.mark.parametrize(
+    "attribute",
+    ['size="1e300 1 1"', "pos='0 -1.1e6 1'", 'fromto = "0 0 0 0 0 2e6"'],
+)
+def test_scenery_beyond_the_greatest_length_is_refused_in_new_documents_only(
+    attribute: str,
+) -> None:
+    def document(attribute: str) -> str:
+        default = '<default><geom size="1 1 1"/></default>'
+        inside = f"<worldbody><geom {attribute}/></worldbody>"
+        scenery = f"<mujoco>{default}{inside}</mujoco>"
+        return f"name = 'x'\n[environment]\nscenery = '''{scenery}'''\n"
+
+    message = f"x.toml: environment.scenery: {attribute}: lengths must be <= 1e+06 m"
+    with pytest.raises(ExperimentError, match=re.escape(message)):
+        parse_experiment(document(attribute), "x.toml")
+    plain = parse_experiment(document('size="1e6 1 1"'), "x.toml")
+    scenery = plain.environment.scenery.replace('size="1e6 1 1"', attribute)
     environment = structs.replace(plain.environment, scenery=scenery)
     old = experiment_text(structs.replace(plain, environment=environment))
     assert experiment_from_text(old).environment.scenery == scenery

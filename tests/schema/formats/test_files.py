@@ -1,6 +1,7 @@
 """Robot files: round trips, and errors in one line."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
@@ -254,6 +255,32 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     (path / "best.yaml").write_text(TEXT)
     with pytest.raises(InvalidRobot, match=r"got a folder; its best .*/best\.yaml"):
         read_robot(path)
+
+
+@pytest.mark.parametrize("ending", [".yaml", ".pb", ".xml", ".urdf"])
+def test_a_full_disk_leaves_the_old_file(
+    tmp_path: Path,
+    full_beyond: Callable[[int], AbstractContextManager[None]],
+    ending: str,
+) -> None:
+    robot, path = read(TEXT), tmp_path / f"robot{ending}"
+    write_robot(robot, path)
+    old = path.read_bytes()
+    with (
+        full_beyond(len(old) // 2),
+        pytest.raises(InvalidRobot, match="cannot be written: File too large"),
+    ):
+        write_robot(robot, path)
+    assert path.read_bytes() == old
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_robot_is_written_where_a_link_leads(tmp_path: Path) -> None:
+    link, path = tmp_path / "link.yaml", tmp_path / "robot.yaml"
+    link.symlink_to(path)
+    write_robot(read(TEXT), link)
+    assert link.is_symlink()
+    assert read_robot(path) == read(TEXT)
 
 
 def test_damaged_protobuf_is_refused(tmp_path: Path) -> None:

@@ -86,6 +86,15 @@ def test_time_left_counts_what_is_still_to_be_born() -> None:
     assert Status((done,), 0, 1, 0.0).left_s == 0.0
 
 
+def test_time_left_is_unknown_while_an_arena_is_paused() -> None:
+    islands = (IslandStatus(30, 50, 0.1, 3), IslandStatus(9, 50, 0.1, 3, 8.0, True))
+    paused = RunStatus("d", "d", 0, "running", 2.0, islands)
+    other = RunStatus("e", "e", 0, "running", 2.0, islands[:1])
+    assert paused.left_s is None
+    assert Status((other, paused), 1, 1, 4.0).left_s is None
+    assert Status((other,), 1, 1, 4.0).left_s == 10.0
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [

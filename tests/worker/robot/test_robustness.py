@@ -1,6 +1,5 @@
 """Fitness under small changes of the simulation."""
 
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,8 +15,8 @@ from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.environment import Environment
 from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
-from worker.robot import robustness
 from worker.robot.disturbances import disturbances
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import (
@@ -128,15 +127,15 @@ def test_fitness_is_that_of_an_evaluation_with_the_changed_settings(
     "failure", [SimulationDiverged, SensorFailed, FitnessUndefined]
 )
 def test_failed_evaluations_have_no_fitness(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch, failure: type[RevolveError]
+    turtle: Robot, failure: type[RevolveError]
 ) -> None:
-    def fake(_: Robot, settings: EvaluationSettings) -> SimpleNamespace:
+    def fake(_: Robot, settings: EvaluationSettings) -> Evaluation:
         if settings.simulation.friction < 1.0:
             raise failure("slipped away")
-        return SimpleNamespace(fitness=0.5)
+        return Evaluation(0.5, 0.0, 0.0, 12.0)
 
-    monkeypatch.setattr(robustness, "evaluate", fake)
-    found = [one.fitness for one in rejudge(turtle, small_changes(SETTINGS))]
+    judgements = rejudge(turtle, small_changes(SETTINGS), fake)
+    found = [one.fitness for one in judgements]
     assert found == [0.5, 0.5, None, *[0.5] * 8]
 
 

@@ -1,0 +1,70 @@
+"""Files that are created or replaced as a whole, even across a power loss."""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+    """Create or replace a file atomically.
+
+    Args:
+        path: the file; its folder must exist.
+        write: function that writes the content to the path it is given.
+
+    Raises:
+        OSError: the disk is full or failed; an old file is unchanged.
+    """
+    write_new(path, write)
+    install_new(path)
+
+
+def write_new(path: Path, write: Callable[[Path], object]) -> None:
+    """Write the new content of a file under another name, for ``install_new``.
+
+    Raises:
+        OSError: the disk is full or failed; an old file is unchanged.
+    """
+    with _removed_on_error(new_path(path)) as temporary:
+        write(temporary)
+        _sync(temporary, os.O_RDONLY)
+
+
+def install_new(path: Path) -> None:
+    """Give a file its new content, which ``write_new`` wrote.
+
+    Raises:
+        OSError: the disk failed; an old file is unchanged.
+    """
+    with _removed_on_error(new_path(path)) as temporary:
+        temporary.replace(path)
+        sync_folder(path.parent)
+
+
+def new_path(path: Path) -> Path:
+    """Return where the new content of a file is written."""
+    return path.with_name(f".{path.name}.new")
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder durable."""
+    _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
+
+
+@contextlib.contextmanager
+def _removed_on_error(temporary: Path) -> Iterator[Path]:
+    try:
+        yield temporary
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+
+
+def _sync(path: Path, flags: int) -> None:
+    descriptor = os.open(path, flags | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
