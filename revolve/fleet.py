@@ -27,7 +27,7 @@ from revolve.robot import Robot, checked
 from revolve.workers import Workers
 from schema.agent.address import hub_of
 from schema.agent.network import DEFAULT_FLEET, Tls
-from schema.agent.supervisor import cores
+from schema.agent.supervisor import cores, most_processes
 from schema.agent.topics import unique_name
 from schema.errors import ExperimentError, JobRefused, RevolveError, shown
 from schema.experiment.brains import types_of
@@ -79,8 +79,9 @@ class Fleet:
         """Configure a fleet; ``with`` opens it.
 
         Args:
-            workers: worker processes to start on this machine; None: one per core, or
-                none with ``connect``. They start with the first job.
+            workers: worker processes to start on this machine, at most four per core;
+                None: one per core, or none with ``connect``. They start with the first
+                job.
             connect: address of a hub whose workers do the jobs, or folder of an active
                 run; None: only the workers that this fleet starts.
             fleet: name of the fleet at that hub.
@@ -89,13 +90,14 @@ class Fleet:
                 workers that this fleet starts.
 
         Raises:
-            RevolveError: a number of workers that is no whole number, or too small.
+            RevolveError: a number of workers that is no whole number, too small or too
+                large.
             ExperimentError: no such module or file.
             NetworkError: an invalid address or name.
         """
         least = 0 if connect else 1
         wanted = least * cores() if workers is None else workers
-        self._count = whole_number("workers", wanted, least)
+        self._count = whole_number("workers", wanted, least, most_processes())
         allow(plugins)
         files = Tls(*tls) if tls else None
         address = hub_of(connect) if connect else ""

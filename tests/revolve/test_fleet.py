@@ -19,6 +19,7 @@ import pytest
 import revolve as rv
 from coordinator.network.service import Network
 from revolve.workers import Workers
+from schema.agent.supervisor import cores
 from schema.plugins import permission
 from schema.wire.calls import call_settings
 from tests.own_brains import write_module
@@ -215,8 +216,14 @@ def test_closed_fleet_cancels_and_refuses() -> None:
         fleet.submit(robots(1)[0])
     with pytest.raises(rv.RevolveError, match="use it in a 'with'"):
         rv.Fleet(workers=1).submit(robots(1)[0])
-    for workers in (0, 2.5):
-        with pytest.raises(rv.RevolveError, match=f"number from 1 .*, got {workers}"):
+
+
+def test_fleet_has_one_to_four_workers_per_core() -> None:
+    most = 4 * cores()
+    rv.Fleet(workers=most)
+    for workers in (0, 2.5, most + 1):
+        expected = f"workers: must be a whole number from 1 to {most}, got {workers}"
+        with pytest.raises(rv.RevolveError, match=expected):
             rv.Fleet(workers=workers)  # type: ignore[arg-type]
 
 
