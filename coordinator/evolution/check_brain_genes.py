@@ -5,12 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from coordinator.evolution.brains import brain_genes
+from coordinator.evolution.brains import OwnGenes, brain_genes
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, RevolveError, error_text
 from schema.experiment.brains import widths
 from schema.experiment.document import Experiment, body_space
-from schema.plugins.origin import where_defined
 from schema.robot.brain import check_widths
 from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
@@ -33,7 +32,7 @@ def check_brain_genes(experiment: Experiment) -> None:
             has too many hidden neurons, or depends on more than its arguments.
     """
     genes = brain_genes(experiment)
-    place = f"brain.type: {where_defined(type(genes))}"
+    place = genes.place if isinstance(genes, OwnGenes) else "brain.type"
     try:
         first = []
         for genome in _genomes(experiment):

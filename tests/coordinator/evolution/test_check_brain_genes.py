@@ -10,7 +10,7 @@ from schema.experiment.document import BrainSection, Experiment
 from schema.plugins import permission
 
 MODULE = """\
-import random
+import random; import numpy as np
 from schema.robot.genome import ConnectionGene, NeuronGene
 import my_brains
 
@@ -44,6 +44,26 @@ CASES = {
         "grow(self, draws, new, branches, rules)",
         'new[0].hidden = (NeuronGene("Waver", (0.0, 1.0)),) * 11',
         "valid robots, got brain: hidden neurons must be <= 10, got ",
+    ),
+    "Listing": (
+        "outputs(self, draws, part)",
+        'return [NeuronGene("Waver", (0.5, 0.5))] * part.outputs',
+        "expected outputs as a tuple of NeuronGene, got a list$",
+    ),
+    "Arrayed": (
+        "vary(self, draws, branches, rules, pruned)",
+        "branches[0].outputs = np.array(branches[0].outputs)",
+        "expected outputs as a tuple of NeuronGene, got a ndarray$",
+    ),
+    "Paired": (
+        "grow(self, draws, new, branches, rules)",
+        'new[0].hidden = (("Waver", (0.5, 0.5)),)',
+        "expected hidden as a tuple of NeuronGene, got one with a tuple$",
+    ),
+    "Unconnected": (
+        "prune(self, draws, branches, rules)",
+        "branches[0].connections = None",
+        "expected connections as a tuple of ConnectionGene, got a NoneType$",
     ),
     "Raising": (
         "vary(self, draws, branches, rules, pruned)",
