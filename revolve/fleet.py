@@ -18,7 +18,7 @@ from coordinator.dispatch.events import Deliver
 from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
 from coordinator.run.requests import read_evaluation
-from revolve.arguments import whole_number
+from revolve.arguments import in_order, whole_number
 from revolve.children import plugins as allowed_plugins
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
@@ -198,8 +198,10 @@ class Fleet:
         Raises:
             InvalidRobot: as for ``submit``; from the iterator, too.
             ExperimentError: as for ``submit``.
-            RevolveError: as for ``submit`` and its future.
+            RevolveError: robots without an order, as a set; as for ``submit`` and its
+                future.
         """
+        robots = in_order("robots", robots)
         if experiment is None:
             return self._in_order(self.submit(robot) for robot in robots)
         settings = settings_for(None, experiment)
@@ -229,8 +231,10 @@ class Fleet:
             UnknownPlugin: no such function.
             ExperimentError: no function of one argument, or one of ``__main__``; from
                 the iterator, an item that is not plain.
-            RevolveError: from the iterator, if a call fails; as for ``submit``, too.
+            RevolveError: items without an order, as a set; from the iterator, if a
+                call fails; as for ``submit``, too.
         """
+        items = in_order("items", items)
         path = _path_of(function)
         allow_references([path], Path.cwd())
         load_function(path, "function", 1)

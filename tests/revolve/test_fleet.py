@@ -177,6 +177,11 @@ def test_map_calls_a_function_by_name(
         fleet.map(os.path.getsize, items)
     with pytest.raises(rv.ExperimentError, match="workers cannot import"):
         fleet.map(lambda item: item, items)
+    for unordered in ({"a"}, frozenset("a"), 3):
+        with pytest.raises(rv.RevolveError, match=r"^items: must be a list, .* got "):
+            fleet.map("lab_of_maps:size", unordered)  # type: ignore[arg-type]
+        with pytest.raises(rv.RevolveError, match=r"^robots: must be a list, .* got "):
+            fleet.evaluate(unordered)  # type: ignore[arg-type]
     other: Any = 3
     message = "^function: must be a function or 'module:attribute', got 3$"
     with pytest.raises(rv.ExperimentError, match=message):
