@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from msgspec import Struct
+
 from coordinator.evolution.cpg import CpgGenes
 from coordinator.evolution.network import NetworkGenes
 from schema.errors import ExperimentError
@@ -19,6 +21,12 @@ BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainGenes]] = {
     "network": NetworkGenes,
     "cpg": CpgGenes,
 }
+
+_TUPLES: Mapping[type[Struct], tuple[str, ...]] = {
+    NeuronGene: ("parameters",),
+    ConnectionGene: ("source", "path", "target"),
+}
+"""Fields of genes that are tuples."""
 
 
 @lru_cache(maxsize=64)
@@ -40,12 +48,12 @@ class OwnGenes:
     change its parent.
 
     Attributes:
-        place: where the brain type is defined, for messages.
+        where: the brain type is defined, for messages.
     """
 
     def __init__(self, brain: BrainGenes) -> None:
         self._brain = brain
-        self.place = f"brain.type: {where_defined(type(brain))}"
+        self.where = where_defined(type(brain))
 
     @property
     def neurons(self) -> NeuronKinds:
@@ -94,18 +102,26 @@ class OwnGenes:
             self._require("hidden", branch.hidden, NeuronGene)
             self._require("connections", branch.connections, ConnectionGene)
 
-    def _require(self, name: str, found: object, kind: type) -> None:
-        """Raise unless genes are a tuple of a kind.
+    def _require(self, name: str, found: object, kind: type[Struct]) -> None:
+        """Raise unless genes are a tuple of a kind, with tuples inside.
 
         Raises:
             ExperimentError: another object, or a tuple with another object.
         """
-        expected = f"{self.place}: expected {name} as a tuple of {kind.__name__}, got "
+        expected = f"brain.type: {self.where}: expected {name} as a tuple of "
+        expected += f"{kind.__name__}, got "
         if not isinstance(found, tuple):
             raise ExperimentError(f"{expected}a {type(found).__name__}")
         for each in found:
             if not isinstance(each, kind):
                 raise ExperimentError(f"{expected}one with a {type(each).__name__}")
+            for field in _TUPLES[kind]:
+                value = getattr(each, field)
+                if not isinstance(value, tuple):
+                    raise ExperimentError(
+                        f"{expected}one with {field} as a {type(value).__name__}, not "
+                        "a tuple"
+                    )
 
 
 @lru_cache(maxsize=64)

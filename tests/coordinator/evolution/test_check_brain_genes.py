@@ -60,6 +60,16 @@ CASES = {
         'new[0].hidden = (("Waver", (0.5, 0.5)),)',
         "expected hidden as a tuple of NeuronGene, got one with a tuple$",
     ),
+    "Inside": (
+        "outputs(self, draws, part)",
+        'return (NeuronGene("Waver", [0.5, 0.5]),) * part.outputs',
+        "of NeuronGene, got one with parameters as a list, not a tuple$",
+    ),
+    "Pathless": (
+        "grow(self, draws, new, branches, rules)",
+        'new[0].connections = (ConnectionGene(("output", 0), [], (), 1.0),)',
+        "of ConnectionGene, got one with path as a list, not a tuple$",
+    ),
     "Unconnected": (
         "prune(self, draws, branches, rules)",
         "branches[0].connections = None",
@@ -68,7 +78,7 @@ CASES = {
     "Raising": (
         "vary(self, draws, branches, rules, pruned)",
         "branches[99].outputs",
-        "outputs, grow, prune and vary to make genes, got IndexError",
+        r"prune and vary to make genes, got IndexError: .* \(broken_raising\.py:7\)$",
     ),
 }
 
