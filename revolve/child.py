@@ -97,13 +97,19 @@ def _serve(connection: Connection) -> int:
 
     prepare_process()
     from revolve.solo import outcome_of  # noqa: PLC0415
+    from schema.agent.stopping import STOPPED  # noqa: PLC0415
 
     while True:
         try:
             task = connection.recv_bytes()
         except EOFError:
             return 0
-        connection.send_bytes(outcome_of(task))
+        try:
+            outcome = outcome_of(task)
+        except KeyboardInterrupt:
+            # Of a plug-in, or of a signal to this process; raised again by the caller.
+            return STOPPED
+        connection.send_bytes(outcome)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import msgspec
 
 from revolve.messages import Outcome, Problem, Task, error_of
 from schema.agent.import_path import environment, python_command
+from schema.agent.stopping import STOPPED
 from schema.agent.supervision import crash_cause
 from schema.errors import RevolveError
 from schema.plugins.permission import allowed, source_of
@@ -131,6 +132,7 @@ class Simulator:
 
         Raises:
             RevolveError: the task cannot be done; of the class that the worker raises.
+            KeyboardInterrupt: Ctrl-C, or raised by a plug-in; the process has ended.
         """
         with self._lock:
             self._note_sources(task.settings)
@@ -163,11 +165,17 @@ class Simulator:
         return self._child
 
     def _death(self) -> str:
-        """Return why the process has ended, and forget it."""
+        """Return why the process has ended, and forget it.
+
+        Raises:
+            KeyboardInterrupt: it was interrupted.
+        """
         assert self._child is not None
         code = self._child.process.wait()
         self._child.end()
         self._child = None
+        if code == STOPPED:
+            raise KeyboardInterrupt from None
         return f"ended its own process, by {crash_cause(code) or 'a signal'}"
 
     def end(self) -> None:

@@ -18,7 +18,7 @@ from coordinator.dispatch.events import Deliver
 from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
 from coordinator.run.requests import read_evaluation
-from revolve.arguments import whole_number
+from revolve.arguments import in_order, whole_number
 from revolve.children import plugins as allowed_plugins
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
@@ -28,7 +28,7 @@ from revolve.workers import Workers
 from schema.agent.address import hub_of
 from schema.agent.command import name_at
 from schema.agent.network import DEFAULT_FLEET, Tls
-from schema.agent.supervisor import cores
+from schema.agent.supervisor import cores, most_processes
 from schema.agent.topics import unique_name
 from schema.errors import ExperimentError, JobRefused, RevolveError, shown
 from schema.experiment.brains import types_of
@@ -80,8 +80,9 @@ class Fleet:
         """Configure a fleet; ``with`` opens it.
 
         Args:
-            workers: worker processes to start on this machine; None: one per core, or
-                none with ``connect``. They start with the first job.
+            workers: worker processes to start on this machine, at most four per core;
+                None: one per core, or none with ``connect``. They start with the first
+                job.
             connect: address of a hub whose workers do the jobs, or folder of an active
                 run; None: only the workers that this fleet starts.
             fleet: name of the fleet at that hub.
@@ -90,13 +91,14 @@ class Fleet:
                 workers that this fleet starts.
 
         Raises:
-            RevolveError: a number of workers that is no whole number, or too small.
+            RevolveError: a number of workers that is no whole number, too small or too
+                large.
             ExperimentError: no such module or file.
             NetworkError: an invalid address or name.
         """
         least = 0 if connect else 1
         wanted = least * cores() if workers is None else workers
-        self._count = whole_number("workers", wanted, least)
+        self._count = whole_number("workers", wanted, least, most_processes())
         allow(plugins)
         files = Tls(*tls) if tls else None
         address = hub_of(connect) if connect else ""
@@ -197,8 +199,10 @@ class Fleet:
         Raises:
             InvalidRobot: as for ``submit``; from the iterator, too.
             ExperimentError: as for ``submit``.
-            RevolveError: as for ``submit`` and its future.
+            RevolveError: robots without an order, as a set; as for ``submit`` and its
+                future.
         """
+        robots = in_order("robots", robots)
         if experiment is None:
             return self._in_order(self.submit(robot) for robot in robots)
         settings = settings_for(None, experiment)
@@ -228,8 +232,10 @@ class Fleet:
             UnknownPlugin: no such function.
             ExperimentError: no function of one argument, or one of ``__main__``; from
                 the iterator, an item that is not plain.
-            RevolveError: from the iterator, if a call fails; as for ``submit``, too.
+            RevolveError: items without an order, as a set; from the iterator, if a
+                call fails; as for ``submit``, too.
         """
+        items = in_order("items", items)
         path = _path_of(function)
         allow_references([path], Path.cwd())
         load_function(path, "function", 1)

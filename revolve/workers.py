@@ -34,7 +34,7 @@ class Workers:
         self._process = subprocess.Popen(
             [
                 *(*python_command("revolve"), "worker", "--connect", address),
-                *("--processes", str(count), "--oversubscribe", "--until-closed"),
+                *("--processes", str(count), "--until-closed"),
                 *words,
             ],
             stdin=subprocess.PIPE,

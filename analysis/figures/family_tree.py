@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 
 from analysis.measures.ancestry import ancestors, parents_first, parents_of
 from analysis.measures.population_table import individual_ids, rows_of
+from schema.tables.last_populations import Row, best_of
 
 LINEAGE = pa.schema(
     [
@@ -44,18 +45,17 @@ def best_robots(robots: pa.Table) -> list[Best]:
     """Return the best robot of each experiment, sorted by the experiment's name.
 
     Args:
-        robots: with the columns of ``outputs``; the first of equally fit robots is
-            the best, and one whose evaluation failed is none.
+        robots: with the columns of ``outputs``. They are compared as at the
+            end of a run; one whose evaluation failed is none.
     """
     columns = [each.name for each in fields(Best)]
     is_judged = pc.field("is_last") & pc.invert(pc.field("is_failed"))
     last = robots.filter(is_judged).select(columns)
-    fittest = last.sort_by([("experiment", "ascending"), ("fitness", "descending")])
-    found: dict[str, Best] = {}
-    for row in fittest.to_pylist():
-        row["folder"] = Path(row["folder"])
-        found.setdefault(row["experiment"], Best(**row))
-    return list(found.values())
+    of: dict[str, list[Row]] = {}
+    for row in last.to_pylist():
+        of.setdefault(row["experiment"], []).append(row)
+    best = (best_of(of[name]) for name in sorted(of))
+    return [Best(**{**row, "folder": Path(row["folder"])}) for row in best if row]
 
 
 def row_of(best: Best, births: pa.Table) -> int:

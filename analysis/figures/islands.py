@@ -98,10 +98,17 @@ def between(tables: Tables) -> p9.ggplot:
     return (
         p9.ggplot(means, p9.aes("births", "distance"))
         + p9.geom_line(p9.aes(colour="experiment", linetype="pairs"), size=0.8)
+        + lone_points(means, ["experiment", "pairs"], shape="pairs")
         + p9.scale_linetype_manual(["-", "--"], limits=list(_PAIRS.values()))
+        + p9.scale_shape_manual(["o", "^"], limits=list(_PAIRS.values()))
         + scales(tables, rows["experiment"].to_pylist(), is_filled=False)
         + p9.expand_limits(y=0)
-        + p9.labs(x="births on each island", y="mean tree edit distance", linetype="")
+        + p9.labs(
+            x="births on each island",
+            y="mean tree edit distance",
+            linetype="",
+            shape="",
+        )
         + theme_of_size(3.8)
     )
 

@@ -136,7 +136,11 @@ def scales(
     return [*lines, p9.scale_fill_manual(**settings)] if is_filled else lines
 
 
-def lone_points(lines: Any, keys: list[str]) -> list[p9.geom_point]:  # noqa: ANN401 - pandas
+def lone_points(
+    lines: Any,  # noqa: ANN401 - pandas
+    keys: list[str],
+    **aesthetics: str,
+) -> list[p9.geom_point]:
     """Return a layer with the points that are alone in their line, if there are some.
 
     A line of one point is not drawn.
@@ -144,9 +148,10 @@ def lone_points(lines: Any, keys: list[str]) -> list[p9.geom_point]:  # noqa: AN
     Args:
         lines: data of a layer of lines.
         keys: columns that tell lines and panels apart; the first is their colour.
+        aesthetics: columns of further aesthetics of the points.
     """
     alone = lines[lines.groupby(keys)[keys[0]].transform("size") == 1]
-    points = p9.geom_point(p9.aes(colour=keys[0]), data=alone, size=1.5)
+    points = p9.geom_point(p9.aes(colour=keys[0], **aesthetics), data=alone, size=1.5)
     return [points] if len(alone) else []
 
 

@@ -1,7 +1,7 @@
 """Summary of a finished run: best robot, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -81,7 +81,8 @@ def restore_best(folder: Path) -> None:
     try:
         allow_plugins_of(folder, is_resumed=False)
         experiment = own_experiment(read_details(folder).document)
-        if _is_extinct(folder, experiment):
+        born = Counter(read_table(folder, "births")["island"].to_pylist())
+        if _is_extinct(experiment, born):
             return
         _, robot = _read_best(folder, best, experiment)
         done = _write_best(robot, folder, experiment)
@@ -92,11 +93,18 @@ def restore_best(folder: Path) -> None:
     tell_user(f"{folder}: {BEST} was missing; best robot: {done}")
 
 
-def _is_extinct(folder: Path, experiment: Experiment) -> bool:
-    """Return whether all islands of a finished run are extinct arenas."""
-    born = Counter(read_table(folder, "births")["island"].to_pylist())
+def _is_extinct(experiment: Experiment, births: Mapping[int, int]) -> bool:
+    """Return whether all islands of a finished run are extinct arenas.
+
+    An arena with all births of the experiment is none, even if its last robots are
+    too few to mate.
+
+    Args:
+        experiment: of the run.
+        births: number of births on each island.
+    """
     return all(
-        own.arena is not None and born[number] < own.births
+        own.arena is not None and births[number] < own.births
         for number, own in enumerate(island_experiments(experiment))
     )
 
@@ -121,8 +129,9 @@ def _results(run: RunSession) -> list[str]:
     run than the last population has, which status and report show.
     """
     folder, islands = run.held.path, run.loop.islands
-    births = counted(sum(island.births for island in islands.values()), "birth")
-    if all(isinstance(one, Arena) and one.is_extinct for one in islands.values()):
+    born = {number: island.births for number, island in islands.items()}
+    births = counted(sum(born.values()), "birth")
+    if _is_extinct(run.experiment, born):
         return [f"extinct after {births}: too few robots are left to mate"]
     last = last_populations(folder)
     best = best_of(last)

@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from coordinator.evolution.brains import brain_genes
+from coordinator.evolution.brains import OwnGenes, brain_genes
 from coordinator.evolution.revolve_angle import RevolveAngle
-from schema.errors import ExperimentError, InvalidRobot, RevolveError, error_text
+from schema.errors import ExperimentError, InvalidRobot, RevolveError
 from schema.experiment.brains import widths
 from schema.experiment.document import Experiment, body_space
-from schema.plugins.origin import where_defined
+from schema.plugins.origin import raised_text
 from schema.robot.brain import check_widths
 from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
@@ -33,7 +33,8 @@ def check_brain_genes(experiment: Experiment) -> None:
             has too many hidden neurons, or depends on more than its arguments.
     """
     genes = brain_genes(experiment)
-    place = f"brain.type: {where_defined(type(genes))}"
+    where = genes.where if isinstance(genes, OwnGenes) else experiment.brain.type
+    place = f"brain.type: {where}"
     try:
         first = []
         for genome in _genomes(experiment):
@@ -49,7 +50,7 @@ def check_brain_genes(experiment: Experiment) -> None:
     except Exception as error:
         raise ExperimentError(
             f"{place}: expected outputs, grow, prune and vary to make genes, got "
-            f"{error_text(error)}"
+            f"{raised_text(error, where)}"
         ) from error
     if first != second:
         raise ExperimentError(

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins, whole_number
-from schema.agent.supervisor import cores
+from schema.agent.supervisor import cores, most_processes
 
 
 def add_reevaluation(flags: Flags, out: str) -> None:
@@ -25,7 +25,7 @@ def add_reevaluation(flags: Flags, out: str) -> None:
     )
     flags.add_argument(
         "--workers",
-        type=whole_number(),
+        type=whole_number(1, most_processes()),
         default=cores(),
         metavar="N",
         help="number of workers, started on this machine; no result depends on it "

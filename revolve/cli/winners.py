@@ -25,6 +25,7 @@ from schema.experiment.settings import (
 from schema.robot.ids import BirthId
 from schema.tables.description import check_folder
 from schema.tables.files import born_as
+from schema.tables.last_populations import fittest_first
 from schema.tables.learnt import best_trials
 from schema.wire.updates import individual
 
@@ -137,9 +138,9 @@ def _recorded(tables: dict[str, pa.Table]) -> dict[tuple[int, BirthId], _Recorde
 
 def _fittest_first(found: pa.Table) -> list[int]:
     """Return the rows of robots by descending fitness, failed robots last."""
-    failed, fitness = found["is_failed"].to_pylist(), found["fitness"].to_pylist()
-    rows = range(found.num_rows)
-    return sorted(rows, key=lambda row: (failed[row], -fitness[row]))
+    rows = found.to_pylist()
+    keys = [(row["is_failed"], *fittest_first(row)) for row in rows]
+    return sorted(range(len(rows)), key=keys.__getitem__)
 
 
 def _alone(experiment: Experiment, island: int) -> Document:

@@ -28,8 +28,10 @@ from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config, hub_c
 from schema.agent.service import GAVE_UP, gave_up
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import (
+    MOST_PER_CORE,
     ProcessPool,
     cores,
+    most_processes,
     stop_on_signals,
     stop_with_input,
 )
@@ -38,10 +40,6 @@ from schema.errors import NetworkError, RevolveError
 from schema.plugins.permission import allow, allowed
 
 _POLL_S = 0.5
-MOST_PER_CORE = 4
-"""Processes per core that a command starts without being told twice."""
-
-
 _TLS_FILES = {
     "--tls-ca": "certificate authority of the fleet (PEM)",
     "--tls-certificate": "certificate (PEM)",
@@ -192,7 +190,7 @@ def check_load(
         processes: the number.
         options: with ``oversubscribe``.
     """
-    most = MOST_PER_CORE * cores()
+    most = most_processes()
     if processes > most and not options.oversubscribe:
         flags.error(
             f"{flag}: must be <= {most}, {MOST_PER_CORE} for each of {cores()} cores, "

@@ -48,6 +48,8 @@ _NETWORK = (
 # default glibc raises it to the size of a robot's simulation, and the memory becomes
 # fragmented: that of a worker grows by a tenth over 3000 births.
 _MAP_BYTES = "131072"
+MOST_PER_CORE = 4
+"""Processes per core that are started without being told twice."""
 GRACE_S = 2.5
 """Time between asking a process to end and killing it [s]."""
 _BETWEEN_STARTS_S = 1.0
@@ -84,6 +86,11 @@ def cores() -> int:
     """Return the number of cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+def most_processes() -> int:
+    """Return how many processes this machine starts without being told twice."""
+    return MOST_PER_CORE * cores()
 
 
 class ProcessPool:

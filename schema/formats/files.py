@@ -188,7 +188,10 @@ def write_robot(
     try:
         # Where a link leads: the link itself stays.
         target = Path(os.path.realpath(path))
-        replace_file(target, lambda new: new.write_bytes(data))
+        if target.exists() and not target.is_file():
+            target.write_bytes(data)  # a device or a pipe
+        else:
+            replace_file(target, lambda new: new.write_bytes(data))
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be written: {error.strerror}") from None
 

@@ -56,6 +56,24 @@ def check_neuron_type(kind: NeuronType, where: str) -> None:
             )
 
 
+def states_problem(found: npt.NDArray[np.generic], expected: tuple[int, ...]) -> str:
+    """Return what is expected of the states that a step returns, and what came.
+
+    Args:
+        found: the states.
+        expected: shape, (K, N).
+
+    Returns:
+        A part of a message; empty for float64 of this shape.
+    """
+    if found.shape == expected and found.dtype == np.float64:
+        return ""
+    return (
+        f"expected step to return float64 of shape (K, N) = {expected}, got "
+        f"{found.dtype} of shape {found.shape}"
+    )
+
+
 def _declaration_problem(kind: NeuronType) -> str:
     """Return what is expected of a name, parameters and number of states, and came."""
     name: Any = kind.name
@@ -104,11 +122,8 @@ def _states(
                 f"{place}: expected step(state, inputs, parameters, tick), got "
                 f"{error_text(error)}"
             ) from error
-        if after.shape != state.shape or after.dtype != np.float64:
-            raise ExperimentError(
-                f"{place}: expected step to return float64 of shape (K, N) = "
-                f"{state.shape}, got {after.dtype} of shape {after.shape}"
-            )
+        if problem := states_problem(after, state.shape):
+            raise ExperimentError(f"{place}: {problem}")
         if not np.isfinite(after).all():
             raise ExperimentError(f"{place}: expected finite states, got {after.min()}")
         if not all(map(np.array_equal, arguments, before)):

@@ -78,6 +78,17 @@ def where_raised(error: BaseException, file: str) -> str:
     return lines[-1] if lines else ""
 
 
+def raised_text(error: BaseException, where: str) -> str:
+    """Return an error of a plug-in as one line, and where it was raised.
+
+    Args:
+        error: with its traceback.
+        where: the plug-in is defined, as of ``where_defined``.
+    """
+    line = where_raised(error, where.partition(":")[0])
+    return error_text(error) + (f" ({line})" if line else "")
+
+
 def raised_by(plugin: object, error: BaseException) -> str:
     """Return a line of where a plug-in is defined, what it raised, and where.
 
@@ -86,9 +97,7 @@ def raised_by(plugin: object, error: BaseException) -> str:
         error: that a call of it raised.
     """
     where = where_defined(plugin)
-    line = where_raised(error, where.partition(":")[0])
-    text = f"{where}: raised {error_text(error)}"
-    return f"{text} ({line})" if line else text
+    return f"{where}: raised {raised_text(error, where)}"
 
 
 def _where_assigned(value: object) -> str:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from schema.errors import ExperimentError, error_text
+from schema.errors import ExperimentError, shown
 from schema.plugins.needs import channels_of
-from schema.plugins.origin import where_defined, where_raised
+from schema.plugins.origin import raised_text, where_defined
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import CONSTANT, Floats, Trace
 
@@ -60,8 +60,7 @@ def check_function(
                 )
     if len(raised) == len(traces):
         first = raised[0]
-        line = where_raised(first, place.partition(":")[0])
-        story = error_text(first) + (f" ({line})" if line else "")
+        story = raised_text(first, place)
         raise ExperimentError(
             f"{where}: {place}: must return a number, raised {story}"
         ) from first
@@ -119,7 +118,7 @@ def _problem(values: list[Any]) -> str:
     for value in values:
         is_number = isinstance(value, Real) and not isinstance(value, bool)
         if not is_number:
-            return f"must return a number, got {value!r}"
+            return f"must return a number, got {shown(value)}"
         if not math.isfinite(value):
             return f"must return a finite number, got {value}"
     if values[0] != values[1]:

@@ -31,21 +31,17 @@ def last_populations(folder: Path) -> list[Row]:
 
 
 def best_of(rows: Iterable[Row]) -> Row | None:
-    """Return the row with the highest fitness; of equal ones that of the first birth.
+    """Return the first row by ``fittest_first``; None if no robot has a fitness."""
+    judged = (row for row in rows if row["fitness"] is not None)
+    return min(judged, key=fittest_first, default=None)
 
-    A copy of a migrant has a row on each island that it lives on; of equal ones that
-    on the island of birth is returned.
 
-    Returns:
-        The row; None if no robot has a fitness.
+def fittest_first(row: Row) -> tuple[float, ...]:
+    """Return the key by which rows with a fitness are sorted, the best robot first.
+
+    Of equally fit robots that of the first birth precedes. A copy of a migrant has a
+    row on each island that it lives on; that on the island of birth precedes.
     """
-    judged = [row for row in rows if row["fitness"] is not None]
-    if not judged:
-        return None
-
-    def place(row: Row) -> tuple[object, ...]:
-        island, home = row["island"], row["birth_island"]
-        home = island if home is None else home
-        return -row["fitness"], home, row["birth"], island != home, island
-
-    return min(judged, key=place)
+    island, home = row["island"], row["birth_island"]
+    home = island if home is None else home
+    return -row["fitness"], home, row["birth"], island != home, island

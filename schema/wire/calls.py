@@ -22,6 +22,7 @@ from schema.wire import revolve_pb2 as pb
 from schema.wire.decoding import parsed
 
 _PLAIN = "None, bool, int, float, str, bytes, list or dict"
+_LEAVES = (type(None), bool, int, float, str, bytes)
 
 
 class CallSettings(Section, frozen=True):
@@ -65,9 +66,31 @@ def pack_value(value: object) -> bytes:
         raise ExperimentError(
             f"must be {_PLAIN}, got {type(value).__name__}: {why}"
         ) from None
+    if strange := _strange_kinds(value):
+        raise ExperimentError(f"must be {_PLAIN}, got {', '.join(strange)}")
     if len(data) > VALUE_BYTES:
         raise ExperimentError(f"must have <= {VALUE_BYTES} bytes, got {len(data)}")
     return data
+
+
+def _strange_kinds(value: object) -> list[str]:
+    """Return the names of the kinds of a value, or in it, that are not plain.
+
+    MessagePack writes some of them as others: a set as a list in no defined order.
+    """
+    found: set[str] = set()
+    waiting = [value]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, dict):
+            waiting += [*each, *each.values()]
+        elif not isinstance(each, list | tuple):
+            if not isinstance(each, _LEAVES):
+                found.add(type(each).__name__)
+        # Of a long list of numbers, fast.
+        elif not set(_LEAVES).issuperset(map(type, each)):
+            waiting += each
+    return sorted(found)
 
 
 def unpack_value(data: bytes) -> Any:  # noqa: ANN401 - any plain value

@@ -12,6 +12,7 @@ from revolve.cli.commands import COMMANDS
 from revolve.cli.parsers import actions, parser_of
 from revolve.command import main
 from schema.agent.flags import Flags
+from schema.agent.supervisor import cores
 
 
 @pytest.fixture(scope="module")
@@ -149,6 +150,17 @@ def test_an_error_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().err
     assert "two lines.yaml" in said
     assert said.count("\n") == 1
+
+
+def test_commands_start_four_workers_per_core_at_most(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    most = 4 * cores()
+    for command in ("ablate", "robustness"):
+        with pytest.raises(SystemExit):
+            main([command, "runs/a", "--workers", str(most + 1)])
+        wanted = f"--workers: must be a whole number in 1..{most}, got '{most + 1}'"
+        assert wanted in capsys.readouterr().err
 
 
 def test_actions_are_those_of_the_command() -> None:

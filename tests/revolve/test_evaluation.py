@@ -14,6 +14,7 @@ import pytest
 from msgspec import structs
 
 import revolve as rv
+from revolve.children import SIMULATOR
 from revolve.experiment import document_of
 from revolve.robot import plain
 from schema.experiment.settings import evaluation_settings_of
@@ -231,6 +232,25 @@ def test_failing_fitness_and_crash_are_results(
     missing = rv.Experiment.from_toml(f'{text}"odd_fitness:undefned"\n')
     with pytest.raises(rv.UnknownPlugin, match="did you mean"):
         rv.evaluate(robot, missing)
+
+
+def test_interrupt_in_a_plugin_is_raised_once_and_ends_the_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "interrupted.py").write_text(
+        "def fitness(track, fitness):\n    raise KeyboardInterrupt\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    experiment = rv.Experiment.from_toml(
+        'name = "odd"\n[fitness]\nfunction = "interrupted:fitness"\n'
+    )
+    robot = rv.Robot.random(seed=1)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rv.evaluate(robot, experiment)
+    assert caught.value.__suppress_context__
+    assert SIMULATOR._child is None
+    assert capfd.readouterr().err == ""
+    assert rv.evaluate(robot, "scenario1").failure == ""
 
 
 def test_genomes_mate_repeatably_and_develop_into_valid_robots() -> None:

@@ -19,6 +19,7 @@ import pytest
 import revolve as rv
 from coordinator.network.service import Network
 from revolve.workers import Workers
+from schema.agent.supervisor import cores
 from schema.plugins import permission
 from schema.wire.calls import call_settings
 from tests.own_brains import write_module
@@ -176,6 +177,11 @@ def test_map_calls_a_function_by_name(
         fleet.map(os.path.getsize, items)
     with pytest.raises(rv.ExperimentError, match="workers cannot import"):
         fleet.map(lambda item: item, items)
+    for unordered in ({"a"}, frozenset("a"), 3):
+        with pytest.raises(rv.RevolveError, match=r"^items: must be a list, .* got "):
+            fleet.map("lab_of_maps:size", unordered)  # type: ignore[arg-type]
+        with pytest.raises(rv.RevolveError, match=r"^robots: must be a list, .* got "):
+            fleet.evaluate(unordered)  # type: ignore[arg-type]
     other: Any = 3
     message = "^function: must be a function or 'module:attribute', got 3$"
     with pytest.raises(rv.ExperimentError, match=message):
@@ -215,8 +221,14 @@ def test_closed_fleet_cancels_and_refuses() -> None:
         fleet.submit(robots(1)[0])
     with pytest.raises(rv.RevolveError, match="use it in a 'with'"):
         rv.Fleet(workers=1).submit(robots(1)[0])
-    for workers in (0, 2.5):
-        with pytest.raises(rv.RevolveError, match=f"number from 1 .*, got {workers}"):
+
+
+def test_fleet_has_one_to_four_workers_per_core() -> None:
+    most = 4 * cores()
+    rv.Fleet(workers=most)
+    for workers in (0, 2.5, most + 1):
+        expected = f"workers: must be a whole number from 1 to {most}, got {workers}"
+        with pytest.raises(rv.RevolveError, match=expected):
             rv.Fleet(workers=workers)  # type: ignore[arg-type]
 
 

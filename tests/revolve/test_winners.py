@@ -2,7 +2,7 @@
 
 import pyarrow as pa
 
-from revolve.cli.winners import _recorded
+from revolve.cli.winners import _fittest_first, _recorded
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
 
@@ -15,6 +15,19 @@ def rows(table: str, *wanted: tuple[int, int, int]) -> pa.Table:
     return pa.Table.from_pylist(
         [dict(zip(names, row, strict=True)) for row in wanted], schema
     )
+
+
+def test_of_equally_fit_robots_that_of_the_first_birth_precedes() -> None:
+    found = pa.table(
+        {
+            "island": [0, 0, 1, 0, 0],
+            "birth_island": [1, 0, 0, 0, 0],
+            "birth": [2, 5, 4, 4, 3],
+            "fitness": [0.5, 0.5, 0.5, 0.5, 0.0],
+            "is_failed": [False, False, False, False, True],
+        }
+    )
+    assert _fittest_first(found) == [3, 2, 1, 0, 4]
 
 
 def test_last_evaluation_on_an_island_is_repeated() -> None:

@@ -85,6 +85,10 @@ def _is_text(_track: Track, _fitness: Fitness) -> float:
     return cast("float", "fast")
 
 
+def _is_array(track: Track, _fitness: Fitness) -> float:
+    return cast("float", track.core_position)
+
+
 def _is_endless(_track: Track, _fitness: Fitness) -> float:
     return float("inf")
 
@@ -181,6 +185,7 @@ def test_function_may_raise_for_some_traces() -> None:
         (_undeclared, r"trace.energy is not recorded: declare it with @needs"),
         (_writes, "must not write to the trace"),
         (_is_text, "must return a number, got 'fast'"),
+        (_is_array, r"must return a number, got array\([\s\S]{74}\.\.\. for a"),
         (_is_endless, "must return a finite number, got inf"),
         (_counts_calls(), "must return the same twice"),
     ],

@@ -180,9 +180,10 @@ def outputs_of(found: object, robots: int, outputs: int) -> Floats:
     """Return what a bank's ``step`` has returned, (R, O).
 
     Raises:
-        ValueError: another shape, or no numbers.
+        TypeError: complex numbers, or no numbers.
+        ValueError: another shape.
     """
-    numbers = np.asarray(found, dtype=np.float64)
+    numbers = np.asarray(found).astype(np.float64, casting="same_kind", copy=False)
     if numbers.shape != (robots, outputs):
         raise ValueError(
             f"step must return (R, O) = {(robots, outputs)}, got {numbers.shape}"

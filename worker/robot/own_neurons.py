@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schema.errors import SimulationDiverged, cut, error_text
+from schema.plugins.check_neuron_type import states_problem
 from schema.plugins.protocols import NeuronType
 from schema.robot.neurons import Tick
 from schema.robot.results import Floats
@@ -85,7 +86,7 @@ class OwnNeurons:
             tick_s: time between two ticks [s].
 
         Raises:
-            SimulationDiverged: the code of a type raised.
+            SimulationDiverged: the code of a type raised, or gave no such array.
         """
         ages = np.broadcast_to(np.asarray(age_ticks) * tick_s, (len(sums), 1))[:, 0]
         self._results = []
@@ -99,6 +100,8 @@ class OwnNeurons:
                 raise SimulationDiverged(
                     f"neuron type {kind.name} raised {story}"
                 ) from error
+            if problem := states_problem(result, mine.shape):
+                raise SimulationDiverged(f"neuron type {kind.name}: {problem}")
             self._results.append(result)
 
     def write(self, outputs: Floats, states: Floats) -> None:

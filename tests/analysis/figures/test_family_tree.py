@@ -22,6 +22,7 @@ from analysis.measures.families import families, family
 from analysis.measures.outputs import schema
 from analysis.measures.run_tables import RunTables
 from schema.robot.ids import BirthId
+from schema.tables.last_populations import best_of
 from tests.analysis.bodies import Body, part
 from tests.analysis.tables import births, population
 
@@ -146,6 +147,20 @@ def test_the_best_robot_is_the_fittest_of_the_last_population() -> None:
     ]  # fmt: skip
     (found,) = best_robots(pa.Table.from_pylist(rows, schema("robots")))
     assert found == Best("b", Path("f"), 3, 0, 0, -0.1)
+
+
+def test_of_equally_fit_robots_the_best_is_that_of_the_end_of_a_run() -> None:
+    rows = [
+        {"experiment": "x", "folder": folder, "island": island, "birth_island": home,
+         "birth": birth, "is_last": True, "is_failed": False, "fitness": 0.5}
+        for folder, island, home, birth in (
+            ("f", 0, 1, 3), ("f", 0, 0, 7), ("f", 1, 0, 4), ("f", 0, 0, 4),
+            ("g", 0, 0, 4),
+        )
+    ]  # fmt: skip
+    (found,) = best_robots(pa.Table.from_pylist(rows, schema("robots")))
+    assert best_of(rows[:4]) == rows[3]
+    assert found == Best("x", Path("f"), 0, 0, 4, 0.5)
 
 
 def test_row_of_a_robot_is_found_by_its_birth_id(members: pa.Table) -> None:

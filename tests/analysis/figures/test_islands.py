@@ -55,9 +55,16 @@ def test_within_and_between_islands_are_means_over_runs() -> None:
         for within, between in ((2.0, 5.0), (4.0, 8.0))
     ]
     runs = [{"experiment": "ring", "folder": "f", "islands": 2}]
-    figure = between({"runs": table("runs", runs), "between": table("between", rows)})
+    tables = {"runs": table("runs", runs), "between": table("between", rows)}
+    figure = between(tables)
     shown = dict(zip(figure.data["pairs"], figure.data["distance"], strict=True))
     assert shown == {"within islands": 3.0, "between islands": 6.5}
+    # No line joins the means of one number of births: they are points.
+    points = layers(figure)["geom_point"]
+    assert points["pairs"] == ["between islands", "within islands"]
+    assert points["distance"] == [6.5, 3.0]
+    later = table("between", [*rows, {**rows[0], "births": 30}])
+    assert "geom_point" not in layers(between({**tables, "between": later}))
 
 
 def test_islands_without_enough_births_are_not_said_to_be_missing() -> None:

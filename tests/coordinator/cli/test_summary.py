@@ -1,11 +1,13 @@
 """Tests of the commands that the summary of a run suggests."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
-import pyarrow as pa
 import pytest
 from msgspec import structs
 
+from coordinator.arena.arena import Arena as LivingArena
 from coordinator.cli import summary
 from schema.errors import RunFolderError
 from schema.experiment.document import (
@@ -76,14 +78,30 @@ def test_run_is_extinct_if_all_of_its_arenas_have_too_few_births(
     islands: tuple[Islands, ...],
     *,
     is_extinct: bool,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    table = pa.table({"island": [0, 0]})
-    monkeypatch.setattr(summary, "read_table", lambda _folder, _name: table)
     experiment = Experiment("e", births=births, arena=Arena(), islands=islands)
-    assert summary._is_extinct(Path(), experiment) is is_extinct
+    assert summary._is_extinct(experiment, {0: 2, 1: 0}) is is_extinct
     off_line = structs.replace(experiment, arena=None)
-    assert not summary._is_extinct(Path(), off_line)
+    assert not summary._is_extinct(off_line, {0: 2, 1: 0})
+
+
+def test_run_that_ends_with_too_few_robots_to_mate_has_a_best_one(
+    tmp_path: Path,
+) -> None:
+    """As ``restore_best`` finds in its tables."""
+    experiment = Experiment("e", births=3, arena=Arena())
+    arena = LivingArena(experiment, 1, 0)
+    arena.births, arena.is_extinct = 3, True
+    run: Any = SimpleNamespace(
+        held=SimpleNamespace(path=tmp_path),
+        loop=SimpleNamespace(islands={0: arena}),
+        experiment=experiment,
+    )
+    none = "no robot of the last population has a fitness"
+    assert summary._results(run) == [f"3 births; {none}"]
+    arena.births = 2
+    (line,) = summary._results(run)
+    assert line.startswith("extinct after 2 births: ")
 
 
 def test_robot_without_a_file_is_said(tmp_path: Path, chain: Robot) -> None:

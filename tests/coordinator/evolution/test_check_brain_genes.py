@@ -2,15 +2,20 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from coordinator.evolution.check_brain_genes import check_brain_genes
+from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError
 from schema.experiment.document import BrainSection, Experiment
+from schema.parts import BUILT_IN
 from schema.plugins import permission
+from schema.robot.genome import walk
+from schema.robot.ids import BirthId
 
 MODULE = """\
-import random
+import random; import numpy as np
 from schema.robot.genome import ConnectionGene, NeuronGene
 import my_brains
 
@@ -45,10 +50,30 @@ CASES = {
         'new[0].hidden = (NeuronGene("Waver", (0.0, 1.0)),) * 11',
         "valid robots, got brain: hidden neurons must be <= 10, got ",
     ),
+    "Arrayed": (
+        "vary(self, draws, branches, rules, pruned)",
+        "branches[0].outputs = np.array(branches[0].outputs)",
+        "expected outputs as a tuple of NeuronGene, got a ndarray$",
+    ),
+    "Paired": (
+        "grow(self, draws, new, branches, rules)",
+        'new[0].hidden = (("Waver", (0.5, 0.5)),)',
+        "expected hidden as a tuple of NeuronGene, got one with a tuple$",
+    ),
+    "Inside": (
+        "outputs(self, draws, part)",
+        'return (NeuronGene("Waver", [0.5, 0.5]),) * part.outputs',
+        "of NeuronGene, got one with parameters as a list, not a tuple$",
+    ),
+    "Unconnected": (
+        "prune(self, draws, branches, rules)",
+        "branches[0].connections = None",
+        "expected connections as a tuple of ConnectionGene, got a NoneType$",
+    ),
     "Raising": (
         "vary(self, draws, branches, rules, pruned)",
         "branches[99].outputs",
-        "outputs, grow, prune and vary to make genes, got IndexError",
+        r"prune and vary to make genes, got IndexError: .* \(broken_raising\.py:7\)$",
     ),
 }
 
@@ -70,6 +95,26 @@ def test_broken_genes_are_refused_in_one_line(
     assert "\n" not in str(caught.value)
     if name != "Mute":
         assert str(caught.value).startswith(f"brain.type: {module}.py:5: expected ")
+
+
+@pytest.mark.usefixtures("_own_brains")
+def test_lists_of_genes_become_tuples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs of earlier versions may have such brain types."""
+    monkeypatch.syspath_prepend(tmp_path)
+    file = tmp_path / "broken_listing.py"
+    body = 'return [NeuronGene("Waver", (0.5, 0.5))] * part.outputs'
+    method = "outputs(self, draws, part)"
+    file.write_text(MODULE.format(name="Listing", method=method, body=body))
+    allowed = {**permission._allowed, file.stem: file}
+    monkeypatch.setattr(permission, "_allowed", allowed)
+    brain = BrainSection(type="broken_listing:Listing")
+    experiment = Experiment(name="x", brain=brain)
+    check_brain_genes(experiment)
+    rng = np.random.default_rng(1)
+    genome = RevolveAngle(experiment, BUILT_IN, None).random(rng, BirthId(0, 0))
+    assert all(isinstance(node.outputs, tuple) for node, _, _ in walk(genome))
 
 
 @pytest.mark.usefixtures("_own_brains")

@@ -1,5 +1,6 @@
 """Robot files: round trips, and errors in one line."""
 
+import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -281,6 +282,17 @@ def test_a_robot_is_written_where_a_link_leads(tmp_path: Path) -> None:
     write_robot(read(TEXT), link)
     assert link.is_symlink()
     assert read_robot(path) == read(TEXT)
+
+
+def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
+    pipe = tmp_path / "robot.yaml"
+    os.mkfifo(pipe)
+    read_end = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_robot(read(TEXT), pipe)
+    written = os.read(read_end, 100_000).decode()
+    os.close(read_end)
+    assert read(written) == read(TEXT)
+    assert pipe.is_fifo()
 
 
 def test_damaged_protobuf_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Calls of users' functions as bytes."""
 
+from datetime import date
+
 import pytest
 
 from schema.errors import ExperimentError, MalformedMessage
@@ -50,7 +52,9 @@ def test_only_a_call_is_a_call() -> None:
         decode_call_request(request()[:-3])
 
 
-@pytest.mark.parametrize("value", [7, 2.5, "text", [1, [2]], None, {"a": b"b"}])
+@pytest.mark.parametrize(
+    "value", [7, 2.5, "text", [1, [2]], None, {"a": b"b", "c": [[[True]]]}]
+)
 def test_value_survives_the_way(value: object) -> None:
     data = encode_call_answer(CALL, 0.5, pack_value(value))
     assert read_call_answer(data, (3, 17)) == value
@@ -72,6 +76,9 @@ def test_failure_is_no_value() -> None:
         (object(), "got object"),
         (len, "got builtin_function_or_method"),
         (2**70, "got int"),
+        ({1, 2}, "or dict, got set$"),
+        ({"a": [1, (frozenset("b"), {"c": {3}})]}, "or dict, got frozenset, set$"),
+        ([date(2020, 1, 1)], "got date$"),
         (b"x" * (VALUE_BYTES + 1), f"must have <= {VALUE_BYTES} bytes"),
     ],
 )

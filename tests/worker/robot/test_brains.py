@@ -2,17 +2,20 @@
 
 import math
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 import pytest
 
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, SimulationDiverged
 from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
+from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.robot.brains import Bank, Network, pack
 from worker.robot.own_neurons import STATE_LIMIT
+from worker.robot.solo_brains import SoloBank
 
 WIDTH = widths(Space())
 TICK_S = 0.125
@@ -144,3 +147,18 @@ def test_states_can_be_moved_to_another_batch(networks: list[Network]) -> None:
     for t in range(10, 20):
         found = second.step(readings[t, ::-1], float(t))
         assert found[::-1].tobytes() == expected[t].tobytes()
+
+
+def test_complex_outputs_of_a_brain_type_are_a_failed_result() -> None:
+    class Complex:
+        states = np.zeros((1, 0))
+
+        def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
+            del readings
+            outputs = np.full((1, WIDTH.outputs), 0.5)
+            return cast("Floats", outputs + 1j) if age_ticks else outputs
+
+    solo = SoloBank(Complex(), WIDTH, TICK_S)
+    assert solo.step(0)[0] == 0.5
+    with pytest.raises(SimulationDiverged, match=r"by 0\.125 s: .*complex128"):
+        solo.step(1)

@@ -1,5 +1,6 @@
 """Neuron types of users, beside the built-in ones."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -196,6 +197,48 @@ def test_off_line_a_type_that_raises_is_a_failed_result_in_one_line() -> None:
     assert str(caught.value) == (
         "brain failed by 0.125 s: neuron type Picky raised ValueError: input of a "
         "neuron too great"
+    )
+
+
+class Turning:
+    """Neuron whose states are of another form after the first tick."""
+
+    name = "Turning"
+    parameters: tuple[Parameter, ...] = ()
+    states = 2
+
+    def __init__(self, form: Callable[[Floats], Floats]) -> None:
+        self._form = form
+
+    def step(
+        self, state: Floats, inputs: Floats, parameters: Floats, tick: Tick
+    ) -> Floats:
+        del inputs, parameters
+        return self._form(state + 0.25) if tick.age_s.max() else state + 0.25
+
+
+@pytest.mark.parametrize(
+    ("form", "got"),
+    [
+        (lambda found: found.astype(np.float32), "float32 of shape (2, 1)"),
+        (lambda found: found + 1j, "complex128 of shape (2, 1)"),
+        (lambda found: found[0], "float64 of shape (1,)"),
+        (lambda _: 0.5, "float64 of shape ()"),
+    ],
+)
+def test_states_of_another_form_are_a_failed_result(
+    form: Callable[[Floats], Floats], got: str
+) -> None:
+    control = NetworkControl(NoParameters(), (Turning(form),))
+    brain = Brain((Neuron("output", "Turning", 0),))
+    bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
+    solo = SoloBank(bank, WIDTH, TICK_S)
+    assert solo.step(0)[0] == 0.25
+    with pytest.raises(SimulationDiverged) as caught:
+        solo.step(1)
+    assert str(caught.value) == (
+        "brain failed by 0.125 s: neuron type Turning: expected step to return float64 "
+        f"of shape (K, N) = (2, 1), got {got}"
     )
 
 
