@@ -90,7 +90,7 @@ def test_many_small_batches_are_refused() -> None:
 
 
 def test_a_decompression_bomb_costs_nothing() -> None:
-    count = 20_000_000
+    count = 4_000_000
     bomb = pa.record_batch(
         [
             pa.nulls(count, field.type)
@@ -102,7 +102,7 @@ def test_a_decompression_bomb_costs_nothing() -> None:
     )
     data = written(bomb, compression="zstd")
     del bomb
-    assert len(data) < 1 << 20
+    assert len(data) < 1 << 18
     before = pa.total_allocated_bytes()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(MalformedMessage, match="compressed"):
