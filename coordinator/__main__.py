@@ -135,6 +135,7 @@ def plugin_kinds() -> tuple[Kind, ...]:
         controls(experiment)
 
     def check_new_brain(experiment: Experiment) -> None:
+        check_brain_genes(experiment, is_new=True)
         controls(experiment).check_new()
 
     return (

@@ -34,15 +34,23 @@ from schema.parts import Slot as Slot
 from schema.parts import constant_shape as constant_shape
 from schema.parts import cylinder as cylinder
 from schema.plugins.needs import needs as needs
+from schema.plugins.protocols import Bank as Bank
+from schema.plugins.protocols import BrainControl as BrainControl
+from schema.plugins.protocols import BrainGenes as BrainGenes
 from schema.plugins.protocols import BrainRules as BrainRules
 from schema.plugins.protocols import BrainType as BrainType
 from schema.plugins.protocols import Branch as Branch
 from schema.plugins.protocols import Draws as Draws
 from schema.plugins.protocols import Encoding as Encoding
+from schema.plugins.protocols import FitnessFunction as FitnessFunction
+from schema.plugins.protocols import Learner as Learner
+from schema.plugins.protocols import MeasureFunction as MeasureFunction
 from schema.plugins.protocols import NeuronType as NeuronType
+from schema.plugins.protocols import ParentSelection as ParentSelection
 from schema.plugins.protocols import Selectable as Selectable
 from schema.plugins.protocols import SensorType as SensorType
 from schema.plugins.protocols import SensorView as SensorView
+from schema.plugins.protocols import SurvivorSelection as SurvivorSelection
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
@@ -54,8 +62,11 @@ from schema.robot.robot import Part as Part
 
 __all__ = [
     "Analysis",
+    "Bank",
     "Box",
     "Brain",
+    "BrainControl",
+    "BrainGenes",
     "BrainRules",
     "BrainType",
     "Branch",
@@ -65,18 +76,22 @@ __all__ = [
     "Encoding",
     "Experiment",
     "ExperimentError",
+    "FitnessFunction",
     "FitnessUndefined",
     "Fleet",
     "Genome",
     "InvalidRobot",
     "JobRefused",
     "Joint",
+    "Learner",
+    "MeasureFunction",
     "Motor",
     "NetworkError",
     "Neuron",
     "NeuronGene",
     "NeuronType",
     "Parameter",
+    "ParentSelection",
     "Part",
     "PartType",
     "Result",
@@ -92,6 +107,7 @@ __all__ = [
     "Shape",
     "SimulationDiverged",
     "Slot",
+    "SurvivorSelection",
     "Tick",
     "Trace",
     "UnknownPlugin",

@@ -12,7 +12,6 @@ import subprocess
 import threading
 from collections.abc import Sequence
 from multiprocessing.connection import Connection, Pipe
-from pathlib import Path
 
 import msgspec
 
@@ -21,25 +20,11 @@ from schema.agent.import_path import environment, python_command
 from schema.agent.stopping import STOPPED
 from schema.agent.supervision import crash_cause
 from schema.errors import RevolveError
-from schema.plugins.permission import allowed, source_of
 from schema.plugins.source import forget_digests, plugins_of
 
 _GRACE_S = 5.0
 _OUTCOMES = msgspec.msgpack.Decoder(Outcome)
 _PROBLEMS = msgspec.msgpack.Decoder(Problem)
-
-
-def plugins() -> tuple[str, ...]:
-    """Return the modules that children may import: those allowed here that exist."""
-    return tuple(
-        entry
-        for entry in allowed()
-        if (Path(entry).is_file() if entry.endswith(".py") else _is_module(entry))
-    )
-
-
-def _is_module(name: str) -> bool:
-    return bool(source_of(name.partition(".")[0]))
 
 
 class Child:

@@ -19,7 +19,6 @@ from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
 from coordinator.run.requests import read_evaluation
 from revolve.arguments import in_order, whole_number
-from revolve.children import plugins as allowed_plugins
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
 from revolve.experiment import Experiment
@@ -35,7 +34,7 @@ from schema.experiment.brains import types_of
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.load import load_function
-from schema.plugins.permission import allow, allow_references
+from schema.plugins.permission import allow, allow_references, allowed
 from schema.plugins.source import forget_digests, plugins_of
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
@@ -307,7 +306,7 @@ class Fleet:
 
     def _start_workers(self) -> None:
         """Start the workers, or replace them by some that may import more plug-ins."""
-        plugins = allowed_plugins()
+        plugins = allowed()
         if not self._count or (self._workers and self._workers[-1].plugins == plugins):
             return
         for earlier in self._workers:

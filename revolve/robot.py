@@ -9,7 +9,7 @@ import numpy as np
 
 from coordinator.evolution.breeding import Breeder
 from revolve.arguments import whole_number
-from revolve.children import SIMULATOR, plugins
+from revolve.children import SIMULATOR
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
 from schema.errors import (
@@ -26,6 +26,7 @@ from schema.formats.files import read_robot, settings_of, types_for, write_robot
 from schema.formats.yaml_reader import OTHER_TYPES
 from schema.limits import MOST_PIXELS, MOST_SEED
 from schema.parts import BodySpace
+from schema.plugins.permission import allowed
 from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
@@ -242,7 +243,7 @@ def task_of(
     types = types_for(settings) if size else types_of(settings)
     encoded = encode_robot(checked(robot, types))
     data = msgspec.json.encode(settings)
-    return Task(data, encoded, plugins(), is_judged, size)
+    return Task(data, encoded, allowed(), is_judged, size)
 
 
 def _settings(experiment: Experiment | None) -> EvaluationSettings:

@@ -10,13 +10,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from revolve.arguments import whole_number
-from revolve.children import plugins as allowed_plugins
 from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError, nearest, rounded, shown
 from schema.experiment.document import island_experiment, island_experiments
 from schema.experiment.file import own_experiment
+from schema.plugins.permission import allowed
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
 from schema.tables.description import (
@@ -323,7 +323,7 @@ def run(
         ("--births", births), ("--workers", workers), ("--connect", connect)
     ):  # fmt: skip
         words += [] if value is None else [flag, str(value)]
-    words += _common(plugins, progress=progress)
+    words += _common((*allowed(), *plugins), progress=progress)
     if not isinstance(experiment, Experiment):
         return _done(("run", str(experiment), *words), folder, progress=progress)
     with tempfile.TemporaryDirectory() as place:
@@ -359,8 +359,7 @@ def resume(
 
 
 def _common(plugins: Iterable[str], *, progress: bool) -> list[str]:
-    entries = dict.fromkeys((*allowed_plugins(), *plugins))
-    words = [word for entry in entries for word in ("--plugins", entry)]
+    words = [word for entry in dict.fromkeys(plugins) for word in ("--plugins", entry)]
     return words if progress else [*words, "--quiet"]
 
 

@@ -42,7 +42,8 @@ def _plain_log(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _plugins_of_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forget after each test which modules it has allowed."""
+    """Forget after each test which modules it has allowed, and their copies."""
+    monkeypatch.setattr(permission, "_copies", {})
     monkeypatch.setattr(permission, "_allowed", dict(permission._allowed))
 
 

@@ -38,7 +38,8 @@ from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
-from schema.tables.description import STATE, read_state
+from schema.plugins.kept import refuse_other
+from schema.tables.description import STATE, read_description, read_state
 from schema.tables.files import is_sealed
 from schema.wire.status import RunStatus
 
@@ -172,6 +173,8 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
                 restore_best(path)
                 if not has_evaluated(path):
                     failed.append(path)
+            else:
+                refuse_other(path, read_description(path).plugins)
         except RevolveError as error:
             # The damaged run fails when the scheduler opens it; the others continue.
             planned.append(Planned(status, partial(_raise, error)))

@@ -4,7 +4,8 @@ Every candidate is a pure function of seed, run, birth, attempt and population.
 Attempts are numbered through all couples of a birth, so that each has its own stream.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
@@ -87,6 +88,16 @@ class Individual:
         return None if self.has_failed else self.fitness
 
 
+@contextmanager
+def at_birth(birth: BirthId) -> Iterator[None]:
+    """Say at which birth an error occurs, of a plug-in for example."""
+    try:
+        yield
+    except ExperimentError as error:
+        where = f"birth {birth.number} of island {birth.island}"
+        raise type(error)(f"{where}: {error}") from error
+
+
 Couple = tuple[Individual, Individual]
 """Two parents; the first gives the root of the child."""
 
@@ -163,18 +174,19 @@ class Breeder:
             ExperimentError: (nearly) no robot meets the restrictions, or an
                 encoding's own code fails.
         """
-        while attempt < end:
-            self.check_attempts(birth, attempt, population, why)
-            couple, genome = self.conceive(birth, attempt, population, couple)
-            why = self._encoding.no_child
-            if genome is not None:
-                try:
-                    robot = self._encoding.develop(genome)
-                except InvalidRobot as error:
-                    why = str(error)
-                else:
-                    return Candidate(birth, attempt, couple, genome, robot)
-            attempt += 1
+        with at_birth(birth):
+            while attempt < end:
+                self.check_attempts(attempt, population, why)
+                couple, genome = self.conceive(birth, attempt, population, couple)
+                why = self._encoding.no_child
+                if genome is not None:
+                    try:
+                        robot = self._encoding.develop(genome)
+                    except InvalidRobot as error:
+                        why = str(error)
+                    else:
+                        return Candidate(birth, attempt, couple, genome, robot)
+                attempt += 1
         return None
 
     def conceive(
@@ -212,12 +224,11 @@ class Breeder:
         return couple, self._encoding.mate(first.genome, second.genome, rng, birth)
 
     def check_attempts(
-        self, birth: BirthId, attempts: int, population: Sequence[Individual], why: str
+        self, attempts: int, population: Sequence[Individual], why: str
     ) -> None:
         """Raise if too many attempts at a birth have failed.
 
         Args:
-            birth: id of the birth.
             attempts: number of failed attempts.
             population: possible parents; empty for a founder.
             why: reason why the last attempt failed.
@@ -233,9 +244,8 @@ class Breeder:
             what = f"{_COUPLES} x selection.max_mating_attempts"
         if attempts >= limit:
             raise ExperimentError(
-                f"birth {birth.number} of island {birth.island}: no viable robot in "
-                f"{what} = {limit} attempts, the last because: {why}; "
-                "the restrictions in [space] and [vetting] allow (nearly) none"
+                f"no viable robot in {what} = {limit} attempts, the last because: "
+                f"{why}; the restrictions in [space] and [vetting] allow (nearly) none"
             )
 
     def survivors(
@@ -254,9 +264,11 @@ class Breeder:
         if selection.culling is not None:
             founders = selection.population
             return cull_population(parents, children, founders, selection.culling)
-        rng = self._stream(children[-1].birth, 0, Purpose.SURVIVORS)
+        last = children[-1].birth
+        rng = self._stream(last, 0, Purpose.SURVIVORS)
         rule = self._survivors_rule
-        return select_survivors(parents, children, rng, selection, rule)
+        with at_birth(last):
+            return select_survivors(parents, children, rng, selection, rule)
 
     def _is_random(self, population: Sequence[Individual]) -> bool:
         return not population or self._experiment.selection.parents == "none"

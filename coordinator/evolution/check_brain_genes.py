@@ -7,12 +7,12 @@ import numpy as np
 
 from coordinator.evolution.brains import OwnGenes, brain_genes
 from coordinator.evolution.revolve_angle import RevolveAngle
-from schema.errors import ExperimentError, InvalidRobot, RevolveError
+from schema.errors import ExperimentError, InvalidRobot, RevolveError, shown
 from schema.experiment.brains import widths
 from schema.experiment.document import Experiment, body_space
 from schema.plugins.origin import raised_text
-from schema.robot.brain import check_widths
-from schema.robot.genome import Genome, develop
+from schema.robot.brain import NeuronKinds, check_widths
+from schema.robot.genome import Genome, develop, walk
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
 
@@ -20,17 +20,19 @@ _FOUNDERS = 6
 _CHILDREN = 20
 
 
-def check_brain_genes(experiment: Experiment) -> None:
+def check_brain_genes(experiment: Experiment, *, is_new: bool = False) -> None:
     """Raise unless a brain type makes valid robots, and equal ones of equal streams.
 
     A few random robots are made and mated, twice.
 
     Args:
         experiment: names the brain type.
+        is_new: refuse also what runs that have begun may go on with.
 
     Raises:
         ExperimentError: the brain type raises, makes a robot that breaks the rules or
-            has too many hidden neurons, or depends on more than its arguments.
+            has too many hidden neurons, or depends on more than its arguments; of new
+            runs, a connection that comes twice, or a parameter outside its range.
     """
     genes = brain_genes(experiment)
     where = genes.where if isinstance(genes, OwnGenes) else experiment.brain.type
@@ -41,6 +43,8 @@ def check_brain_genes(experiment: Experiment) -> None:
             robot = develop(genome, body_space(experiment.space))
             check_robot(robot, body_space(experiment.space), genes.neurons)
             check_widths(robot.brain, widths(experiment.space))
+            if is_new:
+                _check_genes(genome, genes.neurons, is_random=len(first) < _FOUNDERS)
             first.append(genome)
         second = list(_genomes(experiment))
     except InvalidRobot as error:
@@ -57,6 +61,20 @@ def check_brain_genes(experiment: Experiment) -> None:
             f"{place}: expected equal robots from equal random numbers, got different "
             "ones: draw from `draws` only and keep no state"
         )
+
+
+def _check_genes(genome: Genome, kinds: NeuronKinds, *, is_random: bool) -> None:
+    """Raise for a connection that comes twice, or a parameter outside its range."""
+    for node, _, _ in walk(genome):
+        ends = [(each.source, each.path, each.target) for each in node.connections]
+        # Development ignores those that mutation may add.
+        if is_random and len(set(ends)) < len(ends):
+            raise InvalidRobot(f"one with a second connection among {shown(ends)}")
+        for gene in (*node.outputs, *node.hidden):
+            for known, value in zip(kinds[gene.kind], gene.parameters, strict=True):
+                if not known.low <= value <= known.high:
+                    what = f"{gene.kind} must have {known.name} from {known.low} to"
+                    raise InvalidRobot(f"{what} {known.high}, got {value}")
 
 
 def _genomes(experiment: Experiment) -> Iterator[Genome]:

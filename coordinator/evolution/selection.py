@@ -70,7 +70,7 @@ class Rule:
         given = list(population)
         try:
             answer = self.function(given, *rest, self.parameters)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             what = raised_by(self.function, error)
             raise ExperimentError(f"{self.key}: {what}") from error
         place_of = {id(one): place for place, one in enumerate(population)}
@@ -95,7 +95,7 @@ class Rule:
 
 def _whole_numbers(answer: object) -> list[int]:
     """Return the answer of a rule as plain integers; empty if it is none."""
-    if not isinstance(answer, (list, tuple, np.ndarray)):
+    if not isinstance(answer, (Sequence, np.ndarray)):
         return []
     kinds = set(map(type, answer))
     if kinds <= {int}:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from coordinator.evolution.breeding import Candidate, Individual
+from coordinator.evolution.breeding import Candidate, Individual, at_birth
 from coordinator.evolution.encodings import IslandEncoding
 from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.parts import BodySpace
@@ -39,6 +39,8 @@ def birth_record(
         sim_time_s: simulated time of its birth on-line [s].
         place: its place of birth in the ground plane [m].
     """
+    with at_birth(candidate.birth):
+        genome = encoding.to_bytes(candidate.genome)
     row = {
         "island": candidate.birth.island,
         "birth": candidate.birth.number,
@@ -49,7 +51,7 @@ def birth_record(
         "generation": individual.generation,
         "rank": individual.rank,
         "attempts": candidate.attempt + 1,
-        "genome": encoding.to_bytes(candidate.genome),
+        "genome": genome,
         "body": body_rows(candidate.robot),
         **sizes(candidate.robot, candidate.genome, encoding.types),
         "sim_time_s": sim_time_s,

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import entry_points
+from pkgutil import iter_modules
 
 from coordinator.plugins.checks import BIRTHS, HERE, check_apart, check_here
 from schema.agent.flags import Flags, add_plugins, positive_number
@@ -100,13 +101,17 @@ def _built_in(kinds: Sequence[Kind]) -> Iterator[Listed]:
 def _found(kinds: Sequence[Kind]) -> Iterator[Listed]:
     """Yield what installed packages and the modules of ``--plugins`` offer."""
     installed = [entry.module for entry in entry_points(group=GROUP)]
-    named = [entry.rpartition("/")[2].removesuffix(".py") for entry in allowed()]
-    for name in dict.fromkeys([*installed, *named]):
+    entries = [entry.partition("=")[0] for entry in allowed()]
+    named = [entry.rpartition("/")[2].removesuffix(".py") for entry in entries]
+    names = list(dict.fromkeys([*installed, *named]))
+    for name in names:
         try:
             module = load_module(name, "revolve plugins")
         except RevolveError as error:
             yield Listed("", name, one_line(error), digest_of(name))
             continue
+        inside = getattr(module, "__path__", ())
+        names += [f"{name}.{each.name}" for each in iter_modules(inside)]
         for kind, attribute in offered(module, kinds):
             place = where_named(module, attribute)
             yield Listed(kind.name, f"{name}:{attribute}", place, digest_of(name))

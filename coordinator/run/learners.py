@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from coordinator.evolution.breeding import at_birth
 from coordinator.evolution.learners.learner import NewbornLearner
 from coordinator.evolution.random_streams import Purpose, stream
 from coordinator.islands.events import Ask, Asked
@@ -49,14 +50,15 @@ class Learners:
         rules = self._experiments[ask.birth.island].learning
         assert rules is not None
         known = self._known.pop(ask.birth, None)
-        if known is None:
-            known = _Known(NewbornLearner(rules, ask.start))
-        for batch in ask.told[known.told :]:
-            known.learner.tell(batch)
-        known.told = len(ask.told)
         seed, run = self._origin.seed, self._origin.run
         rng = stream(seed, run, ask.birth, ask.number, Purpose.LEARNING)
-        points = known.learner.ask(rng, ask.most)
+        with at_birth(ask.birth):
+            if known is None:
+                known = _Known(NewbornLearner(rules, ask.start))
+            for batch in ask.told[known.told :]:
+                known.learner.tell(batch)
+            known.told = len(ask.told)
+            points = known.learner.ask(rng, ask.most)
         if len(points) < ask.most:
             self._known[ask.birth] = known
             if len(self._known) > REMEMBERED:

@@ -9,10 +9,10 @@ import contextlib
 import os
 import re
 import secrets
+import shutil
 import socket
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -36,7 +36,7 @@ from schema.errors import ExperimentError, RunFolderError, unreadable
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
 from schema.limits import MOST_MARK
-from schema.plugins.kept import PLUGINS, KeptPlugin, kept_file, plugins_to_keep
+from schema.plugins.kept import PLUGINS, KeptPlugin, keep, kept_file
 from schema.tables.description import (
     DETAILS,
     STATE,
@@ -231,39 +231,47 @@ def read_details(path: Path) -> RunDetails:
 
 
 def keep_plugins(path: Path, document: str) -> dict[str, KeptPlugin]:
-    """Copy the plug-in files of an experiment to a folder; describe its plug-ins.
+    """Copy the plug-ins of an experiment to a folder; describe them.
 
     Args:
         path: folder of a run or campaign.
         document: the experiment as JSON.
 
     Raises:
-        ExperimentError: a file cannot be read, or is too large.
+        ExperimentError: as of ``keep``.
         RunFolderError: the disk is full or failed.
     """
-    found = plugins_to_keep(document)
-    for name, (note, source) in found.items():
-        if note.file:
-            replace_durably(kept_file(path, name), partial(_write, source))
-    return {name: note for name, (note, _) in found.items()}
+    kept = keep(path, document, _write)
+    for name in (name for name, note in kept.items() if not note.file):
+        warn_once(
+            f"plug-in {name}: {path} keeps no copy of it, as it is compiled or large: "
+            "do not change it before the run has finished"
+        )
+    return kept
 
 
-def forget_plugins(path: Path, plugins: Iterable[str]) -> None:
-    """Remove the copies of plug-in files from a folder.
+def forget_plugins(path: Path, plugins: Mapping[str, KeptPlugin]) -> None:
+    """Remove the copies of plug-ins from a folder.
 
     Args:
         path: folder of a run or campaign.
-        plugins: names of the modules.
+        plugins: description of each module.
     """
-    for name in plugins:
-        kept_file(path, name).unlink(missing_ok=True)
+    for name, note in plugins.items():
+        copy = kept_file(path, name)
+        if Path(note.file).resolve() == copy.resolve():
+            continue  # the user's own folder of plug-ins
+        if copy.is_dir():
+            shutil.rmtree(copy)
+        else:
+            copy.unlink(missing_ok=True)
     with contextlib.suppress(OSError):
         # Not there, or with other files.
         (path / PLUGINS).rmdir()
 
 
-def _write(data: bytes, path: Path) -> None:
-    path.write_bytes(data)
+def _write(path: Path, data: bytes) -> None:
+    replace_durably(path, lambda new: new.write_bytes(data))
 
 
 def _refuse_used(path: Path, wanted: RunDetails) -> None:

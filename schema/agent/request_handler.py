@@ -215,7 +215,7 @@ class Server:
                 f"{FENCED}epoch {request.epoch} of run {request.run} is over: "
                 f"epoch {newest} has begun"
             )
-        check_plugins(request.plugins)
+        check_plugins(request.plugins, request.run)
         return request
 
 

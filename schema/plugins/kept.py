@@ -1,36 +1,41 @@
 """Sources of plug-ins that a run folder keeps, and when they are imported.
 
-A run that uses a plug-in file keeps a copy of it, so that the folder alone is enough to
-continue the run and to look at it. A run folder may also come from somebody else, and
-an import runs the code. A copy is therefore imported without ``--plugins`` only if it
-has the user's seal: an HMAC with a secret key in the user's own state folder. Of
-installed modules only the digest is kept.
+A run keeps a copy of the sources of its plug-ins: the processes that it starts import
+the copy, so that a plug-in may be edited meanwhile, and the folder alone is enough to
+continue the run and to look at it. Of a module of one file, the copy is the file and
+those files beside it that its text names; of a package, all files. Of compiled or large
+ones only the digest is kept.
+
+A run folder may also come from somebody else, and an import runs the code. A copy is
+therefore imported without ``--plugins`` only if it has the user's seal: an HMAC with a
+secret key in the user's own state folder.
 """
 
 import hmac
 import os
 import secrets
-import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 
+import msgspec
 from msgspec import Struct
 
 from schema.errors import ExperimentError, unreadable
 from schema.limits import MOST_PLUGIN_BYTES
-from schema.plugins.permission import (
-    FLAG,
-    allow_file,
-    allowed_file,
-    is_only_found,
-    source_of,
+from schema.plugins.permission import FLAG, is_chosen, source_of, use_copy
+from schema.plugins.source import (
+    digest_in_use,
+    digest_of,
+    digest_of_sources,
+    modules_named,
 )
-from schema.plugins.source import digest_of, digest_of_bytes, modules_named
 
 PLUGINS = "plugins"
 """Folder of the copies in a run or campaign folder."""
 _KEY_BYTES = 32
+_COMPILED = (".so", ".pyd")
 
 
 class KeptPlugin(Struct, frozen=True, forbid_unknown_fields=True):
@@ -38,8 +43,8 @@ class KeptPlugin(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         digest: of its source, as workers compare it.
-        file: path of the file that was copied; empty for an installed module.
-        seal: of the copy; empty for an installed module, or a user without a key.
+        file: path of the file or folder that was copied; empty without a copy.
+        seal: of the copy; empty without a copy, or for a user without a key.
     """
 
     digest: str
@@ -47,32 +52,45 @@ class KeptPlugin(Struct, frozen=True, forbid_unknown_fields=True):
     seal: str = ""
 
 
-def plugins_to_keep(document: str) -> dict[str, tuple[KeptPlugin, bytes]]:
-    """Return description and source of each plug-in module that a document names.
-
-    The source of an installed module is empty.
+def keep(
+    folder: Path, document: str, write: Callable[[Path, bytes], None]
+) -> dict[str, KeptPlugin]:
+    """Copy the plug-ins that a document names; this process uses the copies.
 
     Args:
+        folder: of a run or campaign.
         document: an experiment as JSON.
+        write: writes a file of the folder.
+
+    Returns:
+        The description of each module.
 
     Raises:
-        ExperimentError: a file cannot be read, or is too large to be kept.
+        ExperimentError: a file cannot be read; two plug-ins need different data files
+            of one name.
     """
-    found: dict[str, tuple[KeptPlugin, bytes]] = {}
+    kept: dict[str, KeptPlugin] = {}
+    written: dict[str, bytes] = {}
     for name in modules_named(document.encode()):
-        file = allowed_file(name)
-        if file is not None:
-            source = _read(name, file)
-            note = KeptPlugin(digest_of_bytes(source), str(file), _seal(name, source))
-            found[name] = note, source
-        elif digest := digest_of(name):
-            found[name] = KeptPlugin(digest), b""
-    return found
+        if not (sources := source_of(name)):
+            continue
+        files = _files(name, sources[0]) if len(sources) == 1 else {}
+        for path, data in files.items():
+            if written.setdefault(path, data) != data:
+                what = f"its data file {path} differs from that of another plug-in"
+                raise ExperimentError(f"plug-in {name}: {what}: rename it")
+            write(folder / PLUGINS / path, data)
+        if files:
+            use_copy(name, kept_file(folder, name))
+        file = str(sources[0]) if files else ""
+        kept[name] = KeptPlugin(digest_of(name), file, _seal(name, files))
+    return kept
 
 
 def kept_file(folder: Path, name: str) -> Path:
-    """Return the path of the copy of a plug-in module in a run folder."""
-    return folder / PLUGINS / f"{name}.py"
+    """Return the path of the copy of a plug-in in a run folder: file or package."""
+    package = folder / PLUGINS / name
+    return package if package.is_dir() else package.with_name(f"{name}.py")
 
 
 def allow_kept(
@@ -80,9 +98,7 @@ def allow_kept(
 ) -> None:
     """Allow the plug-ins of a folder that the user named on the command line.
 
-    Modules that the user allowed herself take precedence over copies. A file that is
-    only found on the import path, as the folder of a Python script is, does not if it
-    has changed since a run that is not resumed.
+    The copies are used, unless the user has named or imported the same source herself.
 
     Args:
         folder: of a run or campaign.
@@ -90,106 +106,100 @@ def allow_kept(
         is_resumed: the run continues; all sources must be those of its beginning.
 
     Raises:
-        ExperimentError: a source differs from that of the run; a copy is missing,
-            damaged or not the user's own.
+        ExperimentError: a source that was named or imported differs from that of the
+            run; a copy is missing, damaged or not the user's own.
     """
     for name, note in kept.items():
-        copy = kept_file(folder, name)
-        if not note.file:
-            if is_resumed:
-                _check_installed(name, note)
+        if is_chosen(name) if note.file else is_resumed:
+            refuse_other(folder, {name: note})
+        # A source that is found, as that of a Python script, stays in use.
+        if not note.file or (not is_resumed and digest_of(name) == note.digest):
             continue
-        found = digest_of(name)
-        if found and found != note.digest and not is_resumed and _is_unused(name):
-            found = ""
-        if found:
-            if found != note.digest:
-                raise ExperimentError(
-                    f"plug-in {name}: has source digest {found}, but {folder} was made "
-                    f"with {note.digest}; to use that one: {_how_to_use(name, copy)}"
-                )
-        else:
-            if is_resumed:
-                _check_original(name, note, copy)
+        copy = kept_file(folder, name)
+        try:
             _check_copy(name, note, copy)
-            allow_file(name, copy)
+        except ExperimentError:
+            if digest_of(name) != note.digest:
+                raise
+        else:
+            use_copy(name, copy)
 
 
-def _is_unused(name: str) -> bool:
-    """Return whether a module is neither imported nor allowed by the user."""
-    return name not in sys.modules and allowed_file(name) is None
+def refuse_other(folder: Path, kept: Mapping[str, KeptPlugin]) -> None:
+    """Raise unless this process uses the sources that a folder was made with.
 
+    Args:
+        folder: of a run.
+        kept: description of each module.
 
-def _how_to_use(name: str, copy: Path) -> str:
-    """Return how a copy takes precedence over the module that is found."""
-    if name in sys.modules or allowed_file(name) or is_only_found(name):
-        return f"{FLAG} {copy} (in Python: read the folder in a new process)"
-    found = ", ".join(map(str, source_of(name)))
-    return f"remove {found} from the import path, and add {FLAG} {copy}"
-
-
-def _check_installed(name: str, note: KeptPlugin) -> None:
-    found = digest_of(name)
-    if found != note.digest:
+    Raises:
+        ExperimentError: a source differs.
+    """
+    for name, note in kept.items():
+        found = digest_in_use(name)
+        if found == note.digest:
+            continue
         what = f"has source digest {found}" if found else "is not installed"
+        how = "install that version, or start another run"
+        if note.file:
+            entry = f"{FLAG} {name}={kept_file(folder, name)}"
+            how = f"to use that one: {entry} (in Python: in a new process)"
         raise ExperimentError(
-            f"plug-in {name}: {what}, but the run began with source digest "
-            f"{note.digest}: install that version, or start another run"
-        )
-
-
-def _check_original(name: str, note: KeptPlugin, copy: Path) -> None:
-    """Raise if the file that was copied is still there and has changed."""
-    original = Path(note.file)
-    if not original.is_file():
-        return
-    found = digest_of_bytes(_read(name, original))
-    if found != note.digest:
-        raise ExperimentError(
-            f"plug-in {name}: {original} has changed since the run began (source "
-            f"digest {found}, expected {note.digest}): undo that, start another run, "
-            f"or continue with the copy in the run folder: {FLAG} {copy}"
+            f"plug-in {name}: {what}, but {folder} was made with {note.digest}: {how}"
         )
 
 
 def _check_copy(name: str, note: KeptPlugin, copy: Path) -> None:
-    source = _read(name, copy)
-    found = digest_of_bytes(source)
+    files = _files(name, copy)
+    found, seal = digest_of_sources([copy] if files else []), _seal(name, files)
     if found != note.digest:
         raise ExperimentError(
             f"plug-in {name}: {copy} is damaged (source digest {found}, expected "
             f"{note.digest}): give the original with {FLAG} FILE"
         )
-    seal = _seal(name, source)
     if not seal or not hmac.compare_digest(seal, note.seal):
         raise ExperimentError(
             f"plug-in {name}: {copy} was not written by a run of yours on this "
             f"machine, and importing it runs its code; if you trust it, add "
-            f"{FLAG} {copy}"
+            f"{FLAG} {name}={copy}"
         )
 
 
-def _read(name: str, file: Path) -> bytes:
+def _files(name: str, source: Path) -> dict[str, bytes]:
+    """Return the files of a plug-in by their path beside it; none if not copied.
+
+    Raises:
+        ExperimentError: one cannot be read.
+    """
+    root = source.parent
     try:
-        with file.open("rb") as opened:
-            data = opened.read(MOST_PLUGIN_BYTES + 1)
+        if source.is_dir():
+            found = [path for path in source.rglob("*") if path.suffix != ".pyc"]
+        else:
+            text = source.read_text("utf-8", "replace")
+            data = (path for path in root.iterdir() if path.suffix not in ("", ".py"))
+            found = [source, *(path for path in data if path.name in text)]
+        paths = sorted(filter(Path.is_file, found))
+        size = sum(path.stat().st_size for path in paths)
+        if size > MOST_PLUGIN_BYTES or any(path.suffix in _COMPILED for path in paths):
+            return {}
+        return {path.relative_to(root).as_posix(): path.read_bytes() for path in paths}
     except OSError as error:
         raise ExperimentError(
-            f"plug-in {name}: {file}: {unreadable(error)}; give its source "
+            f"plug-in {name}: {error.filename}: {unreadable(error)}; give its source "
             f"with {FLAG} FILE"
         ) from None
-    if len(data) > MOST_PLUGIN_BYTES:
-        raise ExperimentError(
-            f"plug-in {name}: {file} must have <= {MOST_PLUGIN_BYTES} bytes"
-        )
-    return data
 
 
-def _seal(name: str, source: bytes) -> str:
-    """Return the user's seal of a source; empty for a user without a key."""
+def _seal(name: str, files: dict[str, bytes]) -> str:
+    """Return the user's seal of a copy; empty for a user without a key."""
     key = _user_key()
-    text = name.encode() + b"\0" + source
-    return hmac.new(key, text, "sha256").hexdigest() if key else ""
+    if list(files) == [f"{name}.py"]:
+        text = name.encode() + b"\0" + files[f"{name}.py"]
+    else:
+        digests = {path: sha256(data).hexdigest() for path, data in files.items()}
+        text = msgspec.json.encode((name, digests))
+    return hmac.new(key, text, "sha256").hexdigest() if key and files else ""
 
 
 def _user_key() -> bytes:

@@ -27,6 +27,7 @@ from schema.plugins.permission import (
     is_allowed,
     source_of,
 )
+from schema.plugins.source import digest_in_use
 
 T = TypeVar("T")
 
@@ -217,7 +218,7 @@ def load_module(name: str, where: str) -> ModuleType:
 
 def _imported(name: str, where: str, path: str) -> ModuleType:
     try:
-        return import_allowed(name)
+        module = import_allowed(name)
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError) and error.name == name
         hint = f": no {name}.py is beside the experiment" if missing else ""
@@ -230,6 +231,8 @@ def _imported(name: str, where: str, path: str) -> ModuleType:
         raise ExperimentError(
             f"{where}: {place}{path!r}: {error_text(error)}"
         ) from error
+    digest_in_use(name)  # remembers it
+    return module
 
 
 def place_of(path: str) -> str:

@@ -7,7 +7,7 @@ its owner named: with ``--plugins``, or in an own experiment. A module allows th
 modules inside it, too.
 
 The list belongs to the process, as ``sys.modules`` does. The commands set it, and pass
-it to the processes that they start.
+it to the processes that they start, with the copies of sources that a run uses.
 """
 
 import sys
@@ -15,10 +15,12 @@ from collections.abc import Iterable
 from filecmp import cmp
 from functools import lru_cache
 from importlib import import_module
+from importlib.machinery import FileFinder, SourceFileLoader
 from importlib.metadata import entry_points
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
+from typing import Never
 
 from schema.errors import ExperimentError, UnknownPlugin, shown
 
@@ -29,13 +31,17 @@ FLAG = "--plugins"
 
 _allowed: dict[str, Path | None] = {}
 """Allowed modules, with the file of those that are loaded from a file."""
+_copies: dict[str, Path] = {}
+"""Copies of top-level modules, files or folders, that replace whatever is installed."""
 
 
 def allow(entries: Iterable[str]) -> None:
     """Allow modules; nothing is imported yet.
 
     Args:
-        entries: names of modules, or paths of Python files.
+        entries: names of modules, or paths of Python files; or ``NAME=PATH``: a module,
+            and the file or folder that replaces whatever has the name of its top-level
+            module.
 
     Raises:
         ExperimentError: no such module or file; a module of the standard library or of
@@ -43,7 +49,16 @@ def allow(entries: Iterable[str]) -> None:
             not count).
     """
     for entry in entries:
-        if entry.endswith(".py"):
+        name, is_copy, place = entry.partition("=")
+        if is_copy and _may_be_plugin(name):
+            copy = Path(place).resolve()
+            other = _copies.get(_top(name), copy)
+            if other != copy or not copy.exists():
+                why = f"{other} is in use" if other != copy else "no such file"
+                raise UnknownPlugin(f"{FLAG}: {entry}: {why}")
+            use_copy(_top(name), copy)
+            _allowed.setdefault(name, None)
+        elif entry.endswith(".py"):
             file = Path(entry).resolve()
             _check_file(file, FLAG)
             _allowed[file.stem] = file
@@ -80,23 +95,28 @@ def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:
             _allowed[module] = None
 
 
-def allow_file(module: str, file: Path) -> None:
-    """Allow a module of a file that was checked already."""
-    _allowed[module] = file.resolve()
+def use_copy(top: str, copy: Path) -> None:
+    """Import a top-level module from a copy, unless another copy is in use.
+
+    A module of one file is also allowed.
+    """
+    _copies.setdefault(top, copy.resolve())
+    if not copy.is_dir():
+        _allowed.setdefault(top, None)
 
 
-def allowed_file(module: str) -> Path | None:
-    """Return the file of an allowed module; None if it is not loaded from a file."""
-    return _allowed.get(module)
+def is_chosen(top: str) -> bool:
+    """Return whether a top-level module is imported, or its source was named."""
+    return top in sys.modules or top in _copies or _allowed.get(top) is not None
 
 
 def allowed() -> tuple[str, ...]:
     """Return the entries with which ``allow`` gives another process the same list."""
     return tuple(
-        name if file is None else str(file)
+        f"{name}={_copies[_top(name)]}" if _top(name) in _copies else str(file or name)
         for name, file in _allowed.items()
         # A document may name a module that is not there.
-        if file is not None or _source(_top(name)) is not None
+        if any(source.exists() for source in source_of(_top(name)))
     )
 
 
@@ -146,21 +166,43 @@ def import_allowed(module: str) -> ModuleType:
     """
     if not is_allowed(module):
         raise ValueError(f"module {module} is not allowed")
-    file = _allowed.get(module)
-    if file is None or module in sys.modules:
-        return import_module(module)
-    spec = spec_from_file_location(module, file)
+    top = _top(module)
+    source = _copies.get(top) or _allowed.get(top)
+    if source is not None and top not in sys.modules:
+        _load(top, source)
+    return import_module(module)
+
+
+def _load(top: str, source: Path) -> None:
+    """Import a top-level module from a file, or from the folder of a package."""
+    if source.is_dir():
+        loader = (_Uncached, [".py"])
+        for folder in (source, *filter(Path.is_dir, source.rglob("*"))):
+            # For the modules inside; also those that a function imports later.
+            sys.path_importer_cache[str(folder)] = FileFinder(str(folder), loader)
+        spec = FileFinder(str(source.parent), loader).find_spec(top)
+    else:
+        spec = spec_from_file_location(top, source, loader=_Uncached(top, str(source)))
     assert spec is not None
-    assert spec.loader is not None
     made = module_from_spec(spec)
     # Registered first, as dataclasses and pickle expect.
-    sys.modules[module] = made
+    sys.modules[top] = made
     try:
-        spec.loader.exec_module(made)
+        if spec.loader is not None:  # a folder without __init__.py has none
+            spec.loader.exec_module(made)
     except BaseException:
-        del sys.modules[module]
+        del sys.modules[top]
         raise
-    return made
+
+
+class _Uncached(SourceFileLoader):
+    """Loader that neither reads nor writes compiled files.
+
+    They may be older than their source, or not be made from it.
+    """
+
+    def path_stats(self, path: str) -> Never:  # type: ignore[override]
+        raise OSError(path)
 
 
 def source_of(top: str) -> list[Path]:
@@ -168,10 +210,9 @@ def source_of(top: str) -> list[Path]:
 
     Nothing is imported. The list is empty if there is no such module.
     """
-    file = _allowed.get(top)
-    if file is not None:
-        return [file]
-    return _source(top) or []
+    named = _copies.get(top) or _allowed.get(top)
+    found = [named] if named else _source(top) or []
+    return [each for each in found if each.exists()]
 
 
 def is_only_found(top: str) -> bool:
@@ -209,7 +250,8 @@ def _check_file(file: Path, where: str) -> None:
     if not file.is_file():
         raise UnknownPlugin(f"{where}: no such file: {file}")
     _check_name(file.stem)
-    named, found = _allowed.get(file.stem), _source(file.stem)
+    named = _copies.get(file.stem) or _allowed.get(file.stem)
+    found = _source(file.stem)
     others = [named] if named else [each.resolve() for each in found or ()]
     # A copy, as a run folder keeps it, is no other module.
     is_same = any(one.is_file() and cmp(file, one, shallow=False) for one in others)

@@ -603,7 +603,7 @@ class FitnessFunction(Protocol):
     The second argument is an instance of the msgspec Struct with which it is
     annotated, read from the table ``[fitness.parameters]``; without such an
     annotation, the section ``[fitness]``. A function that reads more of the trace
-    than the core's position declares the channels with ``schema.plugins.needs``.
+    than the core's position declares the channels with ``revolve.needs``.
     """
 
     def __call__(self, trace: Trace, parameters: Any, /) -> float:  # noqa: ANN401

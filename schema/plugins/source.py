@@ -6,13 +6,16 @@ packages of this project are not plug-ins; their version identifies them.
 
 import json
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from hashlib import sha256
+from pathlib import Path
 
 from schema.errors import PluginDiffers, shown
 from schema.limits import MOST_PLUGIN_CHARACTERS
 from schema.plugins.permission import (
+    FLAG,
     ROOMS,
     allows_any_of,
     how_to_allow,
@@ -23,6 +26,7 @@ _PATH = re.compile(r"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 _PARAMETERS = re.compile(r"(?:.*[._])?parameters(?:\..*)?", re.DOTALL)
 """Keys of parameters of plug-ins, those of a sweep included."""
 _DIGITS = 12
+_IMPORTED = "__revolve_digest__"
 
 
 @lru_cache(maxsize=64)
@@ -70,13 +74,14 @@ def _texts(document: object) -> Iterator[str]:
 
 
 @lru_cache(maxsize=64)
-def check_plugins(wanted: str) -> None:
+def check_plugins(wanted: str, run: str = "") -> None:
     """Raise unless this machine has the same plug-ins, and this process allows them.
 
     Nothing is imported.
 
     Args:
         wanted: the result of ``plugins_of`` on the other machine.
+        run: name of the run that wants them; it ends with the run's folder.
 
     Raises:
         PluginDiffers: one is missing or not allowed, or its source differs; a text
@@ -100,8 +105,19 @@ def check_plugins(wanted: str) -> None:
         if found != digest:
             raise PluginDiffers(
                 f"its plug-in {shown(name)} differs from the coordinator's: source "
-                f"digest {found}, expected {digest[:_DIGITS]}"
+                f"digest {found}, expected {digest[:_DIGITS]}: "
+                f"{_how_to_give(name, run)}"
             )
+
+
+def _how_to_give(name: str, run: str) -> str:
+    """Return how a worker that was started separately gets the source of a run."""
+    source, folder = source_of(name)[0], run.split(":", 2)[-1]
+    way = f"give {source} the content that it had when the run began"
+    if not folder.startswith("/"):
+        return way  # jobs from Python have no run folder
+    copy = f"{name}={folder}/plugins/{name}{'' if source.is_dir() else '.py'}"
+    return f"{way}, or start this process with the run's copy: {FLAG} {copy}"
 
 
 def digest_of(module: str) -> str:
@@ -109,9 +125,26 @@ def digest_of(module: str) -> str:
     return _digest.__wrapped__(module.partition(".")[0])
 
 
-def digest_of_bytes(source: bytes) -> str:
-    """Return the digest of a module of one file."""
-    return sha256(source).hexdigest()[:_DIGITS]
+def digest_in_use(module: str) -> str:
+    """Return the digest of a plug-in module as it was first imported, or is now."""
+    top = module.partition(".")[0]
+    known = vars(sys.modules[top]) if top in sys.modules else {}
+    if _IMPORTED not in known and top not in ROOMS:
+        known[_IMPORTED] = digest_of(top)
+    return str(known.get(_IMPORTED, ""))
+
+
+def digest_of_sources(sources: Iterable[Path]) -> str:
+    """Return the digest of a module's file, or of the folders of a package."""
+    hashed = sha256()
+    for source in sources:
+        if source.is_dir():
+            for file in sorted(source.rglob("*.py")):
+                hashed.update(file.relative_to(source).as_posix().encode() + b"\0")
+                hashed.update(file.read_bytes() + b"\0")
+        else:
+            hashed.update(source.read_bytes())
+    return hashed.hexdigest()[:_DIGITS]
 
 
 def forget_digests() -> None:
@@ -124,14 +157,4 @@ def forget_digests() -> None:
 def _digest(module: str) -> str:
     """Return the digest of a top-level module's source; empty if not installed."""
     sources = source_of(module)
-    if not sources:
-        return ""
-    hashed = sha256()
-    for source in sources:
-        if source.is_dir():
-            for file in sorted(source.rglob("*.py")):
-                hashed.update(file.relative_to(source).as_posix().encode() + b"\0")
-                hashed.update(file.read_bytes() + b"\0")
-        else:
-            hashed.update(source.read_bytes())
-    return hashed.hexdigest()[:_DIGITS]
+    return digest_of_sources(sources) if sources else ""

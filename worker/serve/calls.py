@@ -30,6 +30,7 @@ def answer_call(request: bytes) -> bytes:
         value = pack_value(function(call.argument))
     except ExperimentError as error:
         value = Failed(f"{call.function}: its value {error}")
-    except Exception as error:  # noqa: BLE001 - a user's function may raise anything
+    # Also KeyboardInterrupt or SystemExit: no signal raises one in a worker.
+    except BaseException as error:  # noqa: BLE001 - a user's function may raise anything
         value = Failed(f"{call.function} raised {error_text(error)}")
     return encode_call_answer(call, time.perf_counter() - start, value)

@@ -127,6 +127,6 @@ class NewbornLearner:
     ) -> Any:  # noqa: ANN401 - what it returns
         try:
             return function(*arguments)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             what = raised_by(self._class, error)
             raise ExperimentError(f"{WHERE}: {what}") from error

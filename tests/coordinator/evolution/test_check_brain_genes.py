@@ -97,6 +97,49 @@ def test_broken_genes_are_refused_in_one_line(
         assert str(caught.value).startswith(f"brain.type: {module}.py:5: expected ")
 
 
+NEW_CASES = {
+    "Twice": (
+        "grow(self, draws, new, branches, rules)",
+        'new[0].connections = (ConnectionGene(("output", 0), (), ("output", 0), 0.5),'
+        ' ConnectionGene(("output", 0), (), ("output", 0), -0.5))',
+        "valid robots, got one with a second connection among .*'output', 0",
+    ),
+    "Beyond": (
+        "outputs(self, draws, part)",
+        'return (NeuronGene("Waver", (0.5, 9.0)),) * part.outputs',
+        r"valid robots, got Waver must have \w+ from \S+ to \S+, got 9.0$",
+    ),
+    "Unknown": (
+        "outputs(self, draws, part)",
+        'return (NeuronGene("Waver", (0.5, float("nan"))),) * part.outputs',
+        "valid robots, got ",
+    ),
+}
+
+
+@pytest.mark.usefixtures("_own_brains")
+@pytest.mark.parametrize("name", list(NEW_CASES))
+def test_new_runs_refuse_doubled_connections_and_parameters_beyond_their_range(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that has begun goes on with them."""
+    method, body, message = NEW_CASES[name]
+    file = tmp_path / f"broken_{name.lower()}.py"
+    file.write_text(MODULE.format(name=name, method=method, body=body))
+    allowed = {**permission._allowed, file.stem: file}
+    monkeypatch.setattr(permission, "_allowed", allowed)
+    experiment = Experiment(name="x", brain=BrainSection(type=f"{file.stem}:{name}"))
+    if name != "Unknown":
+        check_brain_genes(experiment)
+    with pytest.raises(ExperimentError, match=message):
+        check_brain_genes(experiment, is_new=True)
+
+
+@pytest.mark.parametrize("name", ["network", "cpg"])
+def test_built_in_brain_types_pass_as_new(name: str) -> None:
+    check_brain_genes(Experiment(name="x", brain=BrainSection(type=name)), is_new=True)
+
+
 @pytest.mark.usefixtures("_own_brains")
 def test_lists_of_genes_become_tuples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -119,4 +162,5 @@ def test_lists_of_genes_become_tuples(
 
 @pytest.mark.usefixtures("_own_brains")
 def test_sound_genes_pass() -> None:
-    check_brain_genes(Experiment(name="x", brain=BrainSection(type="my_brains:Wave")))
+    own = Experiment(name="x", brain=BrainSection(type="my_brains:Wave"))
+    check_brain_genes(own, is_new=True)

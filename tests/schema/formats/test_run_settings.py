@@ -7,6 +7,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from coordinator.storage.folder import keep_plugins
 from schema.__main__ import main
 from schema.errors import ExperimentError, InvalidRobot, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
@@ -14,7 +15,6 @@ from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import settings_of, write_robot
 from schema.formats.run_settings import experiment_of, read_with_settings
 from schema.plugins import permission
-from schema.plugins.kept import kept_file, plugins_to_keep
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
 from schema.tables.description import Description, description_text
@@ -38,11 +38,7 @@ def written(folder: Path, text: str) -> Path:
     """Write the description of a run; return the path of a robot file beside it."""
     folder.mkdir(exist_ok=True)
     document = experiment_text(parse_experiment(text, str(folder.parent / "x.toml")))
-    kept = plugins_to_keep(document)
-    for name, (_, source) in kept.items():
-        kept_file(folder, name).parent.mkdir()
-        kept_file(folder, name).write_bytes(source)
-    notes = {name: note for name, (note, _) in kept.items()}
+    notes = keep_plugins(folder, document)
     found = Description("bumpy", 0, 7, document, plugins=notes)
     (folder / "run.json").write_text(description_text(found))
     return folder / "best.yaml"
@@ -159,6 +155,7 @@ def paddle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     # As in another process.
     del sys.modules[module]
     permission._allowed.clear()
+    permission._copies.clear()
     return file
 
 
@@ -176,6 +173,7 @@ def test_mjcf_file_of_the_run_has_its_own_settings_and_the_runs_part_types(
     assert main(["robot", "convert", str(paddle), str(mjcf)]) == 0
     own = experiment_of(paddle, None)
     permission._allowed.clear()
+    permission._copies.clear()
     capsys.readouterr()
     robot, settings, found = read_with_settings(mjcf, None)
     line = f"revolve: with the settings in {mjcf}; --experiment names others\n"

@@ -13,7 +13,7 @@ from schema.errors import ExperimentError, RevolveError, counted
 from schema.experiment.document import Experiment, Fitness, Simulation
 from schema.experiment.file import experiment_text
 from schema.plugins.kept import KeptPlugin, kept_file
-from schema.plugins.source import digest_of_bytes
+from schema.plugins.source import digest_of_sources
 from schema.robot.robot import Robot
 from schema.tables.description import DETAILS, Description, description_text
 from tests.worker.bench.run_folder import write_run
@@ -153,12 +153,12 @@ def test_fidelity_uses_the_plug_ins_that_a_run_keeps(
         births=[(0, number, robot_of(number)) for number in numbers],
         evaluations=[(0, number, None, 5.5, 0.1 * number) for number in numbers],
     )
-    note = KeptPlugin(digest_of_bytes(source), str(file))
+    note = KeptPlugin(digest_of_sources([file]), str(file))
     known = Description("test", 0, 1, experiment_text(own))
     known = replace(known, plugins={"bench_kept": note})
     (run / DETAILS).write_text(description_text(known))
     arguments = ["bench", "fidelity", str(run), "--per-third", "1"]
-    with pytest.raises(ExperimentError, match=f"add --plugins {file}$"):
+    with pytest.raises(ExperimentError, match=f"add --plugins bench_kept={file}$"):
         main(arguments, ROBOTS)
     main([*arguments, "--plugins", str(file)], ROBOTS)
     assert "mean 0.5000 here, 0.5000 there" in capsys.readouterr().out
