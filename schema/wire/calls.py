@@ -21,7 +21,7 @@ from schema.limits import (
 from schema.wire import revolve_pb2 as pb
 from schema.wire.decoding import parsed
 
-_PLAIN = "None, bool, int, float, str, bytes, list or dict (Genome.to_bytes of robots)"
+_PLAIN = "None, bool, int, float, str, bytes (of robots: Genome.to_bytes), list or dict"
 _LEAVES = (type(None), bool, int, float, str, bytes)
 
 

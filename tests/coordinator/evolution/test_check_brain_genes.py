@@ -100,14 +100,16 @@ def test_broken_genes_are_refused_in_one_line(
 NEW_CASES = {
     "Twice": (
         "grow(self, draws, new, branches, rules)",
-        'new[0].connections = (ConnectionGene(("output", 0), (), ("output", 0), 0.5),'
-        ' ConnectionGene(("output", 0), (), ("output", 0), -0.5))',
+        (
+            "new[0].connections = "
+            '(ConnectionGene(("output", 0), (), ("output", 0), 0.5),) * 2'
+        ),
         "valid robots, got one with a second connection among .*'output', 0",
     ),
     "Beyond": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (0.5, 9.0)),) * part.outputs',
-        r"valid robots, got Waver must have \w+ from \S+ to \S+, got 9.0$",
+        "valid robots, got Waver must have delay from 0.0 to 1.0, got 9.0$",
     ),
     "Unknown": (
         "outputs(self, draws, part)",

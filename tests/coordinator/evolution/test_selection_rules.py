@@ -104,6 +104,45 @@ def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
     assert (first, second) == (living[2], living[4])
 
 
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "range(1, 3)",
+        "(1, 2)",
+        "np.arange(1, 3)",
+        "(np.int32(1), np.uint8(2))",
+        "__import__('array').array('i', [1, 2])",
+        "__import__('collections').deque((1, 2))",
+    ],
+)
+def test_any_sequence_of_places_is_an_answer(
+    answer: str, lab: Callable[[str], str]
+) -> None:
+    text = (
+        f"import numpy as np\ndef some(population, count, rng, _):\n    return {answer}"
+    )
+    selection = Selection(population=2, survivors=f"{lab(text)}:some")
+    everybody = population(9, 5, 7, 4)
+    rng = np.random.default_rng(0)
+    rule = survivors_rule(selection)
+    chosen = select_survivors((), everybody, rng, selection, rule)
+    assert chosen == tuple(everybody[1:3])
+
+
+@pytest.mark.parametrize(
+    "answer", ["{1, 2}", "'12'", "b'12'", "range(1, 4)", "(1.0, 2.0)", "iter((1, 2))"]
+)
+def test_other_answers_are_refused_in_one_line(
+    answer: str, lab: Callable[[str], str]
+) -> None:
+    text = f"def some(population, count, rng, _):\n    return {answer}"
+    selection = Selection(population=2, survivors=f"{lab(text)}:some")
+    everybody = population(9, 5, 7, 4)
+    rng = np.random.default_rng(0)
+    with pytest.raises(ExperimentError, match="must return 2 different whole numbers"):
+        select_survivors((), everybody, rng, selection, survivors_rule(selection))
+
+
 def test_own_survivors_come_in_birth_order(lab: Callable[[str], str]) -> None:
     selection = Selection(population=2, survivors=f"{lab(LAB)}:smallest")
     everybody = population(9, 5, 7, 4)

@@ -186,7 +186,7 @@ EXPECTED = {
     "type": "must return|expected step to return|outputs (of shape|must be)",
     "finite": "finite|different whole numbers",
     "repeatable": "the same|expected equal|must be equal",
-    "exit": "SystemExit: 3$",
+    "exit": r"SystemExit: 3( \(.*py:\d+\))?$",
     "slow": "must take at most 1 s, but was still at",
     "os._exit": "must not end its process, but did, with status 3$",
 }

@@ -76,14 +76,14 @@ def test_a_copy_of_the_user_is_allowed(
 @pytest.mark.parametrize("place", ["", "first", "last"])
 def test_a_changed_original_does_not_matter(
     tmp_path: Path,
-    original: Path,
+    *,
     kept: dict[str, KeptPlugin],
     monkeypatch: pytest.MonkeyPatch,
     place: str,
-    is_resumed: bool,  # noqa: FBT001 - a parameter of the test
+    is_resumed: bool,
 ) -> None:
     """Wherever Python would find it: that of a script, or an installed module."""
-    original.write_text("judge = 2\n")
+    (tmp_path / "kept_lab.py").write_text("judge = 2\n")
     if place:
         at = 0 if place == "first" else len(sys.path)
         monkeypatch.setattr(sys, "path", list(sys.path))
@@ -138,7 +138,7 @@ def test_a_module_that_was_imported_before_an_edit_is_not_that_of_a_later_run(
     permission._allowed.clear()
     two = keep(tmp_path / "two", DOCUMENT, write)
     allow_kept(tmp_path / "one", one, is_resumed=False)
-    with pytest.raises(ExperimentError, match="digest 5ff4453f1603, but .*two was"):
+    with pytest.raises(ExperimentError, match=r"digest 5ff4453f1603, but .*two was"):
         allow_kept(tmp_path / "two", two, is_resumed=False)
     del sys.modules["kept_lab"]
 
@@ -152,7 +152,7 @@ def test_copies_of_two_runs_do_not_mix(
     allow_kept(tmp_path / "run", kept, is_resumed=False)
     with pytest.raises(ExperimentError, match="in Python: in a new process"):
         allow_kept(tmp_path / "other", other, is_resumed=False)
-    with pytest.raises(ExperimentError, match="run/plugins/kept_lab.py is in use"):
+    with pytest.raises(ExperimentError, match=r"run/plugins/kept_lab\.py is in use"):
         allow([f"kept_lab={kept_file(tmp_path / 'other', 'kept_lab')}"])
 
 
@@ -234,7 +234,7 @@ def test_a_file_that_a_package_did_not_have_is_refused(
     kept = kept_by(tmp_path / "run", NAMED)
     package.rename(package.with_name("elsewhere"))
     (tmp_path / "run" / "plugins" / "kept_pack" / name).write_text("1")
-    with pytest.raises(ExperimentError, match="is damaged|was not written by"):
+    with pytest.raises(ExperimentError, match=r"is damaged|was not written by"):
         allow_kept(tmp_path / "run", kept, is_resumed=True)
     assert not permission._copies
 
@@ -290,7 +290,9 @@ def test_data_files_of_one_name_that_differ_are_refused(tmp_path: Path) -> None:
         write(tmp_path / name / f"kept_{name}.py", b"# goals.csv")
         write(tmp_path / name / "goals.csv", name.encode())
         allow([str(tmp_path / name / f"kept_{name}.py")])
-    with pytest.raises(ExperimentError, match="data file goals.csv differs from that"):
+    with pytest.raises(
+        ExperimentError, match=r"data file goals\.csv differs from that"
+    ):
         keep(tmp_path / "run", '["kept_a:x","kept_b:x"]', write)
 
 
@@ -364,7 +366,7 @@ def test_a_separate_worker_says_how_it_gets_the_source(
     run = f"host:12ab:{tmp_path}/runs/a"
     way = f"give {original} the content that it had when the run began, or start this "
     way += f"process with the run's copy: --plugins kept_lab={tmp_path}/runs/a/plugins/"
-    with pytest.raises(PluginDiffers, match=f"{way}kept_lab.py$"):
+    with pytest.raises(PluginDiffers, match=f"{way}kept_lab\\.py$"):
         check_plugins("kept_lab=123456789abc", run)
-    with pytest.raises(PluginDiffers, match="content that it had when the run began$"):
+    with pytest.raises(PluginDiffers, match=r"content that it had when the run began$"):
         check_plugins("kept_lab=123456789abc", "python-host-1234")

@@ -28,6 +28,12 @@ def odd(value):
 def broken(value):
     return 1 / value
 
+def interrupted(value):
+    raise KeyboardInterrupt
+
+def ended(value):
+    exit(3)
+
 def two(first, second):
     return first
 """
@@ -69,6 +75,10 @@ def test_error_of_the_function_is_a_failure() -> None:
     failed = value("lab_of_calls:broken", 0)
     expected = "lab_of_calls:broken raised ZeroDivisionError: division by zero"
     assert failed == Failed(expected)
+    for name, error in (("interrupted", "KeyboardInterrupt"), ("ended", "SystemExit")):
+        failed = value(f"lab_of_calls:{name}", 0)
+        assert isinstance(failed, Failed)
+        assert failed.reason.startswith(f"lab_of_calls:{name} raised {error}")
     odd = value("lab_of_calls:odd", 0)
     assert isinstance(odd, Failed)
     assert "its value must be None, bool" in odd.reason
