@@ -323,7 +323,7 @@ def run(
         ("--births", births), ("--workers", workers), ("--connect", connect)
     ):  # fmt: skip
         words += [] if value is None else [flag, str(value)]
-    words += _common((*allowed(), *plugins), progress=progress)
+    words += _common((*allowed(is_new=True), *plugins), progress=progress)
     if not isinstance(experiment, Experiment):
         return _done(("run", str(experiment), *words), folder, progress=progress)
     with tempfile.TemporaryDirectory() as place:

@@ -110,14 +110,21 @@ def is_chosen(top: str) -> bool:
     return top in sys.modules or top in _copies or _allowed.get(top) is not None
 
 
-def allowed() -> tuple[str, ...]:
-    """Return the entries with which ``allow`` gives another process the same list."""
-    return tuple(
-        f"{name}={_copies[_top(name)]}" if _top(name) in _copies else str(file or name)
-        for name, file in _allowed.items()
+def allowed(*, is_new: bool = False) -> tuple[str, ...]:
+    """Return the entries with which ``allow`` gives another process the same list.
+
+    Args:
+        is_new: the process starts a run: sources that are found come before the copies
+            of an earlier run that was read.
+    """
+    found = []
+    for name, file in _allowed.items():
+        top = _top(name)
+        copy = None if is_new and (file or _source(top)) else _copies.get(top)
         # A document may name a module that is not there.
-        if any(source.exists() for source in source_of(_top(name)))
-    )
+        if any(source.exists() for source in source_of(top)):
+            found.append(f"{name}={copy}" if copy else str(file or name))
+    return tuple(found)
 
 
 def is_allowed(module: str) -> bool:

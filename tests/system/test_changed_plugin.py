@@ -1,6 +1,9 @@
 """A run whose plug-in was changed after its start."""
 
+import contextlib
+import os
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -27,10 +30,53 @@ FAULTY = "\ndef far(track):\n    return 0.0\n"
 HOW = ("--in-process", "--quiet")
 
 
-def test_resume_and_check_name_the_changed_module(
+def test_an_edited_module_does_not_stop_its_run(workspace: Workspace) -> None:
+    """Neither restarted workers nor ``resume`` import it: they use the run's copy."""
+    run, package = workspace.folder / "a", workspace.folder / "lab"
+    package.mkdir()
+    (package / "__init__.py").write_text("from lab.far import far\n")
+    (package / "far.py").write_text(MODULE)
+    slow = DOCUMENT.replace("births = 8", "births = 60").replace("= 40\n[", "= 800\n[")
+    (workspace.folder / "mine.toml").write_text(slow)
+    own = ("--workers", "1", "--quiet")
+    started = workspace.start("run", "mine.toml", "--out", "a", *own)
+    journal = run / "journal.bin"
+    wait_until(lambda: journal.exists() and journal.stat().st_size > 3000, "births")
+    (package / "far.py").write_text(FAULTY)
+    workers = spawned(started.pid)
+    assert len(workers) == 2, "a worker and an analyzer"
+    for process in workers:
+        os.kill(process, signal.SIGKILL)
+    size = journal.stat().st_size
+    wait_until(lambda: journal.stat().st_size > size + 2000, "births of new workers")
+    started.send_signal(signal.SIGINT)
+    _, told = started.communicate(timeout=PATIENCE_S)
+    assert "differs" not in told
+    assert (run / "state").read_text().strip() == "stopped"
+
+    assert "far.py:2: in order" in workspace.run("check", "a")
+    workspace.run("resume", "a", *own)
+    assert (run / "state").read_text().strip() == "finished"
+    workspace.run("robot", "simulate", "a/best.yaml")
+    told = workspace.run("check", "mine.toml", code=1)
+    assert "far.py:2: 'lab:far' must take 2 arguments" in told
+
+
+def spawned(process: int) -> list[int]:
+    """Return the processes that a coordinator has started for its jobs."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
+            words = (entry / "cmdline").read_text()
+            if int(parent) == process and "spawn_main" in words:
+                found.append(int(entry.name))
+    return found
+
+
+def test_another_file_that_is_named_is_refused(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing is simulated by a plug-in that is not the one of the run."""
     # As an installed command: the folder is not searched for modules.
     monkeypatch.setenv("PYTHONSAFEPATH", "1")
     run, module = workspace.folder / "a", workspace.folder / "lab.py"
@@ -38,59 +84,19 @@ def test_resume_and_check_name_the_changed_module(
     module.write_text(MODULE)
     workspace.run("run", "mine.toml", "--out", "a", *HOW)
     assert "lab.py:2: in order" in workspace.run("check", "a")
-    state = (run / "state").read_text()
     (run / "state").write_text("stopped")
     before = (run / "journal.bin").read_bytes()
 
     module.write_text(FAULTY)
+    named = ("--plugins", "lab.py")
     for words, code in ((("resume", "a", *HOW), 2), (("check", "a"), 1)):
-        (line,) = workspace.run(*words, code=code).splitlines()[-1:]
-        assert "plug-in lab: " in line
-        assert "has changed since the run began" in line
-        assert line.endswith(": --plugins a/plugins/lab.py")
-    told = workspace.run("check", "mine.toml", code=1)
-    assert "lab.py:2: 'lab:far' must take 2 arguments" in told
+        (line,) = workspace.run(*words, *named, code=code).splitlines()[-1:]
+        assert "plug-in lab: has source digest" in line
+        assert "--plugins lab=a/plugins/lab.py (in Python: " in line
     assert (run / "journal.bin").read_bytes() == before
 
-    (run / "state").write_text(state)
+    named = ("--plugins", "lab=a/plugins/lab.py")
+    assert "in order" in workspace.run("check", "a", *named)
+    workspace.run("resume", "a", *HOW, *named)
+    assert (run / "state").read_text().strip() == "finished"
     assert "a: already finished" in workspace.run("resume", "a", *HOW)
-    (run / "state").write_text("stopped")
-
-    kept = ("--plugins", "a/plugins/lab.py")
-    assert "in order" in workspace.run("check", "a", *kept)
-    workspace.run("resume", "a", *HOW, *kept)
-    assert (run / "state").read_text().strip() == "finished"
-
-
-def test_the_named_copy_comes_before_a_file_of_the_current_folder(
-    workspace: Workspace,
-) -> None:
-    """``python -m revolve`` searches the folder for modules; so do its workers."""
-    run, module = workspace.folder / "a", workspace.folder / "lab.py"
-    slow = DOCUMENT.replace("births = 8", "births = 40").replace("= 40\n[", "= 600\n[")
-    (workspace.folder / "mine.toml").write_text(slow)
-    module.write_text(MODULE)
-    own = ("--workers", "1", "--quiet")
-    started = workspace.start("run", "mine.toml", "--out", "a", *own)
-    journal = run / "journal.bin"
-    wait_until(lambda: journal.exists() and journal.stat().st_size > 3000, "births")
-    started.send_signal(signal.SIGINT)
-    started.communicate(timeout=PATIENCE_S)
-    assert (run / "state").read_text().strip() == "stopped"
-    module.write_text(FAULTY)
-
-    line = workspace.run("resume", "a", *own, code=2).splitlines()[-1]
-    assert "to use that one: --plugins a/plugins/lab.py" in line
-    kept = ("--plugins", "a/plugins/lab.py")
-    assert "lab.py:2: in order" in workspace.run("check", "a", *kept)
-    workspace.run("resume", "a", *own, *kept)
-    assert (run / "state").read_text().strip() == "finished"
-    workspace.run("robot", "simulate", "a/best.yaml", *kept)
-
-    elsewhere = workspace.folder / "elsewhere"
-    elsewhere.mkdir()
-    (elsewhere / "lab.py").write_text(FAULTY)
-    words = ("robustness", "../a", "--plugins", "../a/plugins/lab.py")
-    done = workspace.start(*words, "--workers", "1", folder=elsewhere)
-    output, errors = done.communicate(timeout=PATIENCE_S)
-    assert done.returncode == 0, output + errors

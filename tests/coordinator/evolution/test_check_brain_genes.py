@@ -125,6 +125,7 @@ def test_new_runs_refuse_doubled_connections_and_parameters_beyond_their_range(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A run that has begun goes on with them."""
+    monkeypatch.syspath_prepend(tmp_path)
     method, body, message = NEW_CASES[name]
     file = tmp_path / f"broken_{name.lower()}.py"
     file.write_text(MODULE.format(name=name, method=method, body=body))

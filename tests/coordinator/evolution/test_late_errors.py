@@ -56,6 +56,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, _own_brains: None) -> s
     name = f"late_{tmp_path.name.replace('-', '_')}"
     file = tmp_path / f"{name}.py"
     file.write_text(LAB)
+    monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(permission, "_allowed", {**permission._allowed, name: file})
     return name
 

@@ -5,6 +5,7 @@ import os
 import py_compile
 import sys
 from collections.abc import Iterator
+from importlib import invalidate_caches
 from pathlib import Path
 
 import pytest
@@ -370,3 +371,21 @@ def test_a_separate_worker_says_how_it_gets_the_source(
         check_plugins("kept_lab=123456789abc", run)
     with pytest.raises(PluginDiffers, match=r"content that it had when the run began$"):
         check_plugins("kept_lab=123456789abc", "python-host-1234")
+
+
+def test_a_new_run_has_the_present_source(
+    tmp_path: Path,
+    original: Path,
+    kept: dict[str, KeptPlugin],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In Python, a run may be started after an earlier one was read."""
+    original.write_text("judge = 2\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    allow_kept(tmp_path / "run", kept, is_resumed=False)
+    copy = kept_file(tmp_path / "run", "kept_lab")
+    assert allowed() == (f"kept_lab={copy}",)
+    assert allowed(is_new=True) == ("kept_lab",)
+    original.unlink()
+    invalidate_caches()
+    assert allowed(is_new=True) == (f"kept_lab={copy}",)
