@@ -49,7 +49,9 @@ def _entry(name: str) -> Iterator[str]:
     if not inspect.isclass(found) or issubclass(found, Exception):
         return
     for key, member in sorted(vars(found).items()):
-        if key.startswith("_") or not inspect.getdoc(member):
+        # That of a protocol says what a function of the user gets and returns.
+        is_private = key.startswith("_") and key != "__call__"
+        if is_private or not inspect.getdoc(member):
             continue
         own = getattr(found, key)
         if isinstance(member, property | cached_property):
@@ -82,8 +84,10 @@ def _item(entry: str) -> str:
 
 
 def _signature(found: object) -> str:
-    """Return the signature of a function or class; empty for an error."""
-    if inspect.isclass(found) and issubclass(found, Exception):
+    """Return the signature of a function or class; empty for an error or a protocol."""
+    if inspect.isclass(found) and (
+        issubclass(found, Exception) or getattr(found, "_is_protocol", False)
+    ):
         return ""
     assert callable(found)
     signature = inspect.signature(found)

@@ -135,9 +135,9 @@ def add_plugins(flags: argparse.ArgumentParser) -> None:
         "--plugins",
         action="append",
         default=[],
-        metavar="MODULE|FILE",
-        help="allow a module, or a .py file, with part types and fitness functions; "
-        "may be repeated (default: built-in modules, installed entry points "
+        metavar="MODULE|FILE|NAME=PATH",
+        help="allow a module, a .py file, or a module and the file or folder that "
+        "replaces it, with plug-ins; may be repeated (default: built-in modules, installed entry points "
         "'revolve.plugins', and modules of a .toml file, if one is given)",
     )
 

@@ -208,7 +208,7 @@ class _Uncached(SourceFileLoader):
     They may be older than their source, or not be made from it.
     """
 
-    def path_stats(self, path: str) -> Never:  # type: ignore[override]
+    def path_stats(self, path: str) -> Never:
         raise OSError(path)
 
 

@@ -231,7 +231,7 @@ def test_all_modules_of_a_package_come_from_the_copy(
 def test_a_file_that_a_package_did_not_have_is_refused(
     tmp_path: Path, package: Path, name: str
 ) -> None:
-    assert package
+    assert package.is_dir()
     kept = kept_by(tmp_path / "run", NAMED)
     package.rename(package.with_name("elsewhere"))
     (tmp_path / "run" / "plugins" / "kept_pack" / name).write_text("1")
