@@ -38,7 +38,7 @@ def check_brain_genes(experiment: Experiment, *, is_new: bool = False) -> None:
     where = genes.where if isinstance(genes, OwnGenes) else experiment.brain.type
     place = f"brain.type: {where}"
     try:
-        first = []
+        first: list[Genome] = []
         for genome in _genomes(experiment):
             robot = develop(genome, body_space(experiment.space))
             check_robot(robot, body_space(experiment.space), genes.neurons)

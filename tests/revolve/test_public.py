@@ -58,6 +58,23 @@ def test_each_public_name_is_loaded_and_documented() -> None:
     assert dir(revolve) == sorted(revolve.__all__)
 
 
+@pytest.mark.parametrize(
+    "method",
+    [
+        "FitnessFunction.__call__", "MeasureFunction.__call__",
+        "ParentSelection.__call__", "SurvivorSelection.__call__",
+        "Learner.ask", "Learner.tell", "BrainGenes.grow", "BrainControl.pack",
+        "BrainControl.bank", "Bank.step", "Encoding.develop", "NeuronType.step",
+        "SensorType.read",
+    ],
+)  # fmt: skip
+def test_protocols_of_plug_ins_are_public_and_in_the_reference(method: str) -> None:
+    name, _, member = method.partition(".")
+    assert getattr(revolve, name)._is_protocol
+    assert getattr(getattr(revolve, name), member).__doc__
+    assert f"### `{method}`" in (TOP / "docs" / "reference.md").read_text("utf-8")
+
+
 def test_types_are_those_of_the_loaded_objects() -> None:
     tree = ast.parse((TOP / "revolve" / "__init__.pyi").read_text("utf-8"))
     typed = {
