@@ -67,7 +67,7 @@ def keep(
 
     Raises:
         ExperimentError: a file cannot be read; two plug-ins need different data files
-            of one name.
+            of one name; a source has changed since it was imported.
     """
     kept: dict[str, KeptPlugin] = {}
     written: dict[str, bytes] = {}
@@ -84,6 +84,7 @@ def keep(
             use_copy(name, kept_file(folder, name))
         file = str(sources[0]) if files else ""
         kept[name] = KeptPlugin(digest_of(name), file, _seal(name, files))
+    refuse_other(folder, kept)
     return kept
 
 

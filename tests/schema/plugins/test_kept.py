@@ -132,12 +132,16 @@ def test_a_module_that_was_imported_before_an_edit_is_not_that_of_a_later_run(
 ) -> None:
     """Its text on disk is that of the second run; in memory is that of the first."""
     monkeypatch.syspath_prepend(tmp_path)
+    original.write_text("judge = 2\n")
+    two = kept_by(tmp_path / "two")
+    original.write_text("judge = 1\n")
     one = kept_by(tmp_path / "one")
     allow(["kept_lab"])
     assert load_object("kept_lab:judge", "here", {}) == 1
     original.write_text("judge = 2\n")
-    permission._allowed.clear()
-    two = keep(tmp_path / "two", DOCUMENT, write)
+    with pytest.raises(ExperimentError, match=r"digest 5ff4453f1603, but .*three was"):
+        keep(tmp_path / "three", DOCUMENT, write)
+    forget()
     allow_kept(tmp_path / "one", one, is_resumed=False)
     with pytest.raises(ExperimentError, match=r"digest 5ff4453f1603, but .*two was"):
         allow_kept(tmp_path / "two", two, is_resumed=False)
