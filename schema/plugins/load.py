@@ -179,7 +179,7 @@ def _load(path: str, where: str) -> object:
 
 @lru_cache(maxsize=256)
 def _loaded(module_name: str, attribute: str, where: str) -> object:
-    module = _imported(module_name, where, f"{module_name}:{attribute}")
+    module = load_module(module_name, where, f"{module_name}:{attribute}")
     if not hasattr(module, attribute):
         names = [
             name
@@ -202,34 +202,32 @@ def _is_imported(value: object, module_name: str) -> bool:
     return isinstance(value, ModuleType)
 
 
-def load_module(name: str, where: str) -> ModuleType:
+def load_module(name: str, where: str, path: str = "") -> ModuleType:
     """Return a module that is allowed.
 
     Args:
         name: of the module.
         where: what needs it, for messages.
+        path: ``module:attribute`` that is wanted, for messages, or empty.
 
     Raises:
         UnknownPlugin: it is not there.
         ExperimentError: its import raises another error.
     """
-    return _imported(name, where, name)
-
-
-def _imported(name: str, where: str, path: str) -> ModuleType:
+    wanted = path or name
     try:
         module = import_allowed(name)
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError) and error.name == name
         hint = f": no {name}.py is beside the experiment" if missing else ""
         raise UnknownPlugin(
-            f"{where}: {_line_of(error, name)}{path!r}: {error}{hint}"
+            f"{where}: {_line_of(error, name)}{wanted!r}: {error}{hint}"
         ) from None
     # A module may call exit().
     except (Exception, SystemExit) as error:
         place = _line_of(error, name)
         raise ExperimentError(
-            f"{where}: {place}{path!r}: {error_text(error)}"
+            f"{where}: {place}{wanted!r}: {error_text(error)}"
         ) from error
     digest_in_use(name)  # remembers it
     return module

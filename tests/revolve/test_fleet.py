@@ -171,6 +171,8 @@ def test_map_calls_a_function_by_name(
         next(found)
     with pytest.raises(rv.ExperimentError, match="item 0: must be None, bool"):
         next(fleet.map("lab_of_maps:inverse", [1j]))
+    with pytest.raises(rv.ExperimentError, match=r"\(of robots: Genome\.to_bytes\)"):
+        next(fleet.map("lab_of_maps:inverse", robots(1)))
     with pytest.raises(rv.UnknownPlugin, match="did you mean 'lab_of_maps:size'"):
         fleet.map("lab_of_maps:sizes", items)
     with pytest.raises(rv.UnknownPlugin, match="not allowed"):
