@@ -268,9 +268,17 @@ def test_plugins_are_identified_by_their_source(
     check_plugins(wanted)
     reply = server().reply(request(plugins=f"plugged_one=0 {two}"))
     digest = one.partition("=")[2]
-    assert reply.reason == (
+    differs = (
         f"{UNFIT}its plug-in 'plugged_one' differs from the coordinator's: source "
-        f"digest {digest}, expected 0"
+        f"digest {digest}, expected 0: give {folder}/plugged_one.py the content that "
+        "it had when the run began"
+    )
+    assert reply.reason == differs
+    wants_two = pb.Request(run="lab:1a2b:/runs/a", epoch=1, plugins="plugged_two=0")
+    reply = server().reply(wants_two.SerializeToString())
+    assert reply.reason.endswith(
+        ", or start this process with the run's copy: "
+        "--plugins plugged_two=/runs/a/plugins/plugged_two"
     )
     assert server().reply(request(plugins=wanted)) == Reply(b"answer")
     assert plugins_of(b'{"function":"worker.fitness:thesis"}') == ""
