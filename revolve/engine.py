@@ -22,7 +22,7 @@ from schema.agent.log import tell_user, warn_user
 from schema.agent.topics import unique_name
 from schema.errors import NetworkError, RevolveError
 
-_WAIT_S = 0.5
+_WAIT_S = 0.2
 _CHORES_S = 1.0
 _ALONE_S = 10.0
 """Time without any worker after which the user is told [s]."""
@@ -39,6 +39,7 @@ class Order:
         encode: returns the request, given run, epoch and number of the job.
         read: decodes and checks an answer, given epoch and number.
         settle: returns the future's value for the end of the job, or raises.
+        simulated_s: as of ``Job``.
         future: gets the value or the exception.
     """
 
@@ -46,6 +47,7 @@ class Order:
     encode: Callable[..., bytes]
     read: Callable[[tuple[int, int]], Read]
     settle: Callable[[Deliver], Any]
+    simulated_s: float | None = None
     future: "Future[Any]" = field(default_factory=Future)
 
 
@@ -204,9 +206,9 @@ class Engine:
         number = fleet.new_number()
         run, epoch = self._client
         payload = order.encode(run=run, epoch=epoch, number=number)
-        read = order.read((_EPOCH, number))
         self._open[number] = order
-        fleet.request(Job(number, order.kind, payload, -1, self._client, order, read))
+        about = (self._client, order, order.read((_EPOCH, number)), order.simulated_s)
+        fleet.request(Job(number, order.kind, payload, -1, *about))
 
     def _withdraw(self, fleet: Fleet) -> None:
         """Drop the jobs of cancelled futures."""

@@ -285,6 +285,7 @@ class Fleet:
                 measures=len(settings.measures.names),
             ),
             partial(_settle, settings=settings),
+            simulated_s,
         )
         return self._order(order)
 

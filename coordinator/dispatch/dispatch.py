@@ -11,13 +11,14 @@ gets no job until a backoff ends. The backoff grows with consecutive failures, s
 broken agent cannot empty the queue. One that is unfit for a client, such as without its
 plug-ins, gets no more jobs of that client.
 
-Overdue jobs are duplicated on idle agents; the first answer counts. If all agents that
-have a copy are silent, too, another one gets it, each time after twice the time. A job
-that crashed several processes is given up.
+Overdue jobs are duplicated on idle agents; the first answer counts. An agent with an
+overdue job that reports no progress when it is asked is silent: the jobs that only
+silent agents have are assigned to others as well, as lost ones are. A silent agent gets
+no more jobs until it is heard. A job that crashed several processes is given up.
 """
 
 from collections.abc import Callable, Iterator
-from heapq import heappop, heappush
+from heapq import heappop
 
 from coordinator.dispatch.events import (
     AgentKind,
@@ -45,7 +46,6 @@ from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     FIRST_S,
     LOOK_S,
-    REPLY_S,
     AgentState,
     Deadlines,
     PairedJobs,
@@ -64,6 +64,11 @@ MAX_ERRORS = 3
 MAX_DEATHS = 3
 LEAST_S = 1.0
 """A job is never late before this time [s]: a second copy would cost more."""
+CALL_S = 2.0 * FIRST_S
+"""An agent is not asked about work of unknown length before this time [s].
+
+Calls differ in duration, and may wait for other programs.
+"""
 VETS_AT_HAND = 16
 """Vettings that an analyzer holds beyond the current one: some milliseconds' work."""
 
@@ -90,7 +95,7 @@ class Dispatch:
         }
         self._kind_of: dict[str, AgentKind] = {}
         self._deadlines = Deadlines(LEAST_S)
-        self._next_look_s = self._next_check_s = 0.0
+        self._next_look_s = 0.0
         self._pairs = PairedJobs()
         self._highest = -1
         self._now_s: float | None = None
@@ -152,7 +157,7 @@ class Dispatch:
         """Return for how long the network waits for the reply to a job [s]."""
         # Calls differ in duration. One that takes longer is sent again, and its worker
         # goes on with it.
-        return self._deadlines.wait_s(job.kind)
+        return self._deadlines.wait_s(job.kind, job.simulated_s)
 
     def payload(self, number: int, agent: str) -> bytes | None:
         """Return the request of a job that an agent has; None: it has no such job."""
@@ -202,18 +207,18 @@ class Dispatch:
         if kind is None:
             return
         pool = self._pools[kind]
-        for number in pool.agents.pop(event.agent).held:
-            if pending := self._jobs.get(number):
+        for number, pending in pool.agents.pop(event.agent).held.items():
+            if number in self._jobs:
                 pending.lost[event.agent] += 1
                 self._put_back(pending, event.agent)
         yield from self._assign(pool)
 
     def _put_back(self, pending: Pending, agent: str) -> None:
-        """Take a job from an agent; it waits again if no other agent has it."""
+        """Take a job from an agent; it waits again if no other agent works at it."""
         del pending.holders[agent]
-        if not pending.holders:
-            number = pending.job.number
-            heappush(self._pools[AGENT_OF[pending.job.kind]].waiting, number)
+        pool = self._pools[AGENT_OF[pending.job.kind]]
+        if not _working(pending, pool):
+            pool.wait(pending)
 
     def _requested(self, event: Requested) -> Iterator[DispatchCommand]:
         number = event.job.number
@@ -225,17 +230,13 @@ class Dispatch:
             )
         pool = self._pools[AGENT_OF[event.job.kind]]
         self._highest = number
-        self._jobs[number] = Pending(event.job)
-        heappush(pool.waiting, number)
+        pending = self._jobs[number] = Pending(event.job)
+        pool.wait(pending)
         yield from self._assign(pool)
 
     def _withdrawn(self, event: Withdrawn) -> Iterator[DispatchCommand]:
-        pending = self._jobs.get(event.number)
-        if pending is None:
-            return
-        if not pending.holders:
-            self._pools[AGENT_OF[pending.job.kind]].drop(event.number)
-        yield from self._close(pending)
+        if pending := self._jobs.get(event.number):
+            yield from self._close(pending)
 
     def _ended(self, event: Ended) -> Iterator[DispatchCommand]:
         jobs = [j for j in self._jobs.values() if j.job.client == event.client]
@@ -251,7 +252,8 @@ class Dispatch:
             return
         pool = self._pools[kind]
         agent = pool.agents[event.agent]
-        agent.is_heard()
+        if event.outcome != "lost":
+            pool.hear(event.agent)
         is_advance = event.number in agent.advances
         if is_advance:
             del agent.advances[event.number]
@@ -322,7 +324,7 @@ class Dispatch:
             return
         if took_s is None or name in pending.repeated:
             took_s = self._now_s - since_s
-        self._deadlines.learn(pending.job.kind, took_s)
+        self._deadlines.learn(pending.job.kind, took_s, pending.job.simulated_s)
         agent.learn(took_s / place)
 
     def _fail(
@@ -348,6 +350,7 @@ class Dispatch:
         """Remove a job that has ended, and cancel its copies."""
         job = pending.job
         del self._jobs[job.number]
+        self._pools[AGENT_OF[job.kind]].drop(job.number)
         if job.paired not in self._jobs:
             self._pairs.forget(job)
         for agent in pending.holders:
@@ -366,9 +369,6 @@ class Dispatch:
         pending.killed[event.agent] = event.cause
         if len(pending.killed) < MAX_DEATHS:
             return
-        pool = self._pools[AGENT_OF[pending.job.kind]]
-        if not pending.holders:
-            pool.drop(event.number)
         causes = ", ".join(sorted(set(pending.killed.values())))
         reason = f"ended its own process {MAX_DEATHS} times, by {causes}"
         yield Deliver(pending.job, event.agent, reason=reason, is_deadly=True)
@@ -387,74 +387,74 @@ class Dispatch:
 
     def _progressed(self, event: Progressed) -> Iterator[DispatchCommand]:
         if kind := self._kind_of.get(event.agent):
-            agent = self._pools[kind].agents[event.agent]
-            agent.worked_s = self._now_s or 0.0
-            agent.is_heard()
-        yield from ()
+            pool = self._pools[kind]
+            pool.agents[event.agent].worked_s = self._now_s or 0.0
+            pool.hear(event.agent)
+            yield from self._assign(pool)
 
     def _look(self, now_s: float) -> Iterator[DispatchCommand]:
-        """Duplicate overdue jobs on idle agents, oldest first; find silent agents."""
-        limits_s = {kind: self._deadlines.limit_s(kind) for kind in AGENT_OF}
-        is_check = now_s >= self._next_check_s
-        if is_check:
-            self._next_check_s = now_s + REPLY_S
+        """Find silent agents; duplicate overdue jobs on idle agents, oldest first."""
         for kind, pool in self._pools.items():
+            for name, agent in pool.agents.items():
+                if agent.held:
+                    yield from self._judge(pool, name, now_s)
+            yield from self._assign(pool)
             idle = pool.idle()
-            if idle:
-                jobs = [j for j in self._jobs.values() if AGENT_OF[j.job.kind] == kind]
-            elif is_check:
-                jobs = self._oldest(pool)
-            else:
-                continue
-            for pending in jobs:
-                limit_s = limits_s[pending.job.kind]
-                if pending.holders and now_s - pending.since_s > limit_s:
-                    yield from self._copy(pending, pool, idle, limit_s)
+            for pending in list(self._jobs.values()) if idle else ():
+                if AGENT_OF[pending.job.kind] == kind:
+                    yield from self._copy(pending, pool, idle, now_s)
 
-    def _oldest(self, pool: Pool) -> list[Pending]:
-        """Return the oldest job of each agent that is not delivered."""
-        jobs = self._jobs
-        numbers = (
-            next((number for number in agent.held if number in jobs), -1)
-            for agent in pool.agents.values()
-        )
-        return [jobs[number] for number in numbers if number >= 0]
+    def _judge(self, pool: Pool, name: str, now_s: float) -> Iterator[DispatchCommand]:
+        """Ask an agent if its oldest job is overdue; give up on it if it is silent."""
+        agent = pool.agents[name]
+        oldest = next(iter(agent.held.values()))
+        since_s, _ = oldest.holders[name]
+        limit_s = self._limit_s(oldest.job)
+        if oldest.job.simulated_s is None:
+            limit_s = max(limit_s, CALL_S)
+        # Its reply may have come since the last look, so the user is told at the next.
+        if agent.is_silent:
+            fit = pool.fit(oldest.job.client)
+            others = (each for each in fit if not pool.agents[each].is_silent)
+            yield from pool.tell(name, now_s - since_s, min(others, default=""))
+        if pool.judge(name, since_s, limit_s, now_s) == "ask":
+            yield Ask(name)
+        if agent.is_silent:
+            for number, pending in agent.held.items():
+                if number in self._jobs and not _working(pending, pool):
+                    pool.wait(pending)
+
+    def _limit_s(self, job: Job) -> float:
+        return self._deadlines.limit_s(job.kind, job.simulated_s)
 
     def _copy(
-        self, pending: Pending, pool: Pool, idle: list[str], limit_s: float
-    ) -> Iterator[DispatchCommand]:
+        self, pending: Pending, pool: Pool, idle: list[str], now_s: float
+    ) -> Iterator[Assign]:
         """Give an overdue job to an idle agent, which is removed from the list."""
-        now_s = self._now_s or 0.0
-        avoid = {*self._pairs.avoided(pending), *pending.holders}
-        fit = self.fit(AGENT_OF[pending.job.kind], pending.job.client)
-        name = next((each for each in idle if each in fit and each not in avoid), "")
-        copies = len(pending.holders)
+        working = _working(pending, pool)
         # The second copy may only be faster; more of them need silent agents.
-        if copies > 1 or not name:
-            latest_s = max(since_s for since_s, _ in pending.holders.values())
-            limit_s = max(limit_s, FIRST_S) * 2 ** (copies - 1)
-            is_silent = True
-            for holder in pending.holders:
-                verdict = pool.judge(holder, latest_s, limit_s, now_s)
-                is_silent &= verdict == "silent"
-                if verdict == "ask":
-                    yield Ask(holder)
-            if not is_silent:
+        if len(working) != 1:
+            return
+        since_s, _ = pending.holders[working[0]]
+        if now_s - since_s <= self._limit_s(pending.job):
+            return
+        client, avoid = pending.job.client, self._pairs.avoided(pending)
+        for name in idle:
+            if name not in pending.holders and pool.may_take(name, client, avoid):
+                idle.remove(name)
+                yield self._give(pending, pool, name)
                 return
-            for holder, (since_s, _) in pending.holders.items():
-                yield from pool.tell(holder, now_s - since_s, name)
-        if name:
-            idle.remove(name)
-            yield self._give(pending, pool, name)
 
     def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
         """Assign a job to an agent."""
         job = pending.job
         self._pairs.note(job, name)
         agent = pool.agents[name]
-        agent.held[job.number] = None
+        agent.held[job.number] = pending
         place = max(1.0, len(agent.held) / agent.joined.slots)
         pending.holders[name] = (self._now_s or 0.0, place)
+        if not _working(pending, pool):
+            pool.wait(pending)
         pool.offer(name)
         return Assign(job, name)
 
@@ -462,7 +462,7 @@ class Dispatch:
         """Assign the jobs that can be assigned."""
         passed: list[str] = []
         while pool.waiting and (name := pool.best()):
-            pending = pool.take(name, self._jobs, self._pairs.avoided)
+            pending = pool.take(name, self._pairs.avoided)
             if pending is None:
                 passed.append(name)
                 heappop(pool.free)
@@ -470,3 +470,8 @@ class Dispatch:
             yield self._give(pending, pool, name)
         for name in passed:
             pool.offer(name)
+
+
+def _working(pending: Pending, pool: Pool) -> list[str]:
+    """Return the agents that have a job and are not silent."""
+    return [name for name in pending.holders if not pool.agents[name].is_silent]

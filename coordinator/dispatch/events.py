@@ -42,6 +42,8 @@ class Job:
         client: the run that requested it.
         subject: the client's own description of the job.
         read: decodes and checks an answer.
+        simulated_s: time that it simulates [s]; 0.0 if it is no simulation, None if its
+            work is unknown, as that of a call.
     """
 
     number: int
@@ -51,6 +53,7 @@ class Job:
     client: Client = NO_CLIENT
     subject: object = None
     read: Read = field(default=bytes, compare=False)
+    simulated_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,8 +241,8 @@ class Overdue:
 
     Attributes:
         agent: its name.
-        waited_s: time since it was given the job [s].
-        to: the agent that takes the job; empty if there is none.
+        waited_s: time since it was given its oldest job [s].
+        to: an agent that can take its jobs; empty if there is none.
     """
 
     agent: str
@@ -273,9 +276,17 @@ class ShardSeen:
 
 @dataclass(frozen=True, slots=True)
 class ShardRequested:
-    """A shard is to be advanced; may be repeated only after ``ShardDone``."""
+    """A shard is to be advanced; may be repeated only after ``ShardDone``.
+
+    Attributes:
+        shard: the shard.
+        simulated_s: time that the advance simulates [s]; None: unknown.
+        rebuilt_s: the same with what a worker without the state repeats first [s].
+    """
 
     shard: int
+    simulated_s: float | None = None
+    rebuilt_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -165,10 +165,20 @@ class Fleet:
         self._move(ShardSeen(shard, platform, may_drift, client))
         return shard
 
-    def advance(self, shard: int) -> None:
-        """Request an advance of a shard; its client gives the last step."""
+    def advance(
+        self,
+        shard: int,
+        simulated_s: float | None = None,
+        rebuilt_s: float | None = None,
+    ) -> None:
+        """Request an advance of a shard; its client gives the last step.
+
+        Args:
+            shard: its number.
+            simulated_s, rebuilt_s: as of ``ShardRequested`` [s].
+        """
         self._advancing.add(shard)
-        self._move(ShardRequested(shard))
+        self._move(ShardRequested(shard, simulated_s, rebuilt_s))
 
     def leave(self, client: Client) -> None:
         """Drop all jobs and shards of a client."""
@@ -356,8 +366,8 @@ def _line(command: Crowded | Overdue) -> str:
             f"the workers keep {command.kept} arenas and have {command.shards}: those "
             "in excess are rebuilt each time; start more workers"
         )
-    then = f"{command.to} takes" if command.to else "no other agent can take"
+    then = "another one takes" if command.to else "no other agent can take"
     return (
         f"{command.agent} has not answered for {command.waited_s:.0f} s and reports no "
-        f"progress: {then} its job"
+        f"progress: {then} its jobs"
     )

@@ -5,7 +5,7 @@ which agents are silent, and one rule for deadlines.
 """
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from itertools import count
@@ -25,13 +25,15 @@ SPARE_SHARE = 0.4
 BACKOFF_S = 0.05
 LONGEST_BACKOFF_S = 3.2
 REPLY_S = 5.0
-"""Time that an agent has to report progress when it is asked [s]."""
+"""Longest time that an agent has to report progress when it is asked [s]."""
 _NEWEST_WEIGHT = 0.1
 """Weight of the newest value in a moving average."""
 PATIENCE = 4.0
 """A job is late after this multiple of the typical duration of its kind."""
 FIRST_S = 60.0
-"""Deadline of a job without history [s]."""
+"""Longest deadline of a job without history [s]."""
+FIRST_SPEED = 10.0
+"""Its deadline is that of a simulation this much faster than real time."""
 LONGEST_WAIT_S = 7 * 24 * 3600.0
 """Effectively no limit: a week is longer than any job [s]."""
 LEAST_WAIT_S = 300.0
@@ -40,7 +42,7 @@ _WAIT = 100.0
 """That time as a multiple of the typical duration."""
 _WAIT_GROWTH = 10.0
 """Growth of that time with each request that is sent again."""
-LOOK_S = 0.25
+LOOK_S = 0.2
 """Interval between checks for late jobs [s]."""
 _MOST_DOUBLINGS = 16
 _PROVIDED = 1e6
@@ -72,11 +74,6 @@ class Pending:
     lost: Counter[str] = field(default_factory=Counter)
     killed: dict[str, str] = field(default_factory=dict)
 
-    @property
-    def since_s(self) -> float:
-        """Time of the first assignment that still holds [s]."""
-        return next(iter(self.holders.values()))[0]
-
 
 @dataclass(slots=True)
 class AgentState:
@@ -84,7 +81,7 @@ class AgentState:
 
     Attributes:
         joined: its properties.
-        held: numbers of its jobs, oldest first.
+        held: its jobs by number, oldest first, delivered ones included.
         advances: numbers of its advances of arenas.
         busy: slots that these occupy; jobs get the next one, so that they never starve.
         job_s: typical time that a slot takes for a job [s]; 0 before the first.
@@ -95,13 +92,14 @@ class AgentState:
         stamp: of its only valid entry in the pool's heap.
         worked_s: time of its last report of progress [s].
         asked_s: time of the last question about it [s].
-        is_silent: it is silent until its next answer or report.
+        is_silent: it is silent until its next answer or report. Its jobs go to others,
+            and it gets no more while it holds any; later ones go to others, too.
         is_told: the user knows that it is silent.
         unfit_for: clients whose jobs it cannot do.
     """
 
     joined: Joined
-    held: dict[int, None] = field(default_factory=dict)
+    held: dict[int, Pending] = field(default_factory=dict)
     advances: dict[int, None] = field(default_factory=dict)
     busy: int = 0
     job_s: float = 0.0
@@ -119,9 +117,10 @@ class AgentState:
         """Update the number of slots that its advances occupy."""
         self.busy = min(len(self.advances), self.joined.slots)
 
-    def is_heard(self) -> None:
-        """Note an answer or a report of progress."""
-        self.is_silent = self.is_told = False
+    @property
+    def is_resting(self) -> bool:
+        """It gets no jobs at present."""
+        return self.is_backing_off or (self.is_silent and bool(self.held))
 
     def learn(self, duration_s: float) -> None:
         """Note the time that a slot took for a job [s]."""
@@ -138,15 +137,21 @@ class Pool:
     Attributes:
         at_hand: jobs beyond its slots that an agent always holds.
         agents: by their names.
-        free: (load, name, stamp) of each agent that is not backing off, a heap; entries
+        free: (load, name, stamp) of each agent that is not resting, a heap; entries
             with an old stamp are invalid.
-        waiting: numbers of jobs, a heap.
+        waiting: jobs that no agent has, or silent ones only, by number.
     """
 
     at_hand: int = 1
     agents: dict[str, AgentState] = field(default_factory=dict)
     free: list[tuple[float, str, int]] = field(default_factory=list)
-    waiting: list[int] = field(default_factory=list)
+    waiting: dict[int, Pending] = field(default_factory=dict)
+    # Heaps of numbers. Jobs that some agent may not have are set aside: agents look at
+    # each group once, not at each job. Jobs that wait no more are skipped.
+    _order: list[int] = field(default_factory=list)
+    _aside: dict[tuple[Client, tuple[str, ...]], list[int]] = field(
+        default_factory=dict
+    )
     _backoffs: list[tuple[float, int, str]] = field(default_factory=list)
     _stamps: Iterator[int] = field(default_factory=lambda: count(1))
 
@@ -185,7 +190,8 @@ class Pool:
         Args:
             name: of the agent.
             since_s: time at which it was given the job [s].
-            limit_s: how long such a job may take [s].
+            limit_s: how long such a job may take, and how long the agent may take to
+                report, up to ``REPLY_S`` [s].
             now_s: the time [s].
         """
         agent = self.agents[name]
@@ -196,10 +202,21 @@ class Pool:
         if agent.asked_s < max(due_s, now_s - 2.0 * REPLY_S):
             agent.asked_s = now_s
             return "ask"
-        if now_s < agent.asked_s + REPLY_S:
+        if now_s < agent.asked_s + min(REPLY_S, limit_s):
             return "in time"
-        agent.is_silent = True
+        if not agent.is_silent:
+            agent.is_silent = True
+            self.offer(name)
         return "silent"
+
+    def hear(self, name: str) -> None:
+        """Note an answer or a report of progress: a silent agent has its jobs again."""
+        agent = self.agents[name]
+        if agent.is_silent:
+            agent.is_silent = agent.is_told = False
+            for number in agent.held:
+                self.drop(number)
+            self.offer(name)
 
     def tell(self, name: str, waited_s: float, to: str = "") -> Iterator[Overdue]:
         """Yield the line about a silent agent, once for each silence."""
@@ -212,7 +229,7 @@ class Pool:
         """Note the load of an agent; its earlier entry becomes invalid."""
         agent = self.agents[name]
         agent.stamp = next(self._stamps)
-        if agent.is_backing_off:
+        if agent.is_resting:
             return
         if len(self.free) > 4 * len(self.agents) + 64:
             self.free = [entry for entry in self.free if self._is_live(entry)]
@@ -270,19 +287,24 @@ class Pool:
         spare_s = min(
             self._spare(agent) / agent.joined.slots * agent.job_s
             for agent in self.agents.values()
-            if not agent.is_backing_off
+            if not agent.is_resting
         )
         return min(PAUSE_S, SPARE_SHARE * spare_s)
 
     def idle(self) -> list[str]:
-        """Return the agents without a job that are not backing off, by name."""
+        """Return the agents without a job that are not backing off or silent.
+
+        Those that have done a job come first, then by name.
+        """
         if not self._least_busy() or self.free[0][0] > 0.0:
             return []
-        return sorted(
-            name
+        idle = (
+            (not agent.job_s, name)
             for name, agent in self.agents.items()
-            if not (agent.held or agent.advances or agent.is_backing_off)
+            if not (agent.held or agent.advances)
+            and not (agent.is_backing_off or agent.is_silent)
         )
+        return [name for _, name in sorted(idle)]
 
     def _is_live(self, entry: tuple[float, str, int]) -> bool:
         agent = self.agents.get(entry[1])
@@ -294,41 +316,55 @@ class Pool:
         return (n for n, a in list(self.agents.items()) if client not in a.unfit_for)
 
     def may_take(self, name: str, client: Client, avoid: tuple[str, ...]) -> bool:
-        """Return whether an agent may have a job that avoids others where it can."""
+        """Return whether an agent may have a job that avoids others where it can.
+
+        It cannot where all that it does not avoid are silent.
+        """
         if client in self.agents[name].unfit_for:
             return False
-        return name not in avoid or all(other in avoid for other in self.fit(client))
+        return name not in avoid or all(
+            other in avoid or self.agents[other].is_silent for other in self.fit(client)
+        )
+
+    def wait(self, pending: Pending) -> None:
+        """Add a job to those that wait, unless it is one."""
+        number = pending.job.number
+        if number not in self.waiting:
+            self.waiting[number] = pending
+            heappush(self._order, number)
 
     def take(
-        self,
-        name: str,
-        jobs: Mapping[int, Pending],
-        avoided: Callable[[Pending], tuple[str, ...]],
+        self, name: str, avoided: Callable[[Pending], tuple[str, ...]]
     ) -> Pending | None:
         """Remove and return the first waiting job that an agent may have, if any.
 
         Args:
             name: of the agent.
-            jobs: by their numbers.
             avoided: returns the agents that a job avoids if there are others.
         """
-        passed: list[int] = []
-        taken: Pending | None = None
-        while self.waiting and taken is None:
-            number = heappop(self.waiting)
-            pending = jobs[number]
-            if self.may_take(name, pending.job.client, avoided(pending)):
-                taken = pending
-            else:
-                passed.append(number)
-        for number in passed:
-            heappush(self.waiting, number)
-        return taken
+        self._aside = {group: heap for group, heap in self._aside.items() if heap}
+        aside = self._aside.items()
+        heaps = [heap for group, heap in aside if self.may_take(name, *group)]
+        heaps.append(self._order)
+        while heap := min(filter(None, heaps), default=None):
+            pending = self.waiting.get(heappop(heap))
+            if pending is None:
+                continue
+            number, client = pending.job.number, pending.job.client
+            group = client, avoided(pending)
+            if self.may_take(name, *group):
+                return self.waiting.pop(number)
+            heappush(self._aside.setdefault(group, []), number)
+        return None
 
     def drop(self, number: int) -> None:
-        """Remove a waiting job."""
-        self.waiting.remove(number)
-        heapify(self.waiting)
+        """Remove a job if it waits."""
+        if self.waiting.pop(number, None) is None:
+            return
+        size = len(self._order) + sum(map(len, self._aside.values()))
+        if size > 2 * len(self.waiting) + 64:
+            self._order = sorted(self.waiting)
+            self._aside.clear()
 
 
 class PairedJobs:
@@ -356,41 +392,55 @@ class PairedJobs:
 
 
 class Deadlines:
-    """Typical duration of the jobs of each kind, from their assignment [s]."""
+    """Typical duration of the jobs of each kind, from their assignment [s].
+
+    That of a simulation is per simulated second, because simulations differ in length.
+    """
 
     def __init__(self, least_s: float) -> None:
         """Initialise without history; no deadline is shorter than ``least_s`` [s]."""
         self._least_s = least_s
         self._typical_s: dict[Hashable, float] = {}
 
-    def learn(self, kind: Hashable, duration_s: float) -> None:
+    def learn(
+        self, kind: Hashable, duration_s: float, simulated_s: float | None = None
+    ) -> None:
         """Note the duration of a job."""
-        known = self._typical_s.get(kind, duration_s)
-        self._typical_s[kind] = known + _NEWEST_WEIGHT * (duration_s - known)
+        each_s = duration_s / _length(simulated_s)
+        known = self._typical_s.get(kind, each_s)
+        self._typical_s[kind] = known + _NEWEST_WEIGHT * (each_s - known)
 
     def forget(self, kind: Hashable) -> None:
         """Drop the history of a kind of jobs that has ended."""
         self._typical_s.pop(kind, None)
 
-    def limit_s(self, kind: Hashable, misses: int = 0) -> float:
+    def limit_s(
+        self, kind: Hashable, simulated_s: float | None, misses: int = 0
+    ) -> float:
         """Return how long a job may take; twice as long after each miss [s]."""
-        typical_s = self._typical_s.get(kind)
-        first_s = FIRST_S
-        if typical_s is not None:
-            first_s = max(self._least_s, PATIENCE * typical_s)
-        return first_s * float(2 ** min(misses, _MOST_DOUBLINGS))
+        limit_s = FIRST_S
+        if kind in self._typical_s:
+            limit_s = PATIENCE * self._typical_s[kind] * _length(simulated_s)
+        elif simulated_s is not None:
+            limit_s = min(FIRST_S, simulated_s / FIRST_SPEED)
+        return max(self._least_s, limit_s) * float(2 ** min(misses, _MOST_DOUBLINGS))
 
-    def wait_s(self, kind: Hashable) -> float:
+    def wait_s(self, kind: Hashable, simulated_s: float | None) -> float:
         """Return for how long the network waits for a reply [s].
 
         The network holds some memory of each request until this time is over, even if
         the reply came long ago: half a kilobyte, three times per birth, once per call.
         A request whose time is over is sent again, see ``longer_s``.
         """
-        typical_s = self._typical_s.get(kind)
-        if typical_s is None:
+        if kind not in self._typical_s:
             return LONGEST_WAIT_S
+        typical_s = self._typical_s[kind] * _length(simulated_s)
         return min(LONGEST_WAIT_S, max(LEAST_WAIT_S, _WAIT * typical_s))
+
+
+def _length(simulated_s: float | None) -> float:
+    """Return how long a job is; what does not simulate outweighs the first second."""
+    return max(1.0, simulated_s or 0.0)
 
 
 def longer_s(wait_s: float) -> float:

@@ -7,7 +7,7 @@ than it has, with the lowest load; ties break on the name. A worker that is unfi
 the shard's client never gets it. A shard without a worker waits. If the user allows a
 drift, one of another platform gets it after a while.
 
-An advance has a deadline. A silent worker loses it only to an idle one, and the next
+An advance has a deadline. A silent worker loses it to one that has room, and the next
 deadline is twice as long, so that an advance that takes long everywhere ends. A worker
 that joins takes over shards of those that hold more.
 """
@@ -37,13 +37,13 @@ from coordinator.dispatch.events import (
     ShardSeen,
     Ticked,
 )
-from coordinator.dispatch.pool import FIRST_S, LONGEST_WAIT_S, LOOK_S, Deadlines, Pool
+from coordinator.dispatch.pool import LONGEST_WAIT_S, LOOK_S, Deadlines, Pool
 from schema.errors import UnexpectedEvent
 
 MAX_ERRORS = 3
 DRIFT_S = 30.0
 """Time that a shard waits for its own platform before it may drift [s]."""
-LEAST_S = 10.0
+LEAST_S = 2.0
 """An advance is never late before this time [s]: to rebuild a state is expensive."""
 
 
@@ -59,6 +59,7 @@ class _Shard:
             does.
         has_state: the holder has its state.
         is_wanted: an advance is requested.
+        simulated_s, rebuilt_s: of that request.
         number: of the job that is assigned; -1 if none is.
         is_whole: that job includes what is needed to rebuild the state.
         since_s: time at which that job was assigned [s].
@@ -76,6 +77,8 @@ class _Shard:
     successor: str = ""
     has_state: bool = False
     is_wanted: bool = False
+    simulated_s: float | None = None
+    rebuilt_s: float | None = None
     may_drift: bool = True
     number: int = -1
     is_whole: bool = False
@@ -160,7 +163,10 @@ class ShardDispatch:
     def wait_s(self, job: AssignShard) -> float:
         """Return for how long the network waits for the reply to an advance [s]."""
         # A rebuild may take very much longer than an advance.
-        return LONGEST_WAIT_S if job.is_whole else self._deadlines.wait_s(job.shard)
+        if job.is_whole:
+            return LONGEST_WAIT_S
+        simulated_s = self._shards[job.shard].simulated_s
+        return self._deadlines.wait_s(job.shard, simulated_s)
 
     def shard_that_lost(self, number: int) -> int | None:
         """Return the shard whose present advance lost a job without reply."""
@@ -189,7 +195,7 @@ class ShardDispatch:
                 shard.platform, shard.may_drift = event.platform, event.may_drift
                 shard.client = event.client
             case ShardRequested():
-                self._want(event.shard)
+                self._want(event)
             case Expired():
                 self._expired(event.number)
             case ShardReturned():
@@ -205,11 +211,12 @@ class ShardDispatch:
     def _shard(self, number: int) -> _Shard:
         return self._shards.setdefault(number, _Shard())
 
-    def _want(self, number: int) -> None:
-        shard = self._shard(number)
+    def _want(self, event: ShardRequested) -> None:
+        shard = self._shard(event.shard)
         if shard.is_wanted:
-            raise UnexpectedEvent(f"shard {number}: is requested already")
+            raise UnexpectedEvent(f"shard {event.shard}: is requested already")
         shard.is_wanted = True
+        shard.simulated_s, shard.rebuilt_s = event.simulated_s, event.rebuilt_s
 
     def _joined(self, joined: Joined) -> Iterator[ShardCommand]:
         if joined.kind == "worker":
@@ -239,14 +246,13 @@ class ShardDispatch:
             yield from self._look()
 
     def _look(self) -> Iterator[ShardCommand]:
-        """Move advances from silent workers to idle ones."""
-        pool, idle = self._workers, set(self._workers.idle())
+        """Move advances from silent workers to others with room."""
+        pool = self._workers
         for number, shard in sorted(self._shards.items()):
             if shard.number < 0:
                 continue
-            limit_s = self._deadlines.limit_s(number, shard.misses)
-            if shard.is_whole:
-                limit_s = max(limit_s, FIRST_S * 2**shard.misses)
+            simulated_s = shard.rebuilt_s if shard.is_whole else shard.simulated_s
+            limit_s = self._deadlines.limit_s(number, simulated_s, shard.misses)
             name = shard.holder
             verdict = pool.judge(name, shard.since_s, limit_s, self._now_s)
             if verdict == "ask":
@@ -255,7 +261,7 @@ class ShardDispatch:
                 continue
             waited_s = self._now_s - shard.since_s
             crowding = self._crowding()
-            free = [n for n in self._fit(shard) if n in idle and not crowding(n)[0]]
+            free = (n for n in self._fit(shard) if crowding(n)[:2] == (False, False))
             to = min(free, key=crowding, default="")
             yield from pool.tell(name, waited_s, to)
             if to:
@@ -465,7 +471,7 @@ class ShardDispatch:
     def _crowding(self) -> Callable[[str], tuple[bool, bool, float, int, str]]:
         """Return by what workers compare: the least one gets the next shard.
 
-        Whether it holds as many as it keeps is first.
+        Whether it is silent is first, then whether it holds as many as it keeps.
         """
         bound, agents = self._bound(), self._workers.agents
 
@@ -473,6 +479,6 @@ class ShardDispatch:
             worker = agents[name]
             is_full = bound[name] >= worker.joined.shards
             share = bound[name] / worker.joined.cores
-            return is_full, worker.is_silent, share, len(worker.held), name
+            return worker.is_silent, is_full, share, len(worker.held), name
 
         return crowding

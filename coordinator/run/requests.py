@@ -81,7 +81,7 @@ class Requests:
         if isinstance(command, Vet):
             kind: JobKind = "vet"
             steps, settings, identity = 0, context.vetting, NO_IDENTITY
-            robot = self._body(command)
+            robot, simulated_s = self._body(command), 0.0
         else:
             kind = "evaluate"
             requester = requester_of(command)
@@ -89,6 +89,8 @@ class Requests:
             origin = structs.replace(context.origin, island=requester)
             identity = Identity(origin, command.birth, command.trial)
             robot = self._robot(command)
+            clock = context.experiments[requester].simulation
+            simulated_s = (steps or clock.evaluation_steps) * clock.timestep_s
         run, epoch = context.client
         for number, paired in self._numbers(command):
             payload = encode_request(
@@ -101,17 +103,19 @@ class Requests:
                 identity=identity,
                 plugins=plugins_of(settings),
             )
-            read = self._reader(command, (epoch, number))
-            self._fleet.request(
-                Job(number, kind, payload, paired, context.client, command, read)
-            )
+            read = self._reader(command, (epoch, number), simulated_s)
+            about = (context.client, command, read, simulated_s)
+            self._fleet.request(Job(number, kind, payload, paired, *about))
 
-    def _reader(self, command: Vet | Evaluate, expected: Expected) -> Read:
+    def _reader(
+        self, command: Vet | Evaluate, expected: Expected, simulated_s: float
+    ) -> Read:
         """Return what decodes the answer to a job, and checks it against the job.
 
         Args:
             command: of the job.
             expected: epoch and number of the job.
+            simulated_s: length of the evaluation [s].
         """
         context = self._context
         if isinstance(command, Vet):
@@ -121,14 +125,11 @@ class Requests:
                 robot=command.robot,
                 space=context.space,
             )
-        own = context.experiments[requester_of(command)]
-        clock = own.simulation
-        steps = command.steps or clock.evaluation_steps
         return partial(
             read_evaluation,
             expected=expected,
-            simulated_s=steps * clock.timestep_s,
-            measures=len(own.measures.names),
+            simulated_s=simulated_s,
+            measures=len(context.experiments[requester_of(command)].measures.names),
         )
 
     def _body(self, command: Vet) -> bytes:

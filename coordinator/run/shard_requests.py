@@ -226,7 +226,9 @@ class ShardRequests:
                 self._context.client, self._encode, platform, may_drift=repeats is None
             )
             self._numbers[shard], self._islands[number] = number, shard
-        self._fleet.advance(self._numbers[shard])
+        timestep_s = self._context.experiments[shard].simulation.timestep_s
+        spans = (command.until - past.step, command.until - past.base)
+        self._fleet.advance(self._numbers[shard], *(n * timestep_s for n in spans))
 
     def request_snapshot(self, shard: int) -> None:
         """Request a snapshot at the end of the next advance that is assigned."""
