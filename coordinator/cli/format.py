@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from coordinator.dispatch.faults import MEANINGS
-from schema.errors import rounded
-from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
+from schema.errors import counted, rounded
+from schema.wire.status import IslandStatus, PeerFault, RunStatus, SilentAgent, Status
 
 _MOST_PEERS = 5
 _MEANINGS = {str(kind): meaning for kind, meaning in MEANINGS.items()}
@@ -74,6 +74,16 @@ def about_arenas(run: RunStatus) -> str:
     if run.simulated_per_s:
         pace = f"{pace}, {run.simulated_per_s:.1f} x real time"
     return f", {simulated_s:.0f} s simulated, {alive} alive{pace}"
+
+
+def silent_lines(silent: Sequence[SilentAgent]) -> list[str]:
+    """Return a line that names the agents that have jobs and do not answer, if any."""
+    if not silent:
+        return []
+    shown = silent[:_MOST_PEERS]
+    names = ", ".join(f"{each.name} has {counted(each.jobs, 'job')}" for each in shown)
+    more = f" and {len(silent) - _MOST_PEERS} more" * (len(silent) > _MOST_PEERS)
+    return [f"silent: {names}{more} (no answer and no report of progress)"]
 
 
 def fault_lines(faults: Sequence[PeerFault]) -> list[str]:

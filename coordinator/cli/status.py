@@ -13,6 +13,7 @@ from coordinator.cli.format import (
     fault_lines,
     missing_agents,
     run_details,
+    silent_lines,
     state_of,
 )
 from coordinator.cli.status_json import Source, status_json
@@ -237,7 +238,8 @@ def _show(source: Source) -> None:
         lines.append(_without_coordinator(status, root))
     elif done < len(status.runs):
         lines.append(f"waiting for {' and '.join(missing_agents(status))}")
-    lines += [printable(line, _WIDEST) for line in fault_lines(status.faults)]
+    about = (*silent_lines(status.silent), *fault_lines(status.faults))
+    lines += [printable(line, _WIDEST) for line in about]
     # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
     for line in lines:

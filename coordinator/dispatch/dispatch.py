@@ -142,6 +142,15 @@ class Dispatch:
         """Return the number of jobs that the agents of a kind hold."""
         return sum(len(agent.held) for agent in self._pools[kind].agents.values())
 
+    def silent(self) -> list[tuple[str, int]]:
+        """Return the silent agents, by name, and how many jobs and advances each has."""
+        agents = {n: a for pool in self._pools.values() for n, a in pool.agents.items()}
+        return sorted(
+            (name, count)
+            for name, agent in agents.items()
+            if agent.is_silent and (count := len(agent.held) + len(agent.advances))
+        )
+
     @property
     def credits(self) -> int:
         """How many jobs all workers together hold while enough jobs wait."""

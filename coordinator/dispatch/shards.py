@@ -247,26 +247,25 @@ class ShardDispatch:
 
     def _look(self) -> Iterator[ShardCommand]:
         """Move advances from silent workers to others with room."""
-        pool = self._workers
+        pool, late = self._workers, list[tuple[int, _Shard]]()
         for number, shard in sorted(self._shards.items()):
             if shard.number < 0:
                 continue
             simulated_s = shard.rebuilt_s if shard.is_whole else shard.simulated_s
             limit_s = self._deadlines.limit_s(number, simulated_s, shard.misses)
-            name = shard.holder
-            verdict = pool.judge(name, shard.since_s, limit_s, self._now_s)
+            verdict = pool.judge(shard.holder, shard.since_s, limit_s, self._now_s)
             if verdict == "ask":
-                yield Ask(name)
-            if verdict != "silent":
-                continue
-            waited_s = self._now_s - shard.since_s
+                yield Ask(shard.holder)
+            elif verdict == "silent":
+                late.append((number, shard))
+        for number, shard in late:
             crowding = self._crowding()
             free = (n for n in self._fit(shard) if crowding(n)[:2] == (False, False))
             to = min(free, key=crowding, default="")
-            yield from pool.tell(name, waited_s, to)
+            yield from pool.tell(shard.holder, self._now_s - shard.since_s, to)
             if to:
                 shard.misses += 1
-                shard.avoid = (*shard.avoid, name)
+                shard.avoid = (*shard.avoid, shard.holder)
                 yield from self._move(number, to)
 
     def _move(self, number: int, to: str) -> Iterator[ShardCommand]:
@@ -323,10 +322,15 @@ class ShardDispatch:
 
         The next ones then wait longer, also if this one ends in another way.
         """
-        shard = self._out.get(number)
-        if shard is not None and not self._shards[shard].is_whole:
-            waited_s = self._now_s - self._shards[shard].since_s
-            self._deadlines.learn(shard, waited_s)
+        if (shard := self._out.get(number)) is not None:
+            self._learn(shard)
+
+    def _learn(self, number: int) -> None:
+        """Note how long a shard's advance took, or has taken so far."""
+        shard = self._shards[number]
+        if not shard.is_whole:
+            took_s = self._now_s - shard.since_s
+            self._deadlines.learn(number, took_s, shard.simulated_s)
 
     def _returned(self, event: ShardReturned) -> list[ShardCommand]:
         number = self._out.pop(event.number, None)
@@ -338,8 +342,7 @@ class ShardDispatch:
             worker = self._workers.agents[agent]
             shard.platform, worker.failures = worker.joined.platform, 0
             shard.has_state, shard.is_wanted = True, False
-            if not shard.is_whole:
-                self._deadlines.learn(number, self._now_s - shard.since_s)
+            self._learn(number)
             self._forgive(shard)
             if shard.successor:
                 self._unbind(shard)
@@ -471,7 +474,8 @@ class ShardDispatch:
     def _crowding(self) -> Callable[[str], tuple[bool, bool, float, int, str]]:
         """Return by what workers compare: the least one gets the next shard.
 
-        Whether it is silent is first, then whether it holds as many as it keeps.
+        Whether it is silent or backs off is first, then whether it holds as many as it
+        keeps.
         """
         bound, agents = self._bound(), self._workers.agents
 
@@ -479,6 +483,7 @@ class ShardDispatch:
             worker = agents[name]
             is_full = bound[name] >= worker.joined.shards
             share = bound[name] / worker.joined.cores
-            return worker.is_silent, is_full, share, len(worker.held), name
+            is_resting = worker.is_silent or worker.is_backing_off
+            return is_resting, is_full, share, len(worker.held), name
 
         return crowding

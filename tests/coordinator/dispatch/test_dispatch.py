@@ -1,14 +1,18 @@
 """Dispatch: each job is done once, whatever happens to its agents."""
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import count
+from itertools import count, pairwise
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.dispatch.dispatch import (
+    CALL_S,
     LEAST_S,
     MAX_DEATHS,
     MAX_ERRORS,
@@ -25,6 +29,7 @@ from coordinator.dispatch.events import (
     Died,
     DispatchCommand,
     DispatchEvent,
+    Ended,
     Expired,
     Job,
     JobKind,
@@ -48,6 +53,7 @@ from coordinator.dispatch.pool import (
     PATIENCE,
     PAUSE_S,
     REPLY_S,
+    Pool,
     longer_s,
 )
 from schema.errors import UnexpectedEvent
@@ -446,42 +452,269 @@ def silent(dispatch: Dispatch, now_s: float) -> list[DispatchCommand]:
     return dispatch.handle(Ticked(now_s + REPLY_S + 0.3))
 
 
-def test_further_copies_need_silent_agents_and_twice_the_time() -> None:
+def test_a_third_copy_needs_a_silent_agent() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0), worker("b"))
-    dispatch.handle(Ticked(FIRST_S + 1.0))
+    assert given_out(dispatch.handle(Ticked(FIRST_S + 1.0))) == [(0, "b")]
     dispatch.handle(worker("c"))
     dispatch.handle(worker("d"))
-    at_s = FIRST_S + 1.0 + 2 * FIRST_S
-    assert dispatch.handle(Ticked(at_s - 1.0)) == []
-    assert dispatch.handle(Ticked(at_s)) == [Ask("a"), Ask("b")]
-    # The second one works: the third has no cause to help.
+    assert dispatch.handle(Ticked(2 * FIRST_S)) == [Ask("a")]
+    # Both work: the third has no cause to help.
+    dispatch.handle(Progressed("a"))
+    assert dispatch.handle(Ticked(3 * FIRST_S + 1.0)) == [Ask("b")]
     dispatch.handle(Progressed("b"))
-    assert dispatch.handle(Ticked(at_s + REPLY_S + 1.0)) == []
-    assert silent(dispatch, at_s + 2 * FIRST_S + 1.0) == [
-        Overdue("a", at_s + 2 * FIRST_S + REPLY_S + 1.3, "c"),
-        Overdue("b", 4 * FIRST_S + REPLY_S + 1.3, "c"),
-        Assign(job(0), "c"),
+    assert given_out(dispatch.handle(Ticked(4 * FIRST_S))) == []
+    assert given_out(silent(dispatch, 4 * FIRST_S + 1.0)) == [(0, "c")]
+    # The second one does not report any more, either.
+    told_s = 5 * FIRST_S + 1.0
+    assert dispatch.handle(Ticked(told_s)) == [
+        Overdue("a", told_s, "b"),
+        Ask("a"),
+        Ask("b"),
     ]
-    # The third copy has four times as long.
-    at_s += 2 * FIRST_S + REPLY_S + 1.3
-    assert dispatch.handle(Ticked(at_s + 4 * FIRST_S - 1.0)) == []
-    assert given_out(silent(dispatch, at_s + 4 * FIRST_S)) == [(0, "d")]
+    assert given_out(dispatch.handle(Ticked(told_s + REPLY_S - 0.1))) == []
+    assert given_out(dispatch.handle(Ticked(told_s + REPLY_S + 1.0))) == [(0, "d")]
 
 
 def test_user_is_told_once_of_a_silent_agent_without_a_substitute() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0, 1))
     assert dispatch.handle(Ticked(FIRST_S)) == []
-    waited_s = 2 * FIRST_S + REPLY_S + 0.3
-    assert silent(dispatch, 2 * FIRST_S) == [Overdue("a", waited_s)]
+    assert silent(dispatch, CALL_S) == []
+    # At the next look: its reply may have come with the coordinator's own delay.
+    assert dispatch.handle(Ticked(130.0)) == [Overdue("a", 130.0)]
     for more in range(1, 9):
-        assert given_out(silent(dispatch, (2 + more) * FIRST_S)) == []
-        assert not any(
-            isinstance(command, Overdue)
-            for command in silent(dispatch, (2.5 + more) * FIRST_S)
-        )
+        commands = dispatch.handle(Ticked(130.0 + more * FIRST_S))
+        assert {type(command) for command in commands} <= {Ask}
     # It was only slow; if it falls silent again, the user is told again.
     dispatch.handle(ok(0, "a"))
-    assert [type(each) for each in silent(dispatch, 9000.0)] == [Overdue]
+    silent(dispatch, 9000.0)
+    assert dispatch.handle(Ticked(9010.0)) == [Overdue("a", 9010.0)]
+
+
+def simulation(number: int, simulated_s: float = 12.0, paired: int = -1) -> Job:
+    return Job(
+        number, "evaluate", b"", paired, Client("run", 1), simulated_s=simulated_s
+    )
+
+
+def vetting(number: int) -> Job:
+    return replace(job(number, "vet"), simulated_s=0.0)
+
+
+class Silence:
+    """Silent agents, and an honest one that does a job in 40 ms, by a simulated clock.
+
+    The silent ones joined first, and their names are first.
+    """
+
+    def __init__(self, silent: int, make: Callable[[int], Job], window: int) -> None:
+        self.dispatch = Dispatch()
+        self.now_s = self.free_s = 0.0
+        self.answers: list[tuple[float, int]] = []
+        self.delivered_s: dict[int, float] = {}
+        self.told: list[Overdue] = []
+        self.silent = [f"silent-{number}" for number in range(silent)]
+        kind: AgentKind = "analyzer" if make(0).kind == "vet" else "worker"
+        self.handle(Ticked(0.0))
+        for name in (*self.silent, "the honest"):
+            self.handle(Joined(name, kind, 1, "p"))
+        self.make, self.window, self.begun = make, window, 0
+
+    def handle(self, event: DispatchEvent) -> None:
+        for command in self.dispatch.handle(event):
+            if isinstance(command, Assign) and command.agent == "the honest":
+                self.free_s = max(self.free_s, self.now_s) + 0.04
+                self.answers.append((self.free_s, command.job.number))
+            elif isinstance(command, Deliver):
+                assert command.job.number not in self.delivered_s
+                self.delivered_s[command.job.number] = self.now_s
+            elif isinstance(command, Overdue):
+                self.told.append(command)
+
+    def wait(self, seconds: int) -> None:
+        for _ in range(seconds):
+            self.now_s += 1.0
+            self.handle(Ticked(self.now_s))
+
+    def run(self, jobs: int, tick_s: float = 0.2) -> float:
+        """Do jobs, a window of which is open at a time; return the longest stall [s]."""
+        begin_s = self.now_s
+        next_s = begin_s + tick_s
+        while len(self.delivered_s) < jobs:
+            assert self.now_s < 200.0
+            done = next(n for n in range(jobs) if n not in self.delivered_s)
+            while self.begun < min(jobs, done + self.window):
+                self.handle(Requested(self.make(self.begun)))
+                self.begun += 1
+            if self.answers and self.answers[0][0] < next_s:
+                self.now_s, number = self.answers.pop(0)
+                self.handle(ok(number, "the honest"))
+            else:
+                self.now_s, next_s = next_s, next_s + tick_s
+                self.handle(Ticked(self.now_s))
+        ended_s = sorted(each for each in self.delivered_s.values() if each > begin_s)
+        times_s = [begin_s, *ended_s]
+        return max(after - before for before, after in pairwise(times_s))
+
+
+@pytest.mark.parametrize("window", [1, 15])
+@pytest.mark.parametrize("make", [simulation, vetting])
+@pytest.mark.parametrize(("silent", "most_s"), [(1, 2.0), (2, 4.0), (4, 8.0)])
+def test_each_silent_agent_costs_a_small_delay(
+    silent: int, most_s: float, make: Callable[[int], Job], window: int
+) -> None:
+    for tick_s in (0.2, 0.23):
+        world = Silence(silent, make, window)
+        assert 0.5 < world.run(40, tick_s) < most_s
+        world.wait(20)
+        assert {each.agent for each in world.told} == set(world.silent)
+        assert all(each.to for each in world.told)
+        found = dict(world.dispatch.silent())
+        assert set(found) == set(world.silent)
+        # They get no more than what an agent holds at first.
+        at_hand = 1 + (VETS_AT_HAND if make is vetting else 1)
+        assert all(1 <= jobs <= at_hand for jobs in found.values())
+        assert world.run(100, tick_s) < 0.3
+
+
+def test_a_silent_agent_that_is_heard_gets_jobs_again() -> None:
+    world = Silence(1, simulation, 15)
+    world.run(40)
+    world.wait(20)
+    (name,) = world.silent
+    held = list(world.dispatch.workers.agents[name].held)
+    assert given_out(world.dispatch.handle(Requested(simulation(100)))) == [
+        (100, "the honest")
+    ]
+    world.dispatch.handle(ok(held[0], name))
+    assert world.dispatch.silent() == []
+    # It has one that others did, the other has one, too, and the names decide.
+    assert given_out(world.dispatch.handle(Requested(simulation(101)))) == [(101, name)]
+
+
+def test_a_job_given_to_a_silent_agent_is_given_to_another_at_once() -> None:
+    """Its queries have ended without a reply: it is tried again, and costs nothing."""
+    world = Silence(1, simulation, 15)
+    world.run(40)
+    (name,) = world.silent
+    for number in list(world.dispatch.workers.agents[name].held):
+        world.dispatch.handle(lost(number, name))
+    world.wait(20)
+    commands = world.dispatch.handle(Requested(simulation(100)))
+    assert sorted(given_out(commands)) == [(100, name), (100, "the honest")]
+    delivered = Deliver(simulation(100), name, "p", b"a100")
+    assert delivered in world.dispatch.handle(ok(100, name))
+    assert world.dispatch.silent() == []
+
+
+def test_slow_agents_that_report_progress_keep_their_jobs() -> None:
+    """Jobs of ten minutes on three workers: one copy each at most, and no line."""
+    dispatch = told(Ticked(0.0), *(worker(name) for name in "abc"))
+    for number in range(3):
+        dispatch.handle(Requested(simulation(number)))
+    copies = 0
+    for second in range(1, 600):
+        for command in dispatch.handle(Ticked(float(second))):
+            assert isinstance(command, Ask)
+            copies += len(dispatch.handle(Progressed(command.agent)))
+    assert copies == 0
+    assert dispatch.silent() == []
+    # They take the next ones as always.
+    assert given_out(dispatch.handle(Requested(simulation(3)))) == [(3, "a")]
+    assert dispatch.handle(ok(1, "b"))[0] == Deliver(simulation(1), "b", "p", b"a1")
+
+
+def test_a_deadline_follows_the_simulated_time() -> None:
+    """Jobs that simulate 10 s take 3 s here, those of 100 s take 30 s."""
+    dispatch = told(Ticked(0.0), worker("a"), Requested(simulation(0, 10.0)))
+    dispatch.handle(Ticked(3.0))
+    dispatch.handle(ok(0, "a"))
+    dispatch.handle(Requested(simulation(1, 100.0)))
+    dispatch.handle(worker("b"))
+    assert dispatch.handle(Ticked(3.0 + 119.0)) == []
+    assert given_out(dispatch.handle(Ticked(3.0 + 121.0))) == [(1, "b")]
+
+
+@pytest.mark.parametrize(
+    ("simulated_s", "first_s"), [(0.0, LEAST_S), (30.0, 3.0), (1e9, FIRST_S)]
+)
+def test_the_first_deadline_is_that_of_a_slow_simulation(
+    simulated_s: float, first_s: float
+) -> None:
+    dispatch = told(Ticked(0.0), worker("a"), Requested(simulation(0, simulated_s)))
+    dispatch.handle(worker("b"))
+    assert dispatch.handle(Ticked(first_s - 0.1)) == []
+    assert (0, "b") in given_out(dispatch.handle(Ticked(first_s + 0.3)))
+
+
+def test_calls_keep_their_wait() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), Requested(job(0, "call")), worker("b"))
+    for second in range(60):
+        assert dispatch.handle(Ticked(float(second))) == []
+    assert given_out(dispatch.handle(Ticked(61.0))) == [(0, "b")]
+    assert dispatch.handle(Ticked(119.0)) == []
+    assert dispatch.handle(Ticked(121.0)) == [Ask("a")]
+
+
+def test_the_second_of_two_paired_jobs_does_not_wait_for_a_silent_worker() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), worker("b"))
+    first, second = simulation(0, paired=1), simulation(1, paired=0)
+    assert given_out(dispatch.handle(Requested(first))) == [(0, "a")]
+    assert given_out(dispatch.handle(Requested(second))) == [(1, "b")]
+    dispatch.handle(Ticked(0.04))
+    dispatch.handle(ok(0, "a"))
+    given = [
+        each
+        for tick in range(1, 20)
+        for each in given_out(dispatch.handle(Ticked(0.2 * tick)))
+    ]
+    assert given == [(1, "a")]
+
+
+def test_an_unfit_agent_looks_at_each_waiting_job_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As does one that has one of each two paired jobs."""
+    looks = 0
+    may_take = Pool.may_take
+
+    def counted(pool: Pool, *job: Any) -> bool:  # noqa: ANN401 - as of the method
+        nonlocal looks
+        looks += 1
+        return may_take(pool, *job)
+
+    monkeypatch.setattr(Pool, "may_take", counted)
+    dispatch = told(worker("a"), worker("b"), Requested(job(0)))
+    dispatch.handle(Returned(0, "a", "unfit", reason="no plug-in"))
+    for number in range(1, 1001):
+        dispatch.handle(Requested(job(number)))
+    assert dispatch.waiting("worker") == 999
+    assert looks < 6 * 1000
+    looks = 0
+    for number in range(1, 1001):
+        dispatch.handle(ok(number, "b"))
+    assert dispatch.pending == 1
+    dispatch = told(worker("slow", 2), worker("z"))
+    for number in range(0, 1000, 2):
+        dispatch.handle(Requested(simulation(number, paired=number + 1)))
+        dispatch.handle(Requested(simulation(number + 1, paired=number)))
+    done = 0
+    while dispatch.workers.agents["z"].held:
+        dispatch.handle(ok(next(iter(dispatch.workers.agents["z"].held)), "z"))
+        done += 1
+    assert done > 400
+    assert looks < 12 * 1000
+
+
+def test_many_waiting_jobs_are_withdrawn_in_linear_time() -> None:
+    def seconds(jobs: int) -> float:
+        dispatch = told(*requests(*range(jobs)))
+        began_s = time.process_time()
+        dispatch.handle(Ended(Client("run", 1)))
+        assert dispatch.pending == dispatch.waiting("worker") == 0
+        return time.process_time() - began_s
+
+    few_s = min(seconds(500) for _ in range(3))
+    assert seconds(10_000) < 100.0 * few_s
 
 
 def test_an_agent_that_works_is_never_called_silent() -> None:
@@ -609,8 +842,12 @@ class World:
                 assert number in self.held[agent]
                 continue
             assert number not in {*self.delivered, *self.withdrawn}
-            copies = sum(number in held for held in self.held.values())
-            assert copies < 2 or self.now_s > FIRST_S
+            silent = dict(self.dispatch.silent())
+            working = sum(
+                number in held and name not in silent
+                for name, held in self.held.items()
+            )
+            assert working < 2
             assert number not in self.held[agent]
             kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
             assert self.agents[agent].kind == kind
@@ -625,6 +862,7 @@ class World:
         """Compare the dispatcher's records with the model."""
         inside = self.dispatch
         ended = len(self.delivered) + len(self.withdrawn)
+        ended_numbers = {*self.delivered, *self.withdrawn}
         assert inside.pending == len(self.jobs) - ended
         for kind, pool in inside._pools.items():
             names = [n for n, joined in self.agents.items() if joined.kind == kind]
@@ -632,16 +870,20 @@ class World:
             for name in names:
                 assert sorted(pool.agents[name].held) == sorted(self.held[name])
             held = [number for name in names for number in self.held[name]]
-            assert len(set(pool.waiting)) == len(pool.waiting)
-            assert not set(pool.waiting) & set(held)
+            silent = {name for name in names if pool.agents[name].is_silent}
+            working = [n for name in names for n in self.held[name] if name not in silent]
+            assert not set(pool.waiting) & set(working)
+            assert set(held) - set(working) - set(pool.waiting) <= ended_numbers
             assert len(pool.free) <= 4 * len(pool.agents) + 65
             if pool.waiting and (name := pool.best()):
                 # Credit and work: only a job that avoids all with credit waits.
-                assert all(inside._jobs[n].avoid for n in pool.waiting)
+                assert all(each.avoid for each in pool.waiting.values())
 
     def request(self) -> None:
         number = next(self.numbers)
-        self.jobs[number] = job(number, self.random.choice(("vet", "evaluate")))
+        kind = self.random.choice(("vet", "evaluate"))
+        made = replace(job(number, kind), simulated_s=self.random.choice((None, 1.0)))
+        self.jobs[number] = made
         self.tell(Requested(self.jobs[number]))
 
     def withdraw(self) -> None:

@@ -506,7 +506,8 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
     fleet.tell(Ticked(FIRST_S + REPLY_S))
     assert agents.cancelled == [("one", payload)]
     assert lines == [
-        "one has not answered for 65 s and reports no progress: two takes its job"
+        "one has not answered for 65 s and reports no progress: another one takes its "
+        "jobs"
     ]
     (moved, other, payload) = agents.sent[1]
     assert (other, payload) == ("two", b"whole True")

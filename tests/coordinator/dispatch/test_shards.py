@@ -412,6 +412,48 @@ def test_slow_advance_on_several_silent_workers_ends() -> None:
     ]
 
 
+def test_silent_worker_loses_its_advance_to_a_busy_one_with_room() -> None:
+    """One that has arenas of its own is never idle until they end."""
+    dispatch = fleet("a", "b")
+    for shard in (0, 1):
+        dispatch.handle(ShardRequested(shard))
+    dispatch.handle(Ticked(FIRST_S))
+    dispatch.handle(Progressed("b"))
+    assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == [
+        Overdue("a", FIRST_S + REPLY_S, "b"),
+        CancelShard(1, 0, "a"),
+        AssignShard(3, 0, "b", "p", is_whole=True),
+    ]
+    # One without room gets none.
+    dispatch = Fleet()
+    for name in "ab":
+        dispatch.handle(Joined(name, "worker", 1, "p", shards=1))
+    for shard in (0, 1):
+        dispatch.handle(ShardRequested(shard))
+    dispatch.handle(Ticked(FIRST_S))
+    dispatch.handle(Progressed("b"))
+    lines = [Overdue("a", FIRST_S + REPLY_S)]
+    assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == lines
+
+
+@pytest.mark.parametrize("advance_s", [0.1, 4.0])
+def test_deadlines_of_advances_follow_their_simulated_time(advance_s: float) -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(ShardRequested(0, 40.0, 40.0))
+    # The first: ten times faster than real time.
+    assert dispatch.handle(Ticked(3.9)) == []
+    assert dispatch.handle(Ticked(4.1)) == [Ask("a")]
+    dispatch.handle(ShardReturned(1, "done"))
+    dispatch.handle(ShardRequested(0, 10.0, 50.0))
+    dispatch.handle(Ticked(4.1 + advance_s))
+    dispatch.handle(ShardReturned(2, "done"))
+    dispatch.handle(Ticked(100.0))
+    dispatch.handle(ShardRequested(0, 20.0, 70.0))
+    limit_s = max(LEAST_S, PATIENCE * 2.0 * advance_s)
+    assert dispatch.handle(Ticked(99.9 + limit_s)) == []
+    assert dispatch.handle(Ticked(100.2 + limit_s)) == [Ask("a")]
+
+
 def test_silent_worker_keeps_its_advance_while_no_other_is_idle() -> None:
     dispatch = fleet("a", "b")
     for shard in (0, 1):

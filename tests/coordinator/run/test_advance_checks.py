@@ -107,8 +107,8 @@ class Two:
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
         raise NotImplementedError
 
-    def ask(self, agent: str) -> None:
-        raise AssertionError(agent)
+    def ask(self, _agent: str) -> None:
+        """No agent reports progress."""
 
     def receive(
         self, _timeout_s: float, _pause_s: float = 0.0, /
