@@ -235,10 +235,7 @@ class Fleet:
             elif event.outcome == "ok":
                 self.faults.note("late", event.agent, f"job {event.number}")
         self._obey(self.dispatch.handle(event))
-        # Without shards time changes nothing for them.
-        if isinstance(event, Joined | Left) or (
-            self._shard_clients and isinstance(event, Ticked)
-        ):
+        if isinstance(event, Joined | Left | Ticked):
             self._move(event)
 
     def _send_again(self, event: Returned) -> bool:

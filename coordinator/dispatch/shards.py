@@ -7,9 +7,9 @@ than it has, with the lowest load; ties break on the name. A worker that is unfi
 the shard's client never gets it. A shard without a worker waits. If the user allows a
 drift, one of another platform gets it after a while.
 
-An advance has a deadline. A silent worker loses it to one that has room, and the next
-deadline is twice as long, so that an advance that takes long everywhere ends. A worker
-that joins takes over shards of those that hold more.
+An advance has a deadline. A silent worker loses it to one that has room. If that one had
+it before, the deadline is twice as long, so that an advance that takes long everywhere
+ends. A worker that joins takes over shards of those that hold more.
 """
 
 from collections import Counter
@@ -63,7 +63,7 @@ class _Shard:
         number: of the job that is assigned; -1 if none is.
         is_whole: that job includes what is needed to rebuild the state.
         since_s: time at which that job was assigned [s].
-        misses: deadlines that the advance has passed.
+        misses: how often the advance moved to a worker that had it before.
         errors: number of workers that could not make the advance.
         avoid: workers that failed at the advance.
         lost: numbers of its jobs that got no reply, with the workers that had them.
@@ -264,7 +264,7 @@ class ShardDispatch:
             to = min(free, key=crowding, default="")
             yield from pool.tell(shard.holder, self._now_s - shard.since_s, to)
             if to:
-                shard.misses += 1
+                shard.misses += to in shard.avoid
                 shard.avoid = (*shard.avoid, shard.holder)
                 yield from self._move(number, to)
 

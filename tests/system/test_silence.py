@@ -24,6 +24,7 @@ from schema.experiment.file import experiment_text, read_experiment
 from schema.wire.arena_codec import decode_advance_request
 from schema.wire.codec import request_kind
 from tests.system.fleet import Fleets
+from tests.system.silent_agents import silent_agents
 
 pytestmark = [
     pytest.mark.system,
@@ -86,6 +87,67 @@ snapshot_interval_s = 100.0
 [[islands]]
 count = 40
 """
+
+
+LIVELY = """
+name = "lively"
+births = 30
+[selection]
+population = 1
+parents = "none"
+window = 1
+"""
+
+
+def longest_stall_s(run: RunSession, fleet: Fleet) -> float:
+    """Finish a run; return the longest time without a birth [s]."""
+    longest_s, births = 0.0, -1
+    run.start()
+    changed_s = began_s = time.monotonic()
+    while not run.loop.is_finished:
+        now_s = time.monotonic()
+        assert now_s - began_s < 200.0
+        ends = fleet.listen(0.2, now_s)
+        run.loop.act(now_s, ends.get(run.loop.client, ()))
+        now_s, born = time.monotonic(), run.status(0.0).births
+        longest_s = max(longest_s, now_s - changed_s)
+        if born != births:
+            births, changed_s = born, now_s
+    run.close()
+    return longest_s
+
+
+@pytest.mark.parametrize(
+    ("workers", "analyzers", "most_s"), [(1, 0, 2.0), (2, 0, 5.0), (4, 0, 10.0), (0, 2, 5.0)]
+)
+def test_each_silent_agent_costs_an_offline_run_seconds(
+    workers: int, analyzers: int, most_s: float, tmp_path: Path
+) -> None:
+    (tmp_path / "lively.toml").write_text(LIVELY)
+    experiment = read_experiment(str(tmp_path / "lively.toml"))
+    details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
+    bodies: dict[AgentKind, tuple[Body, int]] = {
+        "worker": (worker.serve.service.process, 1),
+        "analyzer": (analyzer.service.process, 1),
+    }
+    with real_fleet(bodies) as fleet:
+        agents: Any = fleet._agents
+        lines: list[str] = []
+        fleet._warn = lines.append
+        address = agents.own_address
+        with (
+            silent_agents(address, workers) as taken,
+            silent_agents(address, analyzers, "analyzer") as vets,
+        ):
+            while fleet.dispatch.agents("worker") < 1 + workers or (
+                fleet.dispatch.agents("analyzer") < 1 + analyzers
+            ):
+                fleet.listen(0.1, time.monotonic())
+            stall_s = longest_stall_s(RunSession(RunFolder(tmp_path / "run", details), fleet), fleet)
+            assert len(taken) >= workers
+            assert len(vets) >= analyzers
+            print("STALL", workers, analyzers, round(stall_s, 2), lines, fleet.dispatch.silent())
+            assert stall_s <= most_s
 
 
 class Counting:

@@ -406,7 +406,7 @@ def test_slow_advance_on_several_silent_workers_ends() -> None:
         for old in [each for each in stale if now_s > assigned_s + lasts_s / 20]:
             stale.remove(old)
             assert dispatch.handle(ShardReturned(old.number, "done")) == []
-    assert moves == 5
+    assert moves == 6
     assert dispatch.handle(ShardReturned(hand.number, "done")) == [
         ShardDone(0, hand.agent)
     ]
