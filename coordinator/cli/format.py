@@ -1,10 +1,10 @@
 """Figures of runs as text for a terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from coordinator.dispatch.faults import MEANINGS
 from schema.errors import counted, rounded
-from schema.wire.status import IslandStatus, PeerFault, RunStatus, SilentAgent, Status
+from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 _MOST_PEERS = 5
 _MEANINGS = {str(kind): meaning for kind, meaning in MEANINGS.items()}
@@ -76,14 +76,10 @@ def about_arenas(run: RunStatus) -> str:
     return f", {simulated_s:.0f} s simulated, {alive} alive{pace}"
 
 
-def silent_lines(silent: Sequence[SilentAgent]) -> list[str]:
-    """Return a line that names the agents that have jobs and do not answer, if any."""
-    if not silent:
-        return []
-    shown = silent[:_MOST_PEERS]
-    names = ", ".join(f"{each.name} has {counted(each.jobs, 'job')}" for each in shown)
-    more = f" and {len(silent) - _MOST_PEERS} more" * (len(silent) > _MOST_PEERS)
-    return [f"silent: {names}{more} (no answer and no report of progress)"]
+def silent_lines(silent: Mapping[str, int]) -> list[str]:
+    """Return a line that names the agents that hold jobs and do not answer, if any."""
+    held = ", ".join(f"{name} holds {counted(n, 'job')}" for name, n in silent.items())
+    return [f"no answer and no progress: {held}"] if silent else []
 
 
 def fault_lines(faults: Sequence[PeerFault]) -> list[str]:

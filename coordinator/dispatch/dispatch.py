@@ -65,10 +65,7 @@ MAX_DEATHS = 3
 LEAST_S = 1.0
 """A job is never late before this time [s]: a second copy would cost more."""
 CALL_S = 2.0 * FIRST_S
-"""An agent is not asked about work of unknown length before this time [s].
-
-Calls differ in duration, and may wait for other programs.
-"""
+"""No agent is asked about a call before this time [s]: calls differ in duration."""
 VETS_AT_HAND = 16
 """Vettings that an analyzer holds beyond the current one: some milliseconds' work."""
 
@@ -142,14 +139,11 @@ class Dispatch:
         """Return the number of jobs that the agents of a kind hold."""
         return sum(len(agent.held) for agent in self._pools[kind].agents.values())
 
-    def silent(self) -> list[tuple[str, int]]:
-        """Return the silent agents, by name, and how many jobs and advances each has."""
-        agents = {n: a for pool in self._pools.values() for n, a in pool.agents.items()}
-        return sorted(
-            (name, count)
-            for name, agent in agents.items()
-            if agent.is_silent and (count := len(agent.held) + len(agent.advances))
-        )
+    def silent(self) -> dict[str, int]:
+        """Return how many jobs and advances the silent agents hold, by their names."""
+        agents = [a for pool in self._pools.values() for a in pool.agents.values()]
+        held = {a.joined.agent: (*a.held, *a.advances) for a in agents if a.is_silent}
+        return {name: len(numbers) for name, numbers in held.items() if numbers}
 
     @property
     def credits(self) -> int:

@@ -281,12 +281,10 @@ class ShardRequested:
     Attributes:
         shard: the shard.
         simulated_s: time that the advance simulates [s]; None: unknown.
-        rebuilt_s: the same with what a worker without the state repeats first [s].
     """
 
     shard: int
     simulated_s: float | None = None
-    rebuilt_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ FaultKind = Literal[
 MEANINGS: Mapping[FaultKind, str] = {
     "malformed": "malformed messages, dropped",
     "refused": "cannot do jobs, or may not take part",
-    "late": "answers to jobs that were already done, dropped",
+    "late": "answers to jobs that were already done or withdrawn, dropped",
     "foreign": "replies by another process in the agent's name, dropped",
     "fenced": "jobs refused for a forged epoch; no other coordinator has the run",
     "cancelled": "jobs cancelled by another process",

@@ -165,20 +165,10 @@ class Fleet:
         self._move(ShardSeen(shard, platform, may_drift, client))
         return shard
 
-    def advance(
-        self,
-        shard: int,
-        simulated_s: float | None = None,
-        rebuilt_s: float | None = None,
-    ) -> None:
-        """Request an advance of a shard; its client gives the last step.
-
-        Args:
-            shard: its number.
-            simulated_s, rebuilt_s: as of ``ShardRequested`` [s].
-        """
+    def advance(self, shard: int, simulated_s: float | None = None) -> None:
+        """Request an advance of a shard; its client gives the last step."""
         self._advancing.add(shard)
-        self._move(ShardRequested(shard, simulated_s, rebuilt_s))
+        self._move(ShardRequested(shard, simulated_s))
 
     def leave(self, client: Client) -> None:
         """Drop all jobs and shards of a client."""

@@ -44,7 +44,6 @@ _WAIT_GROWTH = 10.0
 """Growth of that time with each request that is sent again."""
 LOOK_S = 0.2
 """Interval between checks for late jobs [s]."""
-_MOST_DOUBLINGS = 16
 _PROVIDED = 1e6
 """Above the load of any agent that needs jobs."""
 
@@ -118,9 +117,9 @@ class AgentState:
         self.busy = min(len(self.advances), self.joined.slots)
 
     @property
-    def is_resting(self) -> bool:
-        """It gets no jobs at present."""
-        return self.is_backing_off or (self.is_silent and bool(self.held))
+    def is_away(self) -> bool:
+        """It backs off or is silent."""
+        return self.is_backing_off or self.is_silent
 
     def learn(self, duration_s: float) -> None:
         """Note the time that a slot took for a job [s]."""
@@ -137,8 +136,8 @@ class Pool:
     Attributes:
         at_hand: jobs beyond its slots that an agent always holds.
         agents: by their names.
-        free: (load, name, stamp) of each agent that is not resting, a heap; entries
-            with an old stamp are invalid.
+        free: (load, name, stamp) of each agent that may have jobs, a heap; entries with
+            an old stamp are invalid.
         waiting: jobs that no agent has, or silent ones only, by number.
     """
 
@@ -229,7 +228,7 @@ class Pool:
         """Note the load of an agent; its earlier entry becomes invalid."""
         agent = self.agents[name]
         agent.stamp = next(self._stamps)
-        if agent.is_resting:
+        if agent.is_backing_off or (agent.is_silent and agent.held):
             return
         if len(self.free) > 4 * len(self.agents) + 64:
             self.free = [entry for entry in self.free if self._is_live(entry)]
@@ -287,22 +286,18 @@ class Pool:
         spare_s = min(
             self._spare(agent) / agent.joined.slots * agent.job_s
             for agent in self.agents.values()
-            if not agent.is_resting
+            if not agent.is_away
         )
         return min(PAUSE_S, SPARE_SHARE * spare_s)
 
     def idle(self) -> list[str]:
-        """Return the agents without a job that are not backing off or silent.
-
-        Those that have done a job come first, then by name.
-        """
+        """Return the agents without a job, those that have done one before first."""
         if not self._least_busy() or self.free[0][0] > 0.0:
             return []
         idle = (
             (not agent.job_s, name)
             for name, agent in self.agents.items()
-            if not (agent.held or agent.advances)
-            and not (agent.is_backing_off or agent.is_silent)
+            if not (agent.held or agent.advances or agent.is_away)
         )
         return [name for _, name in sorted(idle)]
 
@@ -316,10 +311,7 @@ class Pool:
         return (n for n, a in list(self.agents.items()) if client not in a.unfit_for)
 
     def may_take(self, name: str, client: Client, avoid: tuple[str, ...]) -> bool:
-        """Return whether an agent may have a job that avoids others where it can.
-
-        It cannot where all that it does not avoid are silent.
-        """
+        """Return whether an agent may have a job that avoids some if others answer."""
         if client in self.agents[name].unfit_for:
             return False
         return name not in avoid or all(
@@ -392,21 +384,16 @@ class PairedJobs:
 
 
 class Deadlines:
-    """Typical duration of the jobs of each kind, from their assignment [s].
-
-    That of a simulation is per simulated second, because simulations differ in length.
-    """
+    """Typical duration of jobs of each kind, for simulations per simulated second."""
 
     def __init__(self, least_s: float) -> None:
         """Initialise without history; no deadline is shorter than ``least_s`` [s]."""
         self._least_s = least_s
         self._typical_s: dict[Hashable, float] = {}
 
-    def learn(
-        self, kind: Hashable, duration_s: float, simulated_s: float | None = None
-    ) -> None:
-        """Note the duration of a job."""
-        each_s = duration_s / _length(simulated_s)
+    def learn(self, kind: Hashable, took_s: float, simulated_s: float | None) -> None:
+        """Note the duration of a job, from its assignment."""
+        each_s = took_s / _length(simulated_s)
         known = self._typical_s.get(kind, each_s)
         self._typical_s[kind] = known + _NEWEST_WEIGHT * (each_s - known)
 
@@ -414,16 +401,14 @@ class Deadlines:
         """Drop the history of a kind of jobs that has ended."""
         self._typical_s.pop(kind, None)
 
-    def limit_s(
-        self, kind: Hashable, simulated_s: float | None, misses: int = 0
-    ) -> float:
-        """Return how long a job may take; twice as long after each miss [s]."""
+    def limit_s(self, kind: Hashable, simulated_s: float | None) -> float:
+        """Return how long a job may take [s]."""
         limit_s = FIRST_S
         if kind in self._typical_s:
             limit_s = PATIENCE * self._typical_s[kind] * _length(simulated_s)
         elif simulated_s is not None:
             limit_s = min(FIRST_S, simulated_s / FIRST_SPEED)
-        return max(self._least_s, limit_s) * float(2 ** min(misses, _MOST_DOUBLINGS))
+        return max(self._least_s, limit_s)
 
     def wait_s(self, kind: Hashable, simulated_s: float | None) -> float:
         """Return for how long the network waits for a reply [s].

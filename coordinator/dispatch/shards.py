@@ -7,9 +7,9 @@ than it has, with the lowest load; ties break on the name. A worker that is unfi
 the shard's client never gets it. A shard without a worker waits. If the user allows a
 drift, one of another platform gets it after a while.
 
-An advance has a deadline. A silent worker loses it to one that has room. If that one had
-it before, the deadline is twice as long, so that an advance that takes long everywhere
-ends. A worker that joins takes over shards of those that hold more.
+An advance has a deadline. A silent worker loses it to one that has room. If that one
+had it before, the deadline is twice as long, so that an advance that takes long
+everywhere ends. A worker that joins takes over shards of those that hold more.
 """
 
 from collections import Counter
@@ -41,6 +41,7 @@ from coordinator.dispatch.pool import LONGEST_WAIT_S, LOOK_S, Deadlines, Pool
 from schema.errors import UnexpectedEvent
 
 MAX_ERRORS = 3
+_MOST_DOUBLINGS = 16
 DRIFT_S = 30.0
 """Time that a shard waits for its own platform before it may drift [s]."""
 LEAST_S = 2.0
@@ -59,7 +60,7 @@ class _Shard:
             does.
         has_state: the holder has its state.
         is_wanted: an advance is requested.
-        simulated_s, rebuilt_s: of that request.
+        simulated_s: of that request.
         number: of the job that is assigned; -1 if none is.
         is_whole: that job includes what is needed to rebuild the state.
         since_s: time at which that job was assigned [s].
@@ -78,7 +79,6 @@ class _Shard:
     has_state: bool = False
     is_wanted: bool = False
     simulated_s: float | None = None
-    rebuilt_s: float | None = None
     may_drift: bool = True
     number: int = -1
     is_whole: bool = False
@@ -215,8 +215,7 @@ class ShardDispatch:
         shard = self._shard(event.shard)
         if shard.is_wanted:
             raise UnexpectedEvent(f"shard {event.shard}: is requested already")
-        shard.is_wanted = True
-        shard.simulated_s, shard.rebuilt_s = event.simulated_s, event.rebuilt_s
+        shard.is_wanted, shard.simulated_s = True, event.simulated_s
 
     def _joined(self, joined: Joined) -> Iterator[ShardCommand]:
         if joined.kind == "worker":
@@ -251,8 +250,8 @@ class ShardDispatch:
         for number, shard in sorted(self._shards.items()):
             if shard.number < 0:
                 continue
-            simulated_s = shard.rebuilt_s if shard.is_whole else shard.simulated_s
-            limit_s = self._deadlines.limit_s(number, simulated_s, shard.misses)
+            limit_s = self._deadlines.limit_s(number, shard.simulated_s)
+            limit_s *= 2 ** min(shard.misses, _MOST_DOUBLINGS)
             verdict = pool.judge(shard.holder, shard.since_s, limit_s, self._now_s)
             if verdict == "ask":
                 yield Ask(shard.holder)
@@ -483,7 +482,6 @@ class ShardDispatch:
             worker = agents[name]
             is_full = bound[name] >= worker.joined.shards
             share = bound[name] / worker.joined.cores
-            is_resting = worker.is_silent or worker.is_backing_off
-            return is_resting, is_full, share, len(worker.held), name
+            return worker.is_away, is_full, share, len(worker.held), name
 
         return crowding

@@ -18,8 +18,7 @@ from coordinator.dispatch.fleet import End, Fleet
 from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunFolder
 from schema.errors import RevolveError
-from schema.limits import printable
-from schema.wire.status import PeerFault, Queue, RunStatus, SilentAgent, Status
+from schema.wire.status import PeerFault, Queue, RunStatus, Status
 
 SLACK = 2
 """Open requests per job that the workers may hold at a time."""
@@ -220,10 +219,7 @@ class RunScheduler:
                 for each in self.fleet.faults.counts
             ),
             queues=_queues(self.fleet),
-            silent=tuple(
-                SilentAgent(printable(name), jobs)
-                for name, jobs in self.fleet.dispatch.silent()
-            ),
+            silent=self.fleet.dispatch.silent(),
         )
 
     def _useful(self, kind: AgentKind) -> int:

@@ -227,8 +227,8 @@ class ShardRequests:
             )
             self._numbers[shard], self._islands[number] = number, shard
         timestep_s = self._context.experiments[shard].simulation.timestep_s
-        spans = (command.until - past.step, command.until - past.base)
-        self._fleet.advance(self._numbers[shard], *(n * timestep_s for n in spans))
+        simulated_s = (command.until - past.step) * timestep_s
+        self._fleet.advance(self._numbers[shard], simulated_s)
 
     def request_snapshot(self, shard: int) -> None:
         """Request a snapshot at the end of the next advance that is assigned."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
-from msgspec import Meta
+from msgspec import Meta, field
 
 from schema.experiment.section import Count
 from schema.limits import MOST_SHOWN
@@ -96,18 +96,6 @@ class Queue(Message, frozen=True):
     assigned: Count
 
 
-class SilentAgent(Message, frozen=True):
-    """An agent that neither answers nor reports progress when it is asked.
-
-    Attributes:
-        name: of the agent.
-        jobs: number of jobs and advances of arenas that it has.
-    """
-
-    name: Annotated[str, Meta(max_length=MOST_SHOWN)]
-    jobs: Count
-
-
 class Status(Message, frozen=True):
     """Progress of all runs of a coordinator.
 
@@ -117,7 +105,8 @@ class Status(Message, frozen=True):
         births_per_s: recent rate of all runs [1/s].
         faults: what peers sent and nothing used, by kind and peer.
         queues: by kind; empty if no coordinator is running.
-        silent: connected agents whose jobs others do instead, by name.
+        silent: jobs and advances of each agent that neither answers nor reports
+            progress, by its name.
     """
 
     runs: tuple[RunStatus, ...]
@@ -126,7 +115,7 @@ class Status(Message, frozen=True):
     births_per_s: Finite
     faults: tuple[PeerFault, ...] = ()
     queues: tuple[Queue, ...] = ()
-    silent: tuple[SilentAgent, ...] = ()
+    silent: dict[str, Count] = field(default_factory=dict)
 
     @property
     def births(self) -> int:

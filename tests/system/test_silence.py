@@ -5,8 +5,9 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -16,6 +17,7 @@ from coordinator.cli.dispatch_bench import Body, real_fleet
 from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced
+from coordinator.network.service import Network
 from coordinator.run.session import RunSession
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
@@ -89,6 +91,7 @@ count = 40
 """
 
 
+# One birth at a time, so that each waits for its own jobs.
 LIVELY = """
 name = "lively"
 births = 30
@@ -118,9 +121,9 @@ def longest_stall_s(run: RunSession, fleet: Fleet) -> float:
 
 
 @pytest.mark.parametrize(
-    ("workers", "analyzers", "most_s"), [(1, 0, 2.0), (2, 0, 5.0), (4, 0, 10.0), (0, 2, 5.0)]
+    ("workers", "analyzers", "most_s"), [(4, 0, 10.0), (0, 2, 5.0)]
 )
-def test_each_silent_agent_costs_an_offline_run_seconds(
+def test_each_silent_agent_costs_an_offline_run_a_small_delay(
     workers: int, analyzers: int, most_s: float, tmp_path: Path
 ) -> None:
     (tmp_path / "lively.toml").write_text(LIVELY)
@@ -130,24 +133,25 @@ def test_each_silent_agent_costs_an_offline_run_seconds(
         "worker": (worker.serve.service.process, 1),
         "analyzer": (analyzer.service.process, 1),
     }
-    with real_fleet(bodies) as fleet:
-        agents: Any = fleet._agents
-        lines: list[str] = []
+    lines: list[str] = []
+    with ExitStack() as stack:
+        fleet = stack.enter_context(real_fleet(bodies))
         fleet._warn = lines.append
-        address = agents.own_address
-        with (
-            silent_agents(address, workers) as taken,
-            silent_agents(address, analyzers, "analyzer") as vets,
+        address = cast("Network", fleet._agents).own_address
+        taken = stack.enter_context(silent_agents(address, workers))
+        vets = stack.enter_context(silent_agents(address, analyzers, "analyzer"))
+        while fleet.dispatch.agents("worker") < 1 + workers or (
+            fleet.dispatch.agents("analyzer") < 1 + analyzers
         ):
-            while fleet.dispatch.agents("worker") < 1 + workers or (
-                fleet.dispatch.agents("analyzer") < 1 + analyzers
-            ):
-                fleet.listen(0.1, time.monotonic())
-            stall_s = longest_stall_s(RunSession(RunFolder(tmp_path / "run", details), fleet), fleet)
-            assert len(taken) >= workers
-            assert len(vets) >= analyzers
-            print("STALL", workers, analyzers, round(stall_s, 2), lines, fleet.dispatch.silent())
-            assert stall_s <= most_s
+            fleet.listen(0.1, time.monotonic())
+        run = RunSession(RunFolder(tmp_path / "run", details), fleet)
+        stall_s = longest_stall_s(run, fleet)
+    # The first job went to each of them in turn.
+    assert (len(taken) >= workers, len(vets) >= analyzers) == (True, True)
+    assert 1.0 < stall_s <= most_s
+    assert lines
+    assert all("has not answered for" in each for each in lines)
+    assert all(each.startswith("a-silent-") for each in lines)
 
 
 class Counting:

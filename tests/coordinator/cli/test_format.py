@@ -24,8 +24,8 @@ FAULTS = (
 def test_faults_are_summed_by_kind_with_the_most_frequent_peers() -> None:
     late, malformed = fault_lines(FAULTS)
     assert late == (
-        "not used: 4 late: b 3, a 1 (answers to jobs that were already done, dropped; "
-        "since the start)"
+        "not used: 4 late: b 3, a 1 (answers to jobs that were already done or "
+        "withdrawn, dropped; since the start)"
     )
     assert malformed == (
         "not used: 16 malformed: peer0 2, peer1 2, peer2 2, peer3 2, peer4 2 and 3 "
@@ -44,6 +44,18 @@ def test_status_shows_the_faults(capsys: pytest.CaptureFixture[str]) -> None:
     _show(Source(received, "title"))
     shown = capsys.readouterr().out
     assert all(line in shown for line in fault_lines(FAULTS))
+
+
+def test_status_names_the_silent_agents(capsys: pytest.CaptureFixture[str]) -> None:
+    status = Status((), 2, 1, 0.0, silent={"lab-0.1": 2, "lab-1.2": 1})
+    data = encode_operator_reply(OperatorReply("", status=status))
+    received = decode_operator_reply(data).status
+    assert received == status
+    _show(Source(received, "title"))
+    line = "no answer and no progress: lab-0.1 holds 2 jobs, lab-1.2 holds 1 job\n"
+    assert line in capsys.readouterr().out
+    _show(Source(Status((), 2, 1, 0.0), "title"))
+    assert "no answer" not in capsys.readouterr().out
 
 
 def test_status_leaves_out_empty_columns(capsys: pytest.CaptureFixture[str]) -> None:

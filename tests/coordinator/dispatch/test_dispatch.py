@@ -536,7 +536,7 @@ class Silence:
             self.handle(Ticked(self.now_s))
 
     def run(self, jobs: int, tick_s: float = 0.2) -> float:
-        """Do jobs, a window of which is open at a time; return the longest stall [s]."""
+        """Do jobs, a window of which is open at once; return the longest stall [s]."""
         begin_s = self.now_s
         next_s = begin_s + tick_s
         while len(self.delivered_s) < jobs:
@@ -568,7 +568,7 @@ def test_each_silent_agent_costs_a_small_delay(
         world.wait(20)
         assert {each.agent for each in world.told} == set(world.silent)
         assert all(each.to for each in world.told)
-        found = dict(world.dispatch.silent())
+        found = world.dispatch.silent()
         assert set(found) == set(world.silent)
         # They get no more than what an agent holds at first.
         at_hand = 1 + (VETS_AT_HAND if make is vetting else 1)
@@ -586,7 +586,7 @@ def test_a_silent_agent_that_is_heard_gets_jobs_again() -> None:
         (100, "the honest")
     ]
     world.dispatch.handle(ok(held[0], name))
-    assert world.dispatch.silent() == []
+    assert world.dispatch.silent() == {}
     # It has one that others did, the other has one, too, and the names decide.
     assert given_out(world.dispatch.handle(Requested(simulation(101)))) == [(101, name)]
 
@@ -603,7 +603,7 @@ def test_a_job_given_to_a_silent_agent_is_given_to_another_at_once() -> None:
     assert sorted(given_out(commands)) == [(100, name), (100, "the honest")]
     delivered = Deliver(simulation(100), name, "p", b"a100")
     assert delivered in world.dispatch.handle(ok(100, name))
-    assert world.dispatch.silent() == []
+    assert world.dispatch.silent() == {}
 
 
 def test_slow_agents_that_report_progress_keep_their_jobs() -> None:
@@ -617,7 +617,7 @@ def test_slow_agents_that_report_progress_keep_their_jobs() -> None:
             assert isinstance(command, Ask)
             copies += len(dispatch.handle(Progressed(command.agent)))
     assert copies == 0
-    assert dispatch.silent() == []
+    assert dispatch.silent() == {}
     # They take the next ones as always.
     assert given_out(dispatch.handle(Requested(simulation(3)))) == [(3, "a")]
     assert dispatch.handle(ok(1, "b"))[0] == Deliver(simulation(1), "b", "p", b"a1")
@@ -842,7 +842,7 @@ class World:
                 assert number in self.held[agent]
                 continue
             assert number not in {*self.delivered, *self.withdrawn}
-            silent = dict(self.dispatch.silent())
+            silent = self.dispatch.silent()
             working = sum(
                 number in held and name not in silent
                 for name, held in self.held.items()
@@ -871,7 +871,9 @@ class World:
                 assert sorted(pool.agents[name].held) == sorted(self.held[name])
             held = [number for name in names for number in self.held[name]]
             silent = {name for name in names if pool.agents[name].is_silent}
-            working = [n for name in names for n in self.held[name] if name not in silent]
+            working = [
+                n for name in names for n in self.held[name] if name not in silent
+            ]
             assert not set(pool.waiting) & set(working)
             assert set(held) - set(working) - set(pool.waiting) <= ended_numbers
             assert len(pool.free) <= 4 * len(pool.agents) + 65

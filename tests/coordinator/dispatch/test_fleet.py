@@ -506,8 +506,10 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
     fleet.tell(Ticked(FIRST_S + REPLY_S))
     assert agents.cancelled == [("one", payload)]
     assert lines == [
-        "one has not answered for 65 s and reports no progress: another one takes its "
-        "jobs"
+        (
+            "one has not answered for 65 s and reports no progress: another one takes "
+            "its jobs"
+        )
     ]
     (moved, other, payload) = agents.sent[1]
     assert (other, payload) == ("two", b"whole True")
@@ -519,6 +521,18 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
     ) == (1, 0, 1)
     agents.news = [Returned(moved, "two", "ok", b"x")]
     assert fleet.listen(0.0, 100.0) == {ARENA: [ShardDone(0, "two", b"x")]}
+
+
+def test_an_advance_is_timed_from_its_own_assignment(
+    fleet: Fleet, agents: Agents
+) -> None:
+    """Also the first one of all, of a coordinator that has run for long."""
+    fleet.listen(0.0, 1000.0)
+    fleet.advance(new_shard(fleet))
+    fleet.listen(0.0, 1000.0 + 0.9 * FIRST_S)
+    assert agents.asked == []
+    fleet.listen(0.0, 1000.0 + 1.1 * FIRST_S)
+    assert agents.asked == ["one"]
 
 
 def test_jobs_and_advances_share_one_account_of_load(

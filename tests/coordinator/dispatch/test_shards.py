@@ -439,16 +439,16 @@ def test_silent_worker_loses_its_advance_to_a_busy_one_with_room() -> None:
 @pytest.mark.parametrize("advance_s", [0.1, 4.0])
 def test_deadlines_of_advances_follow_their_simulated_time(advance_s: float) -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0, 40.0, 40.0))
+    dispatch.handle(ShardRequested(0, 40.0))
     # The first: ten times faster than real time.
     assert dispatch.handle(Ticked(3.9)) == []
     assert dispatch.handle(Ticked(4.1)) == [Ask("a")]
     dispatch.handle(ShardReturned(1, "done"))
-    dispatch.handle(ShardRequested(0, 10.0, 50.0))
+    dispatch.handle(ShardRequested(0, 10.0))
     dispatch.handle(Ticked(4.1 + advance_s))
     dispatch.handle(ShardReturned(2, "done"))
     dispatch.handle(Ticked(100.0))
-    dispatch.handle(ShardRequested(0, 20.0, 70.0))
+    dispatch.handle(ShardRequested(0, 20.0))
     limit_s = max(LEAST_S, PATIENCE * 2.0 * advance_s)
     assert dispatch.handle(Ticked(99.9 + limit_s)) == []
     assert dispatch.handle(Ticked(100.2 + limit_s)) == [Ask("a")]

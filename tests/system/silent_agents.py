@@ -1,0 +1,56 @@
+"""Agents that join, take jobs and never answer."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any, Literal
+
+import zenoh
+
+from schema.agent.network import client_config
+from schema.agent.platform_tag import platform_tag, wire_version
+from schema.agent.service import session_config
+from schema.agent.topics import Member
+from schema.wire import revolve_pb2 as pb
+
+
+@contextmanager
+def silent_agents(
+    address: str, count: int, role: Literal["worker", "analyzer"] = "worker"
+) -> Iterator[list[zenoh.Query]]:
+    """Let silent agents join at a hub; return the list of the jobs that they take.
+
+    Their names come before those of honest agents. They reply when they are asked for
+    their properties, as an agent does whose job hangs.
+    """
+    taken: list[zenoh.Query] = []
+    with ExitStack() as stack:
+        for number in range(count):
+            member = Member("default", role, f"a-silent-{number}")
+            config = session_config(client_config(address), member)
+            session = stack.enter_context(zenoh.open(config))
+            info = pb.AgentInfo(
+                agent=member.name,
+                kind=role,
+                slots=1,
+                platform=platform_tag(),
+                version=wire_version(),
+                shards=8,
+                cores=1,
+            ).SerializeToString()
+
+            def tell(
+                query: zenoh.Query, key: str = member.info, info: bytes = info
+            ) -> None:
+                with query:
+                    query.reply(key, info)
+
+            on_job: Any = zenoh.handlers.Callback(taken.append, indirect=False)
+            on_info: Any = zenoh.handlers.Callback(tell)
+            stack.enter_context(
+                session.declare_queryable(member.jobs, on_job, complete=True)
+            )
+            stack.enter_context(
+                session.declare_queryable(member.info, on_info, complete=True)
+            )
+            stack.enter_context(session.liveliness().declare_token(member.alive))
+        yield taken
