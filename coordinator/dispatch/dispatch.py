@@ -66,6 +66,8 @@ LEAST_S = 1.0
 """A job is never late before this time [s]: a second copy would cost more."""
 CALL_S = 2.0 * FIRST_S
 """No agent is asked about a call before this time [s]: calls differ in duration."""
+COPY_GROWTH = 16.0
+"""Growth of the deadline with each copy at agents that report progress."""
 VETS_AT_HAND = 16
 """Vettings that an analyzer holds beyond the current one: some milliseconds' work."""
 
@@ -434,12 +436,10 @@ class Dispatch:
         self, pending: Pending, pool: Pool, idle: list[str], now_s: float
     ) -> Iterator[Assign]:
         """Give an overdue job to an idle agent, which is removed from the list."""
-        working = _working(pending, pool)
-        # The second copy may only be faster; more of them need silent agents.
-        if len(working) != 1:
-            return
-        since_s, _ = pending.holders[working[0]]
-        if now_s - since_s <= self._limit_s(pending.job):
+        since_s = [pending.holders[name][0] for name in _working(pending, pool)]
+        # Of agents that report progress any may lie, but hardly all.
+        limit_s = self._limit_s(pending.job) * COPY_GROWTH ** (len(since_s) - 1)
+        if not since_s or now_s - max(since_s) <= limit_s:
             return
         client, avoid = pending.job.client, self._pairs.avoided(pending)
         for name in idle:

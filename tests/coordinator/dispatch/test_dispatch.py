@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from coordinator.dispatch.dispatch import (
     CALL_S,
+    COPY_GROWTH,
     LEAST_S,
     MAX_DEATHS,
     MAX_ERRORS,
@@ -606,6 +607,24 @@ def test_a_job_given_to_a_silent_agent_is_given_to_another_at_once() -> None:
     assert world.dispatch.silent() == {}
 
 
+def test_agents_that_report_progress_and_never_answer_end_no_run() -> None:
+    dispatch = told(Ticked(0.0), *(worker(name) for name in "abcd"))
+    given = given_out(dispatch.handle(Requested(simulation(0))))
+    at_s = [0.0]
+    for tick in range(1, 1700):
+        for command in dispatch.handle(Ticked(0.2 * tick)):
+            if isinstance(command, Ask):
+                dispatch.handle(Progressed(command.agent))
+            else:
+                given += given_out([command])
+                at_s.append(0.2 * tick)
+    assert given == [(0, name) for name in "abcd"]
+    first_s = 1.2
+    waits_s = [after - before for before, after in pairwise(at_s)]
+    assert waits_s == pytest.approx([first_s * 16.0**copy for copy in range(3)], abs=0.5)
+    assert dispatch.silent() == {}
+
+
 def test_slow_agents_that_report_progress_keep_their_jobs() -> None:
     """Jobs of ten minutes on three workers: one copy each at most, and no line."""
     dispatch = told(Ticked(0.0), *(worker(name) for name in "abc"))
@@ -847,7 +866,7 @@ class World:
                 number in held and name not in silent
                 for name, held in self.held.items()
             )
-            assert working < 2
+            assert working < 2 or self.now_s > COPY_GROWTH * LEAST_S
             assert number not in self.held[agent]
             kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
             assert self.agents[agent].kind == kind
