@@ -87,7 +87,7 @@ class Queue(Message, frozen=True):
     Attributes:
         kind: "worker" or "analyzer", jobs for such agents; or "arena", advances of
             arenas, which workers do.
-        waiting: number of those that no agent has.
+        waiting: number of those that no agent has, or silent ones only.
         assigned: number of those that agents have, copies of late jobs included.
     """
 
