@@ -25,7 +25,7 @@ def silent_agents(
     taken: list[zenoh.Query] = []
     with ExitStack() as stack:
         for number in range(count):
-            member = Member("default", role, f"a-silent-{number}")
+            member = Member("default", role, f"a-silent-{role}-{number}")
             config = session_config(client_config(address), member)
             session = stack.enter_context(zenoh.open(config))
             info = pb.AgentInfo(
