@@ -16,7 +16,7 @@ import zenoh
 from analysis.viewer.presence import Presence
 from schema.agent.log import tell_user, warn_user
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
-from schema.agent.service import HubWatch, log_engine
+from schema.agent.service import HubWatch, start_engine
 from schema.agent.topics import (
     Member,
     agents_alive,
@@ -127,7 +127,7 @@ class LiveSource:
         Raises:
             NetworkError: no hub answers.
         """
-        log_engine()
+        start_engine()
         with ExitStack() as opened:
             try:
                 config = zenoh.Config.from_json5(self._config)

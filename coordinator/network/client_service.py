@@ -6,7 +6,7 @@ from threading import Event
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, DEFAULT_FLEET, Tls, client_config
-from schema.agent.service import log_engine
+from schema.agent.service import start_engine
 from schema.agent.topics import Member, agents_alive, check_name, member_of
 from schema.errors import MalformedMessage, NetworkError
 
@@ -36,7 +36,7 @@ def ask_coordinators(
     """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
-    log_engine()
+    start_engine()
     try:
         session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError:

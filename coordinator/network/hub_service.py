@@ -6,7 +6,7 @@ import zenoh
 
 from schema.agent.log import tell_user
 from schema.agent.network import cannot_listen
-from schema.agent.service import log_engine
+from schema.agent.service import start_engine
 
 
 def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) -> None:
@@ -20,7 +20,7 @@ def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) ->
     Raises:
         NetworkError: an address that cannot be listened on.
     """
-    log_engine()
+    start_engine()
     try:
         session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError as error:

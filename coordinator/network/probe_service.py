@@ -14,7 +14,7 @@ import zenoh
 from coordinator.network.client_service import coordinators, reply_of
 from schema.agent.address import UNIX, parse_address
 from schema.agent.network import Tls, client_config
-from schema.agent.service import log_engine
+from schema.agent.service import start_engine
 from schema.agent.topics import Member, Role
 from schema.errors import MalformedMessage
 from schema.wire.operator import (
@@ -98,7 +98,7 @@ def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
     """
     config = zenoh.Config.from_json5(client_config(connect, tls))
     config.insert_json5("connect/timeout_ms", "1500")
-    log_engine()
+    start_engine()
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:

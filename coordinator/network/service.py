@@ -40,8 +40,8 @@ from schema.agent.platform_tag import wire_version
 from schema.agent.service import (
     HubWatch,
     Outlet,
-    log_engine,
     session_config,
+    start_engine,
 )
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
@@ -207,7 +207,7 @@ class Network:
         Raises:
             NetworkError: an address in use, or no hub.
         """
-        log_engine()
+        start_engine()
         with ExitStack() as opened:
             try:
                 config = session_config(self._config, self._me)

@@ -27,7 +27,12 @@ from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import ReplyCounts, Server
 from schema.agent.supervision import LOOK_S, ProcessSlot
-from schema.agent.supervisor import stop_on_signals, stop_with_parent
+from schema.agent.supervisor import (
+    AGENT_THREADS,
+    HUB_THREADS,
+    stop_on_signals,
+    stop_with_parent,
+)
 from schema.agent.topics import Member, check_name, unique_name
 from schema.errors import NetworkError, counted
 from schema.limits import MOST_SHOWN
@@ -57,12 +62,18 @@ normal: the job is sent again.
 """
 
 
-def log_engine() -> None:
-    """Start Zenoh's log, which the engine writes to descriptor 1, at level "warn".
+def start_engine(*, is_agent: bool = False) -> None:
+    """Choose Zenoh's threads; start its log, on descriptor 1, at level "warn".
 
     RUST_LOG has no effect: at lower levels the log shows secrets. Commands lead the
-    descriptor to standard error, see ``revolve.command.main``.
+    descriptor to standard error, see ``revolve.command.main``. ZENOH_RUNTIME has none:
+    with some values a hub cannot forward, with others the engine panics.
+
+    Args:
+        is_agent: this process is a worker or an analyzer.
     """
+    # Read when a process opens its first session.
+    os.environ["ZENOH_RUNTIME"] = AGENT_THREADS if is_agent else HUB_THREADS
     chosen = os.environ.pop("RUST_LOG", None)
     try:
         zenoh.init_log_from_env_or(_ENGINE_LOG)
@@ -233,7 +244,7 @@ def serve(
         agent.give_up_after_s,
         tells_first=agent.tells_hub,
     )
-    log_engine()
+    start_engine(is_agent=True)
     session = _open(config, hub, stop)
     if session is not None:
         with session:

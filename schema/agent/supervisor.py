@@ -20,6 +20,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
 from schema.agent.import_path import safe_import_path
+from schema.agent.log import warn_user
 from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import (
     LAST_DEATHS,
@@ -28,6 +29,7 @@ from schema.agent.supervision import (
     ProcessSlot,
     crash_cause,
 )
+from schema.errors import shown
 
 # Results must not depend on a library's number of threads. These count only if set
 # before numpy is imported: in the parent of the pool.
@@ -38,9 +40,11 @@ _ONE_THREAD = (
     "VECLIB_MAXIMUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
-# One thread serves the network of a process: a job then costs two fifths less CPU than
-# when it passes from thread to thread. A value set by the user has priority.
-_NETWORK = (
+# Threads of the network. One that receives blocks while it forwards a long message, so
+# in what may be a hub it neither sends nor polls the sockets: the one that accepts
+# connections does. An agent forwards nothing: with one for all a job costs less CPU.
+HUB_THREADS = "(tx: (handover: acc))"
+AGENT_THREADS = (
     "(rx: (worker_threads: 1), net: (handover: rx), acc: (handover: rx), "
     "tx: (handover: rx))"
 )
@@ -65,7 +69,9 @@ def prepare_process() -> None:
     one that computes, for a few milliseconds; children return unused memory.
     """
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-    os.environ.setdefault("ZENOH_RUNTIME", _NETWORK)
+    given = os.environ.get("ZENOH_RUNTIME", HUB_THREADS)
+    if given not in (HUB_THREADS, AGENT_THREADS):  # those of a parent process
+        warn_user(f"ZENOH_RUNTIME: has no effect here, got {shown(given)}")
     os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", _MAP_BYTES)
     _use_batch_policy()
 
