@@ -38,7 +38,9 @@ INFO_BYTES = 128 * KIB
 LIVE_BYTES = 64 * MIB
 """A message to viewers about an arena."""
 UPDATE_BYTES = 64 * MIB
-"""A message to viewers about a run."""
+"""A message to viewers about a run, or its state, which travels in pages."""
+PAGE_BYTES = 32 * KIB
+"""A page of a run's state; with its numbers, less than a connection sends at once."""
 OPERATOR_REQUEST_BYTES = 2 * MIB
 """A request of an operator; it may contain a robot."""
 OPERATOR_REPLY_BYTES = 16 * MIB

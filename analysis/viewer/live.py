@@ -28,7 +28,7 @@ from schema.agent.topics import (
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import LIVE_BYTES, MIB, UPDATE_BYTES
 from schema.wire.arena_codec import Live, decode_live
-from schema.wire.updates import Update, decode_update
+from schema.wire.updates import Page, Update, decode_page, decode_update, encode_update
 
 _MOST = 2000
 """Most messages in the queue."""
@@ -37,7 +37,8 @@ _MOST_BYTES = 256 * MIB
 _MOST_TOKENS = 10_000
 _MOST_COORDINATORS = 100
 """Coordinators that are asked for the complete state."""
-_ASK_AGAIN_S = 3.0
+_ASK_AGAIN_S, _NEXT_PAGES_S = 1.0, 0.25
+"""Least time between two requests, and between those for parts of one state [s]."""
 
 
 class Sequel:
@@ -45,26 +46,30 @@ class Sequel:
 
     Attributes:
         is_behind: the complete state must be requested.
+        run: name of the run that is watched; empty if none is known yet.
     """
 
     def __init__(self) -> None:
         self.is_behind = True
-        self._run = ""
-        self._last = (0, 0)
+        self.run = ""
+        # The newest update, and the oldest one since which none was lost.
+        self._last = self._since = (0, 0)
 
     def take(self, news: Update) -> bool:
         """Note news; return whether they are of the run that is watched."""
         place = (news.epoch, news.sequence)
         if news.is_whole:
-            if self._run not in ("", news.run):
+            if self.run not in ("", news.run):
                 return False
-            self._run, self._last, self.is_behind = news.run, place, False
+            # Updates that came while its pages travelled go on from it.
+            self.is_behind = (place[0], place[1] + 1) < self._since
+            self.run, self._last = news.run, max(self._last, place)
             return True
-        if news.run != self._run:
+        if news.run != self.run:
             return False
         if place > self._last:
-            is_next = place == (self._last[0], self._last[1] + 1)
-            self.is_behind = self.is_behind or not is_next
+            if place != (self._last[0], self._last[1] + 1):
+                self.is_behind, self._since = True, place
             self._last = place
         return True
 
@@ -120,6 +125,9 @@ class LiveSource:
         self._has_told_end = False
         self._sequel = Sequel()
         self._asked_s = -_ASK_AGAIN_S
+        # Token of the coordinator that was asked last, and the pages that it sent.
+        self._asked, self._sequence = "", 0
+        self._part: list[bytes] = []
 
     def __enter__(self) -> Self:
         """Open the session and subscribe.
@@ -158,7 +166,7 @@ class LiveSource:
         self._has_news.set()
 
     def _take_reply(self, member: Member, reply: zenoh.Reply) -> None:
-        """Take the complete state of a run, if its coordinator itself sent it."""
+        """Take a page of the state of a run, if its coordinator itself sent it."""
         if reply.ok is None:
             return
         replier = reply.replier_id
@@ -222,7 +230,8 @@ class LiveSource:
         if self._presence.has_ended and not self._has_told_end:
             self._has_told_end = True
             messages.append(Ended())
-        if self._sequel.is_behind and now_s - self._asked_s >= _ASK_AGAIN_S:
+        wait_s = _NEXT_PAGES_S if self._part else _ASK_AGAIN_S
+        if self._sequel.is_behind and now_s - self._asked_s >= wait_s:
             self._asked_s = now_s
             self._ask()
         return messages
@@ -250,7 +259,10 @@ class LiveSource:
     def _understood(self, message: _Message) -> LiveMessage | None:
         if not message.key.endswith(("/events", "/state")):
             return decode_live(message.data)
-        news = decode_update(message.data)
+        data = self._joined(message) if message.asked else message.data
+        if data is None:
+            return None
+        news = decode_update(data)
         if news.is_whole and not message.asked:
             raise MalformedMessage("update: a complete state that was not requested")
         if not self._sequel.take(news):
@@ -258,6 +270,22 @@ class LiveSource:
         if news.is_whole:
             self._presence.watch(message.asked)
         return news
+
+    def _joined(self, message: _Message) -> bytes | None:
+        """Add a page to the part of a state; return the state once it is complete."""
+        page = decode_page(message.data)
+        self._sequel.run = self._sequel.run or page.run
+        if message.asked != self._asked or page.run != self._sequel.run:
+            return None
+        if not page.page:
+            self._sequence, self._part = page.sequence, []
+        if (page.sequence, page.page) != (self._sequence, len(self._part)):
+            return None
+        self._part.append(page.data)
+        if len(self._part) < page.pages:
+            return None
+        part, self._part = self._part, []
+        return b"".join(part)
 
     def _token(self, sample: zenoh.Sample) -> None:
         key, coordinators = str(sample.key_expr), self._presence.coordinators
@@ -272,15 +300,23 @@ class LiveSource:
         self._sequel.is_behind = True
 
     def _ask(self) -> None:
-        """Request the complete state from all coordinators, without waiting."""
-        for member in self._presence.coordinators.values():
-            self._session.get(
-                member.state,
-                zenoh.handlers.Callback(
-                    partial(self._take_reply, member), indirect=False
-                ),
-                timeout=ASK_TIMEOUT_S,
-                # No other process can keep the request from the coordinator.
-                target=zenoh.QueryTarget.ALL,
-                consolidation=zenoh.ConsolidationMode.NONE,
-            )
+        """Request the next pages of the state, without waiting.
+
+        Coordinators are asked in turn: one without a run to show sends nothing.
+        """
+        there = self._presence.coordinators
+        if not (self._part and self._asked in there):
+            self._asked, self._part = next(iter(there), ""), []
+        if (member := there.pop(self._asked, None)) is None:
+            return
+        there[self._asked] = member
+        wanted = Page(sequence=self._sequence, page=len(self._part))
+        self._session.get(
+            member.state,
+            zenoh.handlers.Callback(partial(self._take_reply, member), indirect=False),
+            payload=encode_update(wanted),
+            timeout=ASK_TIMEOUT_S,
+            # No other process can keep the request from the coordinator.
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+        )

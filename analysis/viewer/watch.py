@@ -85,9 +85,10 @@ def _first(
     """Wait for a run; return its scene, its complete state and later messages."""
     since_s = time.monotonic()
     has_reported = False
+    messages: list[LiveMessage] = []
     while not stop.is_set():
         now_s = time.monotonic()
-        messages = source.receive(_POLL_S, now_s)
+        messages += source.receive(_POLL_S, now_s)
         for index, each in enumerate(messages):
             if isinstance(each, Update) and each.is_whole:
                 try:
@@ -95,8 +96,10 @@ def _first(
                 except RevolveError as error:
                     tell_user(f"{printable(each.run)}: cannot be shown: {error}")
                     source.forget()
+                    messages.clear()
                     break
-                return scene, messages[index:]
+                # Updates that came while its pages travelled may go on from it.
+                return scene, [each, *messages[:index], *messages[index + 1 :]]
         if now_s > since_s + _PATIENCE_S:
             raise NetworkError("the coordinator does not send a run")
         if now_s > since_s + _SILENT_S and not has_reported:

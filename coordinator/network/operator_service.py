@@ -16,10 +16,11 @@ class Order:
     query: zenoh.Query
     key: str
 
-    def reply(self, data: bytes) -> None:
+    def reply(self, *messages: bytes) -> None:
         """Reply, whether the other process still waits or not."""
         with self.query as query:
-            query.reply(self.key, data)
+            for data in messages:
+                query.reply(self.key, data)
 
 
 class Queries:
@@ -50,8 +51,7 @@ class Queries:
         elif len(asked) >= MOST_QUERIES or self._order_bytes + size > MOST_QUERY_BYTES:
             self._faults.note("crowd", peers, f"{len(asked)} queries wait")
         else:
-            # Viewers say nothing.
-            data = b"" if payload is None or is_onlooker else payload.to_bytes()
+            data = b"" if payload is None else payload.to_bytes()
             self._order_bytes += len(data)
             asked.append(Order(data, query, key))
             return
@@ -64,6 +64,6 @@ class Queries:
         return orders
 
     def onlookers(self) -> list[Order]:
-        """Return the viewers' queries for the whole run since the last call."""
+        """Return the viewers' queries for the state of the run since the last call."""
         onlookers, self._onlookers = self._onlookers, []
         return onlookers

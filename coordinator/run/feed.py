@@ -7,7 +7,8 @@ so that a viewer that connects late or lost an update gets the whole.
 from collections import Counter, defaultdict
 from typing import Any
 
-from msgspec.msgpack import Decoder, encode
+from msgspec import Raw
+from msgspec.msgpack import encode
 from msgspec.structs import replace
 
 from coordinator.islands.events import Record
@@ -15,7 +16,6 @@ from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.wire.updates import (
     Birth,
-    Death,
     Level,
     Migrant,
     Update,
@@ -26,8 +26,6 @@ from schema.wire.updates import (
     read_levels,
     read_migrant,
 )
-
-_BIRTH, _DEATH, _LEVEL = Decoder(Birth), Decoder(Death), Decoder(Level)
 
 
 class Feed:
@@ -101,18 +99,19 @@ class Feed:
         return update
 
     def whole(self) -> Update:
-        """Return everything that ``update`` has returned so far, as one update."""
-        births = [_BIRTH.decode(each) for each in self._births]
+        """Return everything that ``update`` has returned so far, as one update.
+
+        It can only be encoded: most of its rows are encoded already.
+        """
+        births: list[Any] = list(map(Raw, self._births))
         for index, birth in self._bodies.values():
             births[index] = birth
-        levels = [_LEVEL.decode(each) for each in self._levels]
-        return replace(
-            self._past,
-            births=tuple(births),
-            deaths=tuple(_DEATH.decode(each) for each in self._deaths),
-            levels=(*levels, *self._newest.values()),
-            migrants=tuple(self._migrants),
-        )
+        rows: dict[str, Any] = {
+            "births": births,
+            "deaths": list(map(Raw, self._deaths)),
+            "levels": [*map(Raw, self._levels), *self._newest.values()],
+        }
+        return replace(self._past, migrants=tuple(self._migrants), **rows)
 
     def _remember(self, update: Update) -> None:
         """Add an update to the past; drop the bodies of dead robots."""

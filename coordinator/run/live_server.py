@@ -1,13 +1,11 @@
 """Server for viewers of a run: publishes updates, and replies with all past ones.
 
-The run's thread encodes at a limited rate. A second thread sends the replies, which
-a slow connection may block.
+All past updates together, the state, travel in pages. They are encoded at a limited
+rate. The hub lets replies to viewers be dropped, so that none blocks the run's thread.
 """
 
 import subprocess
-import threading
 from math import inf
-from queue import SimpleQueue
 
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.fleet import Fleet
@@ -17,20 +15,23 @@ from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from schema.agent.import_path import environment, python_command
 from schema.agent.network import Tls
+from schema.errors import MalformedMessage
 from schema.plugins.permission import allowed
-from schema.wire.updates import WorkerInfo, encode_update
+from schema.wire.updates import WorkerInfo, decode_page, encode_update, pages_of
 
 _UPDATE_S = 0.2
 """Least time between two updates [s]."""
-_WHOLE_S = 1.0
-"""Least time between two encodings of all past updates [s]."""
+_PER_PAGE_S = 0.1
+"""Least time between two encodings of the state, for each of its pages [s]."""
+_MOST_REPLIES, _MOST_PAGES = 8, 6
+"""Replies between two updates, and pages in a reply: what a connection can queue."""
 
 
 class LiveServer:
     """Server of the viewers of one run."""
 
     def __init__(self, feed: Feed, loop: Loop, fleet: Fleet, network: Network) -> None:
-        """Initialise, and start the thread that replies.
+        """Initialise.
 
         Args:
             feed: of the run.
@@ -42,11 +43,8 @@ class LiveServer:
         self._loop = loop
         self._fleet = fleet
         self._network = network
-        self._update_s = self._whole_s = -1e9
-        self._replies: SimpleQueue[tuple[list[Order], bytes] | None] = SimpleQueue()
-        self._is_idle = threading.Event()
-        self._is_idle.set()
-        threading.Thread(target=self._reply, daemon=True).start()
+        self._update_s = self._whole_s = -inf
+        self._sequence, self._pages = -1, list[bytes]()
 
     def serve(self, now_s: float) -> None:
         """Send the updates and replies that are due.
@@ -54,26 +52,34 @@ class LiveServer:
         Args:
             now_s: the time, of any clock that only goes forward [s].
         """
-        # While a connection blocks, at most one encoding is in memory; the queries
-        # wait in the network, which limits their number.
-        may_reply = self._is_idle.is_set() or now_s == inf
-        is_whole_due = may_reply and now_s - self._whole_s >= _WHOLE_S
-        waiting = self._network.queries.onlookers() if is_whole_due else []
-        if now_s - self._update_s < _UPDATE_S and not waiting:
+        if now_s - self._update_s < _UPDATE_S:
             return
         self._update_s = now_s
         update = self._feed.update(self._workers())
         if update is not None and self._network.has_viewers:
             self._network.tell(encode_update(update))
-        if waiting:
-            self._whole_s = now_s
-            self._is_idle.clear()
-            self._replies.put((waiting, encode_update(self._feed.whole())))
+        # Viewers ask again for what is dropped here or on its way.
+        for order in self._network.queries.onlookers()[:_MOST_REPLIES]:
+            order.reply(*self._pages_for(order, now_s))
+
+    def _pages_for(self, order: Order, now_s: float) -> list[bytes]:
+        """Return the pages that a viewer requests, or the first ones of a new state."""
+        try:
+            wanted = decode_page(order.data)
+        except MalformedMessage as error:
+            self._network.faults.note("malformed", "viewers", str(error))
+            return []
+        if wanted.page and wanted.sequence == self._sequence:
+            return self._pages[wanted.page :][:_MOST_PAGES]
+        if now_s >= self._whole_s:
+            state = self._feed.whole()
+            self._sequence, self._pages = state.sequence, pages_of(state)
+            self._whole_s = now_s + _PER_PAGE_S * len(self._pages)
+        return self._pages[:_MOST_PAGES]
 
     def close(self) -> None:
-        """Send what is left, and stop."""
+        """Send what is left."""
         self.serve(inf)
-        self._replies.put(None)
 
     def _workers(self) -> tuple[WorkerInfo, ...]:
         dispatch, requests = self._fleet.dispatch, self._loop.shard_requests
@@ -85,14 +91,6 @@ class LiveServer:
             WorkerInfo(name, dispatch.platform(name), tuple(shards.get(name, ())))
             for name in dispatch.names("worker")
         )
-
-    def _reply(self) -> None:
-        """Send replies until closed."""
-        while (reply := self._replies.get()) is not None:
-            orders, data = reply
-            for order in orders:
-                order.reply(data)
-            self._is_idle.set()
 
 
 def open_viewer(address: str, fleet: str, tls: Tls | None) -> None:

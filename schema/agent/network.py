@@ -26,6 +26,19 @@ CANCELLED = "the job was cancelled"
 # Prefix of a refusal if the agent lacks the plug-ins of the run.
 UNFIT = "unfit: "
 ASK_TIMEOUT_S = 10.0
+# Messages for viewers come in bursts, and are dropped if they do not fit.
+_QUEUE = {"size": {"data_low": 16}}
+# Limits of a hub for viewers' requests: length [bytes], rate of a connection [1/s]; and
+# a reply that its viewer does not read is dropped, or the coordinator would wait.
+_STATES = "revolve/*/co/*/state"
+_REQUESTS: dict[str, Any] = {"messages": ["query"], "flows": ["ingress"]}
+_OF_STATES = {**_REQUESTS, "key_exprs": [_STATES]}
+_DROP = {"congestion_control": "drop", "priority": "data_low"}
+_VIEWER_LIMITS = {
+    "low_pass_filter": [{**_OF_STATES, "size_limit": 64}],
+    "downsampling": [{**_REQUESTS, "rules": [{"key_expr": _STATES, "freq": 10.0}]}],
+    "qos": {"network": [{**_OF_STATES, "overwrite": _DROP}]},
+}
 # A frozen process counts as gone after this [ms].
 LEASE_MS = 5000
 
@@ -147,6 +160,7 @@ def hub_config(
     config["mode"] = "router"
     config["listen"] = {"endpoints": list(listen), "exit_on_failure": True}
     config["connect"] = {"endpoints": []}
+    config |= _VIEWER_LIMITS
     if certificates is not None:
         config["access_control"] = access_control(certificates)
     # Only on this machine: reports the port that was chosen.
@@ -207,7 +221,7 @@ def client_config(connect: str, tls: Tls | None = None) -> str:
 def _link(protocols: set[str]) -> dict[str, Any]:
     return {
         "protocols": sorted(protocols),
-        "tx": {"lease": LEASE_MS, "keep_alive": 4},
+        "tx": {"lease": LEASE_MS, "keep_alive": 4, "queue": _QUEUE},
     }
 
 

@@ -8,12 +8,13 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import groupby
 from math import fsum
 from operator import itemgetter
-from typing import Any
+from typing import Annotated, Any
 
+from msgspec import Meta
 from msgspec.msgpack import Decoder, encode
 
 from schema.experiment.section import Count
-from schema.limits import UPDATE_BYTES
+from schema.limits import PAGE_BYTES, UPDATE_BYTES
 from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode_body, encode_body
@@ -141,15 +142,35 @@ class Update(Message, frozen=True):
     document: str = ""
 
 
+class Page(Message, frozen=True):
+    """A page of a run's state, which is an ``Update`` of everything.
+
+    Without data it is a viewer's request for this page and some that follow.
+
+    Attributes:
+        run: name of the run.
+        sequence: of the state; if it is outdated, page 0 of a newer one is sent.
+        page, pages: number of this page, from 0, and of all pages.
+        data: part of the bytes of the ``Update``.
+    """
+
+    run: str = ""
+    sequence: Count = 0
+    page: Count = 0
+    pages: Annotated[int, Meta(ge=0, le=UPDATE_BYTES // PAGE_BYTES)] = 0
+    data: Annotated[bytes, Meta(max_length=PAGE_BYTES)] = b""
+
+
 _UPDATE = Decoder(Update)
+_PAGE = Decoder(Page)
 _MIGRANT = itemgetter("island", "to", "epoch", "births", "sim_time_s")
 _PART = itemgetter(
     "kind", "parent", "parent_slot", "child_slot", "rot", "params", "gene"
 )
 
 
-def encode_update(news: Update) -> bytes:
-    """Return the bytes of an update."""
+def encode_update(news: Update | Page) -> bytes:
+    """Return the bytes of an update, or of a page."""
     return encode(news)
 
 
@@ -165,6 +186,25 @@ def decode_update(data: bytes) -> Update:
         if birth.body is not None:
             decode_body(birth.body)
     return update
+
+
+def decode_page(data: bytes) -> Page:
+    """Return the page or the request of some bytes; without bytes, that for page 0.
+
+    Raises:
+        MalformedMessage: not the bytes of a page.
+    """
+    return unpack(_PAGE, data, 2 * PAGE_BYTES) if data else Page()
+
+
+def pages_of(state: Update) -> list[bytes]:
+    """Return the pages of a state, encoded."""
+    data = encode(state)
+    parts = [data[at : at + PAGE_BYTES] for at in range(0, len(data), PAGE_BYTES)]
+    return [
+        encode(Page(state.run, state.sequence, number, len(parts), part))
+        for number, part in enumerate(parts)
+    ]
 
 
 def read_birth(row: Mapping[str, Any], births: int) -> Birth:

@@ -126,8 +126,10 @@ from schema.wire.updates import (
     Migrant,
     Update,
     WorkerInfo,
+    decode_page,
     decode_update,
     encode_update,
+    pages_of,
 )
 from tests.coordinator.run.test_honest_worlds import advances, settings_of
 from tests.coordinator.sent_requests import BIRTH, JUDGED, ROBOT, VIABLE
@@ -296,6 +298,7 @@ def _viewers(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Tar
     )
     yield Target("received_columns", columns, tuple(each[0].poses for each in made))
     yield Target("decode_update", decode_update, (encode_update(update()),))
+    yield Target("decode_page", decode_page, tuple(pages_of(update())))
 
 
 def update() -> Update:

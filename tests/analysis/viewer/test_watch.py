@@ -104,6 +104,13 @@ def test_waiting_for_a_run_is_reported_once(
     assert capsys.readouterr().err == "waiting for the coordinator to send a run\n"
 
 
+def test_updates_that_came_before_the_state_are_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen(tmp_path / "a.rrd", news(2, (0, 2)), WHOLE, Ended())
+    assert "recording e-run: 3 births" in capsys.readouterr().err
+
+
 def test_births_count_once_on_every_island() -> None:
     ignored: Any = type("Show", (), {"tell": lambda *_: None})()
     view = LiveView(ignored, "a/run", scene_of(read_experiment("archipelago-ring")))

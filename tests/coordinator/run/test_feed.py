@@ -11,7 +11,13 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row
 from schema.wire.codec import encode_body
-from schema.wire.updates import Birth, Update, WorkerInfo
+from schema.wire.updates import (
+    Birth,
+    Update,
+    WorkerInfo,
+    decode_update,
+    encode_update,
+)
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 BODY = encode_body(CORE)
@@ -54,6 +60,11 @@ def _feed(*records: Record) -> Feed:
     return feed
 
 
+def whole(feed: Feed) -> Update:
+    """Return the state as a viewer reads it."""
+    return decode_update(encode_update(feed.whole()))
+
+
 def _sent(update: Update | None) -> Update:
     assert update is not None
     return update
@@ -85,20 +96,20 @@ def test_the_whole_is_the_sum_of_the_updates() -> None:
     for record in (_birth(2, None, 0, 1), *_population(3, 1, 2)):
         feed.unread.append(record)
     parts.append(_sent(feed.update(WORKERS)))
-    whole = feed.whole()
-    assert (whole.sequence, whole.is_whole) == (2, True)
+    state = whole(feed)
+    assert (state.sequence, state.is_whole) == (2, True)
     births = [one.birth for update in parts for one in update.births]
-    assert [one.birth for one in whole.births] == births
+    assert [one.birth for one in state.births] == births
     levels = [level for update in parts for level in update.levels]
-    assert whole.levels == (replace(levels[0], members=()), levels[1])
-    assert whole.workers == WORKERS
+    assert state.levels == (replace(levels[0], members=()), levels[1])
+    assert state.workers == WORKERS
 
 
 def test_the_whole_holds_nothing_that_no_update_held() -> None:
     feed = _feed(_birth(0))
     feed.update(())
     feed.unread.append(_birth(1))
-    assert len(feed.whole().births) == 1
+    assert len(whole(feed).births) == 1
 
 
 def test_bodies_of_dead_robots_are_dropped_on_line() -> None:
@@ -107,7 +118,7 @@ def test_bodies_of_dead_robots_are_dropped_on_line() -> None:
     feed.unread.append(_death(0))
     update = _sent(feed.update(()))
     assert [gone.birth for gone in update.deaths] == [BirthId(0, 0)]
-    assert [one.body for one in feed.whole().births] == [None, BODY]
+    assert [one.body for one in whole(feed).births] == [None, BODY]
 
 
 def test_bodies_of_robots_that_were_not_selected_are_dropped_off_line() -> None:
@@ -116,7 +127,7 @@ def test_bodies_of_robots_that_were_not_selected_are_dropped_off_line() -> None:
     for record in (*_population(4, 1, 3), _birth(4)):
         feed.unread.append(record)
     feed.update(())
-    bodies = {one.birth.number: one.body for one in feed.whole().births}
+    bodies = {one.birth.number: one.body for one in whole(feed).births}
     assert bodies == {0: None, 1: BODY, 2: None, 3: BODY, 4: BODY}
 
 

@@ -1,8 +1,5 @@
-"""Replies to viewers: each gets the whole run, and a stuck one costs no memory."""
+"""Replies to viewers: pages of the state, which cost the run no time."""
 
-import threading
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, Self
@@ -10,102 +7,193 @@ from typing import Any, Self
 import pytest
 
 from coordinator.dispatch.faults import PeerFaults
+from coordinator.islands.events import Record
+from coordinator.islands.rows import body_rows
 from coordinator.network.operator_service import Queries
+from coordinator.run import live_server
 from coordinator.run.feed import Feed
 from coordinator.run.live_server import LiveServer
 from coordinator.storage.folder import RunDetails
 from schema.limits import MOST_QUERIES
-from schema.wire.updates import Update, encode_update
+from schema.robot.robot import Part, Robot
+from schema.wire.updates import (
+    Page,
+    Update,
+    decode_page,
+    decode_update,
+    encode_update,
+    pages_of,
+)
 
 DETAILS = RunDetails("live", 0, 1, "{}")
-PATIENCE_S = 20.0
+CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
+LONGEST = 65_000
+"""What a connection sends at once, without the key [bytes]."""
+
+
+class Payload(bytes):
+    """Bytes with the method of Zenoh's."""
+
+    def to_bytes(self) -> bytes:
+        return bytes(self)
 
 
 @dataclass
 class Viewer:
-    """Query of a viewer whose connection may block."""
+    """Query of a viewer.
 
-    gate: threading.Event
-    payload: None = None
+    Attributes:
+        is_done: the query has ended.
+    """
+
+    payload: Payload
     replies: list[bytes] = field(default_factory=list)
+    is_done: bool = False
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close nothing."""
+        self.is_done = True
 
     def reply(self, _key: str, data: bytes) -> None:
-        assert self.gate.wait(PATIENCE_S)
         self.replies.append(data)
 
     def drop(self) -> None:
-        """Be dropped."""
+        self.is_done = True
+
+    @property
+    def pages(self) -> list[Page]:
+        """What it got."""
+        return list(map(decode_page, self.replies))
 
 
 class Live:
-    """A server without agents, and the number of its encodings."""
+    """A server of a run without agents, and the number of its encodings."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.queries = Queries("key", PeerFaults())
-        network: Any = SimpleNamespace(queries=self.queries, has_viewers=False)
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, births: int = 0) -> None:
+        self.faults = PeerFaults()
+        self.queries = Queries("key", self.faults)
+        self.encodings = self.born_yet = 0
+        self.feed = Feed("live", 1, DETAILS)
+        self.born(births)
+        network: Any = SimpleNamespace(
+            queries=self.queries, has_viewers=False, faults=self.faults
+        )
         fleet: Any = SimpleNamespace(dispatch=SimpleNamespace(names=lambda _kind: []))
         loop: Any = SimpleNamespace(islands={}, shard_requests=None)
-        self.encodings = 0
-        monkeypatch.setattr(Feed, "whole", self._counting(Feed.whole))
-        self.server = LiveServer(Feed("live", 1, DETAILS), loop, fleet, network)
+        monkeypatch.setattr(live_server, "pages_of", self._counted)
+        self.server = LiveServer(self.feed, loop, fleet, network)
 
-    def _counting(self, real: Callable[[Feed], Update]) -> Callable[[Feed], Update]:
-        def whole(feed: Feed) -> Update:
-            self.encodings += 1
-            return real(feed)
+    def _counted(self, state: Update) -> list[bytes]:
+        self.encodings += 1
+        return pages_of(state)
 
-        return whole
+    def born(self, count: int) -> None:
+        """Add births."""
+        for _ in range(count):
+            row: dict[str, Any] = {
+                "island": 0, "birth": self.born_yet, "parents": [], "rank": 1,
+                "sim_time_s": None, "body": body_rows(CORE),
+            }  # fmt: skip
+            self.feed.unread.append(Record("births", row))
+            self.born_yet += 1
 
-    def ask(self, gate: threading.Event) -> Viewer:
-        viewer = Viewer(gate)
+    def ask(self, request: bytes = b"") -> Viewer:
+        viewer = Viewer(Payload(request))
         self.queries.add(viewer, "key")  # type: ignore[arg-type]
         return viewer
 
-
-def until(is_so: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not is_so():
-        assert time.monotonic() < end_s
-        time.sleep(0.001)
-
-
-def test_each_viewer_gets_the_whole_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    live, gate = Live(monkeypatch), threading.Event()
-    gate.set()
-    viewers = [live.ask(gate) for _ in range(3)]
-    live.server.serve(1.0)
-    late = live.ask(gate)
-    live.server.serve(1.5)
-    until(lambda: all(len(each.replies) == 1 for each in viewers))
-    assert late.replies == []
-    live.server.close()
-    until(lambda: len(late.replies) == 1)
-    assert live.encodings == 2
-    whole = Feed("live", 1, DETAILS).whole()
-    assert viewers[0].replies == [encode_update(whole)]
+    def read(self, now_s: float) -> tuple[Update, int]:
+        """Return the state as a viewer gets it, and the number of its queries."""
+        pages: list[Page] = []
+        queries = 0
+        while not pages or len(pages) < pages[0].pages:
+            sequence = pages[0].sequence if pages else 0
+            request = Page(sequence=sequence, page=len(pages))
+            viewer = self.ask(encode_update(request))
+            queries += 1
+            self.server.serve(now_s + 0.25 * queries)
+            assert viewer.is_done
+            assert max(map(len, viewer.replies)) < LONGEST
+            pages += viewer.pages
+        assert [each.page for each in pages] == list(range(len(pages)))
+        return decode_update(b"".join(each.data for each in pages)), queries
 
 
-def test_nothing_is_encoded_behind_a_stuck_viewer(
+def births(viewer: Viewer) -> int:
+    """Return the number of births in a state of one page."""
+    (page,) = viewer.pages
+    return len(decode_update(page.data).births)
+
+
+def test_each_viewer_gets_the_state_at_its_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    live, gate = Live(monkeypatch), threading.Event()
-    viewers = []
-    for second in range(2 * MOST_QUERIES):
-        viewers.append(live.ask(gate))
-        live.server.serve(float(second))
-    assert live.encodings == 1
-    gate.set()
-    until(lambda: len(viewers[0].replies) == 1)
-    until(live.server._is_idle.is_set)
-    live.server.serve(1e4)
-    until(lambda: len(viewers[1].replies) == 1)
-    assert live.encodings == 2
+    live = Live(monkeypatch)
+    viewers = [live.ask() for _ in range(3)]
+    live.server.serve(1.0)
+    live.born(1)
+    late = live.ask()
     live.server.close()
-    # Beyond the limit they are dropped.
-    until(lambda: sum(len(each.replies) for each in viewers) == 1 + MOST_QUERIES)
+    assert list(map(births, [*viewers, late])) == [0, 0, 0, 1]
+    assert live.encodings == 2
+
+
+def test_a_large_state_travels_in_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No message of 12,000 births is longer than a connection sends at once."""
+    live = Live(monkeypatch, births=12_000)
+    state, queries = live.read(1.0)
+    assert [one.birth.number for one in state.births] == list(range(12_000))
+    assert state.is_whole
+    assert queries > 1
+
+
+def test_requests_for_the_state_cost_few_encodings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A hundred states within two seconds, of a run that goes on."""
+    live = Live(monkeypatch, births=1000)
+    for turn in range(100):
+        live.born(1)
+        live.ask()
+        live.server.serve(0.02 * turn)
+    assert 1 <= live.encodings <= 10
+
+
+def test_a_viewer_begins_again_when_its_state_is_outdated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    live = Live(monkeypatch, births=4000)
+    first = live.ask()
+    live.server.serve(1.0)
+    sequence = first.pages[0].sequence
+    request = encode_update(Page(sequence=sequence, page=6))
+    live.born(1)
+    same, newest = live.ask(request), live.ask()
+    live.server.serve(1000.0)
+    outdated = live.ask(request)
+    live.server.serve(1001.0)
+    found = [(one.pages[0].sequence, one.pages[0].page) for one in (same, newest)]
+    assert found == [(sequence, 6), (sequence + 1, 0)]
+    assert outdated.pages[0] == newest.pages[0]
+
+
+def test_damaged_requests_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    live = Live(monkeypatch)
+    damaged, beyond = live.ask(b"\xff"), live.ask(encode_update(Page(page=10**9)))
+    live.server.serve(1.0)
+    assert damaged.is_done
+    assert damaged.replies == []
+    assert beyond.pages[0].page == 0
+    assert live.faults.total("malformed") == 1
+
+
+def test_a_crowd_of_viewers_costs_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    live = Live(monkeypatch, births=4000)
+    viewers = [live.ask() for _ in range(2 * MOST_QUERIES)]
+    live.server.serve(1.0)
+    assert live.encodings == 1
+    assert live.faults.total("crowd") == MOST_QUERIES
+    # What one connection can queue.
+    assert sum(len(data) for one in viewers for data in one.replies) <= 2 << 20

@@ -5,8 +5,10 @@ import contextlib
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from schema.errors import MalformedMessage
+from schema.limits import MOST_RUN_NAME, PAGE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row
@@ -16,10 +18,13 @@ from schema.wire.updates import (
     Death,
     Level,
     Migrant,
+    Page,
     Update,
     WorkerInfo,
+    decode_page,
     decode_update,
     encode_update,
+    pages_of,
     read_levels,
 )
 
@@ -56,6 +61,8 @@ def test_decoding_inverts_encoding() -> None:
 def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
     with contextlib.suppress(MalformedMessage):
         decode_update(data)
+    with contextlib.suppress(MalformedMessage):
+        decode_page(data)
 
 
 @given(st.integers(0, 10**4), st.integers(0, 255))
@@ -66,6 +73,23 @@ def test_updates_with_one_other_byte_decode_or_are_malformed(
     data[index % len(data)] = value
     with contextlib.suppress(MalformedMessage):
         decode_update(bytes(data))
+
+
+def test_a_state_is_cut_into_pages_that_a_connection_sends_at_once() -> None:
+    state = replace(UPDATE, run="r" * MOST_RUN_NAME, document="d" * 100_000)
+    encoded = pages_of(state)
+    assert max(map(len, encoded)) < 1 << 16
+    pages = list(map(decode_page, encoded))
+    assert [(each.page, each.pages) for each in pages] == [(n, 4) for n in range(4)]
+    assert decode_update(b"".join(each.data for each in pages)) == state
+
+
+@pytest.mark.parametrize(
+    "page", [Page(pages=10**6), Page(data=bytes(PAGE_BYTES + 1)), Page(page=-1)]
+)
+def test_pages_of_too_large_a_state_are_malformed(page: Page) -> None:
+    with pytest.raises(MalformedMessage):
+        decode_page(encode_update(page))
 
 
 def test_body_that_is_not_a_tree_is_malformed() -> None:

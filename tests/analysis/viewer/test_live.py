@@ -1,0 +1,140 @@
+"""A viewer's view of lost updates, and the state of a run from a hub."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+import zenoh
+
+from analysis.viewer.live import LiveMessage, LiveSource, Sequel
+from schema.agent.address import new_socket
+from schema.agent.network import client_config, hub_config
+from schema.agent.service import session_config
+from schema.agent.topics import Member
+from schema.robot.ids import BirthId
+from schema.wire.updates import (
+    Birth,
+    Page,
+    Update,
+    decode_page,
+    encode_update,
+    pages_of,
+)
+
+PATIENCE_S = 30.0
+CHIEF = Member("default", "coordinator", "chief.1")
+OTHER = Member("default", "coordinator", "another.1")
+
+
+def news(sequence: int, *, is_whole: bool = False, births: int = 0) -> Update:
+    born = tuple(
+        Birth(BirthId(0, number), (), 1, number + 1, None, None)
+        for number in range(births)
+    )
+    return Update("host:/run", 1, sequence, is_whole, "e", births=born)
+
+
+@pytest.mark.parametrize(
+    ("sequences", "state", "is_behind"),
+    [
+        ((), 5, False),
+        ((6, 7), 5, False),  # they came while the pages travelled
+        ((3, 4, 5, 6), 5, False),
+        ((7, 8), 5, True),  # 6 was lost
+        ((6, 8), 5, True),  # 7 was lost
+        ((6, 8), 7, False),
+        ((6, 7), 9, False),
+    ],
+)
+def test_updates_go_on_from_a_state_or_one_was_lost(
+    sequences: tuple[int, ...],
+    state: int,
+    is_behind: bool,  # noqa: FBT001 - a parameter of the test
+) -> None:
+    sequel = Sequel()
+    assert sequel.take(news(1, is_whole=True))
+    assert not sequel.is_behind
+    for sequence in sequences:
+        assert sequel.take(news(sequence))
+    assert sequel.take(news(state, is_whole=True))
+    assert sequel.is_behind is is_behind
+    following = max((state, *sequences)) + 1
+    assert sequel.take(news(following))
+    assert sequel.is_behind is is_behind
+    assert not sequel.take(Update("host:/other", 1, following, False, "e"))
+
+
+class Chief:
+    """A coordinator with a state of three pages.
+
+    Attributes:
+        asked: the requests.
+        sent: numbers of the pages that it sent.
+    """
+
+    def __init__(self, member: Member, session: zenoh.Session, state: Update) -> None:
+        self.asked: list[Page] = []
+        self.sent: list[int] = []
+        self._member, self._session = member, session
+        self._pages = pages_of(state)
+        assert len(self._pages) == 3
+        self._lost = [1]
+        self._held = [
+            session.declare_queryable(member.state, self._answer, complete=True),
+            session.liveliness().declare_token(member.alive),
+        ]
+
+    def _answer(self, query: zenoh.Query) -> None:
+        """Send two pages; one is lost at first, and an update comes after."""
+        with query:
+            assert query.payload is not None
+            request = decode_page(query.payload.to_bytes())
+            self.asked.append(request)
+            for number in range(request.page, min(request.page + 2, 3)):
+                if number in self._lost:
+                    self._lost.remove(number)
+                    continue
+                self.sent.append(number)
+                query.reply(self._member.state, self._pages[number])
+        if len(self.asked) == 1:
+            # As a coordinator publishes: behind the pages.
+            self._session.put(
+                self._member.events,
+                encode_update(news(8)),
+                priority=zenoh.Priority.DATA_LOW,
+            )
+
+
+@pytest.fixture
+def address() -> Iterator[str]:
+    address = new_socket()
+    with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
+        yield address
+
+
+@pytest.mark.system
+@pytest.mark.timeout(60)
+def test_a_viewer_gets_pages_that_were_lost_and_the_updates_meanwhile(
+    address: str,
+) -> None:
+    """A coordinator that sends nothing does not keep the viewer from the other one."""
+    text = client_config(address)
+    with (
+        zenoh.open(session_config(text, CHIEF)) as session,
+        zenoh.open(session_config(text, OTHER)) as silent,
+    ):
+        ignored = silent.declare_queryable(OTHER.state, lambda query: query.drop())  # type: ignore[no-untyped-call]
+        token = silent.liveliness().declare_token(OTHER.alive)
+        state = news(7, is_whole=True, births=1300)
+        chief = Chief(CHIEF, session, state)
+        got: list[LiveMessage] = []
+        end_s = time.monotonic() + PATIENCE_S
+        with LiveSource(address, "default", None) as source:
+            while len(got) < 2:
+                assert time.monotonic() < end_s
+                got += source.receive(0.1, time.monotonic())
+            assert source.dropped == 0
+        assert got == [news(8), state]
+        assert chief.asked == [Page(), Page(sequence=7, page=1)]
+        assert chief.sent == [0, 1, 2]
+        del token, ignored
