@@ -2,8 +2,8 @@
 
 The body is plain MJCF, for MuJoCo's viewer and other tools. Two custom texts hold the
 robot in Protobuf form and the settings of an evaluation. Reading takes the robot from
-the text, bit for bit, because MJCF rounds numbers. A file whose body or world was
-edited by hand differs from its text and is refused.
+the text, bit for bit. A file whose body or world was edited by hand differs from its
+text and is refused; earlier files have six digits.
 """
 
 import base64
@@ -30,7 +30,7 @@ from schema.experiment.brains import types_of
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.formats.contents import read_text
-from schema.formats.mjcf_export import add_sensors, portable
+from schema.formats.mjcf_export import add_limits, add_sensors, exact_xml, portable
 from schema.limits import MOST_MJCF_BYTES, MOST_OTHERS
 from schema.mjcf.model import solo_spec
 from schema.robot.robot import Robot, check_number, check_robot
@@ -44,12 +44,13 @@ _ALLOWED = (
     *("mujoco", "compiler", "option", "flag", "size", "default", "asset", "hfield"),
     *("worldbody", "body", "joint", "freejoint", "inertial", "geom", "site"),
     *("light", "camera", "actuator", "general", "velocity", "custom", "text"),
-    *("sensor", "accelerometer", "gyro", "touch"),
+    *("sensor", "accelerometer", "gyro", "touch", "numeric"),
     *("statistic", "visual", "global", "quality", "headlight", "map", "scale", "rgba"),
 )
 """Elements that are allowed: none reads another file or makes more elements."""
 _ONLY = {
     "size": ("memory",),
+    "numeric": ("name", "data"),
     "compiler": ("angle", "autolimits", "coordinate", "eulerseq"),
 }
 """Attributes of elements that could make MuJoCo reserve memory or read files."""
@@ -57,13 +58,13 @@ _WORDS = ("name", "class", "childclass", "model", "data")
 """Attributes whose values are not numbers."""
 _SIDES = frozenset(map(str, range(1, MOST_PATCHES + 2)))
 _DIGITS = 1e-4
-"""Relative difference that is greater than MJCF's rounding."""
+"""Relative difference that is greater than the rounding of earlier files."""
 _INERTIA = 1e-2
 """The same of inertia, which sums up the rounding of many positions."""
 _LENGTH_M = 1e-6
 _SIZES = (
     *("nbody", "ngeom", "njnt", "nsite", "nu", "nq", "nv", "na", "nsensor"),
-    *("nhfield", "nhfielddata"),
+    *("nhfield", "nhfielddata", "nnumeric", "nnumericdata"),
 )
 _PLACES = (
     *("body_pos", "body_quat", "body_ipos", "qpos0", "qpos_spring"),
@@ -83,6 +84,7 @@ _BODY = (
     *("actuator_ctrllimited", "actuator_ctrlrange"),
     *("actuator_damping", "actuator_armature"),
     *("sensor_type", "sensor_objid", "sensor_cutoff", "sensor_noise", "sensor_delay"),
+    "numeric_data",
 )
 _WORLD = (
     *("geom_contype", "geom_conaffinity", "geom_condim", "geom_priority"),
@@ -117,6 +119,7 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
     try:
         spec = solo_spec(robot, space, settings.simulation, settings.environment)
         add_sensors(spec, robot, space)
+        add_limits(spec, robot, space)
         spec.modelname = "robot"
         for name, data in (
             (ROBOT, encode_robot(robot)),
@@ -128,7 +131,7 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
     except ValueError as error:
         raise InvalidRobot(f"cannot be built: {one_line(error)}") from None
     try:
-        return portable(parse_xml(spec.to_xml(), MOST_MJCF_BYTES))
+        return portable(parse_xml(exact_xml(spec), MOST_MJCF_BYTES))
     except ValueError as error:
         raise InvalidRobot(f"MJCF {error}: a .pb file holds any robot") from None
 
@@ -158,9 +161,11 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         check_number(robot)
         check_robot(robot, space, kinds)
         spec = solo_spec(robot, space, settings.simulation, settings.environment)
-        # Earlier files have no sensors.
+        # Earlier files have no sensors, or no limits of motors.
         if root.find("sensor") is not None:
             add_sensors(spec, robot, space)
+        if root.find("actuator/*[@ctrlrange]") is not None:
+            add_limits(spec, robot, space)
         built = spec.compile()
     except (MalformedMessage, ExperimentError, InvalidRobot, ValueError) as error:
         raise InvalidRobot(f"{where}: {one_line(error)}") from None

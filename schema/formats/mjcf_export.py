@@ -1,10 +1,12 @@
-"""World of a robot as other tools read it: names, sensors and servos.
+"""World of a robot as other tools read it: names, sensors, servos and all digits.
 
 dm_control reserves ``/`` in names, so that ``3/servo`` becomes ``3_servo``. The
 sensors are only for other tools: our own readings follow from positions, velocities
 and contacts. MuJoCo has no sensor of light.
 """
 
+import ctypes
+import re
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -14,6 +16,10 @@ from schema.robot.robot import Robot
 
 _PAD_M = 0.001
 """Margin of the site of a touch sensor about its box [m]: contacts lie on its faces."""
+_DIGITS = 17
+"""Significant digits that give each number of double precision again."""
+_LONG = re.compile(r"\d+\.\d{8,}(?:e[+-]\d+)?")
+_GAIN = "motor_gain"
 
 
 def add_sensors(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
@@ -43,8 +49,46 @@ def add_sensors(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
                 _add(spec, mujoco.mjtSensor.mjSENS_TOUCH, name, name)
 
 
+def add_limits(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
+    """Add the range of the velocities that motors take, and their gains.
+
+    Gains are the custom numbers ``motor_gain`` [1/s], one for each actuator; 0 is a
+    motor that controls the velocity.
+
+    Args:
+        spec: world of the robot.
+        robot: as built in it.
+        space: its part types.
+    """
+    gains: list[float] = []
+    for servo in spec.actuators:
+        motor = space[robot.parts[int(servo.name.removeprefix("joint"))].kind].motor
+        assert motor is not None
+        servo.ctrllimited = 1
+        servo.ctrlrange = (-motor.max_velocity, motor.max_velocity)
+        gains.append(motor.gain if motor.control == "position" else 0.0)
+    if gains:
+        numbers = spec.add_numeric()
+        numbers.name, numbers.size, numbers.data = _GAIN, len(gains), gains
+
+
+def exact_xml(spec: mujoco.MjSpec) -> str:
+    """Return the XML of a compiled spec with all digits: with six, gaits differ.
+
+    MuJoCo has no public setting for them. The library is that of its own bindings.
+    """
+    engine = ctypes.CDLL(mujoco._functions.__file__)  # noqa: SLF001
+    usual = engine._mjPRIVATE__get_xml_precision()  # noqa: SLF001
+    engine._mjPRIVATE__set_xml_precision(_DIGITS)  # noqa: SLF001
+    try:
+        # Without digits that say nothing: 0.005, not 0.0050000000000000001.
+        return _LONG.sub(lambda found: repr(float(found[0])), spec.to_xml())
+    finally:
+        engine._mjPRIVATE__set_xml_precision(usual)  # noqa: SLF001
+
+
 def portable(root: ET.Element) -> str:
-    """Return the text of MJCF whose servos are ``velocity`` elements.
+    """Return the text of MJCF whose servos are ``velocity`` elements, for all readers.
 
     MuJoCo 4 writes them as ``general`` elements with an attribute ``input``, which
     MuJoCo 3.3 and earlier do not know. Both give the same model.
@@ -57,6 +101,9 @@ def portable(root: ET.Element) -> str:
         servo.set("kv", servo.attrib.pop("gainprm", "1"))
         for name in ("input", "biastype", "biasprm"):
             del servo.attrib[name]
+    for numbers in root.iterfind("custom/numeric"):
+        # It follows from the data; readers refuse it, as it reserves memory.
+        del numbers.attrib["size"]
     return ET.tostring(root, encoding="unicode") + "\n"
 
 

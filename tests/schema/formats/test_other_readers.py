@@ -188,8 +188,7 @@ def test_mjcf(packages: list[str], script: str, tmp_path: Path) -> None:
     robot, file = spider(), tmp_path / "spider.xml"
     write_robot(robot, file)
     found = run_with(tmp_path / "env", packages, MUJOCO + script, file)
-    # MJCF has six digits.
-    check_same(found, robot, rel=1e-4)
+    check_same(found, robot, rel=1e-9)
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, nstep=400)
