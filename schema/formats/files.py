@@ -60,7 +60,7 @@ BEST = "best.yaml"
 """Name of the file of a run's best robot, in the run folder."""
 MJCF_ENDING = ".xml"
 _YAML = (".yaml", ".yml")
-_ROBOGEN = {".txt": robot_from_robogen_text, ".json": robot_from_robogen_json}
+_ROBOGEN = (".txt", ".json")
 _READ = (*_YAML, *_ROBOGEN, ".pb", MJCF_ENDING)
 _WRITTEN = (".yaml", ".yml", ".pb", MJCF_ENDING, ".urdf")
 _BINARY_DUMP = (
@@ -132,7 +132,11 @@ def read_robot(
     if ending in _YAML:
         return robot_from_yaml(read_text(path), str(path), space, kinds)
     if ending in _ROBOGEN:
-        robot = _ROBOGEN[ending](_robogen_text(path), str(path), space)
+        text = _robogen_text(path)
+        # The content decides: either form may have either ending.
+        is_json = text.lstrip()[:1] == "{" or (ending == ".json" and text[:1] != "0")
+        read = robot_from_robogen_json if is_json else robot_from_robogen_text
+        robot = read(text, str(path), space)
     elif ending == MJCF_ENDING:
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415

@@ -152,8 +152,9 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         root = parse_xml(text, MOST_MJCF_BYTES)
     except ValueError as error:
         raise InvalidRobot(f"{where}: not valid MJCF: {error}") from None
-    _check_elements(root, where)
     held = {each.get("name", ""): each.get("data", "") for each in root.iter("text")}
+    if ROBOT in held:  # else the reason of a foreign file is not one of its elements
+        _check_elements(root, where)
     try:
         robot = decode_robot(_bytes(held, ROBOT))
         settings = read_evaluation_settings(_bytes(held, SETTINGS))
@@ -259,8 +260,8 @@ def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
 def _bytes(held: dict[str, str], name: str) -> bytes:
     if name not in held:
         raise InvalidRobot(
-            f"has no text {name!r}: only MJCF that `revolve robot convert` wrote "
-            "contains a brain"
+            f"has no text {name!r}: only MJCF that `revolve robot convert` wrote is "
+            "read, which contains the brain"
         )
     try:
         return base64.b64decode(held[name], validate=True)

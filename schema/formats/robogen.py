@@ -10,6 +10,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import pi
 
+import numpy as np
+from msgspec.structs import replace
+
 from schema.errors import InvalidRobot, shown
 from schema.formats.ids import with_ids
 from schema.formats.robogen_frames import SQUARE, our_orientation, our_slot
@@ -46,6 +49,8 @@ _BAR_NUMBERS = 3
 _ROOT_TURNS = (2, 0, 3, 3)
 """Quarter turns that children inherit, by RoboGen's slot of a square part."""
 _GREY = (0.5, 0.5, 0.5)
+_SINGLE = float(np.finfo(np.float32).eps)
+"""Greatest relative error of a number of single precision."""
 
 
 @dataclass(slots=True)
@@ -176,7 +181,8 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
         # RoboGen ignores connections to oscillators.
         if neurons[index[target]].kind != "Oscillator":
             connections.append(Connection(index[source], index[target], weight))
-    robot = Robot(tuple(body.parts), Brain(tuple(neurons), tuple(connections)))
+    parts = tuple(_in_range(part, space) for part in body.parts)
+    robot = Robot(parts, Brain(tuple(neurons), tuple(connections)))
     try:
         check_number(robot)
         check_robot(robot, space)
@@ -242,6 +248,20 @@ def _parameters(part: RobogenPart) -> tuple[float, ...]:
         return ()
     length_m, alpha, beta = part.parameters
     return length_m * 1000.0, alpha * pi / 180.0, beta * pi / 180.0
+
+
+def _in_range(part: Part, space: BodySpace) -> Part:
+    """Return a part whose parameters are not beyond their ranges by rounding.
+
+    RoboGen has single precision: its 0.1 m are 100.0000015 mm.
+    """
+    limits = space[part.kind].parameters if part.kind in space else ()
+    near = tuple(
+        min(max(value, limit.low), limit.high)
+        for value, limit in zip(part.parameters, limits, strict=False)
+    )
+    is_near = np.allclose(part.parameters[: len(near)], near, _SINGLE, 0.0)
+    return replace(part, parameters=near) if near and is_near else part
 
 
 def _neurons(

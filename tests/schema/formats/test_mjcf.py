@@ -242,6 +242,11 @@ def test_robot_may_stand_at_another_height() -> None:
         ("<mujoco", "^it: not valid MJCF: "),
         ("<mujoco/>", "^it: has no text 'revolve_robot': only MJCF that"),
         (
+            '<mujoco><compiler inertiafromgeom="true"/><asset><mesh/></asset></mujoco>',
+            "^it: has no text 'revolve_robot': only MJCF that .* wrote is read",
+        ),
+        ('<robot name="urdf"/>', "^it: has no text 'revolve_robot': only MJCF that"),
+        (
             '<mujoco><custom><text name="revolve_robot" data="?"/></custom></mujoco>',
             "^it: text 'revolve_robot': ",
         ),

@@ -150,6 +150,38 @@ def test_bar_parameters_are_converted() -> None:
 
 
 @pytest.mark.parametrize(
+    ("length_m", "alpha_deg", "expected"),
+    [
+        (float(np.float32(0.1)), 0.0, (100.0, 0.0)),
+        (float(np.float32(0.02)), 0.0, (20.0, 0.0)),
+        (0.05, float(np.nextafter(np.float32(90), np.float32(91))), (50.0, math.pi / 2)),
+        (0.05, -90.00000763, (50.0, -math.pi / 2)),
+        # Within its range, a number stays what the file has.
+        (float(np.float32(0.06)), 0.0, (1000 * float(np.float32(0.06)), 0.0)),
+    ],
+)
+def test_ranges_allow_for_single_precision(
+    length_m: float, alpha_deg: float, expected: tuple[float, float]
+) -> None:
+    """RoboGen's longest bar has 0.1 m, which it writes as 0.10000000149011612."""
+    text = f"0 E C 0\n\t0 B bar 2 {length_m!r} {alpha_deg!r} 0\n"
+    written: dict[str, Any] = document()
+    bar = {"type": "ParametricJoint", "orientation": 2}
+    numbers = [{"paramValue": each} for each in (length_m, alpha_deg, 0.0)]
+    written["body"]["part"][1] |= {**bar, "evolvableParam": numbers}
+    written["brain"] = {}
+    of_json = robot_from_robogen_json(json.dumps(written), "it", BUILT_IN)
+    for robot in (read(text), of_json):
+        assert robot.parts[1].parameters[:2] == expected
+
+
+@pytest.mark.parametrize("length_m", ["0.1000001", "0.101", "0.0199999", "-0.1"])
+def test_more_than_rounding_beyond_a_range_is_refused(length_m: str) -> None:
+    with pytest.raises(InvalidRobot, match=r"part 'bar': connection_length: must be"):
+        read(f"0 E C 0\n\t0 B bar 2 {length_m} 0 0\n")
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "it.txt:1: must be the core"),
@@ -292,11 +324,27 @@ def test_files_of_editors_of_windows_are_read(tmp_path: Path) -> None:
         assert read_robot(tmp_path / name) == plain
 
 
-def test_ending_selects_the_format(tmp_path: Path) -> None:
-    (tmp_path / "star.txt").write_text(STARFISH)
-    (tmp_path / "arm.json").write_text(json.dumps(document()))
-    assert read_robot(tmp_path / "star.txt") == read(STARFISH)
-    assert len(read_robot(tmp_path / "arm.json").parts) == 2
+@pytest.mark.parametrize("ending", [".txt", ".json"])
+def test_content_selects_the_form(tmp_path: Path, ending: str) -> None:
+    """Saved by a browser, JSON may be called robot.txt."""
+    star, arm = (tmp_path / f"{name}{ending}" for name in ("star", "arm"))
+    star.write_text(STARFISH)
+    arm.write_text(f"\n{json.dumps(document())}")
+    assert read_robot(star) == read(STARFISH)
+    assert len(read_robot(arm).parts) == 2
+
+
+@pytest.mark.parametrize(
+    ("ending", "message"), [(".txt", r"must be the core|TABS"), (".json", "valid JSON")]
+)
+def test_a_file_of_neither_form_is_that_of_its_ending(
+    tmp_path: Path, ending: str, message: str
+) -> None:
+    file = tmp_path / f"it{ending}"
+    for text in ("", "hello"):
+        file.write_text(text)
+        with pytest.raises(InvalidRobot, match=message):
+            read_robot(file)
 
 
 SPACE_2016 = body_space(
