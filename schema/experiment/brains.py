@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar, cast
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schema.errors import ExperimentError, error_text
 from schema.experiment.document import BrainSection, Experiment, Space, body_space
@@ -15,7 +16,7 @@ from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import BrainType, NeuronType
-from schema.robot.brain import NeuronKinds, Widths
+from schema.robot.brain import Brain, NeuronKinds, Widths
 from schema.robot.cpg import CpgParameters, cpg_neurons
 from schema.robot.neurons import BUILT_IN_NEURONS
 
@@ -132,6 +133,18 @@ def brain_half(
 def widths(space: Space) -> Widths:
     """Return the greatest numbers of neurons in an experiment."""
     return Widths(space.max_inputs, space.max_outputs, space.max_hidden)
+
+
+def with_room(settings: EvaluationSettings, brain: Brain) -> EvaluationSettings:
+    """Return settings that hold a brain, also one that their search does not allow."""
+    space = settings.space
+    roomy = replace(
+        space,
+        max_inputs=max(space.max_inputs, brain.count("input")),
+        max_outputs=max(space.max_outputs, brain.count("output")),
+        max_hidden=max(space.max_hidden, brain.count("hidden")),
+    )
+    return settings if roomy == space else replace(settings, space=roomy)
 
 
 @lru_cache(maxsize=64)

@@ -171,15 +171,15 @@ def check_widths(brain: Brain, width: Widths) -> None:
     Raises:
         InvalidRobot: more input, output or hidden neurons.
     """
-    limits: dict[Layer, int] = {
-        "input": width.inputs,
-        "output": width.outputs,
-        "hidden": width.hidden,
+    limits: dict[Layer, tuple[str, int]] = {
+        "input": ("max_inputs", width.inputs),
+        "output": ("max_outputs", width.outputs),
+        "hidden": ("max_hidden", width.hidden),
     }
-    for layer, limit in limits.items():
+    for layer, (key, limit) in limits.items():
         if (count := brain.count(layer)) > limit:
             raise InvalidRobot(
-                f"brain: {layer} neurons must be <= {limit}, got {count}"
+                f"brain: {layer} neurons must be <= space.{key} = {limit}, got {count}"
             )
 
 

@@ -18,6 +18,7 @@ from schema.errors import (
     SimulationDiverged,
     one_line,
 )
+from schema.experiment.brains import with_room
 from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
@@ -66,7 +67,7 @@ def evaluate(
             number.
         ExperimentError: a sensor that has no stimulus in this environment, or an
             unknown fitness function or measure.
-        InvalidRobot: more neurons than the limits.
+        InvalidRobot: neurons of other types than the experiment's.
     """
     if settings.robust is None:
         return judge(
@@ -117,7 +118,7 @@ def simulate(
     Sensors, controller and commands are updated every ``brain_steps`` from step 0
     on. The position of the core's centre is sampled every ``pose_steps`` of the
     window, both ends included, and so are the channels that fitness and measures
-    declare.
+    declare. The robot may have more neurons than ``[space]`` allows in a search.
 
     Args:
         robot: a checked robot.
@@ -132,7 +133,7 @@ def simulate(
         SensorFailed: a sensor of a plug-in raised or gave wrong values.
         ExperimentError: a sensor that has no stimulus in this environment, or an
             unknown fitness function or measure.
-        InvalidRobot: more neurons than the limits, or an ablation of another robot.
+        InvalidRobot: neurons of other types, or an ablation of another robot.
     """
     means: tuple[float, ...] = ()
     if settings.ablation is not None and settings.ablation.has_means:
@@ -170,6 +171,7 @@ def _loop(
 ) -> "_ControlLoop":
     """Return the control loop of a robot; ``means`` are those of ``mean_inputs``."""
     silence_engine()
+    settings = with_room(settings, robot.brain)
     clock, space = settings.simulation, body_space(settings.space)
     try:
         model = solo_spec(robot, space, clock, settings.environment).compile()

@@ -103,7 +103,7 @@ def test_tiny_period_gives_finite_outputs(period: float) -> None:
 
 def test_more_neurons_than_the_limit_are_rejected() -> None:
     brain = Brain(tuple(Neuron("hidden", "Simple", 0, (0.0, 1.0)) for _ in range(11)))
-    with pytest.raises(InvalidRobot, match="hidden neurons must be <= 10, got 11"):
+    with pytest.raises(InvalidRobot, match=r"must be <= space.max_hidden = 10, got 11"):
         check_widths(brain, WIDTH)
 
 

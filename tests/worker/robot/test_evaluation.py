@@ -16,7 +16,6 @@ from msgspec.structs import replace
 from schema.errors import (
     ExperimentError,
     FitnessUndefined,
-    InvalidRobot,
     SimulationDiverged,
 )
 from schema.experiment.document import Fitness, Simulation, Space
@@ -200,9 +199,20 @@ def test_light_sensor_in_a_world_without_light_is_rejected() -> None:
         simulate(Robot(parts, Brain(inputs)), replace(SETTINGS, space=space))
 
 
-def test_brain_beyond_the_limits_is_rejected(turtle: Robot) -> None:
-    with pytest.raises(InvalidRobot, match="input neurons must be <= 6, got 8"):
-        simulate(turtle, replace(SETTINGS, space=Space(max_inputs=6)))
+def test_limits_of_a_search_refuse_no_robot_that_exists(turtle: Robot) -> None:
+    """It has 8 inputs, and lives as with limits that are just met."""
+    brain = turtle.brain
+    met = Space(
+        max_inputs=8,
+        max_outputs=brain.count("output"),
+        max_hidden=brain.count("hidden"),
+    )
+    tight = replace(met, max_parts=2, max_inputs=6, max_outputs=1, max_hidden=0)
+    expected, found = (
+        simulate(turtle, replace(SETTINGS, space=space)) for space in (met, tight)
+    )
+    assert brain.count("input") == 8
+    assert bits(found) == bits(expected)
 
 
 def not_a_number(_track: Track, _fitness: Fitness) -> float:
