@@ -97,7 +97,7 @@ class Robot:
     ) -> Self:
         """Return a random robot as evolution starts with; no analyzer vets it.
 
-        It equals file ``number`` of ``revolve robot random --seed SEED``.
+        It equals file ``number`` of ``revolve robot random --unvetted --seed SEED``.
 
         Args:
             experiment: whose restrictions it meets.

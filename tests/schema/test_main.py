@@ -1,4 +1,4 @@
-"""``revolve robot``: check, convert, show."""
+"""``revolve robot``: convert and show robot files."""
 
 from pathlib import Path
 
@@ -28,19 +28,6 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
-def test_check(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["robot", "check", str(path)]) == 0
-    assert "well formed; 3 parts, 6 inputs, 1 output," in capsys.readouterr().out
-
-
-def test_check_of_a_wrong_file(path: Path) -> None:
-    path.write_text(TEXT.replace("leg,", "leg, leg: 1,"))
-    with pytest.raises(
-        InvalidRobot, match=r"robot\.yaml:4: part 'leg': leg: no such key"
-    ):
-        main(["robot", "check", str(path)])
-
-
 def test_convert_round_trip(path: Path) -> None:
     there, back = path.with_suffix(".pb"), path.with_suffix(".yml")
     assert main(["robot", "convert", str(path), str(there)]) == 0
@@ -61,10 +48,10 @@ def test_mjcf_keeps_its_settings_and_part_types(path: Path, tmp_path: Path) -> N
     assert main(["robot", "convert", str(there), str(again)]) == 0
     assert read_mjcf(again) == read_mjcf(there)
     assert read_mjcf(again)[1].simulation.gravity == 3.0
-    assert main(["robot", "check", str(again)]) == 0
+    assert main(["robot", "show", str(again)]) == 0
     named = ["--experiment", "scenario1"]
     with pytest.raises(InvalidRobot, match=r"must be one of .*, got 'ActiveWheel'"):
-        main(["robot", "check", str(again), *named])
+        main(["robot", "show", str(again), *named])
 
 
 def test_show(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -109,7 +96,6 @@ def test_robots_without_experiment_have_all_built_in_neuron_types(
         "brain: {neurons: [{part: leg, layer: output, type: PhaseOscillator, "
         "params: {frequency: 0.75}}]}"
     )
-    assert main(["robot", "check", str(path)]) == 0
     assert main(["robot", "show", str(path)]) == 0
     assert "PhaseOscillator(frequency 0.75 Hz, " in capsys.readouterr().out
     there, back = path.with_suffix(".pb"), path.with_suffix(".yml")
@@ -130,7 +116,7 @@ def test_part_types_of_an_experiment(
         'name = "mine"\n[space]\npart_types = ["schema.parts:CORE", '
         '"schema.parts:ACTIVE_HINGE", "flippers:FLIPPER"]'
     )
-    words = ["robot", "check", str(path), "--experiment", str(experiment)]
+    words = ["robot", "show", str(path), "--experiment", str(experiment)]
     with pytest.raises(InvalidRobot, match="must be one of Core, ActiveHinge, Flipper"):
         main(words)
     bar = "type: ParametricBarJoint, params: {connection_length: 33}"
@@ -141,4 +127,4 @@ def test_part_types_of_an_experiment(
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["robot", "--help"])
-    assert "examples:\n  revolve robot check" in capsys.readouterr().out
+    assert "examples:\n  revolve robot show" in capsys.readouterr().out

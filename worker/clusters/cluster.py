@@ -12,7 +12,7 @@ from itertools import chain
 import mujoco
 import numpy as np
 
-from schema.errors import one_line
+from schema.errors import RevolveError, one_line
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
@@ -306,21 +306,39 @@ class Cluster:
         self.failure, self.failed_at = "", NEVER
 
 
+def check_layout() -> None:
+    """Raise before any job if clusters cannot copy the states of this MuJoCo.
+
+    Raises:
+        RevolveError: its arrays have another order.
+    """
+    model = mujoco.MjSpec()
+    model.worldbody.add_body().add_freejoint()
+    model.worldbody.bodies[0].add_geom(size=(1.0, 0.0, 0.0))
+    _live(mujoco.MjData(model.compile()))
+
+
 def _live(data: mujoco.MjData) -> tuple[Floats, tuple[int, int, int, int]]:
     """Return ``live`` and ``parts`` of a cluster.
 
-    The engine keeps all its arrays in one block of memory, in a fixed order. To copy
-    everything from the first to the last that is wanted is twice as fast as to copy
-    four arrays, although half of it is not wanted.
+    The engine keeps all its arrays in one block of memory, in an order that minor
+    versions may change. To copy everything from the first to the last that is wanted is
+    twice as fast as to copy four arrays, although half of it is not wanted.
+
+    Raises:
+        RevolveError: the arrays have another order, or more than one block.
     """
     wanted = data.qpos, data.qvel, data.xpos, data.xmat
     start = data.qpos.ctypes.data
     first, second, third, last = (
         (array.ctypes.data - start) // array.itemsize for array in wanted
     )
-    if not 0 == first < second < third < last:
-        raise AssertionError("this version of MuJoCo orders its arrays otherwise")
-    live = np.lib.stride_tricks.as_strided(
-        data.qpos, (last + data.xmat.size,), writeable=False
-    )
+    end = last + data.xmat.size
+    is_known = 0 == first < second < third < last
+    if not is_known or end * data.qpos.itemsize > data.nbuffer:
+        raise RevolveError(
+            f"MuJoCo {mujoco.__version__} orders the arrays of a state in another way "
+            "than arenas need: install mujoco-core 4.0"
+        )
+    live = np.lib.stride_tricks.as_strided(data.qpos, (end,), writeable=False)
     return live, (first, second, third, last)

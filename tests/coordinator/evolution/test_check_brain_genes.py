@@ -48,7 +48,7 @@ CASES = {
     "Crowded": (
         "grow(self, draws, new, branches, rules)",
         'new[0].hidden = (NeuronGene("Waver", (0.0, 1.0)),) * 11',
-        "valid robots, got brain: hidden neurons must be <= space.max_hidden = 10, got ",
+        "got brain: hidden neurons must be <= space.max_hidden = 10, got ",
     ),
     "Arrayed": (
         "vary(self, draws, branches, rules, pruned)",

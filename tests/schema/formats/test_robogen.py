@@ -154,7 +154,11 @@ def test_bar_parameters_are_converted() -> None:
     [
         (float(np.float32(0.1)), 0.0, (100.0, 0.0)),
         (float(np.float32(0.02)), 0.0, (20.0, 0.0)),
-        (0.05, float(np.nextafter(np.float32(90), np.float32(91))), (50.0, math.pi / 2)),
+        (
+            0.05,
+            float(np.nextafter(np.float32(90), np.float32(91))),
+            (50.0, math.pi / 2),
+        ),
         (0.05, -90.00000763, (50.0, -math.pi / 2)),
         # Within its range, a number stays what the file has.
         (float(np.float32(0.06)), 0.0, (1000 * float(np.float32(0.06)), 0.0)),

@@ -2,18 +2,21 @@
 
 from pathlib import Path
 
+from analyzer.report import analyze
 from coordinator.evolution.breeding import Breeder
 from schema.agent.flags import Flags, add_count, add_seed
 from schema.errors import counted
+from schema.experiment.document import Experiment, body_space
 from schema.experiment.file import read_experiment
 from schema.formats.files import settings_of, write_robot
 from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
 
 
 def main(arguments: list[str]) -> int:
     """Write random robots, one file each, and return the exit code.
 
-    They meet the experiment's restrictions; no analyzer vets them.
+    They are the founders, vetted, of the experiment's first run with the seed.
 
     Args:
         arguments: the command's name, ``robot random``, first.
@@ -29,9 +32,7 @@ def main(arguments: list[str]) -> int:
     experiment = read_experiment(options.experiment)
     breeder = Breeder(experiment, options.seed, run=0)
     for number in range(options.count):
-        candidate = breeder.candidate(BirthId(0, number), 0, ())
-        assert candidate is not None
-        robot = candidate.robot
+        robot = _founder(breeder, number, None if options.unvetted else experiment)
         path: Path = options.file
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")
@@ -39,6 +40,20 @@ def main(arguments: list[str]) -> int:
         parts = counted(len(robot.parts), "part")
         print(f"{path}: {parts}, {counted(len(robot.brain.neurons), 'neuron')}")
     return 0
+
+
+def _founder(breeder: Breeder, number: int, vetting: Experiment | None) -> Robot:
+    """Return the founder of a number; without experiment, the first candidate."""
+    attempt, why = 0, ""
+    while True:
+        found = breeder.candidate(BirthId(0, number), attempt, (), why=why)
+        assert found is not None
+        if vetting is None:
+            return found.robot
+        report = analyze(found.robot, body_space(vetting.space), vetting.vetting)
+        if report.is_viable:
+            return found.robot
+        attempt, why = found.attempt + 1, report.reason
 
 
 def parser(_command: str = "robot random") -> Flags:
@@ -59,6 +74,11 @@ def parser(_command: str = "robot random") -> Flags:
     )
     add_seed(flags, default=1)
     add_count(flags, "--count", 1, "number of robots")
+    flags.add_argument(
+        "--unvetted",
+        action="store_true",
+        help="also robots whose parts intersect, which evolution refuses",
+    )
     flags.add_argument(
         "--experiment",
         default="scenario1",
