@@ -20,7 +20,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from schema.agent.log import tell_user, warn_user
 from schema.agent.topics import unique_name
-from schema.errors import NetworkError, RevolveError
+from schema.errors import NetworkError, RevolveError, error_text
 
 _WAIT_S = 0.2
 _CHORES_S = 1.0
@@ -144,7 +144,7 @@ class Engine:
         except RevolveError as error:
             why = error
         except Exception as error:  # noqa: BLE001 - else callers would wait for ever
-            why = RevolveError(f"{type(error).__name__}: {error}")
+            why = RevolveError(error_text(error))
         finally:
             self._end(why)
             self._is_open.set()

@@ -4,7 +4,7 @@ import msgspec
 
 import schema.errors
 from revolve.trace import PackedTrace
-from schema.errors import RevolveError
+from schema.errors import RevolveError, error_text
 from schema.robot.results import Evaluation
 
 
@@ -57,7 +57,7 @@ def problem_of(error: Exception) -> Problem:
     if kind.__module__ == "schema.errors":
         return Problem(kind.__name__, str(error))
     own = isinstance(error, RevolveError)
-    return Problem("RevolveError", str(error) if own else f"{kind.__name__}: {error}")
+    return Problem("RevolveError", str(error) if own else error_text(error))
 
 
 def error_of(problem: Problem) -> RevolveError:

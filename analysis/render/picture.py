@@ -177,7 +177,7 @@ def save_picture(picture: Picture, path: Path) -> None:
     try:
         Image.fromarray(picture).save(path)
     except OSError as error:
-        raise NoPictures(f"{path}: cannot be written: {error.strerror}") from None
+        raise NoPictures(f"{path}: cannot be written: {error.strerror or error}") from None
     except ValueError as error:
         raise NoPictures(f"{path}: {error}") from None
 
@@ -196,7 +196,7 @@ def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -
     try:
         path.write_bytes(gif(pictures, interval_s, _COLOURS))
     except OSError as error:
-        raise NoPictures(f"{path}: cannot be written: {error.strerror}") from None
+        raise NoPictures(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:

@@ -22,7 +22,7 @@ from schema.wire.arena import (
     Judgement,
     Touch,
 )
-from schema.wire.decoding import parsed
+from schema.wire.decoding import parsed, read_reason
 from schema.wire.messages import (
     birth_from_message,
     birth_to_message,
@@ -242,8 +242,7 @@ def decode_advance_answer(data: bytes, most: int = ADVANCE_BYTES) -> AdvanceAnsw
     if result == "advance":
         advance = advance_from_message(message.advance)
         fallen = tuple(
-            replace(one, reason=printable(one.reason, LONGEST_REASON))
-            for one in advance.casualties
+            replace(one, reason=read_reason(one.reason)) for one in advance.casualties
         )
         advance = replace(advance, casualties=fallen)
     return AdvanceAnswer(

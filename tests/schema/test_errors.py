@@ -2,7 +2,7 @@
 
 import pytest
 
-from schema.errors import error_text, one_line, rounded, shown
+from schema.errors import InvalidRobot, RevolveError, error_text, one_line, rounded, shown
 from schema.limits import LONGEST_REASON
 
 
@@ -43,7 +43,9 @@ class Mute(Exception):  # noqa: N818 - reads as what it says
         (ValueError("two\n  lines"), "two lines"),
         (ValueError("\x1b[31m red \ud800 ü"), "?[31m red ? ü"),
         (ValueError("x" * 2000), "x" * 2000),
-        (ValueError(), ""),
+        (ValueError(), "(no message)"),
+        (ValueError(" \n"), "(no message)"),
+        (RevolveError(), "(no message)"),
         (Mute(), "(no message: its __str__ raises KeyError)"),
     ],
 )
@@ -51,6 +53,14 @@ def test_any_error_is_one_line_that_can_be_printed(
     error: Exception, expected: str
 ) -> None:
     assert one_line(error) == expected
+
+
+def test_an_error_of_ours_is_never_empty() -> None:
+    """A plug-in may raise one without message; an empty reason is no failure."""
+    for error in (RevolveError(), InvalidRobot(""), InvalidRobot("  ")):
+        assert str(error) == "(no message)"
+    assert str(InvalidRobot("slot 3")) == "slot 3"
+    assert error_text(KeyError()) == "KeyError: (no message)"
 
 
 def test_the_text_of_a_foreign_error_is_cut() -> None:

@@ -71,7 +71,7 @@ REPORTS = st.builds(
     Report, st.just(value=True), st.just(""), PAIRS, VECTOR, VECTOR, NUMBER, U32
 )
 WALL = st.floats(0, 1e9)
-ANSWERS = st.builds(Answer, U64, U64, WALL, REPORTS | EVALUATIONS | REASON)
+ANSWERS = st.builds(Answer, U64, U64, WALL, REPORTS | EVALUATIONS | REASON.filter(bool))
 REPORT = Report(
     is_viable=True,
     reason="",
@@ -207,9 +207,11 @@ def test_report_of_zeros_round_trip() -> None:
     assert decode_answer(encode_answer(answer)) == answer
 
 
-def test_failure_with_empty_reason_round_trip() -> None:
-    answer = Answer(1, 2, 0.0, "")
-    assert decode_answer(encode_answer(answer)) == answer
+@pytest.mark.parametrize("blank", ["", " \n\t"])
+def test_a_failure_without_reason_is_malformed(blank: str) -> None:
+    """The user of a run would read nothing in its table."""
+    with pytest.raises(MalformedMessage, match="^a failure must have a reason$"):
+        decode_answer(encode_answer(Answer(1, 2, 0.0, blank)))
 
 
 @pytest.mark.parametrize(
