@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from schema.agent.flags import Flags, add_plugins, add_settings
 from schema.agent.terminal.progress_line import progress_if_long
-from schema.errors import rounded
+from schema.errors import counted, rounded
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.run_settings import read_with_settings, tell
 from schema.plugins.permission import allow
@@ -58,7 +58,8 @@ def _evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
     """Return the evaluation of a robot; show progress if it takes long."""
     clock = settings.simulation
     all_s = f"{clock.evaluation_steps * clock.timestep_s:g} s"
-    with progress_if_long(f"simulated 0.0 of {all_s}") as tell_progress:
+    building = f"building the model of {counted(len(robot.parts), 'part')}"
+    with progress_if_long(building) as tell_progress:
         return evaluate(
             robot,
             settings,

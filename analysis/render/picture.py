@@ -118,6 +118,8 @@ class RobotRenderer:
     ) -> tuple[Floats, float]:
         """Return where a camera that stands still sees the robot in all of some poses.
 
+        It sees the shadows on level ground, too.
+
         Args:
             poses: (nq,) each; at least one.
             cut: shares of the picture's height that are cut off above and below.
@@ -125,11 +127,15 @@ class RobotRenderer:
         Returns:
             ``look_at`` and ``distance_m`` of ``picture``.
         """
-        centres = []
+        centres: list[Floats] = []
+        lamp = self._stage.data.light_xpos[0]
         for pose in poses:
             self._stage.pose(pose)
-            centres.append(self._stage.data.geom_xpos[self._geoms])
-        radii = np.tile(self.model.geom_rbound[self._geoms], len(poses))
+            places = self._stage.data.geom_xpos[self._geoms]
+            height = np.clip(places[:, 2:], 0.0, 0.5 * lamp[2])
+            away = (places - lamp) * height / (lamp[2] - height)
+            centres += [places, places + away]
+        radii = np.tile(self.model.geom_rbound[self._geoms], len(centres))
         return self._stage.framing(np.concatenate(centres), radii, cut)
 
 

@@ -1,11 +1,14 @@
 """``revolve robot simulate``: equal results from all file formats."""
 
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from schema.formats.files import settings_of, write_robot
+from worker import robot_command
 from worker.bench.spider import spider
 from worker.robot.evaluation import evaluate
 from worker.robot_command import main
@@ -112,3 +115,23 @@ def test_a_long_simulation_shows_its_progress(
     assert found
     assert float(found[1]) > 0
     assert "simulated:         100.0 s" in said.out
+
+
+def test_until_the_first_tick_the_model_is_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot of 1000 parts takes minutes, in which nothing is simulated."""
+    shown: list[str] = []
+
+    @contextmanager
+    def progress(text: str) -> Iterator[Callable[[str], None]]:
+        shown.append(text)
+        yield shown.append
+
+    monkeypatch.setattr(robot_command, "progress_if_long", progress)
+    write_robot(spider(), tmp_path / "spider.yaml")
+    assert main(["robot simulate", str(tmp_path / "spider.yaml")]) == 0
+    parts = len(spider().parts)
+    assert shown[0] == f"building the model of {parts} parts"
+    assert shown[1] == "simulated 0.0 of 12 s"
+    assert len(shown) > 100

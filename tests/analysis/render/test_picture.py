@@ -293,3 +293,16 @@ def test_a_checker_is_averaged_over_a_pixel(
 ) -> None:
     found = _checker(np.array([place]), np.array([width]))
     assert found == pytest.approx([share], abs=1e-5)
+
+
+def test_framing_shows_the_whole_shadow_of_a_robot_in_the_air(
+    renderer: RobotRenderer,
+) -> None:
+    pose = np.array([0.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0])
+    look_at, distance_m = renderer.framing([pose], (0.0, 0.0))
+    picture = renderer.picture(pose, look_at=look_at, distance_m=distance_m)
+    is_grey = np.ptp(picture.astype(int), axis=2) < 30
+    dark = np.argwhere(is_grey & (picture.max(axis=2) < 140))
+    assert len(dark) > 50
+    assert (dark > 0).all()
+    assert (dark < (119, 159)).all()
