@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 from schema.limits import LONGEST_REASON, MOST_SHOWN, printable
 
-
 _NO_MESSAGE = "(no message)"
 """Text of an error without one: an empty reason would mean that nothing failed."""
 

@@ -234,6 +234,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "measure": "name in measures.names",
         "mean": "mean of judged robots, in the measure's unit",
         "robots": "number of these robots",
+        "unit": "unit of the measure, of an own one as its docstring's first line has "
+        "it in brackets; empty if it is not known",
+        "about": "that line of an own measure",
     },
     "learning": {
         **_RUN,
@@ -322,7 +325,7 @@ _INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "pla
 _TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measure",
           "a", "b", "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "setting", "value", "differs", "function", "fitness_function",
-          "plugins"}  # fmt: skip
+          "plugins", "unit", "about"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

@@ -10,6 +10,7 @@ from multiprocessing import active_children, get_context
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analysis.measures.docstrings import with_meanings
 from analysis.measures.load import TABLE, LeftOut, Run, read_duration_s, read_tables
 from analysis.measures.measures import measure
 from analysis.measures.outputs import run_schema, schema
@@ -85,6 +86,8 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
         born, planned = tables["births"].num_rows, planned_births(run)
         why = f"the run is not finished: {born} of {planned} births are recorded"
         left_out.append(LeftOut(folder, "comparison", why))
+    if "named_measures" in found:
+        found["named_measures"] = with_meanings(found["named_measures"], run)
     named = {name: _named(found[name], name, run) for name in found}
     named["runs"] = _named(_summary(run, tables, unread), "runs", run)
     if run.point:

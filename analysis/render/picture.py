@@ -183,7 +183,9 @@ def save_picture(picture: Picture, path: Path) -> None:
     try:
         Image.fromarray(picture).save(path)
     except OSError as error:
-        raise NoPictures(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise NoPictures(
+            f"{path}: cannot be written: {error.strerror or error}"
+        ) from None
     except ValueError as error:
         raise NoPictures(f"{path}: {error}") from None
 
@@ -202,7 +204,9 @@ def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -
     try:
         path.write_bytes(gif(pictures, interval_s, _COLOURS))
     except OSError as error:
-        raise NoPictures(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise NoPictures(
+            f"{path}: cannot be written: {error.strerror or error}"
+        ) from None
 
 
 def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:

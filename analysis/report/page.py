@@ -141,7 +141,7 @@ def _sections(
         "bodies": ("Bodies", shown("bodies")),
         "diversity": ("Diversity and ancestry", shown("diversity")),
         "islands": ("Islands and arenas", shown("islands")),
-        "measures": ("Measures of the experiments", shown("measures")),
+        "measures": ("Measures of the experiments", shown("measures") + _own(tables)),
         "learning": ("Lifetime learning", shown("learning")),
         "speed": ("Speed", speed(tables) + shown("speed")),
         "thesis": ("Findings of the thesis", _thesis(tables) + shown("thesis")),
@@ -150,6 +150,15 @@ def _sections(
         "tables": ("Tables", folded("Files and columns", _contents(tables))),
         "made": ("How this was made", _provenance(command, versions)),
     }
+
+
+def _own(tables: Tables) -> str:
+    """Return a table of what own measures are, by their docstrings."""
+    rows = tables["named_measures"].to_pylist() if "named_measures" in tables else ()
+    lines = {(row["measure"], row["about"]) for row in rows if row["about"]}
+    return table(
+        ("measure", "docstring"), [list(map(cell, one)) for one in sorted(lines)]
+    )
 
 
 def _overview(tables: Tables, courses: str) -> str:

@@ -21,10 +21,10 @@ SEEDS = (7, 2**63 + 1)
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder above ``runs``, which has two finished runs."""
-    top = tmp_path_factory.mktemp("readers")
+    top = tmp_path_factory.mktemp("readers [1] ö")
     for seed in SEEDS:
         details = RunDetails("a/b c", 0, seed, "{}")
-        folder = top / "runs" / str(seed)
+        folder = top / "runs" / f"[ä-{seed}] {{*}} ?"
         with RunFolder(folder, details):
             recorder = Recorder(folder, details)
             for row in records(30):
@@ -67,7 +67,8 @@ def test_every_library_gives_the_same_frame(
     found = as_arrow(frame, schema).sort_by(
         [("seed", "ascending"), ("record", "ascending")]
     )
-    expected = [read_table(runs / "runs" / str(seed), table) for seed in SEEDS]
+    folders = [runs / "runs" / f"[ä-{seed}] {{*}} ?" for seed in SEEDS]
+    expected = [read_table(folder, table) for folder in folders]
     assert found.equals(pa.concat_tables(expected))
     assert found["seed"].unique().to_pylist() == list(SEEDS)
     assert len(found["run_id"].unique()) == len(SEEDS)

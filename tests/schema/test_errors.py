@@ -2,7 +2,14 @@
 
 import pytest
 
-from schema.errors import InvalidRobot, RevolveError, error_text, one_line, rounded, shown
+from schema.errors import (
+    InvalidRobot,
+    RevolveError,
+    error_text,
+    one_line,
+    rounded,
+    shown,
+)
 from schema.limits import LONGEST_REASON
 
 

@@ -134,4 +134,4 @@ def test_until_the_first_tick_the_model_is_built(
     parts = len(spider().parts)
     assert shown[0] == f"building the model of {parts} parts"
     assert shown[1] == "simulated 0.0 of 12 s"
-    assert len(shown) > 100
+    assert len(shown) > 90

@@ -14,6 +14,7 @@ from PIL import Image
 from analysis.comparison.progression import progression
 from analysis.figures.figure_writer import Drawings
 from analysis.measures.outputs import schema
+from analysis.report import page as report_page
 from analysis.report.differences import differences
 from tests.analysis.reported import NOTHING, drawings, page, tables
 
@@ -331,3 +332,15 @@ def test_a_report_without_runs_has_no_empty_sections() -> None:
     reader = read_page(empty)
     assert [link for link in reader.links if link != "#made"] == ["#tables"]
     assert "Left out" not in reader.text
+
+
+def test_docstrings_of_own_measures_are_shown_once() -> None:
+    rows = [
+        {"measure": "flight", "about": "Share of samples in the air <b>[1]</b>."},
+        {"measure": "energy", "about": ""},
+    ]
+    found = report_page._own({"named_measures": pa.Table.from_pylist(2 * rows)})
+    assert found.count("<td>flight</td>") == 1
+    assert "<td>Share of samples in the air &lt;b&gt;[1]&lt;/b&gt;.</td>" in found
+    assert "energy" not in found
+    assert report_page._own({}) == ""

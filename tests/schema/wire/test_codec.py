@@ -210,7 +210,7 @@ def test_report_of_zeros_round_trip() -> None:
 @pytest.mark.parametrize("blank", ["", " \n\t"])
 def test_a_failure_without_reason_is_malformed(blank: str) -> None:
     """The user of a run would read nothing in its table."""
-    with pytest.raises(MalformedMessage, match="^a failure must have a reason$"):
+    with pytest.raises(MalformedMessage, match=r"^a failure must have a reason$"):
         decode_answer(encode_answer(Answer(1, 2, 0.0, blank)))
 
 
