@@ -1,14 +1,16 @@
-"""``revolve robot``: convert and show robot files."""
+"""``revolve robot``: robot files on the command line."""
 
 from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins, add_settings
+from schema.errors import counted
+from schema.experiment.document import Vetting
 from schema.formats.files import types_for, write_robot
 from schema.formats.run_settings import read_with_settings
 from schema.parts import BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import NeuronKinds, neuron_names
-from schema.robot.robot import Robot, size_text
+from schema.robot.robot import Robot
 
 
 def main(arguments: list[str]) -> int:
@@ -25,10 +27,17 @@ def main(arguments: list[str]) -> int:
     """
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
-    robot, settings, _ = read_with_settings(
+    robot, settings, experiment = read_with_settings(
         options.file, options.experiment, options.island
     )
-    if options.command == "convert":
+    if options.command == "check":
+        from analyzer.report import analyze
+
+        vetting = experiment.vetting if experiment else Vetting()
+        why = analyze(robot, types_for(settings)[0], vetting).reason
+        verdict = f"not viable: {why}" if why else "viable"
+        print(f"{options.file}: well formed; {_summary(robot)}; {verdict}")
+    elif options.command == "convert":
         write_robot(robot, options.output, settings)
         print(f"{options.output}: written")
     else:
@@ -40,16 +49,18 @@ def parser(_command: str = "robot") -> Flags:
     """Return the parser of ``revolve robot``."""
     flags = Flags(
         prog="revolve robot",
-        description="Convert or show a robot file. It reads .yaml, .yml, "
+        description="Check, convert or show a robot file. It reads .yaml, .yml, "
         ".pb, .xml (MJCF), and RoboGen's .txt and .json; it writes .yaml, .yml, .pb, "
         ".xml and .urdf.",
         examples=(
+            "revolve robot check best.yaml",
             "revolve robot show runs/scenario1-seed1/best.yaml",
             "revolve robot convert best.yaml best.xml --experiment scenario1",
         ),
     )
     commands = flags.add_subparsers(dest="command", required=True, metavar="ACTION")
     for name, what in (
+        ("check", "check that a file holds a well-formed robot, and vet its body"),
         ("convert", "convert a robot file to another format (.urdf: the body only)"),
         ("show", "show the body and brain of a robot as a tree"),
     ):
@@ -75,6 +86,17 @@ def parser(_command: str = "robot") -> Flags:
         )
         add_plugins(command)
     return flags
+
+
+def _summary(robot: Robot) -> str:
+    brain = robot.brain
+    return (
+        f"{counted(len(robot.parts), 'part')}, "
+        f"{counted(brain.count('input'), 'input')}, "
+        f"{counted(brain.count('output'), 'output')}, "
+        f"{counted(brain.count('hidden'), 'hidden neuron')}, "
+        f"{counted(len(brain.connections), 'connection')}"
+    )
 
 
 def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> None:
@@ -111,5 +133,5 @@ def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> Non
                 source = f"<- {edge.weight:g} × {names[edge.source]}"
                 branch.add(Text(source, style="dim"))
     console = Console()
-    console.print(Text(f"{title}: {size_text(robot)}"))
+    console.print(Text(f"{title}: {_summary(robot)}"))
     console.print(trees[0])

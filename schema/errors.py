@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from schema.limits import LONGEST_REASON, MOST_SHOWN, printable
 
-_NO_MESSAGE = "(no message)"
+NO_MESSAGE = "(no message)"
 """Text of an error without one: an empty reason would mean that nothing failed."""
 
 
@@ -18,7 +18,7 @@ class RevolveError(Exception):
 
     def __str__(self) -> str:
         """Return the message, which is never empty."""
-        return super().__str__().strip() or _NO_MESSAGE
+        return super().__str__().strip() or NO_MESSAGE
 
 
 class ExperimentError(RevolveError):
@@ -117,7 +117,7 @@ def one_line(error: BaseException) -> str:
         text = str(error)
     except Exception as fault:  # noqa: BLE001 - of the code of a user
         return f"(no message: its __str__ raises {type(fault).__name__})"
-    return printable(text, len(text)) or _NO_MESSAGE
+    return printable(text, len(text)) or NO_MESSAGE
 
 
 def error_text(error: BaseException) -> str:

@@ -1,12 +1,18 @@
 """Means over populations of the measures that an experiment names."""
 
+import ast
+import json
 from collections import defaultdict
 
 import numpy as np
 import pyarrow as pa
 
+from analysis.measures.load import Run
 from analysis.measures.population_table import Numbers, individual_ids, rows_of
 from analysis.measures.run_tables import RunTables
+from schema.experiment.bounded import read_bytes
+from schema.limits import LONGEST_NAME, MOST_PLUGIN_BYTES, printable
+from schema.plugins.kept import PLUGINS
 
 _Row = tuple[int, int, str, float, int]
 """Island, births, measure, mean, number of robots."""
@@ -86,3 +92,32 @@ def _on_line(run: RunTables) -> list[_Row]:
     return [
         (*key, float(np.mean(values)), len(robots[key])) for key, values in sums.items()
     ]
+
+
+def with_docstrings(named: pa.Table, run: Run) -> pa.Table:
+    """Return rows of ``named_measures`` with the column ``about``.
+
+    Args:
+        named: the rows.
+        run: whose folder has the sources of its own measures; none is imported.
+    """
+    paths = json.loads(run.document).get("measures", {}).get("names", ())
+    own = {path.rpartition(":")[2]: _first_line(run, path) for path in paths}
+    about = [own.get(name, "") for name in named["measure"].to_pylist()]
+    return named.append_column("about", pa.array(about, pa.string()))
+
+
+def _first_line(run: Run, path: str) -> str:
+    """Return the first line of a function's docstring; empty if it is not known."""
+    module, _, name = path.rpartition(":")
+    file = run.folder.joinpath(PLUGINS, *module.split(".")).with_suffix(".py")
+    try:
+        found = ast.parse(read_bytes(file, MOST_PLUGIN_BYTES)).body
+    except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
+        return ""
+    texts = [
+        ast.get_docstring(each) or ""
+        for each in found
+        if isinstance(each, ast.FunctionDef) and each.name == name
+    ]
+    return printable("".join(texts).partition("\n")[0], LONGEST_NAME)

@@ -234,9 +234,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "measure": "name in measures.names",
         "mean": "mean of judged robots, in the measure's unit",
         "robots": "number of these robots",
-        "unit": "unit of the measure, of an own one as its docstring's first line has "
-        "it in brackets; empty if it is not known",
-        "about": "that line of an own measure",
+        "about": "first line of an own measure's docstring; empty if it is not known",
     },
     "learning": {
         **_RUN,
@@ -325,7 +323,7 @@ _INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "pla
 _TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measure",
           "a", "b", "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "setting", "value", "differs", "function", "fitness_function",
-          "plugins", "unit", "about"}  # fmt: skip
+          "plugins", "about"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

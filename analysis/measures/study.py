@@ -10,9 +10,9 @@ from multiprocessing import active_children, get_context
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.docstrings import with_meanings
 from analysis.measures.load import TABLE, LeftOut, Run, read_duration_s, read_tables
 from analysis.measures.measures import measure
+from analysis.measures.named_measures import with_docstrings
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
@@ -87,7 +87,7 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
         why = f"the run is not finished: {born} of {planned} births are recorded"
         left_out.append(LeftOut(folder, "comparison", why))
     if "named_measures" in found:
-        found["named_measures"] = with_meanings(found["named_measures"], run)
+        found["named_measures"] = with_docstrings(found["named_measures"], run)
     named = {name: _named(found[name], name, run) for name in found}
     named["runs"] = _named(_summary(run, tables, unread), "runs", run)
     if run.point:

@@ -116,9 +116,7 @@ class RobotRenderer:
     def framing(
         self, poses: Sequence[Floats], cut: tuple[float, float]
     ) -> tuple[Floats, float]:
-        """Return where a camera that stands still sees the robot in all of some poses.
-
-        It sees the shadows on level ground, too.
+        """Return where a fixed camera sees a robot and its shadow in some poses.
 
         Args:
             poses: (nq,) each; at least one.

@@ -6,11 +6,10 @@ from analyzer.report import analyze
 from coordinator.evolution.breeding import Breeder
 from schema.agent.flags import Flags, add_count, add_seed
 from schema.errors import counted
-from schema.experiment.document import Experiment, body_space
+from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.formats.files import settings_of, write_robot
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
 
 
 def main(arguments: list[str]) -> int:
@@ -32,7 +31,15 @@ def main(arguments: list[str]) -> int:
     experiment = read_experiment(options.experiment)
     breeder = Breeder(experiment, options.seed, run=0)
     for number in range(options.count):
-        robot = _founder(breeder, number, None if options.unvetted else experiment)
+        attempt, why, is_done = 0, "", False
+        while not is_done:
+            found = breeder.candidate(BirthId(0, number), attempt, (), why=why)
+            assert found is not None
+            attempt, robot = found.attempt + 1, found.robot
+            why = analyze(
+                robot, body_space(experiment.space), experiment.vetting
+            ).reason
+            is_done = options.unvetted or not why
         path: Path = options.file
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")
@@ -40,20 +47,6 @@ def main(arguments: list[str]) -> int:
         parts = counted(len(robot.parts), "part")
         print(f"{path}: {parts}, {counted(len(robot.brain.neurons), 'neuron')}")
     return 0
-
-
-def _founder(breeder: Breeder, number: int, vetting: Experiment | None) -> Robot:
-    """Return the founder of a number; without experiment, the first candidate."""
-    attempt, why = 0, ""
-    while True:
-        found = breeder.candidate(BirthId(0, number), attempt, (), why=why)
-        assert found is not None
-        if vetting is None:
-            return found.robot
-        report = analyze(found.robot, body_space(vetting.space), vetting.vetting)
-        if report.is_viable:
-            return found.robot
-        attempt, why = found.attempt + 1, report.reason
 
 
 def parser(_command: str = "robot random") -> Flags:

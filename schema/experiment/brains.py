@@ -137,14 +137,12 @@ def widths(space: Space) -> Widths:
 
 def with_room(settings: EvaluationSettings, brain: Brain) -> EvaluationSettings:
     """Return settings that hold a brain, also one that their search does not allow."""
-    space = settings.space
-    roomy = replace(
-        space,
-        max_inputs=max(space.max_inputs, brain.count("input")),
-        max_outputs=max(space.max_outputs, brain.count("output")),
-        max_hidden=max(space.max_hidden, brain.count("hidden")),
+    counts = brain.count("input"), brain.count("output"), brain.count("hidden")
+    needed = zip(("max_inputs", "max_outputs", "max_hidden"), counts, strict=True)
+    more = {key: n for key, n in needed if n > getattr(settings.space, key)}
+    return (
+        replace(settings, space=replace(settings.space, **more)) if more else settings
     )
-    return settings if roomy == space else replace(settings, space=roomy)
 
 
 @lru_cache(maxsize=64)

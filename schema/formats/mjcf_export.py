@@ -16,10 +16,7 @@ from schema.robot.robot import Robot
 
 _PAD_M = 0.001
 """Margin of the site of a touch sensor about its box [m]: contacts lie on its faces."""
-_DIGITS = 17
-"""Significant digits that give each number of double precision again."""
 _LONG = re.compile(r"\d+\.\d{8,}(?:e[+-]\d+)?")
-_GAIN = "motor_gain"
 
 
 def add_sensors(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
@@ -52,13 +49,8 @@ def add_sensors(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
 def add_limits(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
     """Add the range of the velocities that motors take, and their gains.
 
-    Gains are the custom numbers ``motor_gain`` [1/s], one for each actuator; 0 is a
-    motor that controls the velocity.
-
-    Args:
-        spec: world of the robot.
-        robot: as built in it.
-        space: its part types.
+    Gains are custom numbers [1/s], one for each actuator; 0 is a motor that controls
+    the velocity. Arguments as of ``add_sensors``.
     """
     gains: list[float] = []
     for servo in spec.actuators:
@@ -69,19 +61,17 @@ def add_limits(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
         gains.append(motor.gain if motor.control == "position" else 0.0)
     if gains:
         numbers = spec.add_numeric()
-        numbers.name, numbers.size, numbers.data = _GAIN, len(gains), gains
+        numbers.name, numbers.size, numbers.data = "motor_gain", len(gains), gains
 
 
 def exact_xml(spec: mujoco.MjSpec) -> str:
-    """Return the XML of a compiled spec with all digits: with six, gaits differ.
-
-    MuJoCo has no public setting for them. The library is that of its own bindings.
-    """
+    """Return the XML of a compiled spec with all digits: with six, gaits differ."""
+    # MuJoCo has no public setting of the digits. Its bindings load this library, too.
     engine = ctypes.CDLL(mujoco._functions.__file__)  # noqa: SLF001
     usual = engine._mjPRIVATE__get_xml_precision()  # noqa: SLF001
-    engine._mjPRIVATE__set_xml_precision(_DIGITS)  # noqa: SLF001
+    engine._mjPRIVATE__set_xml_precision(17)  # noqa: SLF001
     try:
-        # Without digits that say nothing: 0.005, not 0.0050000000000000001.
+        # Short numbers stay short: 0.005, not 0.0050000000000000001.
         return _LONG.sub(lambda found: repr(float(found[0])), spec.to_xml())
     finally:
         engine._mjPRIVATE__set_xml_precision(usual)  # noqa: SLF001
@@ -102,8 +92,7 @@ def portable(root: ET.Element) -> str:
         for name in ("input", "biastype", "biasprm"):
             del servo.attrib[name]
     for numbers in root.iterfind("custom/numeric"):
-        # It follows from the data; readers refuse it, as it reserves memory.
-        del numbers.attrib["size"]
+        del numbers.attrib["size"]  # of the data; refused, as it reserves memory
     return ET.tostring(root, encoding="unicode") + "\n"
 
 

@@ -8,10 +8,7 @@ Source: RoboGen's published sources of 2018, planar bodies as it builds them.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from math import pi
-
-import numpy as np
-from msgspec.structs import replace
+from math import isclose, pi
 
 from schema.errors import InvalidRobot, shown
 from schema.formats.ids import with_ids
@@ -49,8 +46,8 @@ _BAR_NUMBERS = 3
 _ROOT_TURNS = (2, 0, 3, 3)
 """Quarter turns that children inherit, by RoboGen's slot of a square part."""
 _GREY = (0.5, 0.5, 0.5)
-_SINGLE = float(np.finfo(np.float32).eps)
-"""Greatest relative error of a number of single precision."""
+_SINGLE = 2.0**-23
+"""Relative rounding of RoboGen's single precision: its 0.1 m are 100.0000015 mm."""
 
 
 @dataclass(slots=True)
@@ -181,8 +178,7 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
         # RoboGen ignores connections to oscillators.
         if neurons[index[target]].kind != "Oscillator":
             connections.append(Connection(index[source], index[target], weight))
-    parts = tuple(_in_range(part, space) for part in body.parts)
-    robot = Robot(parts, Brain(tuple(neurons), tuple(connections)))
+    robot = Robot(tuple(body.parts), Brain(tuple(neurons), tuple(connections)))
     try:
         check_number(robot)
         check_robot(robot, space)
@@ -243,25 +239,15 @@ def _levelled(part: RobogenPart, inherited: int) -> tuple[int, int]:
 
 
 def _parameters(part: RobogenPart) -> tuple[float, ...]:
-    """Return the parameters of a part in Revolve's units."""
+    """Return the parameters of a part in Revolve's units, in range but for rounding."""
     if part.kind != "ParametricBarJoint":
         return ()
     length_m, alpha, beta = part.parameters
-    return length_m * 1000.0, alpha * pi / 180.0, beta * pi / 180.0
-
-
-def _in_range(part: Part, space: BodySpace) -> Part:
-    """Return a part whose parameters are not beyond their ranges by rounding.
-
-    RoboGen has single precision: its 0.1 m are 100.0000015 mm.
-    """
-    limits = space[part.kind].parameters if part.kind in space else ()
-    near = tuple(
-        min(max(value, limit.low), limit.high)
-        for value, limit in zip(part.parameters, limits, strict=False)
-    )
-    is_near = np.allclose(part.parameters[: len(near)], near, _SINGLE, 0.0)
-    return replace(part, parameters=near) if near and is_near else part
+    values = length_m * 1000.0, alpha * pi / 180.0, beta * pi / 180.0
+    pairs = zip(values, BUILT_IN[part.kind].parameters, strict=False)
+    near = [(value, min(max(value, own.low), own.high)) for value, own in pairs]
+    return tuple(end if isclose(value, end, rel_tol=_SINGLE) else value
+                 for value, end in near)  # fmt: skip
 
 
 def _neurons(

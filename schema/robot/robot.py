@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from msgspec import Struct
 
-from schema.errors import InvalidRobot, counted, shown
+from schema.errors import InvalidRobot, shown
 from schema.limits import MOST_NEURONS, MOST_PARTS
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Brain, NeuronKinds, check_brain, check_neurons
@@ -50,18 +50,6 @@ class Robot:
 
     parts: tuple[Part, ...]
     brain: Brain = NO_BRAIN
-
-
-def size_text(robot: Robot) -> str:
-    """Return the numbers of parts, neurons and connections of a robot in words."""
-    brain = robot.brain
-    return (
-        f"{counted(len(robot.parts), 'part')}, "
-        f"{counted(brain.count('input'), 'input')}, "
-        f"{counted(brain.count('output'), 'output')}, "
-        f"{counted(brain.count('hidden'), 'hidden neuron')}, "
-        f"{counted(len(brain.connections), 'connection')}"
-    )
 
 
 def motor_count(robot: Robot, space: BodySpace) -> int:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from schema.errors import MalformedMessage
+from schema.errors import NO_MESSAGE, MalformedMessage
 from schema.limits import (
     ADVANCE_BYTES,
     ADVANCE_REQUEST_BYTES,
@@ -22,7 +22,7 @@ from schema.wire.arena import (
     Judgement,
     Touch,
 )
-from schema.wire.decoding import parsed, read_reason
+from schema.wire.decoding import parsed
 from schema.wire.messages import (
     birth_from_message,
     birth_to_message,
@@ -242,7 +242,8 @@ def decode_advance_answer(data: bytes, most: int = ADVANCE_BYTES) -> AdvanceAnsw
     if result == "advance":
         advance = advance_from_message(message.advance)
         fallen = tuple(
-            replace(one, reason=read_reason(one.reason)) for one in advance.casualties
+            replace(one, reason=printable(one.reason, LONGEST_REASON) or NO_MESSAGE)
+            for one in advance.casualties
         )
         advance = replace(advance, casualties=fallen)
     return AdvanceAnswer(

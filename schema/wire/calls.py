@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from schema.errors import ExperimentError, MalformedMessage, one_line
+from schema.errors import NO_MESSAGE, ExperimentError, MalformedMessage, one_line
 from schema.experiment.section import Section
 from schema.limits import (
     LONGEST_REASON,
@@ -19,7 +19,7 @@ from schema.limits import (
     printable,
 )
 from schema.wire import revolve_pb2 as pb
-from schema.wire.decoding import parsed, read_reason
+from schema.wire.decoding import parsed
 
 _PLAIN = "None, bool, int, float, str, bytes (of robots: Genome.to_bytes), list or dict"
 _LEAVES = (type(None), bool, int, float, str, bytes)
@@ -183,6 +183,6 @@ def read_call_answer(data: bytes, expected: tuple[int, int]) -> Any:  # noqa: AN
         case "value":
             return unpack_value(message.value)
         case "failure":
-            return Failed(read_reason(message.failure))
+            return Failed(printable(message.failure, LONGEST_REASON) or NO_MESSAGE)
         case _:
             raise MalformedMessage("answer: must be a value or a failure")

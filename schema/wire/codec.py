@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from schema.errors import MalformedMessage
+from schema.errors import NO_MESSAGE, MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.limits import (
     ADVANCE_REQUEST_BYTES,
@@ -25,7 +25,7 @@ from schema.robot.genome import Genome
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb
-from schema.wire.decoding import parsed, read_reason, require_most
+from schema.wire.decoding import parsed, require_most
 from schema.wire.messages import (
     body_from_message,
     body_to_message,
@@ -236,8 +236,8 @@ def decode_answer(data: bytes, pairs: int = _MOST_PAIRS) -> Answer:
         pairs: number of intersections that a report may have.
 
     Raises:
-        MalformedMessage: not an answer's bytes, too many of them, no result, a failure
-            without reason, a number that is not finite, a negative duration.
+        MalformedMessage: not an answer's bytes, too many of them, no result, a number
+            that is not finite, a negative duration.
     """
     message = parsed(data, pb.Answer(), ANSWER_BYTES + pairs * PAIR_BYTES)
     result: Report | Evaluation | str
@@ -251,7 +251,7 @@ def decode_answer(data: bytes, pairs: int = _MOST_PAIRS) -> Answer:
         case "evaluation":
             result = evaluation_from_message(message.evaluation)
         case "failure":
-            result = read_reason(message.failure)
+            result = printable(message.failure, LONGEST_REASON) or NO_MESSAGE
         case _:
             raise MalformedMessage("answer: has no result")
     return Answer(message.epoch, message.number, read_wall_s(message), result)

@@ -16,13 +16,7 @@ from msgspec import Meta, Struct
 from msgspec.msgpack import Decoder
 
 from schema.errors import MalformedMessage
-from schema.limits import (
-    LONGEST_REASON,
-    MOST_FIELDS,
-    MOST_SUBMESSAGES,
-    UNCOUNTED_BYTES,
-    printable,
-)
+from schema.limits import MOST_FIELDS, MOST_SUBMESSAGES, UNCOUNTED_BYTES
 
 T = TypeVar("T")
 M = TypeVar("M", bound=ProtobufMessage)
@@ -47,17 +41,6 @@ class Message(Struct, frozen=True, forbid_unknown_fields=True):
 def fingerprint(data: bytes) -> bytes:
     """Return 8 bytes that identify a request: no other content has them by chance."""
     return blake2b(data, digest_size=8).digest()
-
-
-def read_reason(text: str) -> str:
-    """Return why something failed, cut.
-
-    Raises:
-        MalformedMessage: the text is blank.
-    """
-    if not (reason := printable(text, LONGEST_REASON)):
-        raise MalformedMessage("a failure must have a reason")
-    return reason
 
 
 def unpack(decoder: Decoder[T], data: bytes, most: int) -> T:

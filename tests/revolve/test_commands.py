@@ -164,7 +164,7 @@ def test_commands_start_four_workers_per_core_at_most(
 
 
 def test_actions_are_those_of_the_command() -> None:
-    assert list(actions(parser_of("robot"))) == ["convert", "show"]
+    assert list(actions(parser_of("robot"))) == ["check", "convert", "show"]
     assert actions(parser_of("status")) == {}
 
 

@@ -1,4 +1,4 @@
-"""``revolve robot``: convert and show robot files."""
+"""``revolve robot``: check, convert, show."""
 
 from pathlib import Path
 
@@ -20,12 +20,68 @@ brain:
   connections: [{source: part-0-in-2, target: leg-out-0, weight: 0.25}]
 """
 
+CURL = """\
+body:
+  type: Core
+  children:
+    1: {type: FixedBrick, children: {3: {type: FixedBrick, children: {3: {type:
+      FixedBrick, children: {3: {type: FixedBrick}}}}}}}
+    3: {slot: 0, id: leg, type: ActiveHinge}
+brain: {neurons: [{part: leg, layer: output, type: Simple}]}
+"""
+
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     file = tmp_path / "robot.yaml"
     file.write_text(TEXT)
     return file
+
+
+def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    assert main(["robot", "check", *words]) == 0
+    return capsys.readouterr().out.strip()
+
+
+def test_a_viable_robot(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sizes = "3 parts, 6 inputs, 1 output, 0 hidden neurons, 1 connection"
+    assert said(capsys, str(path)) == f"{path}: well formed; {sizes}; viable"
+
+
+def test_a_body_without_motor_is_not_viable(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path.write_text("body: {type: Core, children: {0: {type: FixedBrick}}}")
+    assert said(capsys, str(path)).endswith("; not viable: no part has a motor")
+
+
+def test_parts_that_intersect_are_named(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Four bricks, each to the same side of the last, meet where they began."""
+    path.write_text(CURL)
+    found = said(capsys, str(path))
+    assert "well formed; 6 parts" in found
+    assert "; not viable: parts " in found
+    assert "(FixedBrick) intersect" in found
+
+
+def test_vetting_is_that_of_the_experiment(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    experiment = path.with_name("mine.toml")
+    vetting = 'mode = "contact"\ntolerance_m = 1.0'
+    experiment.write_text(f'name = "mine"\n[vetting]\n{vetting}')
+    words = (str(path), "--experiment", str(experiment))
+    assert "not viable: parts 1 (ActiveHinge) and 2 " in said(capsys, *words)
+
+
+def test_a_wrong_file_is_refused(path: Path) -> None:
+    path.write_text(TEXT.replace("leg,", "leg, leg: 1,"))
+    with pytest.raises(
+        InvalidRobot, match=r"robot\.yaml:4: part 'leg': leg: no such key"
+    ):
+        main(["robot", "check", str(path)])
 
 
 def test_convert_round_trip(path: Path) -> None:
@@ -127,4 +183,4 @@ def test_part_types_of_an_experiment(
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["robot", "--help"])
-    assert "examples:\n  revolve robot show" in capsys.readouterr().out
+    assert "examples:\n  revolve robot check" in capsys.readouterr().out

@@ -307,15 +307,10 @@ class Cluster:
 
 
 def check_layout() -> None:
-    """Raise before any job if clusters cannot copy the states of this MuJoCo.
-
-    Raises:
-        RevolveError: its arrays have another order.
-    """
-    model = mujoco.MjSpec()
-    model.worldbody.add_body().add_freejoint()
-    model.worldbody.bodies[0].add_geom(size=(1.0, 0.0, 0.0))
-    _live(mujoco.MjData(model.compile()))
+    """Raise ``RevolveError`` if the engine's arrays have another order than needed."""
+    bodies = "<worldbody><body><freejoint/><geom size='1'/></body></worldbody>"
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{bodies}</mujoco>")
+    _live(mujoco.MjData(model))
 
 
 def _live(data: mujoco.MjData) -> tuple[Floats, tuple[int, int, int, int]]:
@@ -324,9 +319,6 @@ def _live(data: mujoco.MjData) -> tuple[Floats, tuple[int, int, int, int]]:
     The engine keeps all its arrays in one block of memory, in an order that minor
     versions may change. To copy everything from the first to the last that is wanted is
     twice as fast as to copy four arrays, although half of it is not wanted.
-
-    Raises:
-        RevolveError: the arrays have another order, or more than one block.
     """
     wanted = data.qpos, data.qvel, data.xpos, data.xmat
     start = data.qpos.ctypes.data

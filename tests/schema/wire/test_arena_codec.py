@@ -130,6 +130,15 @@ def test_answer_round_trip(answer: AdvanceAnswer) -> None:
     assert repr(decode_advance_answer(encode_advance_answer(answer))) == repr(answer)
 
 
+def test_a_death_without_reason_says_so() -> None:
+    mute = Casualty(BirthId(0, 3), 7, " ", (0.0, 0.0, 0.0))
+    advance = Advance(8, b"x" * 32, (), (mute,), (), b"")
+    data = encode_advance_answer(AdvanceAnswer(1, 2, 0.5, advance))
+    found = decode_advance_answer(data).advance
+    assert found is not None
+    assert [one.reason for one in found.casualties] == ["(no message)"]
+
+
 @given(data=st.binary(max_size=64))
 def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
     with suppress(MalformedMessage):

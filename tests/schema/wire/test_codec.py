@@ -208,10 +208,10 @@ def test_report_of_zeros_round_trip() -> None:
 
 
 @pytest.mark.parametrize("blank", ["", " \n\t"])
-def test_a_failure_without_reason_is_malformed(blank: str) -> None:
+def test_a_failure_without_reason_says_so(blank: str) -> None:
     """The user of a run would read nothing in its table."""
-    with pytest.raises(MalformedMessage, match=r"^a failure must have a reason$"):
-        decode_answer(encode_answer(Answer(1, 2, 0.0, blank)))
+    found = decode_answer(encode_answer(Answer(1, 2, 0.0, blank)))
+    assert found.result == "(no message)"
 
 
 @pytest.mark.parametrize(

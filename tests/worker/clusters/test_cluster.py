@@ -8,7 +8,6 @@ import pytest
 
 import worker.__main__
 from schema.errors import RevolveError
-from worker.clusters import cluster
 from worker.clusters.cluster import check_layout
 
 MESSAGE = (
@@ -35,7 +34,7 @@ class Rearranged:
 def use(monkeypatch: pytest.MonkeyPatch, data: Rearranged) -> None:
     """Let the engine make this state of any model."""
     made: Any = lambda _model: data  # noqa: E731
-    monkeypatch.setattr(cluster.mujoco, "MjData", made)
+    monkeypatch.setattr(mujoco, "MjData", made)
 
 
 def test_installed_engine_has_the_order_that_clusters_need() -> None:

@@ -1,0 +1,69 @@
+"""Docstrings of own measures, from the sources that a run keeps."""
+
+import json
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from analysis.measures.load import IslandSettings, Run
+from analysis.measures.named_measures import with_docstrings
+
+SOURCE = '''\
+"""Measures of a lab; importing it would fail."""
+import no_such_module
+
+def flight(trace):
+    """Return the share of samples in the air [1].
+
+    Not of those before the window.
+    """
+
+def speed(trace):
+    "Greatest speed <b>[m/s]</b>."
+
+def bare(trace):
+    return 0.0
+'''
+NAMES = ("flight", "speed", "bare", "gone")
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    (tmp_path / "plugins" / "lab").mkdir(parents=True)
+    (tmp_path / "plugins" / "gaits.py").write_text(SOURCE)
+    (tmp_path / "plugins" / "lab" / "ropes.py").write_text(SOURCE)
+    (tmp_path / "plugins" / "broken.py").write_text("def )(")
+    names = [f"gaits:{name}" for name in NAMES]
+    names += ["height", "broken:none", "installed:far"]
+    document = json.dumps({"measures": {"names": names}})
+    islands = (IslandSettings(30, is_online=False, records_touches=False),)
+    return Run(tmp_path, "a", 0, 1, "finished", document, islands)
+
+
+def described(run: Run, *names: str) -> dict[str, str]:
+    rows = with_docstrings(pa.table({"measure": list(names)}), run).to_pylist()
+    return {row["measure"]: row["about"] for row in rows}
+
+
+def test_first_lines_of_docstrings(run: Run) -> None:
+    assert described(run, *NAMES) == {
+        "flight": "Return the share of samples in the air [1].",
+        "speed": "Greatest speed <b>[m/s]</b>.",
+        "bare": "",
+        "gone": "",
+    }
+
+
+def test_modules_of_a_package(run: Run) -> None:
+    document = json.dumps({"measures": {"names": ["lab.ropes:flight"]}})
+    packed = Run(run.folder, "a", 0, 1, "finished", document, run.islands)
+    found = described(packed, "flight", "turning")
+    assert found == {
+        "flight": "Return the share of samples in the air [1].",
+        "turning": "",
+    }
+
+
+def test_sources_that_cannot_be_read_give_nothing(run: Run) -> None:
+    assert described(run, "none", "far") == {"none": "", "far": ""}
