@@ -91,7 +91,7 @@ class Run:
         islands: settings of each island.
         differs: settings that differ from other runs of the same experiment name, or
             from those of the first experiment.
-        has_measures: the experiment names measures of robots.
+        measures: of robots, as the experiment names them.
         function: fitness function; empty if the document does not name one.
         fitness: fitness functions as ``fitness_text``, with digests of their sources.
         plugins: digest of the source of each plug-in, by module; "unknown" for runs
@@ -107,7 +107,7 @@ class Run:
     document: str
     islands: tuple[IslandSettings, ...]
     differs: str = ""
-    has_measures: bool = False
+    measures: tuple[str, ...] = ()
     function: str = ""
     fitness: str = ""
     plugins: Mapping[str, str] = field(default_factory=dict)
@@ -206,7 +206,7 @@ def read_run(folder: Path) -> Run:
         document = json.loads(details["document"])
         islands = tuple(_settings(document))
         name, number, seed = details["name"], details["run"], details["seed"]
-        has_measures = bool(document.get("measures", {}).get("names"))
+        measures = tuple(map(str, document.get("measures", {}).get("names") or ()))
         function = str(document.get("fitness", {}).get("function", ""))
         plugins = _plugins(details)
         fitness = fitness_text(document, plugins)
@@ -224,7 +224,7 @@ def read_run(folder: Path) -> Run:
         state=_state(folder, details),
         document=str(details["document"]),
         islands=islands,
-        has_measures=has_measures,
+        measures=measures,
         function=function,
         fitness=fitness,
         plugins=plugins,

@@ -1,7 +1,6 @@
 """Means over populations of the measures that an experiment names."""
 
 import ast
-import json
 from collections import defaultdict
 
 import numpy as np
@@ -13,6 +12,7 @@ from analysis.measures.run_tables import RunTables
 from schema.experiment.bounded import read_bytes
 from schema.limits import LONGEST_NAME, MOST_PLUGIN_BYTES, printable
 from schema.plugins.kept import PLUGINS
+from schema.plugins.source import PATH
 
 _Row = tuple[int, int, str, float, int]
 """Island, births, measure, mean, number of robots."""
@@ -101,7 +101,7 @@ def with_docstrings(named: pa.Table, run: Run) -> pa.Table:
         named: the rows.
         run: whose folder has the sources of its own measures; none is imported.
     """
-    paths = json.loads(run.document).get("measures", {}).get("names", ())
+    paths = filter(PATH.fullmatch, run.measures)
     own = {path.rpartition(":")[2]: _first_line(run, path) for path in paths}
     about = [own.get(name, "") for name in named["measure"].to_pylist()]
     return named.append_column("about", pa.array(about, pa.string()))

@@ -121,7 +121,7 @@ def _wanted(run: Run) -> frozenset[str]:
         wanted.add("interactions")
     if len(run.islands) > 1:
         wanted |= {"between", "migrants"}
-    if run.has_measures:
+    if run.measures:
         wanted.add("named_measures")
     if any(island.learns for island in run.islands):
         wanted |= {"learning", "learning_curves"}

@@ -30,15 +30,14 @@ def main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
     breeder = Breeder(experiment, options.seed, run=0)
+    space, vetting = body_space(experiment.space), experiment.vetting
     for number in range(options.count):
         attempt, why, is_done = 0, "", False
         while not is_done:
             found = breeder.candidate(BirthId(0, number), attempt, (), why=why)
             assert found is not None
             attempt, robot = found.attempt + 1, found.robot
-            why = analyze(
-                robot, body_space(experiment.space), experiment.vetting
-            ).reason
+            why = analyze(robot, space, vetting).reason
             is_done = options.unvetted or not why
         path: Path = options.file
         if options.count > 1:

@@ -140,9 +140,9 @@ def with_room(settings: EvaluationSettings, brain: Brain) -> EvaluationSettings:
     counts = brain.count("input"), brain.count("output"), brain.count("hidden")
     needed = zip(("max_inputs", "max_outputs", "max_hidden"), counts, strict=True)
     more = {key: n for key, n in needed if n > getattr(settings.space, key)}
-    return (
-        replace(settings, space=replace(settings.space, **more)) if more else settings
-    )
+    if not more:
+        return settings
+    return replace(settings, space=replace(settings.space, **more))
 
 
 @lru_cache(maxsize=64)

@@ -22,7 +22,7 @@ from schema.plugins.permission import (
     source_of,
 )
 
-_PATH = re.compile(r"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+PATH = re.compile(r"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 _PARAMETERS = re.compile(r"(?:.*[._])?parameters(?:\..*)?", re.DOTALL)
 """Keys of parameters of plug-ins, those of a sweep included."""
 _DIGITS = 12
@@ -52,7 +52,7 @@ def modules_named(document: bytes) -> list[str]:
     Raises:
         ValueError: the document is not JSON.
     """
-    found = (_PATH.fullmatch(text) for text in _texts(json.loads(document)))
+    found = (PATH.fullmatch(text) for text in _texts(json.loads(document)))
     return sorted({each[1] for each in found if each}.difference(ROOMS))
 
 

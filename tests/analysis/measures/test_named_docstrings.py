@@ -1,6 +1,5 @@
 """Docstrings of own measures, from the sources that a run keeps."""
 
-import json
 from pathlib import Path
 
 import pyarrow as pa
@@ -36,9 +35,12 @@ def run(tmp_path: Path) -> Run:
     (tmp_path / "plugins" / "broken.py").write_text("def )(")
     names = [f"gaits:{name}" for name in NAMES]
     names += ["height", "broken:none", "installed:far"]
-    document = json.dumps({"measures": {"names": names}})
+    return run_of(tmp_path, names)
+
+
+def run_of(folder: Path, names: list[str]) -> Run:
     islands = (IslandSettings(30, is_online=False, records_touches=False),)
-    return Run(tmp_path, "a", 0, 1, "finished", document, islands)
+    return Run(folder, "a", 0, 1, "finished", "{}", islands, measures=tuple(names))
 
 
 def described(run: Run, *names: str) -> dict[str, str]:
@@ -56,9 +58,7 @@ def test_first_lines_of_docstrings(run: Run) -> None:
 
 
 def test_modules_of_a_package(run: Run) -> None:
-    document = json.dumps({"measures": {"names": ["lab.ropes:flight"]}})
-    packed = Run(run.folder, "a", 0, 1, "finished", document, run.islands)
-    found = described(packed, "flight", "turning")
+    found = described(run_of(run.folder, ["lab.ropes:flight"]), "flight", "turning")
     assert found == {
         "flight": "Return the share of samples in the air [1].",
         "turning": "",
@@ -67,3 +67,10 @@ def test_modules_of_a_package(run: Run) -> None:
 
 def test_sources_that_cannot_be_read_give_nothing(run: Run) -> None:
     assert described(run, "none", "far") == {"none": "", "far": ""}
+
+
+@pytest.mark.parametrize("name", ["{0}/plugins/gaits:flight", ":flight", "a..b:flight"])
+def test_only_modules_of_the_run_are_read(run: Run, name: str) -> None:
+    """A run folder may be somebody else's."""
+    hostile = run_of(run.folder / "other", [name.format(run.folder)])
+    assert described(hostile, "flight") == {"flight": ""}
