@@ -8,7 +8,6 @@ annotation it gets the experiment's fitness section.
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 from schema.errors import FitnessUndefined, error_text
 from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
-from schema.plugins.simple_traces import check_function, simple_traces
+from schema.plugins.simple_traces import check_function
 from schema.robot.sums import sum_in_order
 from schema.robot.trace import Trace
 
@@ -139,22 +138,3 @@ def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
     """
     argument = fitness_argument(function, fitness)
     check_function(function, (argument,), "fitness.function")
-
-
-def advise_fitness(function: FitnessFunction, fitness: Fitness) -> str:
-    """Return a warning if a function is negative on a simple trace, or nothing.
-
-    Args:
-        function: a function that ``check_fitness`` accepts.
-        fitness: the experiment's section.
-    """
-    argument = fitness_argument(function, fitness)
-    for name, trace in simple_traces(function).items():
-        with suppress(Exception):  # a function may raise for some of the traces
-            if (value := function(trace, argument)) < 0.0:
-                return (
-                    f"returned {value:.3g} for a {name} trace, but a failed evaluation "
-                    "counts as 0, more than any negative fitness: keep fitness >= 0, "
-                    "or return a low number instead of raising"
-                )
-    return ""

@@ -7,7 +7,7 @@ import worker.fitness
 from schema.experiment.document import Experiment, Fitness, Measures
 from schema.experiment.kinds import Kind, Use
 from schema.experiment.settings import FITNESS, fitness_function
-from worker.fitness import advise_fitness, check_fitness
+from worker.fitness import check_fitness
 from worker.measures.functions import BUILT_IN, check_measure, measures_of
 
 
@@ -18,7 +18,6 @@ def fitness_use(fitness: Fitness) -> Use:
         fitness.function,
         lambda: fitness_function(fitness),
         lambda function: check_fitness(function, fitness),
-        lambda function: advise_fitness(function, fitness),
     )
 
 

@@ -22,8 +22,8 @@ def _trials(run: RunTables) -> tuple[Numbers, Integers]:
     """Return the best fitness after each trial, and the births row of each robot.
 
     Returns:
-        (R, T) with a failed trial as 0 if none before succeeded, NaN behind a robot's
-        last trial; and (R,) rows.
+        (R, T) with a failed trial as 0, or the least fitness below 0, if none before
+        succeeded, NaN behind a robot's last trial; and (R,) rows.
     """
     table = run.tables["learning"].sort_by(
         [("island", "ascending"), ("birth", "ascending"), ("trial", "ascending")]
@@ -37,7 +37,8 @@ def _trials(run: RunTables) -> tuple[Numbers, Integers]:
     tried = np.zeros(best.shape, np.bool_)
     tried[places, trials] = True
     best = np.fmax.accumulate(best, axis=1)
-    best = np.where(tried, np.nan_to_num(best, nan=0.0), np.nan)
+    least = np.nanmin(best, initial=0.0)
+    best = np.where(tried, np.nan_to_num(best, nan=least), np.nan)
     return best, robots
 
 

@@ -103,7 +103,8 @@ def _evaluated(run: RunTables) -> tuple[Numbers, Integers, Booleans, Booleans]:
         order = np.lexsort((-homes, is_native, greatness, rows))
         order = order[rows[order] >= 0]
         last = order[is_last_of_each(rows[order])]
-        fitness[rows[last]] = np.nan_to_num(values[last], nan=0.0)
+        least = np.nanmin(values, initial=0.0)
+        fitness[rows[last]] = np.nan_to_num(values[last], nan=least)
         islands[rows[last]] = homes[last]
 
     def take_table(rows: pa.Table) -> None:
@@ -131,7 +132,7 @@ def _evaluations(run: RunTables) -> pa.Table:
     """Return the last evaluation of each individual on each island that it lives on.
 
     Natives of an island on which the mean of their evaluations counts have that mean,
-    in which a failed evaluation is 0.
+    in which a failed evaluation counts as in selection.
     """
     every = run.tables["evaluations"]
     last = last_there(every, np.arange(every.num_rows))
@@ -148,7 +149,10 @@ def _evaluations(run: RunTables) -> pa.Table:
     _, rows, counts = np.unique(
         residence_ids(every), return_inverse=True, return_counts=True
     )
-    means = np.bincount(rows, np.nan_to_num(values)) / counts
+    least = np.zeros(len(counts))
+    np.fmin.at(least, rows, values)
+    counted = np.where(np.isnan(values), least[rows], values)
+    means = np.bincount(rows, counted) / counts
     succeeded = np.bincount(rows, ~np.isnan(values)) > 0
     is_native = islands == np.asarray(last["birth_island"], np.int64)
     is_averaged = is_native & np.isin(islands, averaged) & succeeded

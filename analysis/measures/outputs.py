@@ -159,7 +159,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "arena it can be greater than the last",
         "births": "births on its island up to its own; in an arena the founders are "
         "born in descending order of their numbers",
-        "is_failed": "whether all its evaluations failed, which counts as fitness 0",
+        "is_failed": "whether all its evaluations failed, which counts as 0, or as "
+        "the least fitness below 0",
     },
     "extremities": {
         **_RUN,
@@ -240,7 +241,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         **_RUN,
         **_ROBOT,
         "trials": "number of brains that the robot tried",
-        "at_birth": "fitness with the brain at birth; 0 if that trial failed",
+        "at_birth": "fitness with the brain at birth; if that trial failed 0, or the "
+        "least fitness below 0",
         "fitness": "fitness with the best brain",
         "gain": "fitness minus at_birth",
         "kept": "whether it is in the first population recorded after its birth, in an "
@@ -254,7 +256,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "trial": "number of the trial, 0 is the brain at birth",
         "robots": "number of robots with such a trial",
         "median": "median over these robots of the best fitness so far; failed trials "
-        "count 0",
+        "count as at_birth",
         "low": "lower quartile",
         "high": "upper quartile",
     },

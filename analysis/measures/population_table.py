@@ -154,21 +154,23 @@ def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:
     Args:
         population: ``island``, ``births``, ``birth_island`` and ``birth`` (id of the
             individual), ``fitness``, ``is_online``. Off-line a null fitness means that
-            the evaluation failed, and counts as 0, as in selection; on-line it means
-            that the robot is not mature, and does not count.
+            the evaluation failed, and counts as ``failed_fitness``, as in selection;
+            on-line it means that the robot is not mature, and does not count.
         births: births of the same run: ``island``, ``birth``.
     """
     islands = np.asarray(population["island"], np.int64)
     numbers = np.asarray(population["births"], np.int64)
     fitness = np.asarray(population["fitness"].to_numpy(), np.float64)
     is_failed = np.isnan(fitness) & ~np.asarray(population["is_online"], np.bool_)
-    fitness = np.where(is_failed, 0.0, fitness)
     members = rows_of(individual_ids(population), births)
     order = np.lexsort((numbers, islands))
     islands, numbers, members = islands[order], numbers[order], members[order]
     is_first = np.ones(len(order), np.bool_)
     is_first[1:] = (islands[1:] != islands[:-1]) | (numbers[1:] != numbers[:-1])
     group = np.cumsum(is_first) - 1
+    fitness, least = fitness[order], np.zeros(group.max(initial=-1) + 1)
+    np.fmin.at(least, group, fitness)
+    fitness = np.where(is_failed[order], least[group], fitness)
     incomplete = np.unique(group[members < 0])
     kept = ~np.isin(group, incomplete)
     islands, numbers, members = islands[kept], numbers[kept], members[kept]
@@ -178,6 +180,6 @@ def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:
         numbers[firsts],
         np.append(firsts, len(members)),
         members,
-        fitness[order][kept],
+        fitness[kept],
         len(incomplete),
     )

@@ -31,7 +31,7 @@ from schema.tables.files import born_as, read_table
 from schema.tables.last_populations import Row, best_of, last_populations
 from schema.tables.learnt import learnt_births
 from schema.wire.born import robot_of_birth
-from schema.wire.updates import individual
+from schema.wire.updates import individual, read_levels
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +136,7 @@ def _results(run: RunSession) -> list[str]:
     last = last_populations(folder)
     best = best_of(last)
     if best is None:
-        none = f"{births}; no robot of the last population has a fitness"
-        return [none, *_counted_as_zero(run, last)]
+        return [f"{births}; no robot of the last population has a fitness"]
     means = _means(run, last)
     mean = f"mean fitness of the last population {rounded(fmean(means))}"
     if len(means) > 1:
@@ -146,7 +145,7 @@ def _results(run: RunSession) -> list[str]:
         f"{births}; {mean}",
         *_best_robot(run, best),
     ]
-    lines[1:1] = [*_counted_as_zero(run, last), *judged_apart(run.experiment)]
+    lines[1:1] = judged_apart(run.experiment)
     arenas = [one.experiment for one in islands.values() if isinstance(one, Arena)]
     if arenas:
         lines[-1:-1] = _windows(folder, arenas)
@@ -156,29 +155,11 @@ def _results(run: RunSession) -> list[str]:
 def _means(run: RunSession, last: Sequence[Row]) -> list[float]:
     """Return the mean fitness of each island, as analyses compute it.
 
-    Failed evaluations count as 0. Robots of arenas without a fitness do not count.
+    Failed evaluations count. Robots of arenas without a fitness do not.
     """
-    fitness: dict[int, list[float]] = {}
-    for row in last:
-        is_online = isinstance(run.loop.islands[row["island"]], Arena)
-        if not (is_online and row["fitness"] is None):
-            fitness.setdefault(row["island"], []).append(row["fitness"] or 0.0)
-    return [fmean(each) for each in fitness.values()]
-
-
-def _counted_as_zero(run: RunSession, last: Sequence[Row]) -> list[str]:
-    """Return a line about failed robots that win over others, or are the only ones."""
-    # Robots of an arena without a fitness are young, not failed.
-    off_line = [
-        row for row in last if not isinstance(run.loop.islands[row["island"]], Arena)
-    ]
-    fitness = [row["fitness"] for row in off_line if row["fitness"] is not None]
-    failed, worse = len(off_line) - len(fitness), sum(each < 0.0 for each in fitness)
-    if not failed or (fitness and not worse):
-        return []
-    line = f"{failed} of {len(off_line)} robots of the last population failed: "
-    line += "selection counts them as fitness 0"
-    return [f"{line}, more than the {worse} negative ones" if worse else line]
+    islands = run.loop.islands.items()
+    arenas = {number for number, one in islands if isinstance(one, Arena)}
+    return [each.mean for each in read_levels(last, arenas) if each.judged]
 
 
 def judged_apart(experiment: Experiment) -> list[str]:

@@ -4,7 +4,7 @@ Every candidate is a pure function of seed, run, birth, attempt and population.
 Attempts are numbered through all couples of a birth, so that each has its own stream.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -23,7 +23,7 @@ from coordinator.evolution.selection import (
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation
+from schema.robot.results import Evaluation, failed_fitness
 from schema.robot.robot import Robot
 
 NO_MEASURES: Mapping[str, float] = MappingProxyType({})
@@ -38,7 +38,8 @@ class Individual:
     Attributes:
         birth: its id.
         genome: what its children inherit, of the type that the encoding uses.
-        fitness: always maximised; 0 where its evaluation failed.
+        fitness: always maximised; where its evaluation failed 0, or the least of its
+            population below 0.
         rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
         generation: number of its brood; founders are 0; None on-line.
         has_failed: its evaluation ended without a fitness.
@@ -96,6 +97,15 @@ def at_birth(birth: BirthId) -> Iterator[None]:
     except ExperimentError as error:
         where = f"birth {birth.number} of island {birth.island}"
         raise type(error)(f"{where}: {error}") from error
+
+
+def failed_last(individuals: Iterable[Individual]) -> list[Individual]:
+    """Return individuals of which the failed ones are no fitter than the others."""
+    given = list(individuals)
+    least = failed_fitness(one.fitness for one in given)
+    if least == 0.0:
+        return given
+    return [replace(one, fitness=least) if one.has_failed else one for one in given]
 
 
 Couple = tuple[Individual, Individual]
@@ -261,6 +271,8 @@ class Breeder:
             ExperimentError: the selection of survivors fails.
         """
         selection = self._experiment.selection
+        judged = failed_last([*parents, *children])
+        parents, children = judged[: len(parents)], judged[len(parents) :]
         if selection.culling is not None:
             founders = selection.population
             return cull_population(parents, children, founders, selection.culling)

@@ -274,7 +274,8 @@ def cull_population(
 def select_culled(mature: Sequence[S], rules: Arena | Culling) -> tuple[str, list[S]]:
     """Return the robots to cull and the reason, the least fit first.
 
-    Robots below a share of the mean fitness are culled ("selection"). If there are
+    Robots below a share of the mean fitness are culled ("selection"). The limit is as
+    far below a negative mean as it would be below a positive one. If there are
     none, and the mature alone reach the population limit, a share of the limit is
     culled ("cull"). At least ``population_floor`` of the mature remain. The original
     did not sort the list first.
@@ -288,7 +289,8 @@ def select_culled(mature: Sequence[S], rules: Arena | Culling) -> tuple[str, lis
     if not weakest:
         return "selection", []
     mean = fsum(one.fitness for one in weakest) / len(weakest)
-    limit = rules.survive_share_of_mean * mean
+    share = rules.survive_share_of_mean
+    limit = mean - (1.0 - share) * abs(mean) if mean < 0.0 else share * mean
     below = [one for one in weakest if one.fitness < limit]
     if below or len(weakest) < rules.population_limit:
         return "selection", below[:spare]

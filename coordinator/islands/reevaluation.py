@@ -25,6 +25,7 @@ from coordinator.islands.rows import evaluation_record
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, Simulation, steps_of
 from schema.robot.ids import BirthId
+from schema.robot.results import failed_fitness
 
 
 def with_durations(
@@ -135,7 +136,9 @@ class Reevaluations:
             trials = trials[-1:]
         if all(each is None for each in trials):
             return evaluated
-        fitness = fsum(each or 0.0 for each in trials) / len(trials)
+        failed = failed_fitness(each for each in trials if each is not None)
+        fitness = fsum(failed if each is None else each for each in trials)
+        fitness /= len(trials)
         return replace(evaluated, fitness=fitness, has_failed=False)
 
     def _last_evaluation(self, individual: Individual) -> tuple[int, BirthId]:

@@ -472,7 +472,10 @@ class Selectable(Protocol):
 
     @property
     def fitness(self) -> float:
-        """Fitness, always maximised; 0 where its evaluation failed."""
+        """Fitness, always maximised.
+
+        Where its evaluation failed, it is 0, or the least of the population below 0.
+        """
         ...
 
     @property

@@ -1,5 +1,6 @@
 """Results of vetting and evaluating a robot."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,15 @@ class Provenance:
     agent: str = ""
     platform: str = ""
     wall_s: float = 0.0
+
+
+def failed_fitness(others: Iterable[float]) -> float:
+    """Return what a failed evaluation counts as: 0, or the least of others below 0.
+
+    Args:
+        others: fitness that it is compared with.
+    """
+    return min((0.0, *others))
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from msgspec.msgpack import Decoder, encode
 from schema.experiment.section import Count
 from schema.limits import PAGE_BYTES, UPDATE_BYTES
 from schema.robot.ids import BirthId, IslandNumber
+from schema.robot.results import failed_fitness
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode_body, encode_body
 from schema.wire.decoding import Finite, Message, unpack
@@ -67,7 +68,7 @@ class Level(Message, frozen=True):
         births: number of births on the island so far.
         size: number of living individuals.
         judged: number of living individuals whose fitness counts: in an arena that of
-            mature robots, off-line that of all, 0 of a failed evaluation.
+            mature robots, off-line that of all; failures count as ``failed_fitness``.
         mean, best: fitness of those; 0 if there is none.
         members: living individuals, ascending; given for the newest level of an
             island only.
@@ -262,7 +263,8 @@ def _level(
     island: int, births: int, rows: Sequence[Mapping[str, Any]], *, is_online: bool
 ) -> Level:
     known = [row["fitness"] for row in rows if row["fitness"] is not None]
-    fitness = known if is_online else known + [0.0] * (len(rows) - len(known))
+    failed = 0 if is_online else len(rows) - len(known)
+    fitness = known + [failed_fitness(known)] * failed
     return Level(
         island=island,
         births=births,

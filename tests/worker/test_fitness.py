@@ -13,7 +13,6 @@ from schema.robot.results import Track
 from schema.robot.trace import Trace
 from worker.fitness import (
     FitnessFunction,
-    advise_fitness,
     check_fitness,
     finite_value,
     path_velocity,
@@ -157,17 +156,6 @@ def test_the_reason_of_a_failure_is_one_line() -> None:
     message = "^own raised ValueError: two lines$"
     with pytest.raises(FitnessUndefined, match=message):
         finite_value("own", raises, None)
-
-
-def test_a_negative_fitness_is_advised_against() -> None:
-    def loses(trace: Trace, _fitness: Fitness) -> float:
-        return -2.5 if trace.core_position[-1, 0] == 0.6 else 0.0
-
-    advice = advise_fitness(loses, WEIGHTS)
-    assert advice.startswith("returned -2.5 for a straight trace, but a failed")
-    assert advise_fitness(thesis, WEIGHTS) == ""
-    # A function that raises for all traces is refused by its check.
-    assert advise_fitness(_always_raises, WEIGHTS) == ""
 
 
 def test_function_may_raise_for_some_traces() -> None:

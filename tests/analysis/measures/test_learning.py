@@ -50,7 +50,7 @@ def test_gain_and_bodies_saved_by_hand() -> None:
         (0, 3, 0.5, 1.0, 0.5, None, None),
         (1, 3, 2.0, 2.0, 0.0, None, None),
         (2, 3, 1.5, 5.0, 3.5, True, True),
-        (3, 3, 0.0, -1.0, -1.0, False, False),
+        (3, 3, -1.0, -1.0, 0.0, False, False),
         (4, 3, 2.5, 3.0, 0.5, True, False),
     ]
     names = ("birth", "trials", "at_birth", "fitness", "gain", "kept", "saved")
@@ -60,7 +60,7 @@ def test_gain_and_bodies_saved_by_hand() -> None:
 
 
 def test_learning_curves_by_hand() -> None:
-    """After trial 1: 1, 2, 4, 0 (all failed) and 3."""
+    """After trial 1: 1, 2, 4, -1 (both failed) and 3."""
     found = learning_curves(TABLES).to_pylist()
     assert [row["robots"] for row in found] == [5, 5, 5]
     assert [row["median"] for row in found] == [1.5, 2.0, 2.0]

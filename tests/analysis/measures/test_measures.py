@@ -241,6 +241,28 @@ def test_robots_have_their_last_fitness() -> None:
     assert found["is_failed"].to_pylist() == [False, True, False]
 
 
+def test_a_failure_counts_as_the_least_fitness_below_0() -> None:
+    evaluations = [
+        {"birth": 0, "fitness": -0.2},
+        {"birth": 1, "fitness": None},
+        {"birth": 2, "fitness": 0.3},
+        {"birth": 3, "trial": 0, "fitness": -0.6},
+        {"birth": 3, "trial": 1, "fitness": None},
+    ]
+    tables = run(
+        births=FAMILY,
+        population=population((0, 3, {A: -0.2, B: None}), (0, 4, {A: 0.5, B: None})),
+        evaluations=table("evaluations", evaluations),
+    )
+    assert column(tables, "fitness") == [-0.2, 0.25]
+    assert column(tables, "fitness_best") == [-0.2, 0.5]
+    settings = IslandSettings(5, is_online=False, records_touches=False)
+    islands = (replace(settings, reevaluation="mean"),)
+    fitness = robots(RunTables(tables, islands=islands))["fitness"].to_pylist()
+    # A and B as in their last population, D with the mean of -0.6 and -0.6.
+    assert fitness == [0.5, 0.0, 0.3, -0.6]
+
+
 @pytest.mark.parametrize(
     ("rule", "expected"),
     [("replace", [0.3, 0.4, 0.0, 0.5, 0.3]), ("mean", [0.2, 0.2, 0.0, 0.5, 0.3])],

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from coordinator.evolution.breeding import Breeder, Individual
+from coordinator.evolution.breeding import Breeder, Individual, failed_last
 from schema.errors import ExperimentError
 from schema.experiment.document import Culling, Experiment, Selection, Space
 from schema.robot.genome import NeuronGene, Node
@@ -134,3 +134,46 @@ def test_a_selection_function_cannot_change_measures(found: Evaluation | None) -
     assert one.measures == ({} if found is None else {"height": 2.0})
     with pytest.raises(TypeError, match="item assignment"):
         one.measures["height"] = 1.0
+
+
+def judged(*fitness: float | None) -> list[Individual]:
+    """Return individuals with a fitness, or with a failed evaluation for None."""
+    return [
+        replace(each, fitness=value or 0.0, has_failed=value is None)
+        for each, value in zip(founders(len(fitness)), fitness, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("parents", "children", "alive"),
+    [
+        # A failed robot is no fitter than the least fit one; of equals the elder lives.
+        ([-2.0, None], [-1.0, None], [0, 2]),
+        ([-2.0, None], [-1.0, -3.0], [0, 2]),
+        ([None, -0.5], [0.5, -1.0], [1, 2]),
+        # Without a negative fitness it counts as 0.
+        ([None, 0.0], [0.0, 0.5], [0, 3]),
+    ],
+)
+def test_a_failed_robot_is_no_fitter_than_a_negative_fitness(
+    parents: list[float | None], children: list[float | None], alive: list[int]
+) -> None:
+    both = judged(*parents, *children)
+    found = breeder(population=2, parents="random").survivors(both[:2], both[2:])
+    assert [one.birth.number for one in found] == alive
+
+
+def test_failed_robots_are_culled_with_the_worst() -> None:
+    # Mean -1.75, limit -2.275.
+    both = judged(None, -1.0, -1.0, -1.0, -1.0, -1.0, -4.0)
+    culling = Culling(interval=1, population_floor=4, population_limit=20)
+    own = breeder(population=6, parents="random", culling=culling)
+    assert [one.birth.number for one in own.survivors(both[:6], both[6:])] == [
+        *range(1, 6)
+    ]
+
+
+def test_fitness_is_not_changed_where_none_is_negative() -> None:
+    members = judged(None, 0.0, 0.5)
+    assert all(a is b for a, b in zip(failed_last(members), members, strict=True))
+    assert [one.known_fitness for one in failed_last(judged(None, -1.0))] == [None, -1]

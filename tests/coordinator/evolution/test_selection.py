@@ -136,6 +136,31 @@ def test_fitness_equal_to_the_share_of_the_mean_survives() -> None:
     assert culled(fitness, survive_share_of_mean=0.5) == ("selection", [1])
 
 
+def test_the_limit_lies_below_a_negative_mean() -> None:
+    # Mean -1.0, limit -1.0 - 0.3 * 1.0 = -1.3: that is enough, a little less is not.
+    fitness = [-1.3, -1.3001, -0.3999, *([-1.0] * 9)]
+    assert culled(fitness) == ("selection", [1])
+    assert culled([-1.0] * 29) == ("selection", [])
+    assert culled([0.0] * 29) == ("selection", [])
+    # A share above 1 spares only what is better than the mean, of either sign.
+    for mean in (-1.0, 1.0):
+        few = [mean + 0.3, mean - 0.3, *([mean] * 8)]
+        assert 0 not in culled(few, survive_share_of_mean=1.2, population_floor=1)[1]
+        assert len(culled(few, survive_share_of_mean=1.2, population_floor=1)[1]) == 9
+
+
+def test_the_limit_of_other_means_is_share_times_mean_to_the_last_bit() -> None:
+    # 0.7 * 0.1 = 0.06999999999999999, but 0.1 - 0.3 * 0.1 = 0.07.
+    limit = 0.7 * 0.1
+    assert culled([limit, 0.2 - limit, *([0.1] * 8)]) == ("selection", [])
+
+
+def test_off_line_culling_keeps_equals_of_a_negative_fitness() -> None:
+    living = individuals(*([-1.0] * 17))
+    rules = Culling(interval=1)
+    assert after_culling(rules, living[:16], living[16:]) == list(range(17))
+
+
 def test_the_weakest_are_culled_down_to_the_floor() -> None:
     fitness = [0.03, 0.01, 0.02, *([1.0] * 7)]
     assert culled(fitness) == ("selection", [1, 2])

@@ -153,13 +153,19 @@ def test_the_new_fitness_replaces_the_old_or_joins_the_mean(
 
 
 @pytest.mark.parametrize(
-    ("rule", "value", "has_failed"), [("replace", 0.0, True), ("mean", 0.25, False)]
+    ("rule", "before", "value", "has_failed"),
+    [
+        ("replace", 0.5, 0.0, True),
+        ("mean", 0.5, 0.25, False),
+        # Not above the fitness of the trial that succeeded.
+        ("mean", -0.5, -0.5, False),
+    ],
 )
-def test_a_failed_trial_counts_as_zero(
-    rule: str, value: float, *, has_failed: bool
+def test_a_failed_trial_counts_as_zero_or_as_the_least_below(
+    rule: str, before: float, value: float, *, has_failed: bool
 ) -> None:
     found = reevaluations(fitness=rule)
-    population = (one(0, 0.5), one(5, 0.7))
+    population = (one(0, before), one(5, 0.7))
     found.start(9, population)
     found.take(EvaluationFailed(BirthId(0, 0), "diverged", Provenance(), 1))
     (first, second), (record,) = found.conclude(population)

@@ -118,3 +118,6 @@ def test_level_counts_failed_robots_off_line_and_no_immature_ones_of_arenas() ->
         Level(0, 2, 2, 2, 0.25, 0.5, two),
         Level(0, 3, 3, 3, 1 / 3, 0.75, three),
     ]
+    # It counts as the least fitness below 0.
+    rows[0]["fitness"] = -0.5
+    assert read_levels(rows, arenas={1})[0] == Level(0, 2, 2, 2, -0.5, -0.5, two)
