@@ -28,11 +28,20 @@ class Experiment:
     and values outside their ranges raise ``ExperimentError``.
     """
 
-    __slots__ = ("_document",)
+    __slots__ = ("_document", "_islands")
 
-    def __init__(self, document: Document) -> None:
-        """Wrap a checked document; use ``read`` or ``from_toml`` instead."""
+    def __init__(
+        self, document: Document, islands: list[dict[str, Any]] | None = None
+    ) -> None:
+        """Wrap a checked document; use ``read`` or ``from_toml`` instead.
+
+        Args:
+            document: complete.
+            islands: tables ``[[islands]]`` with the keys that they set themselves;
+                None: those whose values differ from the rest of the document.
+        """
         self._document = document
+        self._islands = _own_keys(self.settings) if islands is None else islands
 
     @classmethod
     def read(
@@ -50,7 +59,7 @@ class Experiment:
             ExperimentError: no such experiment or file, or an invalid document.
         """
         text, where = source_text(str(source))
-        return cls(_parsed(text, where, changes))
+        return cls._changed(parse_toml(text, where), where, changes)
 
     @classmethod
     def from_toml(cls, text: str, **changes: Any) -> Self:  # noqa: ANN401 - as above
@@ -59,16 +68,27 @@ class Experiment:
         Raises:
             ExperimentError: an invalid document.
         """
-        return cls(_parsed(text, _GIVEN, changes))
+        return cls._changed(parse_toml(text, _GIVEN), _GIVEN, changes)
 
     def replace(self, **changes: Any) -> Self:  # noqa: ANN401 - as above
         """Return the experiment with other values of some keys.
 
+        They hold on all islands that do not set them themselves, as in ``read``.
+
         Raises:
             ExperimentError: an unknown key, or a value that is not allowed.
         """
-        tables = _merged(self.settings, changes)
-        return type(self)(experiment_from_tables(tables, _GIVEN))
+        return self._changed(self._tables(), _GIVEN, changes)
+
+    @classmethod
+    def _changed(
+        cls, tables: dict[str, Any], where: str, changes: Mapping[str, Any]
+    ) -> Self:
+        merged = _merged(tables, changes)
+        return cls(experiment_from_tables(merged, where), merged.get("islands", []))
+
+    def _tables(self) -> dict[str, Any]:
+        return {**self.settings, "islands": self._islands}
 
     @property
     def name(self) -> str:
@@ -91,8 +111,8 @@ class Experiment:
         return found
 
     def to_toml(self) -> str:
-        """Return the experiment as a TOML text with all keys."""
-        lines = [f"{key} = {_toml(value)}" for key, value in self.settings.items()]
+        """Return the experiment as a TOML text with all keys, of islands their own."""
+        lines = [f"{key} = {_toml(value)}" for key, value in self._tables().items()]
         return "\n".join([*lines, ""])
 
     def __eq__(self, other: object) -> bool:
@@ -116,9 +136,22 @@ def document_of(experiment: Experiment | str | Path) -> Document:
     return read_experiment(str(experiment))
 
 
-def _parsed(text: str, where: str, changes: Mapping[str, Any]) -> Document:
-    tables = _merged(parse_toml(text, where), changes)
-    return experiment_from_tables(tables, where)
+def _own_keys(settings: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the tables of islands without the values that the document has, too."""
+    return [
+        {
+            name: {
+                key: value
+                for key, value in section.items()
+                if key not in settings[name] or value != settings[name][key]
+            }
+            if name in settings and isinstance(section, dict)
+            else section
+            for name, section in island.items()
+            if section != settings.get(name)
+        }
+        for island in settings["islands"]
+    ]
 
 
 def _merged(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

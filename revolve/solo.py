@@ -47,19 +47,23 @@ def _done(task: Task) -> Outcome:
     check_types(robot, body_space(settings.space))
     if task.size is not None:
         return Outcome(picture=_picture(robot, settings, task.size))
+    trace = evaluation = None
+    failure = ""
+    is_disturbed = task.is_judged and settings.robust is not None
     try:
-        trace = simulate(robot, settings)
-    except (SimulationDiverged, SensorFailed) as error:
-        return Outcome(failure=str(error))
-    packed = pack_trace(trace)
-    if not task.is_judged:
-        return Outcome(packed)
-    try:
-        if settings.robust is not None:
-            return Outcome(packed, evaluate(robot, settings))
-        return Outcome(packed, judge(trace, settings))
+        if is_disturbed:
+            evaluation = evaluate(robot, settings)
+        else:
+            trace = simulate(robot, settings)
+            evaluation = judge(trace, settings) if task.is_judged else None
     except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
-        return Outcome(packed, failure=str(error))
+        failure = str(error)
+    if is_disturbed:
+        # The trace has no part in the fitness, and may be of another outcome.
+        with suppress(SimulationDiverged, SensorFailed):
+            trace = simulate(robot, settings)
+    packed = None if trace is None else pack_trace(trace)
+    return Outcome(packed, evaluation, failure)
 
 
 def _picture(

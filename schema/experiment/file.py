@@ -159,12 +159,12 @@ def shipped_experiments() -> list[str]:
 
 
 def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
-    """Return the experiment of the tables of a user's TOML text, which are changed.
+    """Return the experiment of the tables of a user's TOML text.
 
     The modules that it names may be imported by this process from now on.
 
     Args:
-        document: the tables.
+        document: the tables; paths of scenery and calibration become what they hold.
         where: path of the text, for messages, and for relative paths of scenery and
             plug-ins.
 
@@ -287,11 +287,11 @@ def _converted(document: dict[str, Any], where: str) -> Experiment:
     _refuse_unknown(document, Experiment, where, "")
     _refuse_many_islands(document, where)
     _read_scenery(document, where)
-    _complete(document)
+    complete = _completed(document)
     try:
-        return msgspec.convert(document, type=Experiment)
+        return msgspec.convert(complete, type=Experiment)
     except msgspec.ValidationError as error:
-        raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+        raise ExperimentError(f"{where}: {_explain(error, complete)}") from None
 
 
 def _read_sweep(document: dict[str, Any], where: str) -> None:
@@ -435,12 +435,16 @@ def _read_calibration(document: dict[str, Any], where: str) -> None:
     document["calibration"] = tables["calibration"]
 
 
-def _complete(document: dict[str, Any]) -> None:
-    """Merge each section into those of ``islands``, in place."""
-    for islands in document.get("islands", ()):
-        for key, changed in islands.items():
-            if isinstance(changed, dict):
-                islands[key] = {**document.get(key, {}), **changed}
+def _completed(document: dict[str, Any]) -> dict[str, Any]:
+    """Return tables whose ``islands`` have all keys of the sections that they name."""
+    islands = [
+        {
+            key: {**document.get(key, {}), **own} if isinstance(own, dict) else own
+            for key, own in each.items()
+        }
+        for each in document.get("islands", ())
+    ]
+    return {**document, "islands": islands} if islands else document
 
 
 def experiment_text(experiment: Experiment) -> str:
