@@ -1,5 +1,8 @@
 """Tasks of the process that simulates single robots, done in this process."""
 
+from dataclasses import replace
+
+import pytest
 from msgspec import msgpack
 
 import revolve as rv
@@ -9,12 +12,11 @@ from revolve.robot import plain, task_of
 from revolve.solo import outcome_of
 from worker.robot.evaluation import evaluate
 
-STRONG = """name = "strong"
+PLAIN = """name = "plain"
 [simulation]
-torque_factor = 1e9
-servo_stiffness = 1e9
 window_steps = 400
 """
+STRONG = f"{PLAIN}torque_factor = 1e9\nservo_stiffness = 1e9\n"
 WEAK = """
 [robust]
 draws = 2
@@ -27,21 +29,16 @@ def _outcome(robot: rv.Robot, *, is_judged: bool = True) -> Outcome:
     return msgpack.decode(outcome_of(msgpack.encode(task)), type=Outcome)
 
 
-def test_a_robust_evaluation_is_that_of_a_worker() -> None:
+@pytest.mark.parametrize(("text", "diverges"), [(PLAIN, False), (STRONG, True)])
+def test_a_robust_evaluation_is_that_of_a_worker(text: str, *, diverges: bool) -> None:
     """Also if physics diverges without disturbances, which have no part in it."""
-    strong = rv.Experiment.from_toml(STRONG)
-    weakened = rv.Experiment.from_toml(STRONG + WEAK)
-    robots = [rv.Robot.random(weakened, seed=3, number=number) for number in range(6)]
-    diverged = 0
-    for robot in robots:
-        found = _outcome(robot)
-        settings = settings_for(robot, None)
-        assert found.evaluation == evaluate(plain(robot), settings)
-        assert found.failure == ""
-        undisturbed = _outcome(rv.Robot(robot.parts, robot.brain, strong))
-        assert found.trace == undisturbed.trace
-        # Fails alike, whether its fitness is asked for or not.
-        assert _outcome(robot, is_judged=False).trace == undisturbed.trace
-        diverged += undisturbed.trace is None
-        assert bool(undisturbed.failure) == (undisturbed.evaluation is None)
-    assert diverged in range(1, 6)
+    robot = rv.Robot.random(rv.Experiment.from_toml(text + WEAK), seed=3)
+    found = _outcome(robot)
+    assert found.evaluation == evaluate(plain(robot), settings_for(robot, None))
+    assert found.failure == ""
+    alone = replace(robot, experiment=rv.Experiment.from_toml(text))
+    undisturbed = _outcome(alone)
+    traces = [_outcome(each, is_judged=False).trace for each in (robot, alone)]
+    assert found.trace == undisturbed.trace == traces[0] == traces[1]
+    assert (found.trace is None) == diverges
+    assert bool(undisturbed.failure) == (undisturbed.evaluation is None) == diverges
