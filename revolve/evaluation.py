@@ -9,6 +9,7 @@ from revolve.experiment import Experiment, document_of
 from revolve.robot import DEFAULT, Robot, plain, task_of
 from revolve.trace import Trace, unpack_trace
 from schema.errors import SimulationDiverged
+from schema.experiment.document import island_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
@@ -51,8 +52,8 @@ def evaluate(
 
     Args:
         robot: to evaluate.
-        experiment: whose simulation and fitness apply; None: the robot's own, else
-            ``scenario1``.
+        experiment: whose simulation and fitness apply, those of island 0; None: the
+            robot's own, else ``scenario1``.
 
     Returns:
         The result. Diverged physics, an undefined fitness and a crash are results with
@@ -103,7 +104,8 @@ def settings_for(
         ExperimentError: no such experiment or file, or an invalid document.
     """
     own = robot.experiment if isinstance(robot, Robot) else None
-    return evaluation_settings_of(document_of(experiment or own or DEFAULT))
+    document = document_of(experiment or own or DEFAULT)
+    return evaluation_settings_of(island_experiment(document, 0))
 
 
 def result_of(

@@ -21,8 +21,9 @@ from schema.errors import (
     shown,
 )
 from schema.experiment.brains import types_of
-from schema.experiment.settings import EvaluationSettings
-from schema.formats.files import read_robot, settings_of, types_for, write_robot
+from schema.experiment.settings import EvaluationSettings, experiment_with
+from schema.formats.files import settings_of, types_for, write_robot
+from schema.formats.run_settings import read_with_settings
 from schema.formats.yaml_reader import OTHER_TYPES
 from schema.limits import MOST_PIXELS, MOST_SEED
 from schema.parts import BodySpace
@@ -69,23 +70,30 @@ class Robot:
         Args:
             path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
             experiment: whose part types are allowed, and whose simulation and fitness
-                apply; None: all built-in types are allowed, and ``evaluate`` and
-                ``simulate`` take ``scenario1``, which has no light sensor, also if the
-                file lies in a run folder or holds settings (MJCF).
+                apply, those of island 0; None, as of the commands: the settings in an
+                MJCF file, else those of the run folder that holds the file, on the
+                island where ``best.yaml`` is the best robot. Elsewhere all built-in
+                types are allowed, and ``evaluate`` and ``simulate`` take ``scenario1``,
+                which has no light sensor.
 
         Raises:
             InvalidRobot: the file holds no robot that is well formed.
-            ExperimentError: no such experiment.
+            ExperimentError: no such experiment; a plug-in of the run is missing.
+            RunFolderError: the description of the run is damaged.
         """
-        own = None if experiment is None else as_experiment(experiment)
+        named = None if experiment is None else document_of(experiment)
         try:
-            found = read_robot(Path(path), *types_for(_settings(own)))
+            found, settings, own = read_with_settings(
+                Path(path), named, say=lambda _line: None
+            )
         except InvalidRobot as error:
             text = str(error).replace(OTHER_TYPES, _OTHER_TYPES)
             raise InvalidRobot(text) from None
         except MalformedMessage as error:
             raise InvalidRobot(str(error)) from None
-        return cls(found.parts, found.brain, own)
+        if own is None and settings != settings_of(None):
+            own = experiment_with(settings, Path(path).stem)
+        return cls(found.parts, found.brain, own and Experiment(own))
 
     @classmethod
     def random(
@@ -159,7 +167,8 @@ class Robot:
     def __repr__(self) -> str:
         neurons = counted(len(self.brain.neurons), "neuron")
         edges = counted(len(self.brain.connections), "resolved connection")
-        return f"<Robot: {counted(len(self.parts), 'part')}, {neurons}, {edges}>"
+        own = "" if self.experiment is None else f", settings of {self.experiment.name}"
+        return f"<Robot: {counted(len(self.parts), 'part')}, {neurons}, {edges}{own}>"
 
 
 def plain(robot: object) -> PlainRobot:

@@ -1,6 +1,7 @@
 """Experiment whose settings apply to a robot file: named, or of the file's run."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from schema.errors import ExperimentError
@@ -20,23 +21,29 @@ from schema.tables.description import DETAILS, allow_plugins_of, read_descriptio
 from schema.tables.last_populations import best_of, last_populations
 
 
+def tell(line: str) -> None:
+    """Write a line about the settings of a robot file to standard error."""
+    sys.stderr.write(f"revolve: {line}\n")
+
+
 def experiment_of(
     file: Path,
-    named: str | None,
+    named: str | Experiment | None,
     island: int | None = None,
     *,
     tells_default: bool = False,
+    say: Callable[[str], object] = tell,
 ) -> Experiment | None:
-    """Return the settings of a robot file; say on standard error which ones they are.
+    """Return the settings of a robot file; say which ones they are.
 
     Args:
-        file: robot file that the user named on the command line. In a run folder, the
-            experiment is that of the run, and its plug-ins may be imported as when the
-            run is viewed.
+        file: robot file that the user named. In a run folder, the experiment is that of
+            the run, and its plug-ins may be imported as when the run is viewed.
         named: experiment that the user named; it comes first.
         island: island that the user named; None is, of the file of a run's best robot,
             the island on which it has its fitness, and of other files island 0.
         tells_default: also say which settings apply if the file is in no run folder.
+        say: gets the line; the default writes it to standard error.
 
     Returns:
         The experiment, with the settings of one island; None: the default settings
@@ -49,10 +56,10 @@ def experiment_of(
             names the best robot's island, is damaged.
     """
     if named:
-        experiment = read_experiment(named)
+        experiment = read_experiment(named) if isinstance(named, str) else named
         own = _of_island(experiment, island or 0)
         if island is None and _differs(experiment):
-            tell(f"with the settings of {named}, island 0; --island names another")
+            say(f"with the settings of {named}, island 0; --island names another")
         return own
     folder = file.parent
     if not (folder / DETAILS).is_file():
@@ -62,7 +69,7 @@ def experiment_of(
                 "islands: --experiment FILE.toml"
             )
         if tells_default:
-            tell("with the settings of scenario1; --experiment names others")
+            say("with the settings of scenario1; --experiment names others")
         return None
     allow_plugins_of(folder)
     experiment = own_experiment(read_description(folder).document)
@@ -77,16 +84,17 @@ def experiment_of(
             where += ", where it is the best robot" if best else ""
             where += "; --island names another"
     own = _of_island(experiment, number)
-    tell(where)
+    say(where)
     return own
 
 
 def read_with_settings(
     file: Path,
-    named: str | None,
+    named: str | Experiment | None,
     island: int | None = None,
     *,
     tells_default: bool = False,
+    say: Callable[[str], object] = tell,
 ) -> tuple[Robot, EvaluationSettings, Experiment | None]:
     """Return a file's robot, its evaluation settings and their experiment.
 
@@ -98,6 +106,7 @@ def read_with_settings(
         named: as of ``experiment_of``.
         island: as of ``experiment_of``.
         tells_default: as of ``experiment_of``.
+        say: as of ``experiment_of``.
 
     Returns:
         The robot, the settings and the experiment; of an MJCF file's own settings and
@@ -117,9 +126,9 @@ def read_with_settings(
         is_of_run = _allow_run_of(file)
         robot, settings = read_mjcf(file)
         if is_of_run or tells_default:
-            tell(f"with the settings in {file}; --experiment names others")
+            say(f"with the settings in {file}; --experiment names others")
         return robot, settings, None
-    found = experiment_of(file, named, island, tells_default=tells_default)
+    found = experiment_of(file, named, island, tells_default=tells_default, say=say)
     return read_robot_of(file, found), settings_of(found), found
 
 
@@ -158,8 +167,3 @@ def read_robot_of(file: Path, experiment: Experiment | None) -> Robot:
         ExperimentError: a type that cannot be loaded.
     """
     return read_robot(file, *(types_of(experiment) if experiment else ()))
-
-
-def tell(line: str) -> None:
-    """Write a line about the settings of a robot file to standard error."""
-    sys.stderr.write(f"revolve: {line}\n")
