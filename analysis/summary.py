@@ -37,7 +37,8 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     """
     populations = _last_populations(tables["populations"])
     if populations:
-        heads = ("experiment", "run", "births", "judged", "mean of population", "best")
+        heads = ("experiment", "run", "births", "judged", "mean of population",
+                 "best of population")  # fmt: skip
         _print_table(console, heads, populations, words={0, 1})
     else:
         print_line(console, "no population could be measured")

@@ -3,11 +3,11 @@
 import html
 import tempfile
 from collections.abc import Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from revolve.arguments import whole_number
 from revolve.children import run_command
@@ -26,6 +26,13 @@ from schema.tables.description import (
     run_columns,
 )
 from schema.tables.files import born_as, read_table
+from schema.tables.last_populations import (
+    Row,
+    best_ever,
+    best_of,
+    fittest,
+    last_populations,
+)
 from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual
@@ -196,12 +203,10 @@ class Run:
         ]
 
     def best(self, count: int = 1) -> list[Robot]:
-        """Return the robots with the highest fitness of all evaluations.
+        """Return the fittest robots of the last population, of all islands together.
 
-        Each has the settings of the island on which it had this fitness.
-
-        Robots of arenas count with the best sample (table ``fitness``) while they were
-        mature; the end of a run names the best robot of its last population instead.
+        The first of a finished run is that of ``best.yaml``. Each has the settings of
+        the island on which it had its fitness.
 
         Args:
             count: number of robots, >= 0; fewer if there are no more.
@@ -210,36 +215,38 @@ class Run:
             RunFolderError: a table is damaged.
             RevolveError: another count.
         """
-        count = whole_number("count", count)
-        found = self._judged()
-        order = pc.sort_indices(found, [("fitness", "descending")])
-        best: dict[BirthId, int] = {}
-        for row in found.take(order).to_pylist():
-            if len(best) == count:
-                break
-            best.setdefault(individual(row), row["island"])
-        return [
-            robot
-            for birth, island in best.items()
-            for robot in self._robots(self._birth(birth), [island])
-        ]
+        return self._first(fittest(last_populations(self.folder)), count)
 
-    def _judged(self) -> pa.Table:
-        """Return all evaluations and samples of mature robots that have a fitness."""
-        columns = ["island", "birth_island", "birth", "fitness"]
-        samples = self.fitness.filter(pc.field("is_mature"))
-        found = pa.concat_tables(
-            [self.evaluations.select(columns), samples.select(columns)],
-            promote_options="default",  # the fitness of a sample is never null
-        )
-        return found.filter(pc.is_valid(found["fitness"]))
+    def best_ever(self, count: int = 1) -> list[Robot]:
+        """Return the fittest robots that were ever evaluated, dead or alive.
+
+        Robots of arenas count with the best sample (table ``fitness``) while they were
+        mature.
+
+        Args:
+            count: as of ``best``.
+
+        Raises:
+            RunFolderError: as of ``best``.
+            RevolveError: as of ``best``.
+        """
+        return self._first(best_ever(self.folder), count)
+
+    def _first(self, rows: Iterable[Row], count: int) -> list[Robot]:
+        """Return the robots of the first rows, each once."""
+        islands: dict[BirthId, int] = {}
+        for row in rows:
+            islands.setdefault(individual(row), row["island"])
+        first = islice(islands.items(), whole_number("count", count))
+        return [self._robots(self._birth(one), [home])[0] for one, home in first]
 
     def __repr__(self) -> str:
         return f"<Run {self.name}, seed {self.seed}: {self.state}, {self.folder}>"
 
     def _repr_html_(self) -> str:
         """Return the summary that a notebook shows."""
-        fitness = pc.max(self._judged()["fitness"]).as_py()
+        best = best_of(last_populations(self.folder))
+        ever = next(iter(best_ever(self.folder)), None)
         document = document_of(self.experiment)
         planned = sum(own.births for own in island_experiments(document))
         rows: dict[str, Any] = {
@@ -249,13 +256,18 @@ class Run:
             "seed": self.seed,
             "state": self.state,
             "births": f"{self.births.num_rows} of {planned}",
-            "best fitness": "-" if fitness is None else rounded(fitness),
+            "best of the last population": _named(best),
+            "best ever": _named(ever),
         }
         cells = (
             f"<tr><th>{key}</th><td>{html.escape(str(value))}</td></tr>"
             for key, value in rows.items()
         )
         return f"<table>{''.join(cells)}</table>"
+
+
+def _named(row: Row | None) -> str:
+    return f"{individual(row).name}, fitness {rounded(row['fitness'])}" if row else "-"
 
 
 def _check_births(rows: object) -> None:

@@ -86,9 +86,9 @@ def _of_best(rows: Sequence[Row]) -> str:
     name = f"{rows[0]['island']}:{rows[0]['birth']}"
     undisturbed = rows[0]["undisturbed"]
     if undisturbed is None:
-        return f"the best, {name}, has no fitness without changes"
+        return f"the best ever, {name}, has no fitness without changes"
     if undisturbed <= 0:
-        return f"the best, {name}, has a fitness of {rounded(undisturbed)}"
+        return f"the best ever, {name}, has a fitness of {rounded(undisturbed)}"
     kept = [
         f"{percent(share)} without {row['kind']}"
         for row in rows
@@ -108,7 +108,7 @@ def _of_best(rows: Sequence[Row]) -> str:
     carried = [
         f"the {row['change']} carries {percent(1 - row['share'])}" for row in first
     ]
-    line = f"the best, {name} ({_fitness(rows[0])})"
+    line = f"the best ever, {name} ({_fitness(rows[0])})"
     line += f", keeps {', '.join(kept)}" if kept else ""
     return "; ".join([line, *([", ".join(carried)] if carried else [])])
 

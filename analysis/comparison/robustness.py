@@ -23,7 +23,7 @@ ROBOT: Columns = {
     "folder": (pa.string(), "path of the run folder"),
     "island": (pa.int32(), "island of birth"),
     "birth": (pa.int64(), "number of birth there"),
-    "is_best": (pa.bool_(), "whether it has the greatest recorded fitness of the run"),
+    "is_best": (pa.bool_(), "whether it is the best ever, of the greatest fitness"),
     "is_last": (pa.bool_(), "whether it is in an island's last population"),
     "recorded": (pa.float64(), "last recorded fitness"),
     "undisturbed": (
@@ -100,11 +100,11 @@ def line_of(
     of_best: Callable[[Sequence[Row]], str],
     of_last: Callable[[Sequence[Sequence[Row]]], str],
 ) -> str:
-    """Return a line about the best robot, the last population, and failures.
+    """Return a line about the best robot ever, the last population, and failures.
 
     Args:
         table: rows of one run.
-        of_best: describes the best robot by its rows.
+        of_best: describes the best robot ever by its rows.
         of_last: describes the last population by the rows of each robot; may be empty.
     """
     robots: dict[tuple[int, int], list[Row]] = {}
@@ -133,13 +133,14 @@ def _of_best(rows: Sequence[Row]) -> str:
     name = f"{rows[0]['island']}:{rows[0]['birth']}"
     undisturbed, share = rows[0]["undisturbed"], kept(rows)
     if undisturbed is None:
-        return f"the best, {name}, has no fitness without changes"
+        return f"the best ever, {name}, has no fitness without changes"
     if share is None:
-        return f"the best, {name}, has a fitness of {rounded(undisturbed)} undisturbed"
+        fitness = rounded(undisturbed)
+        return f"the best ever, {name}, has a fitness of {fitness} undisturbed"
     known = sorted((r["share"], r["change"]) for r in rows if r["share"] is not None)
     (low, worst), (high, gain) = known[0], known[-1]
     return (
-        f"the best, {name}, keeps {percent(share)} of its fitness "
+        f"the best ever, {name}, keeps {percent(share)} of its fitness "
         f"({rounded(undisturbed)}) on average, from {percent(low)} under {worst} to "
         f"{percent(high)} under {gain}"
     )

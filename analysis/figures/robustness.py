@@ -10,7 +10,7 @@ from analysis.figures.forms import NothingToDraw
 from analysis.figures.style import theme_of_size
 from schema.errors import counted
 
-_LAST, _BEST = "last population", "best"
+_LAST, _BEST = "last population", "best ever"
 _MOST = 2.0
 """Greatest share that the figure shows; points beyond stand at the edge."""
 

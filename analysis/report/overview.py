@@ -188,8 +188,9 @@ def all_runs(tables: Tables) -> str:
                  duration(row["duration_s"]), row["failures"],
                  row["folder"])  # fmt: skip
         rows.append([cell(value) for value in cells])
-    heads = ("experiment", "run", "seed", "state", "births", "islands", "best fitness",
-             "mean of population", "time", "failures", "folder")  # fmt: skip
+    heads = ("experiment", "run", "seed", "state", "births", "islands",
+             "best of population", "mean of population", "time", "failures",
+             "folder")  # fmt: skip
     return table(heads, rows)
 
 

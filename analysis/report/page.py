@@ -221,6 +221,7 @@ def _films(tables: Tables, drawings: Drawings) -> str:
         for name, why in drawings.no_films.items()
     )
     text = (
+        "Each is the best robot of an experiment's last populations. "
         f"{PART_COLOURS} The dark shapes on the floor are shadows; their edges are "
         "coarse because they are drawn with few pixels."
     )

@@ -12,7 +12,7 @@ from analysis.viewer.flags import LAST_S
 from analysis.viewer.live import LiveSource
 from analysis.viewer.motion import (
     Motion,
-    best_evaluated,
+    named_robot,
     selected_robots,
     show_motion,
 )
@@ -32,7 +32,6 @@ from analysis.viewer.watch import watch
 from schema.agent.command import connect_of, tls_of
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
-from schema.errors import rounded
 from schema.experiment.file import own_experiment
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
@@ -59,7 +58,7 @@ def view(options: argparse.Namespace, simulators: Simulators) -> int:
     if options.run is not None and options.connect is not None:
         raise ViewerError("give either a run folder or --connect ADDRESS")
     if options.ancestry and not options.robot:
-        raise ViewerError("--ancestry: needs --robot best or --robot ISLAND:BIRTH")
+        raise ViewerError("--ancestry: needs --robot best, best-ever or ISLAND:BIRTH")
     if options.run is not None:
         output = Output.of(options.save, options.serve)
         _replay(options, output, simulators)
@@ -148,15 +147,16 @@ def _motions(
 
 
 def _wanted(options: argparse.Namespace) -> list[BirthId]:
-    """Return the robots of ``--robot``; print which one is the best."""
-    if None not in options.robot:
-        return list(options.robot)
-    best, island, fitness = best_evaluated(options.run)
-    line = f"best ever evaluated: {best.name}, fitness {rounded(fitness)}"
-    if island != best.island:
-        line += f" on island {island}; shown as on its island of birth"
-    tell_user(line)
-    return [best if birth is None else birth for birth in options.robot]
+    """Return the robots of ``--robot``; print which ones are the best."""
+    wanted: list[BirthId] = []
+    for each in options.robot:
+        if isinstance(each, BirthId):
+            wanted.append(each)
+        else:
+            birth, line = named_robot(options.run, each)
+            tell_user(line)
+            wanted.append(birth)
+    return wanted
 
 
 def _span(options: argparse.Namespace, folder: Path) -> tuple[float, float]:

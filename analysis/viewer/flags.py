@@ -13,6 +13,8 @@ HOST, PORT = "127.0.0.1", 9876
 LAST_S, FILM_S = 600.0, 20.0
 """Simulated time at the end of a run that is replayed and filmed by default [s]."""
 FILM_ENDING = ".gif"
+BEST, BEST_EVER = "best", "best-ever"
+"""Robots with a name: the fittest of the last population, and of all evaluated."""
 
 
 def parser(_command: str = "view") -> Flags:
@@ -51,8 +53,9 @@ def parser(_command: str = "view") -> Flags:
     )  # fmt: skip
     flags.add_argument(
         "--robot", action="append", default=[], type=_selected, metavar="ROBOT",
-        help="re-simulate a robot and show its full motion: 'best' (ever evaluated, "
-        "dead or alive), BIRTH of island 0, or ISLAND:BIRTH; may be repeated",
+        help="re-simulate a robot and show its full motion: 'best' (of the last "
+        "population), 'best-ever' (evaluated, dead or alive), BIRTH of island 0, or "
+        "ISLAND:BIRTH; may be repeated",
     )  # fmt: skip
     flags.add_argument(
         "--ancestry", action="store_true",
@@ -85,6 +88,6 @@ def _robot_name(text: str) -> BirthId:
     return BirthId(int(match[1] or 0), int(match[2]))
 
 
-def _selected(text: str) -> BirthId | None:
-    """Return the individual of a flag; None is the best ever evaluated."""
-    return None if text == "best" else _robot_name(text)
+def _selected(text: str) -> BirthId | str:
+    """Return the individual of a flag, or the name of one."""
+    return text if text in (BEST, BEST_EVER) else _robot_name(text)

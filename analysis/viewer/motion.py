@@ -6,13 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from analysis.viewer.body import BoxModel, place_rows
 from analysis.viewer.entities import TimePoint, motion_path
+from analysis.viewer.flags import BEST
 from analysis.viewer.recording import Recording, ViewerError
+from schema.errors import rounded
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
+from schema.tables.last_populations import best_ever, best_of, last_populations
 from schema.wire.updates import individual
 
 LANE_M = 0.8
@@ -60,29 +62,27 @@ def selected_robots(
     return list(found)
 
 
-def best_evaluated(folder: Path) -> tuple[BirthId, int, float]:
-    """Return the fittest robot that a run ever evaluated, the first of equal ones.
-
-    The robot may be dead, and is then fitter than the best of the last population.
+def named_robot(folder: Path, name: str) -> tuple[BirthId, str]:
+    """Return the robot of a run that ``--robot`` names, and a line about it.
 
     Args:
         folder: the run folder.
-
-    Returns:
-        The robot, the island on which it had its fitness, and the fitness [m/s].
+        name: ``best``, of the last population, or ``best-ever``.
 
     Raises:
         ViewerError: no robot was evaluated.
     """
-    alone = read_table(folder, "evaluations")
-    together = read_table(folder, "fitness")
-    judged = (alone, together.filter(together["is_mature"]))
-    rows = pa.concat_tables(judged, promote_options="default")
-    best = pc.max(rows["fitness"]).as_py()
-    if best is None:
-        raise ViewerError(f"{folder}: no robot has been evaluated yet")
-    (row,) = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
-    return individual(row), row["island"], best
+    if name == BEST:
+        what, row = "best of the last population", best_of(last_populations(folder))
+    else:
+        what, row = "best ever", next(iter(best_ever(folder)), None)
+    if row is None:
+        raise ViewerError(f"{folder}: --robot {name}: no robot has a fitness yet")
+    birth = individual(row)
+    line = f"{what}: {birth.name}, fitness {rounded(row['fitness'])}"
+    if row["island"] != birth.island:
+        line += f" on island {row['island']}; shown as on its island of birth"
+    return birth, line
 
 
 def show_motion(

@@ -42,7 +42,7 @@ from schema.wire.operator import (
 )
 from schema.wire.status import RunStatus, Status
 
-_COLUMNS = ("run", "state", "births", "births/s", "best, arenas")
+_COLUMNS = ("run", "state", "births", "births/s", "best of population, arenas")
 _WIDEST = 1000
 """Characters of the widest line that is not wrapped."""
 

@@ -1,7 +1,7 @@
-"""Summary of a finished run: best robot, failures, where the results are."""
+"""Summary of a finished run: best robots, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,10 +28,17 @@ from schema.formats.yaml import robot_to_yaml
 from schema.robot.robot import Robot, motor_count
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import born_as, read_table
-from schema.tables.last_populations import Row, best_of, last_populations
+from schema.tables.last_populations import (
+    Row,
+    best_ever,
+    best_of,
+    last_populations,
+)
 from schema.tables.learnt import learnt_births
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual, read_levels
+
+_BEST = "best robot of the last population"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +57,7 @@ class Conclusion:
 
 
 def conclude(run: RunSession) -> Conclusion:
-    """Write the best robot of all islands to a file; return the summary of a run.
+    """Write the best robot of the last population; return the summary of a run.
 
     Args:
         run: a finished run with its tables.
@@ -68,7 +75,7 @@ def conclude(run: RunSession) -> Conclusion:
 
 
 def restore_best(folder: Path) -> None:
-    """Write the best robot of a finished run to a file if the file is missing.
+    """Write the best robot of a last population to a file if the file is missing.
 
     A process that ends after its run, but before the summary, leaves no file.
 
@@ -90,7 +97,7 @@ def restore_best(folder: Path) -> None:
         # A finished run needs none of its plug-ins for anything else.
         warn_user(f"{folder}: the file {BEST} is missing and not written: {error}")
         return
-    tell_user(f"{folder}: {BEST} was missing; best robot: {done}")
+    tell_user(f"{folder}: {BEST} was missing; {_BEST}: {done}")
 
 
 def _is_extinct(experiment: Experiment, births: Mapping[int, int]) -> bool:
@@ -141,15 +148,13 @@ def _results(run: RunSession) -> list[str]:
     mean = f"mean fitness of the last population {rounded(fmean(means))}"
     if len(means) > 1:
         mean += f", the mean over {len(means)} islands"
-    lines = [
+    return [
         f"{births}; {mean}",
+        *judged_apart(run.experiment),
+        *_windows([one.experiment for one in islands.values()]),
         *_best_robot(run, best),
+        *_better_ever(folder, best),
     ]
-    lines[1:1] = judged_apart(run.experiment)
-    arenas = [one.experiment for one in islands.values() if isinstance(one, Arena)]
-    if arenas:
-        lines[-1:-1] = _windows(folder, arenas)
-    return lines
 
 
 def _means(run: RunSession, last: Sequence[Row]) -> list[float]:
@@ -187,13 +192,21 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
     where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
     lives = f" on island {best['island']}" if best["island"] != birth.island else ""
     what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
-    line = (
-        f"best robot: birth {birth.number}{where}, fitness {rounded(best['fitness'])}"
-    )
+    line = f"{_BEST}: birth {birth.number}{where}, fitness {rounded(best['fitness'])}"
     return [
         f"{line}{lives}, rank in ancestry {rank} (founders: 1), {what}",
         _write_best(robot, folder, run.experiment),
     ]
+
+
+def _better_ever(folder: Path, best: Row) -> list[str]:
+    """Return a line about the best robot ever if it had more fitness than this one."""
+    ever = best_ever(folder)[0]
+    if ever["fitness"] <= best["fitness"]:
+        return []
+    shown = command("view", folder, "--robot", "best-ever")
+    name, fitness = individual(ever).name, rounded(ever["fitness"])
+    return [f"best ever: robot {name}, fitness {fitness}: {shown}"]
 
 
 def _read_best(folder: Path, best: Row, experiment: Experiment) -> tuple[int, Robot]:
@@ -221,30 +234,17 @@ def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
     return f"its file: {file}"
 
 
-def _windows(folder: Path, arenas: Sequence[Experiment]) -> list[str]:
-    """Return a line about the windows in which robots of arenas were judged.
+def _windows(islands: Iterable[Experiment]) -> list[str]:
+    """Return a line about the windows in which robots of arenas were judged, if any.
 
     Args:
-        folder: of the run.
-        arenas: settings of each arena.
+        islands: settings of each island.
     """
-    windows = read_table(folder, "fitness")
-    best = windows.filter(windows["is_mature"]).sort_by([("fitness", "descending")])
-    clocks = [each.simulation for each in arenas]
+    clocks = [each.simulation for each in islands if each.arena is not None]
     seconds = sorted({each.window_steps * each.timestep_s for each in clocks})
     lasts = " or ".join(f"{each:g}" for each in seconds)
     what = f"a robot's last {lasts} s before the last birth"
-    line = f"in arenas fitness is that of {what}"
-    if not best.num_rows:
-        return [line]
-    (row,) = best.slice(0, 1).to_pylist()
-    return [
-        (
-            f"{line}; the best window of the whole run is that of robot "
-            f"{individual(row).name} that ended at {row['sim_time_s']:g} s: "
-            f"fitness {rounded(row['fitness'])}"
-        )
-    ]
+    return [f"in arenas fitness is that of {what}"] if seconds else []
 
 
 def has_evaluated(folder: Path) -> bool:

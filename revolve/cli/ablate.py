@@ -35,9 +35,10 @@ def parser(_command: str = "ablate") -> Flags:
     """Return the parser of ``revolve ablate``."""
     flags = Flags(
         prog="revolve ablate",
-        description="Re-evaluate the best robot and the fittest of the last population "
-        "of finished runs, alone: with sensors that read 0 or their mean, with dead "
-        "motors, and with random brains. Show how much of their fitness they keep.",
+        description="Re-evaluate the best robot ever and the fittest of the last "
+        "population of finished runs, alone: with sensors that read 0 or their mean, "
+        "with dead motors, and with random brains. Show how much of their fitness they "
+        "keep.",
         examples=(
             "revolve ablate runs/scenario1-seed1",
             "revolve ablate runs/a runs/b --out without --robots 10",

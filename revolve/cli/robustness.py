@@ -29,9 +29,9 @@ def parser(_command: str = "robustness") -> Flags:
     """Return the parser of ``revolve robustness``."""
     flags = Flags(
         prog="revolve robustness",
-        description="Re-evaluate the last population and the best robot of finished "
-        "runs, alone, under changes of time step, friction, start, mass, torque, noise "
-        "and ground, and show how much of their fitness they keep.",
+        description="Re-evaluate the last population and the best robot ever of "
+        "finished runs, alone, under changes of time step, friction, start, mass, "
+        "torque, noise and ground, and show how much of their fitness they keep.",
         examples=(
             "revolve robustness runs/scenario1-seed1",
             "revolve robustness runs/a runs/b --out robust --workers 4",

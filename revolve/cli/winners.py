@@ -25,7 +25,7 @@ from schema.experiment.settings import (
 from schema.robot.ids import BirthId
 from schema.tables.description import check_folder
 from schema.tables.files import born_as
-from schema.tables.last_populations import fittest_first
+from schema.tables.last_populations import best_ever, fittest_first
 from schema.tables.learnt import best_trials
 from schema.wire.updates import individual
 
@@ -61,7 +61,7 @@ class _Recorded(NamedTuple):
 
 
 def chosen_robots(folders: Iterable[Path], most: int | None = None) -> list[Chosen]:
-    """Return the best robot of each run, and those of its last populations.
+    """Return the best robot ever of each run, and those of its last populations.
 
     Args:
         folders: of finished runs.
@@ -87,25 +87,26 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     found = robots(RunTables(tables, islands=run.islands))
     if not found.num_rows:
         raise RunFolderError(f"{folder}: no robot was evaluated")
-    order = _fittest_first(found)
-    best, is_last = order[0], found["is_last"].to_pylist()
+    order, is_last = _fittest_first(found), found["is_last"].to_pylist()
     last = set([row for row in order if is_last[row]][:most])
+    judged = [*best_ever(folder), found.slice(order[0], 1).to_pylist()[0]]
+    ever = individual(judged[0])
     own = OwnRun(folder)
     births = tables["births"]
     recorded = _recorded(tables)
     chosen: list[Chosen] = []
     for number, row in enumerate(found.to_pylist()):
-        if not (number in last or number == best):
-            continue
         island, birth = row["birth_island"], row["birth"]
         name = BirthId(island, birth)
+        if not (number in last or name == ever):
+            continue
         (robot,) = own.robots(births.filter(born_as(name)))
         head = {
             "experiment": run.experiment,
             "folder": str(folder),
             "island": island,
             "birth": birth,
-            "is_best": number == best,
+            "is_best": name == ever,
             "is_last": number in last,
             "recorded": row["fitness"],
         }

@@ -159,7 +159,7 @@ def add_settings(flags: argparse.ArgumentParser, default: str) -> None:
         "--island",
         None,
         "island number, for experiments whose islands differ (default: for best.yaml "
-        "of a run the island on which it is the best robot, else 0)",
+        "of a run the island on which it has its fitness, else 0)",
         least=0,
     )
 

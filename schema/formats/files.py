@@ -57,7 +57,7 @@ def robot_from_yaml(
 
 
 BEST = "best.yaml"
-"""Name of the file of a run's best robot, in the run folder."""
+"""Name of the file of the best robot of a run's last population, in its folder."""
 MJCF_ENDING = ".xml"
 _YAML = (".yaml", ".yml")
 _ROBOGEN = (".txt", ".json")
@@ -103,7 +103,8 @@ def check_file(path: Path) -> str:
     """
     if path.is_dir():
         best = path / BEST
-        hint = f"; its best robot is {best}" if best.is_file() else ""
+        what = f"; the best robot of its last population is {best}"
+        hint = what if best.is_file() else ""
         raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
     ending = _ending(path, _READ)
     try:

@@ -40,8 +40,8 @@ def experiment_of(
         file: robot file that the user named. In a run folder, the experiment is that of
             the run, and its plug-ins may be imported as when the run is viewed.
         named: experiment that the user named; it comes first.
-        island: island that the user named; None is, of the file of a run's best robot,
-            the island on which it has its fitness, and of other files island 0.
+        island: island that the user named; None is, of ``best.yaml`` of a run, the
+            island on which it has its fitness, and of other files island 0.
         tells_default: also say which settings apply if the file is in no run folder.
         say: gets the line; the default writes it to standard error.
 
@@ -81,7 +81,7 @@ def experiment_of(
             number = best["island"]
         where += f", island {number}"
         if island is None:
-            where += ", where it is the best robot" if best else ""
+            where += ", where it is the best of the last population" if best else ""
             where += "; --island names another"
     own = _of_island(experiment, number)
     say(where)

@@ -1,4 +1,9 @@
-"""The last recorded population of each island of a run, and its best robot."""
+"""The best robots of a run: those of the last populations, and the best ever.
+
+*Best* is the fittest robot of the last recorded population of all islands, and *best
+ever* the fittest that was ever evaluated, dead or alive. Of both, ``fittest_first``
+says which of equally fit robots is meant.
+"""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -30,10 +35,37 @@ def last_populations(folder: Path) -> list[Row]:
     return pa.concat_tables(last).to_pylist() if last else []
 
 
+def best_ever(folder: Path) -> list[Row]:
+    """Return rows of all robots with a fitness, the best ever first.
+
+    Robots of arenas count with their samples while they were mature.
+
+    Returns:
+        Island, individual and greatest fitness of each robot on each island.
+
+    Raises:
+        RunFolderError: a table is damaged.
+    """
+    keys = ["island", "birth_island", "birth"]
+    samples = read_table(folder, "fitness").filter(pc.field("is_mature"))
+    judged = (read_table(folder, "evaluations"), samples)
+    every = pa.concat_tables(
+        [each.select([*keys, "fitness"]) for each in judged],
+        promote_options="default",  # the fitness of a sample is never null
+    )
+    greatest = every.group_by(keys).aggregate([("fitness", "max")]).to_pylist()
+    return fittest({**row, "fitness": row["fitness_max"]} for row in greatest)
+
+
 def best_of(rows: Iterable[Row]) -> Row | None:
     """Return the first row by ``fittest_first``; None if no robot has a fitness."""
+    return next(iter(fittest(rows)), None)
+
+
+def fittest(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows with a fitness by ``fittest_first``."""
     judged = (row for row in rows if row["fitness"] is not None)
-    return min(judged, key=fittest_first, default=None)
+    return sorted(judged, key=fittest_first)
 
 
 def fittest_first(row: Row) -> tuple[float, ...]:

@@ -59,7 +59,7 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
     capsys.readouterr()
     assert main(["robustness", "a", "--workers", "1", "--out", "out"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("a: the best, 0:")
+    assert lines[0].startswith("a: the best ever, 0:")
     rows = pq.read_table("out/robustness.parquet").to_pylist()
     assert Path("out/robustness.png").stat().st_size > 10_000
     assert not any("replaces" in line for line in lines)
@@ -116,7 +116,7 @@ def _check_ablations(capsys: pytest.CaptureFixture[str], run: rv.Run) -> None:
     words = ["ablate", "a", "--robots", "1", "--brains", "2", "--workers", "1"]
     assert main([*words, "--out", "out"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("a: the best, 0:")
+    assert lines[0].startswith("a: the best ever, 0:")
     table = pq.read_table("out/ablation.parquet")
     rows = table.to_pylist()
     assert Path("out/ablation.png").stat().st_size > 10_000

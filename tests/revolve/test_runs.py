@@ -57,7 +57,7 @@ def test_run_has_every_table(done: rv.Run) -> None:
 
 
 def test_best_robot_has_the_best_fitness(done: rv.Run) -> None:
-    best = done.best(2)
+    best = done.best_ever(2)
     assert len(best) == 2
     greatest = pc.max(done.evaluations["fitness"]).as_py()
     assert rv.evaluate(best[0]).fitness == greatest
@@ -68,8 +68,8 @@ def test_best_robot_has_the_best_fitness(done: rv.Run) -> None:
 
 
 def test_wrong_numbers_and_names_are_refused(done: rv.Run) -> None:
-    assert done.best(0) == []
-    assert len(done.best(10**6)) == BIRTHS
+    assert done.best(0) == done.best_ever(0) == []
+    assert len(done.best_ever(10**6)) == BIRTHS
     with pytest.raises(rv.RevolveError, match=r"count: must be .* from 0 to .* got -1"):
         done.best(-1)
     wrong: Any = "3"
@@ -81,13 +81,29 @@ def test_wrong_numbers_and_names_are_refused(done: rv.Run) -> None:
         done.table("birth")
 
 
-def test_best_robot_of_an_arena_has_the_best_mature_sample(tmp_path: Path) -> None:
+def test_best_robot_ever_of_an_arena_has_the_best_mature_sample(tmp_path: Path) -> None:
     with ZipFile(OLD / "arena.zip") as archive:
         archive.extractall(tmp_path)
     arena_run = rv.read(tmp_path / "undisturbed")
     samples = arena_run.fitness.filter(pc.field("is_mature"))
     row = samples.take(pc.sort_indices(samples, [("fitness", "descending")])[:1])
-    assert arena_run.best() == [arena_run.robot(row["birth"][0].as_py())]
+    assert arena_run.best_ever() == [arena_run.robot(row["birth"][0].as_py())]
+
+
+def test_best_robot_is_that_of_the_file(done: rv.Run, tmp_path: Path) -> None:
+    """Also in an arena, where robots that had more fitness before may be dead."""
+    with ZipFile(OLD / "arena.zip") as archive:
+        archive.extractall(tmp_path)
+    for each in (done, rv.read(tmp_path / "undisturbed")):
+        kept = rv.Robot.read(each.folder / "best.yaml")
+        assert each.best() == [kept]
+        assert each.best()[0].experiment == kept.experiment
+        population = each.population
+        last = population.filter(
+            pc.field("births") == pc.max(population["births"]).as_py()
+        )
+        judged = last.filter(pc.is_valid(last["fitness"])).num_rows
+        assert len(each.best(10**6)) == judged
 
 
 def test_notebook_gets_a_table(done: rv.Run) -> None:
@@ -105,7 +121,8 @@ def test_notebook_gets_births_of_all_islands_and_the_best_sample(
     shown = rv.read(tmp_path / "undisturbed")._repr_html_()
     births = rv.read(tmp_path / "undisturbed").births.num_rows
     assert f"<td>{births} of {births}</td>" in shown
-    assert "<th>best fitness</th><td>0." in shown
+    assert "<th>best ever</th><td>" in shown
+    assert "<th>best of the last population</th><td>" in shown
 
 
 def test_used_and_missing_folders_raise_the_line_of_the_command(

@@ -101,7 +101,7 @@ def test_run_reports_failed_evaluations_and_the_reason(workspace: Workspace) -> 
     # No failed robot outlives one with a negative fitness.
     last = last_populations(workspace.folder / "a")
     assert [row["fitness"] < 0.0 for row in last] == [True] * 6
-    assert "best robot: birth " in output
+    assert "best robot of the last population: birth " in output
     assert (workspace.folder / "a" / "best.yaml").exists()
 
 
@@ -224,7 +224,8 @@ def test_missing_file_of_the_best_robot_is_written_again(
         file.unlink()
         output = workspace.run("resume", folder, "--in-process", "--quiet")
         assert "already finished" in output
-        assert "best.yaml was missing; best robot: its file: twice/seeing-1" in output
+        said = "best.yaml was missing; best robot of the last population: its file: "
+        assert f"{said}twice/seeing-1" in output
         assert file.read_bytes() == sound
         output = workspace.run("resume", folder, "--in-process", "--quiet")
         assert "was missing" not in output

@@ -122,7 +122,7 @@ MISTAKES = {
     ),
     "folder to simulate": (
         "robot simulate run",
-        "run: must be the file of a robot, got a folder; its best robot is run/best",
+        "run: must be the file of a robot, got a folder; the best robot of its last ",
         2,
     ),
     "other file to simulate": (

@@ -65,26 +65,25 @@ def test_shares_are_of_the_fitness_without_changes() -> None:
 
 def test_line_about_a_run() -> None:
     assert summary(table_of(ROWS, COLUMNS)) == (
-        "the best, 0:7 (fitness 0.1000), keeps 96 % without touch, 50 % without imu, "
-        "40 % without sensors, 80 % with sensors at their mean, 20 % with a random "
-        "brain; the motor of part 4 carries 41 %, the motor of part 8 carries 0 %; "
+        "the best ever, 0:7 (fitness 0.1000), keeps 96 % without touch, 50 % without "
+        "imu, 40 % without sensors, 80 % with sensors at their mean, 20 % with a "
+        "random brain; the motor of part 4 carries 41 %, the motor of part 8 carries 0 %; "
         "2 of the last population keep 75 % without sensors, 40 % without their most "
         "important motor, 30 % with a random brain in the median; "
         "1 of 18 evaluations failed"
     )
     arena = [row(7, HELD, "all", 0.1, recorded=0.3)]
     assert summary(table_of(arena, COLUMNS)) == (
-        "the best, 0:7 (fitness 0.1000 alone, 0.3000 recorded), keeps 100 % without "
-        "sensors"
+        "the best ever, 0:7 (fitness 0.1000 alone, 0.3000 recorded), keeps 100 % "
+        "without sensors"
     )
     failed = [row(7, HELD, "all", None, undisturbed=None)]
     assert summary(table_of(failed, COLUMNS)) == (
-        "the best, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
+        "the best ever, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
     )
     still = [row(7, HELD, "all", 0.1, undisturbed=-0.2)]
-    assert (
-        summary(table_of(still, COLUMNS)) == "the best, 0:7, has a fitness of -0.2000"
-    )
+    said = summary(table_of(still, COLUMNS))
+    assert said == "the best ever, 0:7, has a fitness of -0.2000"
 
 
 def test_figure_orders_motors_by_what_robots_lose() -> None:

@@ -51,17 +51,17 @@ def test_groups_count_equally() -> None:
 
 def test_line_about_a_run() -> None:
     assert summary(table_of(ROWS, COLUMNS)) == (
-        "the best, 0:7, keeps 60 % of its fitness (0.1000) on average, from 40 % "
+        "the best ever, 0:7, keeps 60 % of its fitness (0.1000) on average, from 40 % "
         "under friction changed to 100 % under start changed; the last population of 3 "
         "keeps 85 % in the median, 60 % to 110 %; 1 of 9 evaluations failed"
     )
     failed = [row(7, "start", None, None, is_last=False)]
     assert summary(table_of(failed, COLUMNS)) == (
-        "the best, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
+        "the best ever, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
     )
     still = [row(7, "start", 0.1, -0.2)]
     assert summary(table_of(still, COLUMNS)) == (
-        "the best, 0:7, has a fitness of -0.2000 undisturbed"
+        "the best ever, 0:7, has a fitness of -0.2000 undisturbed"
     )
 
 

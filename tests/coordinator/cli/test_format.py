@@ -63,9 +63,10 @@ def test_status_leaves_out_empty_columns(capsys: pytest.CaptureFixture[str]) -> 
     slow = RunStatus("/r/slow", "a", 0, "finished", 0.0, islands)
     fast = RunStatus("/r/fast", "a", 1, "running", 2.5, islands)
     damaged = RunStatus("/r/bad", "a", 2, "damaged")
+    best = ["best", "of", "population,", "arenas"]
     for runs, columns in (
-        ((slow, damaged), ["run", "state", "births", "best,", "arenas"]),
-        ((fast,), ["run", "state", "births", "births/s", "best,", "arenas"]),
+        ((slow, damaged), ["run", "state", "births", *best]),
+        ((fast,), ["run", "state", "births", "births/s", *best]),
         ((damaged,), ["run", "state"]),
     ):
         _show(Source(Status(runs, 0, 0, 0.0), None, "/r"))

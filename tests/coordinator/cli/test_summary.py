@@ -4,6 +4,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from msgspec import structs
 
@@ -20,6 +21,8 @@ from schema.experiment.document import (
 )
 from schema.formats.files import BEST, read_robot
 from schema.robot.robot import Robot
+from schema.tables.files import parquet_path
+from tests.analysis.tables import table
 
 
 @pytest.mark.parametrize("screen", ["", ":0"])
@@ -52,15 +55,15 @@ def test_islands_that_judge_in_other_ways_are_said() -> None:
     )
 
 
-def test_windows_of_all_arenas_are_said(tmp_path: Path) -> None:
+def test_windows_of_all_arenas_are_said() -> None:
     slow = Simulation(timestep_s=0.01, window_steps=600)
     own = Islands(arena=Arena(), simulation=slow)
     experiment = Experiment("e", arena=Arena(), islands=(Islands(), own))
     arenas = [island_experiment(experiment, number) for number in range(2)]
-    (line,) = summary._windows(tmp_path, arenas)
+    (line,) = summary._windows(arenas)
     what = "a robot's last 6 or 12 s before the last birth"
     assert line == f"in arenas fitness is that of {what}"
-    (line,) = summary._windows(tmp_path, arenas[1:])
+    (line,) = summary._windows(arenas[1:])
     assert "last 6 s before" in line
 
 
@@ -115,3 +118,21 @@ def test_robot_without_a_file_is_said(tmp_path: Path, chain: Robot) -> None:
     best.mkdir()
     with pytest.raises(RunFolderError, match=r"best\.yaml: cannot be written: "):
         summary._write_best(core, tmp_path, Experiment("e"))
+
+
+@pytest.mark.parametrize(("ever", "is_said"), [(0.5, True), (0.3, False)])
+def test_a_better_robot_that_died_is_named(
+    tmp_path: Path, ever: float, *, is_said: bool
+) -> None:
+    rows: dict[str, list[dict[str, Any]]] = {
+        "evaluations": [{"birth": 4, "fitness": 0.3}, {"birth": 2, "fitness": ever}],
+        "fitness": [],
+    }
+    for name, own in rows.items():
+        path = parquet_path(tmp_path, "e", 0, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(table(name, own), path)
+    best = {"island": 0, "birth_island": None, "birth": 4, "fitness": 0.3}
+    shown = f"revolve view {tmp_path} --robot best-ever"
+    said = [f"best ever: robot 0:2, fitness 0.5000: {shown}"] if is_said else []
+    assert summary._better_ever(tmp_path, best) == said

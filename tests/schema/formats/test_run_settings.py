@@ -116,7 +116,9 @@ def test_best_robot_has_the_world_of_the_island_where_it_is_the_best(
     said = [
         line.partition("(two), ")[2] for line in capsys.readouterr().err.split("\n")
     ]
-    best = "island 1, where it is the best robot; --island names another"
+    best = (
+        "island 1, where it is the best of the last population; --island names another"
+    )
     other = "island 0; --island names another"
     assert said == [best, "island 0", other, "island 1", ""]
 
