@@ -15,7 +15,7 @@ from analysis.measures.fitness_functions import (
     functions_of,
     measured_apart,
 )
-from analysis.measures.populations import failures_as_best, last_rows
+from analysis.measures.populations import last_rows
 from schema.agent.terminal.progress_line import print_line
 from schema.errors import rounded
 
@@ -37,13 +37,11 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     """
     populations = _last_populations(tables["populations"])
     if populations:
-        heads = ("experiment", "run", "births", "judged", "mean of population",
-                 "best of population")  # fmt: skip
+        heads = ("experiment", "run", "births", "judged", "mean of population", "best")
+        print_line(console, "last populations:")
         _print_table(console, heads, populations, words={0, 1})
     else:
         print_line(console, "no population could be measured")
-    if warning := failures_as_best(tables):
-        print_line(console, warning)
     if findings := _findings(tables["findings"]):
         heads = ("figure", "finding of the thesis", "a", "b", "q", "verdict")
         _print_table(console, heads, findings, words={1, 5})

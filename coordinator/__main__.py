@@ -43,13 +43,14 @@ from schema.agent.command import (
 )
 from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
-from schema.agent.log import start_log, tell_user
+from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.agent.terminal.screen import missing_screen
 from schema.agent.topics import check_name
 from schema.errors import ExperimentError, NetworkError
+from schema.experiment.cost import cost_line
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
@@ -180,7 +181,11 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
 
     refuse_faulty(options.experiments, options.births)
     check = partial(check_built_in, kinds=worker.kinds.KINDS)
-    return read_experiments(options.experiments, options.births, check)
+    found = read_experiments(options.experiments, options.births, check)
+    islands = (own for each in found for own in island_experiments(each))
+    for line in dict.fromkeys(filter(None, map(cost_line, islands))):
+        warn_user(line)
+    return found
 
 
 def _deployment(

@@ -28,9 +28,9 @@ Written from the code by `python -m docs.reference_pages`.
 [Experiments](../experiments.md) is the introduction.
 
 Every setting is a key of an experiment's TOML file, and every key may change a birth.
-Settings that may not are flags of the [commands](commands.md). Whole numbers are at
-most 2^63 - 1, all numbers are finite. The unit 1 is that of shares, factors and other
-numbers without a dimension. Beyond the limits of single keys, a run checks that keys
+Settings that may not are flags of the [commands](commands.md). Seeds and points of a
+sweep are below 2^63. The unit 1 is that of shares, factors and other numbers without a
+dimension. Beyond the limits of single keys, a run checks that keys
 agree with each other, and names the key that does not.
 
 """

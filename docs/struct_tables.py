@@ -112,7 +112,7 @@ def shown_type(kind: kinds.Type, name_of: Callable[[type], str]) -> str:
 def _limits(kind: kinds.Type) -> str:
     """Return the limits of a type; the greatest numbers are left out."""
     signs = [
-        f"{sign} {value}"
+        f"{sign} {value if isinstance(value, int) else format(value, 'g')}"
         for key, sign in _SIGNS.items()
         if (value := getattr(kind, key, None)) is not None and abs(value) not in _MOST
     ]

@@ -138,15 +138,15 @@ def document_of(experiment: Experiment | str | Path) -> Document:
 
 def _own_keys(settings: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the tables of islands without the values that the document has, too."""
+
+    def own(section: Any, known: Any) -> Any:  # noqa: ANN401 - any plain value
+        if not isinstance(section, dict) or known is None:
+            return section
+        return {key: value for key, value in section.items() if value != known.get(key)}
+
     return [
         {
-            name: {
-                key: value
-                for key, value in section.items()
-                if key not in settings[name] or value != settings[name][key]
-            }
-            if name in settings and isinstance(section, dict)
-            else section
+            name: own(section, settings.get(name))
             for name, section in island.items()
             if section != settings.get(name)
         }

@@ -181,6 +181,8 @@ MOST_PLUGIN_CHARACTERS = 10_000
 
 # Numbers
 
+MOST_LENGTH_M = 1e6
+"""Greatest length in an experiment [m]: beyond it contacts lose their precision."""
 GREATEST_COORDINATE = 1e10
 """Coordinate above which the physics engine resets its state [m]."""
 GREATEST_VELOCITY = 1e12

@@ -13,13 +13,13 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from schema.errors import ExperimentError
-from schema.experiment.section import NotNegative, Positive
+from schema.experiment.section import Angle, Coordinate, Extent, Limit, NotNegative
 from schema.plugins.needs import needs
 from schema.robot.results import Floats
 from schema.robot.sums import sum_in_order
 from schema.robot.trace import Trace
 
-_Place = tuple[float, float]
+_Place = tuple[Coordinate, Coordinate]
 
 
 class _Own(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -35,9 +35,9 @@ class Directed(_Own, frozen=True):
         limit: greatest realistic speed [m/s].
     """
 
-    heading_deg: float = 0.0
+    heading_deg: Angle = 0.0
     drift_weight: NotNegative = 1.0
-    limit: Positive = 1.0
+    limit: Limit = 1.0
 
 
 def directed_locomotion(trace: Trace, parameters: Directed) -> float:
@@ -74,8 +74,8 @@ class Targets(_Own, frozen=True):
     targets: Annotated[tuple[_Place, ...], Meta(min_length=1, max_length=100)] = (
         (1.0, 0.0),
     )
-    reach_m: Positive = 0.1
-    limit: Positive = 1.0
+    reach_m: Extent = 0.1
+    limit: Limit = 1.0
 
 
 def target(trace: Trace, parameters: Targets) -> float:
@@ -114,7 +114,7 @@ class Light(_Own, frozen=True):
         full_within_m: distance within which brightness is 1, as for light sensors [m].
     """
 
-    full_within_m: Positive = 1.0
+    full_within_m: Extent = 1.0
 
 
 def light(trace: Trace, parameters: Light) -> float:
@@ -153,7 +153,7 @@ class Turning(_Own, frozen=True):
 
     direction: Literal["either", "left", "right"] = "either"
     wander_weight: NotNegative = 5.0
-    limit: Positive = 10.0
+    limit: Limit = 10.0
 
 
 @needs("core_attitude")
@@ -191,7 +191,7 @@ class Balance(_Own, frozen=True):
 
     tilt_deg: Annotated[float, Meta(gt=0, lt=90)] = 30.0
     drift_weight: NotNegative = 0.05
-    limit: Positive = 1.0
+    limit: Limit = 1.0
 
 
 @needs("core_attitude")

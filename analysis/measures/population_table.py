@@ -154,8 +154,9 @@ def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:
     Args:
         population: ``island``, ``births``, ``birth_island`` and ``birth`` (id of the
             individual), ``fitness``, ``is_online``. Off-line a null fitness means that
-            the evaluation failed, and counts as ``failed_fitness``, as in selection;
-            on-line it means that the robot is not mature, and does not count.
+            the evaluation failed, and counts as ``failed_fitness``, as in selection,
+            unless all have failed; on-line it means that the robot is not mature, and
+            does not count.
         births: births of the same run: ``island``, ``birth``.
     """
     islands = np.asarray(population["island"], np.int64)
@@ -168,8 +169,10 @@ def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:
     is_first = np.ones(len(order), np.bool_)
     is_first[1:] = (islands[1:] != islands[:-1]) | (numbers[1:] != numbers[:-1])
     group = np.cumsum(is_first) - 1
-    fitness, least = fitness[order], np.zeros(group.max(initial=-1) + 1)
+    # ``failed_fitness`` of each population; none where all have failed.
+    fitness, least = fitness[order], np.full(group.max(initial=-1) + 1, np.nan)
     np.fmin.at(least, group, fitness)
+    least = np.minimum(least, 0.0)
     fitness = np.where(is_failed[order], least[group], fitness)
     incomplete = np.unique(group[members < 0])
     kept = ~np.isin(group, incomplete)

@@ -1,7 +1,6 @@
 """Measures of each recorded population; the last populations of measured runs."""
 
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -145,30 +144,3 @@ def last_rows(populations: pa.Table) -> list[dict[str, Any]]:
         [(key, "ascending") for key in keys]
     ).to_pylist()
     return found
-
-
-def failures_as_best(tables: Mapping[str, pa.Table]) -> str:
-    """Return a warning if failed evaluations may be the best of last populations.
-
-    Args:
-        tables: ``runs`` and ``populations``.
-
-    Returns:
-        A line that names the runs; empty if there is none.
-    """
-    runs = tables["runs"].filter(pc.field("failures") > 0)
-    failures = dict(
-        zip(*(runs[name].to_pylist() for name in ("folder", "failures")), strict=True)
-    )
-    folders = [
-        row["folder"]
-        for row in last_rows(tables["populations"])
-        if row["fitness_best"] == 0.0 and row["folder"] in failures
-    ]
-    names = ", ".join(
-        f"{Path(folder).name} ({failures[folder]} failed)"
-        for folder in dict.fromkeys(folders)
-    )
-    if not names:
-        return ""
-    return f"a failed evaluation counts as fitness 0, which is the best of {names}"

@@ -12,9 +12,9 @@ from analysis.measures.fitness_functions import (
     fitness_unit,
     functions_of,
 )
-from analysis.measures.populations import failures_as_best, last_rows
+from analysis.measures.populations import last_rows
 from analysis.report.fitness import run_names
-from analysis.report.html import capitalised, cell, duration, folded, plural, table
+from analysis.report.html import cell, duration, folded, plural, table
 
 _MOST_LINES = 3
 """Differing experiments, or runs of arenas, that are described without a fold."""
@@ -60,12 +60,9 @@ def summary(tables: Tables) -> str:
         rows.append(cells)
     if not rows:
         return ""
-    warning = failures_as_best(tables)
-    noted = f'<p class="warning">{escape(capitalised(warning))}.</p>'
     return (
         table(heads, rows)
         + _differing({row["experiment"]: row["differs"] for row in runs})
-        + noted * bool(warning)
         + _summary_note(
             set(functions.values()), has_islands=any(row["islands"] > 1 for row in runs)
         )

@@ -9,8 +9,8 @@ from coordinator.cli.status import ask, ask_status
 from schema.agent.command import add_connect, add_network_flags
 from schema.agent.flags import Flags, add_count, birth_name, number
 from schema.agent.log import tell_user
-from schema.errors import InvalidRobot, NetworkError
-from schema.formats.run_settings import experiment_of, read_robot_of
+from schema.errors import NetworkError
+from schema.formats.run_settings import read_with_settings
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode_robot
 from schema.wire.operator import (
@@ -128,10 +128,8 @@ def _robot(options: argparse.Namespace) -> bytes:
         InvalidRobot: the file holds no robot.
         ExperimentError: an invalid experiment.
     """
-    file = Path(options.file)
-    if not file.is_file():
-        raise InvalidRobot(f"{file}: no such file")
-    return encode_robot(read_robot_of(file, experiment_of(file, options.experiment)))
+    robot, *_ = read_with_settings(Path(options.file), options.experiment)
+    return encode_robot(robot)
 
 
 def parser(_command: str = "arena") -> Flags:
@@ -172,8 +170,9 @@ def parser(_command: str = "arena") -> Flags:
             action.add_argument(
                 "--experiment",
                 metavar="NAME|FILE.toml",
-                help="experiment whose settings to use (default: that of the run "
-                "folder that holds the file, else all built-in part types)",
+                help="experiment whose settings to use (default: that in an MJCF "
+                "file, else that of the run folder that holds the file, else all "
+                "built-in part types)",
             )
         if name == "insert":
             action.add_argument(

@@ -3,10 +3,13 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from math import isclose
+from typing import Annotated
+
+from msgspec import Meta
 
 from schema.errors import nearest, shown
 from schema.experiment.robust import NoiseLevel
-from schema.experiment.section import NotNegative, Section
+from schema.experiment.section import Number, Section
 from schema.parts import PartType
 
 
@@ -20,10 +23,10 @@ class Response(Section, frozen=True):
         delay_s: age of the value; a whole number of brain ticks [s].
     """
 
-    gain: float = 1.0
-    offset: float = 0.0
+    gain: Number = 1.0
+    offset: Number = 0.0
     noise: NoiseLevel = 0.0
-    delay_s: NotNegative = 0.0
+    delay_s: Annotated[float, Meta(ge=0, le=1000)] = 0.0
 
 
 IDEAL = Response()

@@ -20,21 +20,35 @@ from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.experiment.robust import NoiseLevel, Robust
 from schema.experiment.section import (
+    Angle,
     AtLeastOne,
-    Count,
+    Extent,
+    Length,
+    Limit,
     NotNegative,
+    Number,
     Parameters,
+    Place,
     PluginSection,
     Positive,
     Probability,
     Section,
+    Size,
+    Steps,
 )
 from schema.experiment.sweep import Sweep
-from schema.limits import MOST_MEASURES
+from schema.limits import (
+    MOST_GEOMS,
+    MOST_ISLANDS,
+    MOST_MEASURES,
+    MOST_NEURONS,
+    MOST_PARTS,
+)
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
 from schema.plugins.part_checks import check_part_type
 
+Neurons = Annotated[int, Meta(ge=0, le=MOST_NEURONS)]
 REVOLVE_ANGLE = "revolve-angle"
 """Name of the encoding of the thesis."""
 
@@ -66,11 +80,11 @@ class Space(Section, frozen=True):
         "schema.parts:PARAMETRIC_BAR_JOINT",
         "schema.parts:TOUCH_SENSOR",
     )
-    min_parts: AtLeastOne = 3
-    max_parts: AtLeastOne = 30
-    max_inputs: Count = 10
-    max_outputs: AtLeastOne = 10
-    max_hidden: Count = 10
+    min_parts: Annotated[int, Meta(ge=1, le=MOST_PARTS)] = 3
+    max_parts: Size = 30
+    max_inputs: Neurons = 10
+    max_outputs: Annotated[int, Meta(ge=1, le=MOST_NEURONS)] = 10
+    max_hidden: Neurons = 10
     planar: bool = True
     neuron_types: tuple[str, ...] = ("Simple", "Sigmoid", "Oscillator")
 
@@ -107,7 +121,7 @@ class Generation(Section, frozen=True):
         max_tries: attempts per robot; after these the run stops with an error.
     """
 
-    parts_mean: float = 12.0
+    parts_mean: Number = 12.0
     parts_sd: NotNegative = 5.0
     p_connect_neurons: Probability = 0.1
     hidden_on: Literal["any", "wired"] = "any"
@@ -227,9 +241,9 @@ class Selection(PluginSection, frozen=True):
         reevaluation: re-evaluates living robots.
     """
 
-    population: AtLeastOne = 15
-    children: AtLeastOne = 15
-    window: AtLeastOne | None = None
+    population: Size = 15
+    children: Size = 15
+    window: Size | None = None
     parents: str = "tournament"
     parents_parameters: Parameters = field(default_factory=dict)
     tournament_size: AtLeastOne = 4
@@ -256,7 +270,7 @@ class Vetting(Section, frozen=True):
     """
 
     mode: Literal["overlap", "contact"] = "overlap"
-    tolerance_m: NotNegative = 1e-6
+    tolerance_m: Length = 1e-6
 
 
 class Simulation(Section, frozen=True):
@@ -295,11 +309,11 @@ class Simulation(Section, frozen=True):
 
     later: ClassVar = ("start_deg", "mass_factor", "torque_factor")
 
-    timestep_s: Positive = 0.005
-    brain_steps: AtLeastOne = 25
-    pose_steps: AtLeastOne = 40
-    window_steps: AtLeastOne = 2400
-    warmup_steps: Count = 0
+    timestep_s: Annotated[float, Meta(ge=1e-6, le=10)] = 0.005
+    brain_steps: Steps = 25
+    pose_steps: Steps = 40
+    window_steps: Steps = 2400
+    warmup_steps: Annotated[int, Meta(ge=0, le=10**9)] = 0
     gravity: NotNegative = 9.81
     friction: NotNegative = 1.0
     armature: NotNegative = 1e-4
@@ -307,11 +321,11 @@ class Simulation(Section, frozen=True):
     servo_armature: NotNegative = 5e-3
     servo_stiffness: Positive = 1.0
     contact_time_s: Positive = 0.01
-    drop_m: NotNegative = 0.0
+    drop_m: Length = 0.0
     evaluation_s: tuple[Positive, Positive] | None = None
     sensor_noise: NoiseLevel = 0.0
     actuator_noise: NoiseLevel = 0.0
-    start_deg: Vector = (0.0, 0.0, 0.0)
+    start_deg: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
     mass_factor: Positive = 1.0
     torque_factor: Positive = 1.0
 
@@ -343,9 +357,9 @@ class Fitness(PluginSection, frozen=True):
     later: ClassVar = ("parameters",)
 
     function: str = "worker.fitness:thesis"
-    path_weight: float = 1.0
-    straight_weight: float = 5.0
-    limit: Positive = 1.0
+    path_weight: Number = 1.0
+    straight_weight: Number = 5.0
+    limit: Limit = 1.0
     parameters: Parameters = field(default_factory=dict)
 
 
@@ -411,19 +425,19 @@ class Arena(Section, frozen=True):
     population_floor: AtLeastOne = 8
     survive_share_of_mean: NotNegative = 0.7
     full_cull_share: Probability = 0.7
-    birth_radius_m: NotNegative = 2.0
-    birth_distance_m: NotNegative = 0.25
-    birth_place_tries: AtLeastOne = 5
-    drop_m: NotNegative = 0.25
-    wall_diameter_m: NotNegative = 0.0
-    wall_segments: Annotated[int, Meta(ge=3)] = 12
-    wall_height_m: Positive = 1.0
-    wall_thickness_m: Positive = 0.05
-    light: tuple[float, float, float] | None = None
+    birth_radius_m: Length = 2.0
+    birth_distance_m: Length = 0.25
+    birth_place_tries: Size = 5
+    drop_m: Length = 0.25
+    wall_diameter_m: Length = 0.0
+    wall_segments: Annotated[int, Meta(ge=3, le=MOST_GEOMS)] = 12
+    wall_height_m: Extent = 1.0
+    wall_thickness_m: Extent = 0.05
+    light: Place | None = None
     record_touches: bool = False
-    proximity_steps: AtLeastOne = 8
-    merge_distance_m: NotNegative = 0.02
-    split_distance_m: NotNegative = 0.06
+    proximity_steps: Steps = 8
+    merge_distance_m: Length = 0.02
+    split_distance_m: Length = 0.06
 
 
 class Islands(Section, frozen=True):
@@ -448,7 +462,7 @@ class Islands(Section, frozen=True):
         learning: lifetime learning of these islands' newborns.
     """
 
-    count: AtLeastOne = 1
+    count: Annotated[int, Meta(ge=1, le=MOST_ISLANDS)] = 1
     births: AtLeastOne | None = None
     generation: Generation | None = None
     variation: Variation | None = None

@@ -10,7 +10,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
-from schema.experiment.section import Count, NotNegative, Positive, Section
+from schema.experiment.section import Count, Extent, Length, Place, Positive, Section
+from schema.limits import MOST_LENGTH_M
 from schema.parts import Vector
 from schema.robot.results import Floats
 
@@ -26,8 +27,6 @@ MOST_IMPULSE = 1000.0
 _UNUSED = re.compile(r"\s(surfacevel|adhesion|fluidshape|fluidcoef)\s*=")
 """Attributes of geoms that MuJoCo obeys, and that scenery here has not."""
 
-MOST_LENGTH_M = 1e6
-"""Greatest length in scenery [m]: beyond it contacts lose their precision."""
 _LENGTHS = re.compile(r"\s(?:size|pos|fromto|offset)\s*=\s*[\"']([^\"']*)[\"']")
 
 
@@ -59,12 +58,12 @@ class Environment(Section, frozen=True, dict=True):
     uncounted: ClassVar = ("gap_contacts",)
 
     slope_deg: Annotated[float, Meta(ge=0, lt=45)] = 0.0
-    roughness_m: NotNegative = 0.0
-    patch_m: Positive = 0.1
-    extent_m: Positive = 5.0
+    roughness_m: Length = 0.0
+    patch_m: Extent = 0.1
+    extent_m: Extent = 5.0
     ground_seed: Count = 1
     scenery: str = ""
-    light: Vector | None = None
+    light: Place | None = None
     push_impulse: Annotated[float, Meta(ge=0, le=MOST_IMPULSE)] = 0.0
     push_interval_s: Positive = 3.0
     # Documents of new runs have it if their scenery has gaps; see ``add_gap_contacts``.

@@ -20,7 +20,6 @@ from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, island_experiments, references
 from schema.experiment.environment import (
-    MOST_LENGTH_M,
     add_gap_contacts,
     is_mjcf,
     too_long,
@@ -39,6 +38,7 @@ from schema.limits import (
     MOST_ISLAND_TABLES,
     MOST_ISLANDS,
     MOST_KEY_PARTS,
+    MOST_LENGTH_M,
     MOST_TEXT_BYTES,
 )
 from schema.plugins.parameters import read_parameters

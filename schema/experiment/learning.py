@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from schema.errors import nearest, shown
-from schema.experiment.section import Parameters, PluginSection
+from schema.experiment.section import Number, Parameters, PluginSection
 
 LEARNERS = ("cma-es", "(1+1)-es", "random")
 """Built-in learners."""
@@ -43,7 +43,7 @@ class Learning(PluginSection, frozen=True):
     what: Literal["all", "weights", "neurons"] = "all"
     sigma: Annotated[float, Meta(gt=0, le=1)] = 0.2
     inherit: Literal["darwinian", "lamarckian"] = "darwinian"
-    weight_limits: tuple[float, float] = (0.0, 1.0)
+    weight_limits: tuple[Number, Number] = (0.0, 1.0)
     parameters: Parameters = field(default_factory=dict)
 
 

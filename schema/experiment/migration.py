@@ -9,8 +9,10 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from schema.experiment.section import AtLeastOne, Count, Positive, Probability, Section
+from schema.experiment.section import AtLeastOne, Positive, Probability, Section
+from schema.limits import MOST_ISLANDS
 
+_Island = Annotated[int, Meta(ge=0, le=MOST_ISLANDS)]
 Topology = Literal[
     "unconnected",
     "ring",
@@ -50,9 +52,9 @@ class Migration(Section, frozen=True):
     """
 
     topology: Topology = "unconnected"
-    degree: AtLeastOne = 4
+    degree: Annotated[int, Meta(ge=1, le=MOST_ISLANDS)] = 4
     p_rewire: Probability = 0.1
-    edges: tuple[tuple[Count, Count], ...] = ()
+    edges: tuple[tuple[_Island, _Island], ...] = ()
     epoch: AtLeastOne = 15
     epoch_s: Positive | None = None
     migrants: AtLeastOne | Annotated[float, Meta(gt=0, le=1)] = 1

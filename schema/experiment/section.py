@@ -5,13 +5,24 @@ from typing import Annotated, Any, ClassVar
 from msgspec import NODEFAULT, Meta, Struct, json
 from msgspec.structs import fields
 
-from schema.limits import MOST_COUNT
+from schema.limits import MOST_COUNT, MOST_LENGTH_M
 
 Probability = Annotated[float, Meta(ge=0, le=1)]
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
+Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
+Positive = Annotated[float, Meta(gt=0, le=1e12)]
+NotNegative = Annotated[float, Meta(ge=0, le=1e12)]
+Limit = Annotated[float, Meta(gt=0, le=1e300)]
+"""A limit that a great number switches off."""
+Length = Annotated[float, Meta(ge=0, le=MOST_LENGTH_M)]
+Extent = Annotated[float, Meta(gt=0, le=MOST_LENGTH_M)]
+Coordinate = Annotated[float, Meta(ge=-MOST_LENGTH_M, le=MOST_LENGTH_M)]
+Place = tuple[Coordinate, Coordinate, Coordinate]
+Angle = Annotated[float, Meta(ge=-3600, le=3600)]
 Count = Annotated[int, Meta(ge=0, le=MOST_COUNT)]
-AtLeastOne = Annotated[int, Meta(ge=1, le=MOST_COUNT)]
+AtLeastOne = Annotated[int, Meta(ge=1, le=10**9)]
+Size = Annotated[int, Meta(ge=1, le=10**6)]
+"""Number of things that exist at the same time."""
+Steps = Annotated[int, Meta(ge=1, le=10**9)]
 
 
 class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -34,26 +34,10 @@ def experiment_of(
     tells_default: bool = False,
     say: Callable[[str], object] = tell,
 ) -> Experiment | None:
-    """Return the settings of a robot file; say which ones they are.
+    """Return the experiment of a robot file, with the settings of one island.
 
-    Args:
-        file: robot file that the user named. In a run folder, the experiment is that of
-            the run, and its plug-ins may be imported as when the run is viewed.
-        named: experiment that the user named; it comes first.
-        island: island that the user named; None is, of ``best.yaml`` of a run, the
-            island on which it has its fitness, and of other files island 0.
-        tells_default: also say which settings apply if the file is in no run folder.
-        say: gets the line; the default writes it to standard error.
-
-    Returns:
-        The experiment, with the settings of one island; None: the default settings
-        apply.
-
-    Raises:
-        ExperimentError: an invalid experiment, or no island of that number; a plug-in
-            of the run that is missing or not the user's own.
-        RunFolderError: the description of the run, or the table of the populations that
-            names the best robot's island, is damaged.
+    None: the default settings apply. Arguments and errors are those of
+    ``read_with_settings``.
     """
     if named:
         experiment = read_experiment(named) if isinstance(named, str) else named
@@ -102,11 +86,13 @@ def read_with_settings(
     the folder of a run.
 
     Args:
-        file: as of ``experiment_of``.
-        named: as of ``experiment_of``.
-        island: as of ``experiment_of``.
-        tells_default: as of ``experiment_of``.
-        say: as of ``experiment_of``.
+        file: robot file that the user named. In a run folder, the experiment is that of
+            the run, and its plug-ins may be imported as when the run is viewed.
+        named: experiment that the user named; it comes first.
+        island: island that the user named; None is, of ``best.yaml`` of a run, the
+            island on which it has its fitness, and of other files island 0.
+        tells_default: also say which settings apply if the file is in no run folder.
+        say: gets the line; the default writes it to standard error.
 
     Returns:
         The robot, the settings and the experiment; of an MJCF file's own settings and
@@ -115,8 +101,10 @@ def read_with_settings(
     Raises:
         InvalidRobot: the file is missing, or holds no robot that is well formed.
         MalformedMessage: a .pb file that does not hold a robot.
-        ExperimentError: as of ``experiment_of``.
-        RunFolderError: as of ``experiment_of``.
+        ExperimentError: an invalid experiment, or no island of that number; a plug-in
+            of the run that is missing or not the user's own.
+        RunFolderError: the description of the run, or the table of the populations that
+            names the best robot's island, is damaged.
     """
     # First: nothing is said about the settings of a file that is not there.
     if check_file(file) == MJCF_ENDING and named is None and island is None:
@@ -129,7 +117,8 @@ def read_with_settings(
             say(f"with the settings in {file}; --experiment names others")
         return robot, settings, None
     found = experiment_of(file, named, island, tells_default=tells_default, say=say)
-    return read_robot_of(file, found), settings_of(found), found
+    robot = read_robot(file, *(types_of(found) if found else ()))
+    return robot, settings_of(found), found
 
 
 def _allow_run_of(file: Path) -> bool:
@@ -157,13 +146,3 @@ def _of_island(experiment: Experiment, number: int) -> Experiment:
         return island_experiment(experiment, number)
     except ValueError as error:
         raise ExperimentError(f"--{error}") from None
-
-
-def read_robot_of(file: Path, experiment: Experiment | None) -> Robot:
-    """Return the robot of a file; without experiment it may have all built-in types.
-
-    Raises:
-        InvalidRobot, MalformedMessage: as of ``read_robot``.
-        ExperimentError: a type that cannot be loaded.
-    """
-    return read_robot(file, *(types_of(experiment) if experiment else ()))

@@ -62,18 +62,6 @@ def test_all_islands_of_a_run_are_named_if_it_has_several() -> None:
     assert runs == ["alone", "arch 0", "arch 1"]
 
 
-def test_failed_evaluations_that_are_the_best_are_named() -> None:
-    (row, _) = ROWS["populations"]
-    rows = [row | {"folder": name, "fitness_best": best}
-            for name, best in (("a", 0.0), ("b", 0.0), ("c", -1.0))]  # fmt: skip
-    runs = [
-        {"folder": name, "failures": count}
-        for name, count in zip("abc", (3, 0, 3), strict=True)
-    ]
-    text = output({"populations": rows, "runs": runs}, 120)
-    assert "counts as fitness 0, which is the best of a (3 failed)\n" in text
-
-
 def test_figures_that_are_left_out_share_a_line() -> None:
     rows = [
         {"folder": "", "what": f"figure {number}", "why": why}

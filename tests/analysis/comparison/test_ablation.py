@@ -67,9 +67,9 @@ def test_line_about_a_run() -> None:
     assert summary(table_of(ROWS, COLUMNS)) == (
         "the best ever, 0:7 (fitness 0.1000), keeps 96 % without touch, 50 % without "
         "imu, 40 % without sensors, 80 % with sensors at their mean, 20 % with a "
-        "random brain; the motor of part 4 carries 41 %, the motor of part 8 carries 0 %; "
-        "2 of the last population keep 75 % without sensors, 40 % without their most "
-        "important motor, 30 % with a random brain in the median; "
+        "random brain; the motor of part 4 carries 41 %, the motor of part 8 carries "
+        "0 %; 2 of the last population keep 75 % without sensors, 40 % without their "
+        "most important motor, 30 % with a random brain in the median; "
         "1 of 18 evaluations failed"
     )
     arena = [row(7, HELD, "all", 0.1, recorded=0.3)]

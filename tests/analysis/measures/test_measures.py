@@ -261,6 +261,9 @@ def test_a_failure_counts_as_the_least_fitness_below_0() -> None:
     fitness = robots(RunTables(tables, islands=islands))["fitness"].to_pylist()
     # A and B as in their last population, D with the mean of -0.6 and -0.6.
     assert fitness == [0.5, 0.0, 0.3, -0.6]
+    # Where all have failed, there is none.
+    tables["population"] = population((0, 3, {A: None, B: None}))
+    assert column(tables, "fitness_best") == column(tables, "fitness") == [None]
 
 
 @pytest.mark.parametrize(

@@ -238,19 +238,6 @@ def test_births_of_off_line_islands_are_no_births_in_arenas() -> None:
     assert "A run of several islands counts with the mean of their means." in text
 
 
-def test_failed_robots_that_are_the_best_are_told() -> None:
-    given = tables()
-    assert "counts as fitness 0" not in read_page(given).text
-    zero = pa.array([-1.0, 0.0] * 3)
-    place = given["populations"].schema.get_field_index("fitness_best")
-    given["populations"] = given["populations"].set_column(place, "fitness_best", zero)
-    place = given["runs"].schema.get_field_index("failures")
-    failures = pa.array([0, 5, None], pa.int64())
-    given["runs"] = given["runs"].set_column(place, "failures", failures)
-    warning = "A failed evaluation counts as fitness 0, which is the best of "
-    assert f"{warning}soft-1 (5 failed)." in read_page(given).text
-
-
 def test_dots_are_in_the_order_of_birth_and_of_robots_that_did_not_fail() -> None:
     given = tables()
     robots = given["robots"]

@@ -1,0 +1,109 @@
+"""Every number of an experiment has bounds, which the reference shows."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import pytest
+
+from docs.settings_reference import page
+from schema.errors import ExperimentError
+from schema.experiment.file import (
+    experiment_from_tables,
+    experiment_from_text,
+    parse_toml,
+    read_experiment,
+    shipped_experiments,
+)
+
+_ROW = re.compile(r"^\| `(\w+)` \| ([^|]*number[^|]*) \|", re.MULTILINE)
+_BOUNDED = re.compile(r"(whole )?number >=? \S+, <=? [^\s,)]+")
+_DATA = Path(__file__).parents[1] / "data"
+
+
+def test_the_reference_shows_both_bounds_of_every_number() -> None:
+    rows = _ROW.findall(page())
+    assert len(rows) > 100
+    without = {name for name, kind in rows if "number" in _BOUNDED.sub("", kind)}
+    # Its head names the bound of these.
+    assert without == {"ground_seed", "seed", "samples", "steps", "low", "high"}
+
+
+@pytest.mark.parametrize(
+    ("keys", "where"),
+    [
+        ({"simulation": {"window_steps": 9 * 10**18}}, "simulation.window_steps"),
+        ({"simulation": {"timestep_s": 1e-300}}, "simulation.timestep_s"),
+        ({"space": {"min_parts": 8 * 10**8}}, "space.min_parts"),
+        ({"space": {"max_hidden": 10**7}}, "space.max_hidden"),
+        ({"selection": {"population": 10**9}}, "selection.population"),
+        ({"births": 10**12}, "births"),
+        ({"environment": {"extent_m": 1e300}}, "environment.extent_m"),
+        ({"environment": {"patch_m": 1e300}}, "environment.patch_m"),
+        ({"environment": {"light": [1e300, 0, 1]}}, "environment.light"),
+        ({"arena": {"light": [0, -1e9, 1]}}, "arena.light"),
+        ({"arena": {"wall_segments": 10**6}}, "arena.wall_segments"),
+        ({"islands": [{"count": 10**5}]}, "islands"),
+        ({"simulation": {"start_deg": [0, 0, 1e9]}}, "simulation.start_deg"),
+        ({"sweep": {"settings": {"births": {"low": 1, "high": 10**400}}}}, "sweep"),
+    ],
+)
+def test_absurd_settings_are_refused_in_one_line(
+    keys: dict[str, Any], where: str
+) -> None:
+    with pytest.raises(ExperimentError) as raised:
+        experiment_from_tables({"name": "a", **keys}, "a.toml")
+    line = str(raised.value)
+    assert line.startswith(f"a.toml: {where}")
+    assert "<=" in line or ">=" in line
+    assert "\n" not in line
+
+
+def test_settings_of_users_who_want_no_limit_are_not_refused() -> None:
+    text = """name = "a"
+births = 100_000_000
+[space]
+max_parts = 1000
+max_hidden = 10_000
+[selection]
+population = 20_000
+children = 20_000
+[simulation]
+window_steps = 100_000_000
+servo_stiffness = 1e9
+torque_factor = 1e9
+[fitness]
+limit = 1e99
+[environment]
+light = [100_000.0, 0, 100_000.0]
+[[islands]]
+count = 2
+[migration]
+topology = "ring"
+epoch = 1_000_000_000
+epoch_s = 1e9
+[arena]
+population_limit = 1_000_000
+cull_interval_s = 1e9
+snapshot_interval_s = 1e9
+"""
+    found = experiment_from_tables(parse_toml(text, "a.toml"), "a.toml")
+    assert found.fitness.limit == 1e99
+
+
+@pytest.mark.parametrize("name", shipped_experiments())
+def test_shipped_experiments_are_within_the_bounds(name: str) -> None:
+    read_experiment(name)
+
+
+@pytest.mark.parametrize(
+    "path", sorted(_DATA.glob("runs-*/*.zip")), ids=lambda path: path.stem
+)
+def test_experiments_of_earlier_runs_are_within_the_bounds(path: Path) -> None:
+    with ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if name.endswith("run.json")]
+        assert names
+        for name in names:
+            experiment_from_text(json.loads(archive.read(name))["document"])
