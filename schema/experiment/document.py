@@ -49,6 +49,7 @@ from schema.plugins.load import load_instance
 from schema.plugins.part_checks import check_part_type
 
 Neurons = Annotated[int, Meta(ge=0, le=MOST_NEURONS)]
+Evaluated = Annotated[float, Meta(gt=0, le=1e6)]
 REVOLVE_ANGLE = "revolve-angle"
 """Name of the encoding of the thesis."""
 
@@ -189,7 +190,8 @@ class Culling(Section, frozen=True):
             corresponds to ``arena.cull_interval_s``.
         population_limit: size of a full population.
         population_floor: number of robots that are always kept, the fittest.
-        survive_share_of_mean: robots below this share of the mean are removed.
+        survive_share_of_mean: robots below this share of the mean are removed; the
+            limit is as far below a negative mean as below a positive one.
         full_cull_share: share of ``population_limit`` to remove.
     """
 
@@ -322,7 +324,7 @@ class Simulation(Section, frozen=True):
     servo_stiffness: Positive = 1.0
     contact_time_s: Positive = 0.01
     drop_m: Length = 0.0
-    evaluation_s: tuple[Positive, Positive] | None = None
+    evaluation_s: tuple[Evaluated, Evaluated] | None = None
     sensor_noise: NoiseLevel = 0.0
     actuator_noise: NoiseLevel = 0.0
     start_deg: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
@@ -396,7 +398,7 @@ class Arena(Section, frozen=True):
         population_limit: living robots at which births stop.
         population_floor: number of mature robots that removals always keep.
         survive_share_of_mean: mature robots below this share of their mean fitness
-            are removed.
+            are removed; as of ``selection.culling``.
         full_cull_share: share of ``population_limit`` to remove if that many robots
             are mature and none is below the share of the mean.
         birth_radius_m: robots are born within this distance of the origin [m].

@@ -36,6 +36,7 @@ def test_the_reference_shows_both_bounds_of_every_number() -> None:
     [
         ({"simulation": {"window_steps": 9 * 10**18}}, "simulation.window_steps"),
         ({"simulation": {"timestep_s": 1e-300}}, "simulation.timestep_s"),
+        ({"simulation": {"evaluation_s": [12, 1e12]}}, "simulation.evaluation_s"),
         ({"space": {"min_parts": 8 * 10**8}}, "space.min_parts"),
         ({"space": {"max_hidden": 10**7}}, "space.max_hidden"),
         ({"selection": {"population": 10**9}}, "selection.population"),
