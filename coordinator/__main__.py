@@ -20,6 +20,7 @@ from coordinator.plugins.checks import (
     refuse_faulty_of,
 )
 from coordinator.plugins.command import check, check_flags, list_flags, list_plugins
+from coordinator.plugins.cost import cost_line
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
@@ -50,7 +51,6 @@ from schema.agent.supervisor import cores
 from schema.agent.terminal.screen import missing_screen
 from schema.agent.topics import check_name
 from schema.errors import ExperimentError, NetworkError
-from schema.experiment.cost import cost_line
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS

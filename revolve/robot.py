@@ -93,7 +93,7 @@ class Robot:
             raise InvalidRobot(str(error)) from None
         if own is None and settings != settings_of(None):
             own = experiment_with(settings, Path(path).stem)
-        return cls(found.parts, found.brain, own and Experiment(own))
+        return cls(found.parts, found.brain, None if own is None else Experiment(own))
 
     @classmethod
     def random(

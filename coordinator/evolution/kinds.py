@@ -35,6 +35,7 @@ from schema.experiment.selection_rules import own_rule
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
+from schema.robot.results import failed_fitness
 
 Labels = tuple[str, ...] | None
 """Measures that an experiment records; None: every one that a rule may ask for."""
@@ -135,8 +136,9 @@ def _advise(name: str, function: Callable[..., Any], parameters: object) -> str:
     It is not an error: a run in which no robot fails goes on.
     """
     *_, population = _populations(_CHILDREN + 1, None)
+    failed = failed_fitness(one.fitness for one in population)
     mixed = [
-        replace(one, fitness=0.0, measures=NO_MEASURES)
+        replace(one, fitness=failed, measures=NO_MEASURES)
         if number % _FAILED == 0
         else one
         for number, one in enumerate(population)

@@ -75,15 +75,18 @@ def test_two_names_of_one_function_are_listed_as_such() -> None:
 def test_rows_of_settings_have_type_default_unit_and_meaning() -> None:
     page = _page("settings.md").splitlines()
     for row in (
-        "`tournament_size` | whole number >= 1 | `4` |  | individuals per tournament",
-        "`timestep_s` | number > 0 | `0.005` | s | physics step",
+        (
+            "`tournament_size` | whole number >= 1, <= 1000000000 | `4` |  |"
+            " individuals per tournament"
+        ),
+        "`timestep_s` | number >= 1e-06, <= 10 | `0.005` | s | physics step",
         (
             '`duplicable_size` | `"mean"`, `"sum"` | `"mean"` |  | size of subtrees in'
             " that number: their `mean` or `sum`"
         ),
         (
-            "`light` | list of 3 (number) | not given | m | position of the light; no"
-            " light if not given"
+            "`light` | list of 3 (number >= -1e+06, <= 1e+06) | not given | m |"
+            " position of the light; no light if not given"
         ),
         (
             "`culling` | [`[selection.culling]`](#selectionculling) | not given |  |"

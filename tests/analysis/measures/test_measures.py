@@ -242,7 +242,7 @@ def test_robots_have_their_last_fitness() -> None:
 
 
 def test_a_failure_counts_as_the_least_fitness_below_0() -> None:
-    evaluations = [
+    evaluations: list[dict[str, Any]] = [
         {"birth": 0, "fitness": -0.2},
         {"birth": 1, "fitness": None},
         {"birth": 2, "fitness": 0.3},

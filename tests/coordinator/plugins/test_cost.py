@@ -4,7 +4,7 @@ import tracemalloc
 
 import pytest
 
-from schema.experiment.cost import cost_line, evaluation_cost
+from coordinator.plugins.cost import cost_line, evaluation_cost
 from schema.experiment.document import island_experiments
 from schema.experiment.file import read_experiment, shipped_experiments
 from schema.experiment.settings import evaluation_settings_of
