@@ -35,10 +35,7 @@ class Experiment:
     ) -> None:
         """Wrap a checked document; use ``read`` or ``from_toml`` instead.
 
-        Args:
-            document: complete.
-            islands: tables ``[[islands]]`` with the keys that they set themselves;
-                None: those whose values differ from the rest of the document.
+        ``islands`` have the keys that they set themselves; None: those that differ.
         """
         self._document = document
         self._islands = _own_keys(self.settings) if islands is None else islands
@@ -138,17 +135,13 @@ def document_of(experiment: Experiment | str | Path) -> Document:
 
 def _own_keys(settings: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the tables of islands without the values that the document has, too."""
-
-    def own(section: Any, known: Any) -> Any:  # noqa: ANN401 - any plain value
-        if not isinstance(section, dict) or known is None:
-            return section
-        return {key: value for key, value in section.items() if value != known.get(key)}
-
     return [
         {
-            name: own(section, settings.get(name))
-            for name, section in island.items()
-            if section != settings.get(name)
+            name: {k: v for k, v in own.items() if v != settings.get(name, {}).get(k)}
+            if isinstance(own, dict)
+            else own
+            for name, own in island.items()
+            if own != settings.get(name)
         }
         for island in settings["islands"]
     ]

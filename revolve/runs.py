@@ -218,17 +218,10 @@ class Run:
         return self._first(fittest(last_populations(self.folder)), count)
 
     def best_ever(self, count: int = 1) -> list[Robot]:
-        """Return the fittest robots that were ever evaluated, dead or alive.
+        """Return the fittest robots that were ever evaluated, as ``best`` does.
 
-        Robots of arenas count with the best sample (table ``fitness``) while they were
-        mature.
-
-        Args:
-            count: as of ``best``.
-
-        Raises:
-            RunFolderError: as of ``best``.
-            RevolveError: as of ``best``.
+        They may be dead. Robots of arenas count with the best sample (table
+        ``fitness``) while they were mature.
         """
         return self._first(best_ever(self.folder), count)
 

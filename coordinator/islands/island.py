@@ -9,13 +9,7 @@ Source: Hupkes 2016, section 5.3; the code of the original.
 from dataclasses import dataclass
 from math import isfinite
 
-from coordinator.evolution.breeding import (
-    Breeder,
-    Candidate,
-    Couple,
-    Individual,
-    failed_last,
-)
+from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.events import (
     Answered,
@@ -296,7 +290,7 @@ class Island:
         commands, population = migration.receive(self.population, self.births)
         if population is None:
             return [*commands]
-        self.population = tuple(failed_last(population))
+        self.population = population
         return [*commands, *self._open_brood()]
 
     def _open_brood(self) -> list[IslandCommand]:

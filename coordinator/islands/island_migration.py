@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from coordinator.evolution.breeding import Individual
+from coordinator.evolution.breeding import Individual, failed_last
 from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.events import (
     Emigrate,
@@ -126,4 +126,5 @@ class IslandMigration:
                 natives.remove(replaced)
             self._settled += 1
             settled.append(immigrant)
-        return tuple(sorted([*natives, *settled], key=lambda one: one.birth))
+        everyone = failed_last([*natives, *settled])
+        return tuple(sorted(everyone, key=lambda one: one.birth))

@@ -34,7 +34,6 @@ from schema.experiment.section import (
     Probability,
     Section,
     Size,
-    Steps,
 )
 from schema.experiment.sweep import Sweep
 from schema.limits import (
@@ -190,8 +189,7 @@ class Culling(Section, frozen=True):
             corresponds to ``arena.cull_interval_s``.
         population_limit: size of a full population.
         population_floor: number of robots that are always kept, the fittest.
-        survive_share_of_mean: robots below this share of the mean are removed; the
-            limit is as far below a negative mean as below a positive one.
+        survive_share_of_mean: robots below it are removed; see ``arena``.
         full_cull_share: share of ``population_limit`` to remove.
     """
 
@@ -312,9 +310,9 @@ class Simulation(Section, frozen=True):
     later: ClassVar = ("start_deg", "mass_factor", "torque_factor")
 
     timestep_s: Annotated[float, Meta(ge=1e-6, le=10)] = 0.005
-    brain_steps: Steps = 25
-    pose_steps: Steps = 40
-    window_steps: Steps = 2400
+    brain_steps: AtLeastOne = 25
+    pose_steps: AtLeastOne = 40
+    window_steps: AtLeastOne = 2400
     warmup_steps: Annotated[int, Meta(ge=0, le=10**9)] = 0
     gravity: NotNegative = 9.81
     friction: NotNegative = 1.0
@@ -398,7 +396,7 @@ class Arena(Section, frozen=True):
         population_limit: living robots at which births stop.
         population_floor: number of mature robots that removals always keep.
         survive_share_of_mean: mature robots below this share of their mean fitness
-            are removed; as of ``selection.culling``.
+            are removed; the limit is as far below a negative mean as a positive one.
         full_cull_share: share of ``population_limit`` to remove if that many robots
             are mature and none is below the share of the mean.
         birth_radius_m: robots are born within this distance of the origin [m].
@@ -437,7 +435,7 @@ class Arena(Section, frozen=True):
     wall_thickness_m: Extent = 0.05
     light: Place | None = None
     record_touches: bool = False
-    proximity_steps: Steps = 8
+    proximity_steps: AtLeastOne = 8
     merge_distance_m: Length = 0.02
     split_distance_m: Length = 0.06
 

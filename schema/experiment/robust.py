@@ -5,13 +5,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from schema.experiment.section import (
-    Length,
-    NotNegative,
-    Positive,
-    Probability,
-    Section,
-)
+from schema.experiment.section import NotNegative, Positive, Probability, Section
 
 MOST_DRAWS = 100
 """Most draws of one evaluation."""
@@ -65,7 +59,7 @@ class Robust(Section, frozen=True):
     friction: tuple[NotNegative, NotNegative] = (0.9, 1.1)
     mass: tuple[Positive, Positive] = (0.9, 1.1)
     torque: tuple[Positive, Positive] = (0.9, 1.1)
-    lift_m: tuple[Length, Length] = (0.0, 0.001)
+    lift_m: tuple[NotNegative, NotNegative] = (0.0, 0.001)
     tilt_deg: tuple[Degrees, Degrees] = (-1.0, 1.0)
     heading_deg: tuple[Degrees, Degrees] = (0.0, 0.0)
     sensor_noise: tuple[NoiseLevel, NoiseLevel] = (0.0, 0.05)

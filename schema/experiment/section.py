@@ -18,11 +18,11 @@ Extent = Annotated[float, Meta(gt=0, le=MOST_LENGTH_M)]
 Coordinate = Annotated[float, Meta(ge=-MOST_LENGTH_M, le=MOST_LENGTH_M)]
 Place = tuple[Coordinate, Coordinate, Coordinate]
 Angle = Annotated[float, Meta(ge=-3600, le=3600)]
+Value = Annotated[int, Meta(ge=-MOST_COUNT, le=MOST_COUNT)] | Number
 Count = Annotated[int, Meta(ge=0, le=MOST_COUNT)]
 AtLeastOne = Annotated[int, Meta(ge=1, le=10**9)]
 Size = Annotated[int, Meta(ge=1, le=10**6)]
 """Number of things that exist at the same time."""
-Steps = Annotated[int, Meta(ge=1, le=10**9)]
 
 
 class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

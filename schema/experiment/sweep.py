@@ -5,21 +5,13 @@ import random
 from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from itertools import product
-from typing import Annotated, Any
+from typing import Any
 
-from msgspec import Meta, field
+from msgspec import field
 
 from schema.errors import ExperimentError
-from schema.experiment.section import (
-    Count,
-    Number,
-    Parameters,
-    PluginSection,
-    Section,
-)
-from schema.limits import MOST_COUNT, MOST_SWEEP_POINTS
-
-_Whole = Annotated[int, Meta(ge=-MOST_COUNT, le=MOST_COUNT)]
+from schema.experiment.section import Count, Parameters, PluginSection, Section, Value
+from schema.limits import MOST_SWEEP_POINTS
 
 Point = dict[str, Any]
 """Values of the settings at one point of a sweep, by their dotted keys."""
@@ -36,8 +28,8 @@ class Range(Section, frozen=True):
         log: space the values evenly in their logarithm.
     """
 
-    low: _Whole | Number
-    high: _Whole | Number
+    low: Value
+    high: Value
     steps: Count = 0
     log: bool = False
 

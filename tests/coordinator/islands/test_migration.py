@@ -5,6 +5,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from coordinator.evolution.breeding import Individual
 from coordinator.islands.events import (
     Emigrate,
     Evaluate,
@@ -225,3 +226,23 @@ def test_migrants_are_recorded_before_they_are_sent() -> None:
     emigrated = kinds.index(Emigrate)
     assert kinds[emigrated - 1] is Record
     assert lived.commands[0][emigrated - 1].table == "migrations"  # type: ignore[union-attr]
+
+
+def test_a_failed_immigrant_is_no_fitter_than_a_negative_native() -> None:
+    lived = small_islands(6, 6, judge_anew=True)
+    lived.fit = lambda birth, _: -1.0 - birth.number
+    lived.live(turns=1)
+    island = lived.islands[0]
+    assert isinstance(island, Island)
+    migration = island._migration
+    assert migration is not None
+    natives = [
+        Individual(BirthId(0, number), None, -1.0 - number, 1, 0) for number in range(4)
+    ]
+    failed = Individual(BirthId(1, 0), None, 0.5, 1, 0).evaluated(None, ())
+    # It replaces the worst, number 3, and is then as fit as number 2.
+    found = migration._settle(natives, [failed])
+    assert [(one.birth, one.fitness) for one in found] == [
+        *((one.birth, one.fitness) for one in natives[:3]),
+        (failed.birth, -3.0),
+    ]
