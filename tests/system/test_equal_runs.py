@@ -96,7 +96,7 @@ def test_noise_is_the_same_in_every_process(workspace: Workspace) -> None:
     reevaluations = read_table(one, "evaluations").to_pylist()
     repeated = {row["birth"] for row in reevaluations if row["trial"]}
     assert repeated
-    robots = ("--robot", "best", "--robot", f"0:{min(repeated)}")
+    robots = ("--robot", "best-ever", "--robot", f"0:{min(repeated)}")
     out = workspace.run("view", "one", *robots, "--save", "a.rrd")
     assert out.count("moves as recorded, equal to the last bit") == 2
     assert "DIFFERS" not in out
