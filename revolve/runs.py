@@ -166,7 +166,7 @@ class Run:
 
     def _birth(self, birth: BirthId) -> pa.Table:
         """Return the row of a birth."""
-        found = self.births.filter(born_as(birth))
+        found = read_table(self.folder, "births", where=born_as(birth))
         if not found.num_rows:
             raise RunFolderError(
                 f"{self.folder}: has no birth {birth.number} on island {birth.island}"
@@ -190,7 +190,8 @@ class Run:
     def _robots(self, births: pa.Table, homes: Sequence[int]) -> list[Robot]:
         """Return the robots of some births, with the settings of one island each."""
         allow_plugins_of(self.folder)
-        rows = with_learnt(births, self.learning)
+        learning = read_table(self.folder, "learning", ["island", "birth", "robot"])
+        rows = with_learnt(births, learning)
         documents = {
             island: island_experiment(document_of(self.experiment), island)
             for island in set(homes)
@@ -241,6 +242,7 @@ class Run:
         best = best_of(last_populations(self.folder))
         ever = next(iter(best_ever(self.folder)), None)
         document = document_of(self.experiment)
+        born = read_table(self.folder, "births", ["record"]).num_rows
         planned = sum(own.births for own in island_experiments(document))
         rows: dict[str, Any] = {
             "folder": self.folder,
@@ -248,7 +250,7 @@ class Run:
             "repeat": self.number,
             "seed": self.seed,
             "state": self.state,
-            "births": f"{self.births.num_rows} of {planned}",
+            "births": f"{born} of {planned}",
             "best of the last population": _named(best),
             "best ever": _named(ever),
         }

@@ -348,7 +348,7 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
 def read_duration_s(folder: Path) -> float | None:
     """Return the time from a run's start to its end [s]; None if not recorded."""
     try:
-        rows = read_table(folder, "runs").select(["start", "end"]).to_pylist()
+        rows = read_table(folder, "runs", ["start", "end"]).to_pylist()
     except (RunFolderError, pa.ArrowException, OSError):
         return None
     start, end = (rows[0]["start"], rows[0]["end"]) if rows else (None, None)

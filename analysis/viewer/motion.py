@@ -46,7 +46,7 @@ def selected_robots(
     Raises:
         ViewerError: no robot of that name was born.
     """
-    births = read_table(folder, "births").select(["island", "birth", "parents"])
+    births = read_table(folder, "births", ["island", "birth", "parents"])
     rows = (row.values() for row in births.to_pylist())
     parents = {BirthId(island, birth): couple for island, birth, couple in rows}
     found: dict[BirthId, None] = {}

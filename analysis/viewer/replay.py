@@ -49,7 +49,7 @@ def read_news(run: Run) -> Update:
     folder = run.folder
     counts: dict[int, int] = {}
     births = []
-    for row in read_table(folder, "births").select(_BORN).to_pylist():
+    for row in read_table(folder, "births", _BORN).to_pylist():
         counts[row["island"]] = counts.get(row["island"], 0) + 1
         births.append(read_birth(row, counts[row["island"]]))
     if not births:
@@ -72,7 +72,7 @@ def read_news(run: Run) -> Update:
 def last_time(folder: Path) -> float:
     """Return the last simulated time in the tables of a run [s]."""
     times = [
-        pc.max(read_table(folder, table)["sim_time_s"]).as_py() or 0.0
+        pc.max(read_table(folder, table, ["sim_time_s"])["sim_time_s"]).as_py() or 0.0
         for table in ("births", "fitness", "deaths")
     ]
     return float(max(times))
@@ -124,4 +124,4 @@ def _within(folder: Path, start_s: float, end_s: float) -> pa.Table:
     is_in = (time >= start_s) & (time <= end_s)
     if parquet_files(folder, "poses"):
         return campaign(folder, "poses").to_table(filter=is_in)
-    return read_table(folder, "poses").filter(is_in)
+    return read_table(folder, "poses", where=is_in)

@@ -192,7 +192,7 @@ def _differences(
 
 def _rows_of(folder: Path, table: str, birth: BirthId) -> pa.Table:
     """Return the rows of a robot on the island where it was born."""
-    rows = read_table(folder, table).filter(born_as(birth))
+    rows = read_table(folder, table, where=born_as(birth))
     if "birth_island" in rows.column_names:
         rows = rows.filter(pc.is_null(rows["birth_island"]))
     return rows

@@ -88,7 +88,7 @@ def restore_best(folder: Path) -> None:
     try:
         allow_plugins_of(folder, is_resumed=False)
         experiment = own_experiment(read_details(folder).document)
-        born = Counter(read_table(folder, "births")["island"].to_pylist())
+        born = Counter(read_table(folder, "births", ["island"])["island"].to_pylist())
         if _is_extinct(experiment, born):
             return
         _, robot = _read_best(folder, best, experiment)
@@ -211,8 +211,7 @@ def _better_ever(folder: Path, best: Row) -> list[str]:
 
 def _read_best(folder: Path, best: Row, experiment: Experiment) -> tuple[int, Robot]:
     """Return the rank in ancestry and the robot of a population row."""
-    found = learnt_births(folder).filter(born_as(individual(best)))
-    (row,) = found.select(["genome", "robot", "rank"]).to_pylist()
+    (row,) = learnt_births(folder, born_as(individual(best))).to_pylist()
     return row["rank"], robot_of_birth(row["genome"], row["robot"], experiment)
 
 
@@ -253,16 +252,18 @@ def has_evaluated(folder: Path) -> bool:
     Raises:
         RunFolderError: a table cannot be read.
     """
-    evaluations = read_table(folder, "evaluations")
+    evaluations = read_table(folder, "evaluations", ["status"])
     is_success = pc.not_equal(evaluations["status"], "failed")
-    return bool(pc.any(is_success).as_py() or read_table(folder, "fitness").num_rows)
+    if pc.any(is_success).as_py():
+        return True
+    return read_table(folder, "fitness", ["record"]).num_rows > 0
 
 
 def _failures(folder: Path) -> str:
     """Return a line about failed evaluations and deaths; empty if there are none."""
-    evaluations = read_table(folder, "evaluations")
+    evaluations = read_table(folder, "evaluations", ["status", "reason"])
     failed = evaluations.filter(pc.field("status") == "failed")
-    deaths = read_table(folder, "deaths")
+    deaths = read_table(folder, "deaths", ["reason", "detail"])
     diverged = deaths.filter(pc.field("reason") == "diverged")
     lines = []
     if failed.num_rows:

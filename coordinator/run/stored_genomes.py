@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pyarrow.compute as pc
+
 from coordinator.evolution.encodings import encoding_of
 from schema.errors import InvalidRobot, RunFolderError
 from schema.experiment.document import REVOLVE_ANGLE, Experiment
@@ -25,7 +27,7 @@ def check_stored_genomes(folder: Path, experiment: Experiment) -> None:
     """
     if experiment.encoding.type == REVOLVE_ANGLE:
         return
-    births = read_table(folder, "births").slice(0, 1).to_pylist()
+    births = read_table(folder, "births", where=pc.field("record") == 0).to_pylist()
     if not births:
         return
     row, encoding = births[0], encoding_of(experiment)

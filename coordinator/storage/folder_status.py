@@ -41,8 +41,9 @@ def folder_status(folder: Path) -> RunStatus:
             f"{folder}: is finished, but its tables are missing; to write them again: "
             f"{command('resume', folder)}"
         )
-    births = Counter(read_table(folder, "births")["island"].to_pylist())
-    populations = read_table(folder, "population").group_by(["island", "births"])
+    births = Counter(read_table(folder, "births", ["island"])["island"].to_pylist())
+    names = ["island", "births", "fitness"]
+    populations = read_table(folder, "population", names).group_by(names[:2])
     summaries = populations.aggregate([("fitness", "max"), ([], "count_all")])
     newest = {row["island"]: row for row in summaries.sort_by("births").to_pylist()}
     islands = tuple(

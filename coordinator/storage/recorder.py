@@ -25,6 +25,7 @@ from schema.tables.description import run_columns
 from schema.tables.files import (
     batches_by_island,
     damage_of,
+    in_groups,
     parquet_path,
     read_table,
     stored_rows,
@@ -37,7 +38,6 @@ _LOG = logging.getLogger(__name__)
 
 BUFFERED = 64
 """Rows of a table that are buffered before they are written together."""
-ROW_GROUP = 50_000
 
 
 class Recorder:
@@ -195,7 +195,7 @@ class TableFile:
         self._ahead = 0
         self.buffered: list[Mapping[str, Any]] = []
         if parquet.exists() and not self._set_aside():
-            self._stored: int = read_table(folder, name).num_rows
+            self._stored: int = read_table(folder, name, ["record"]).num_rows
             return
         stored = stored_rows(folder, name)
         self._stored = stored.rows
@@ -303,18 +303,8 @@ class TableFile:
         with pa.parquet.ParquetWriter(
             path, self._schema, compression="zstd", write_page_checksum=True
         ) as file:
-            waiting: list[pa.RecordBatch] = []
-            rows = 0
-            for batch in batches_by_island(self._folder, self._name):
-                waiting.append(batch)
-                rows += batch.num_rows
-                while rows >= ROW_GROUP:
-                    table = pa.Table.from_batches(waiting)
-                    file.write_table(table.slice(0, ROW_GROUP).combine_chunks())
-                    waiting = table.slice(ROW_GROUP).to_batches()
-                    rows -= ROW_GROUP
-            if rows:
-                file.write_table(pa.Table.from_batches(waiting).combine_chunks())
+            for rows in in_groups(batches_by_island(self._folder, self._name)):
+                file.write_table(rows)
 
     def _write(self, batch: pa.RecordBatch) -> None:
         """Append a batch to the segment, all or nothing."""

@@ -8,7 +8,7 @@ partitioning), so that one call reads a campaign, such as DuckDB's
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from operator import and_
 from pathlib import Path
@@ -36,8 +36,10 @@ from schema.tables.segments import (
     warn_once,
 )
 
-BYTES_AT_ONCE = 64 * 2**20
+SORTED_BYTES = 32 * 2**20
 """Size of the rows of several islands that are sorted in memory together, about."""
+GROUP_BYTES = 8 * 2**20
+"""Size of the rows that are written, or read and filtered, at once, about."""
 
 
 class Stored(NamedTuple):
@@ -97,7 +99,7 @@ def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
     """Yield these rows sorted by island, with new record numbers.
 
-    Rows of about ``BYTES_AT_ONCE``, or one batch, are in memory at a time. No batch is
+    Rows of about ``SORTED_BYTES``, or one batch, are in memory at a time. No batch is
     empty.
 
     Raises:
@@ -114,7 +116,7 @@ def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
         yield from filter(len, stored_batches(folder, table))
         return
     rows = 0
-    for islands in _read_together(counts, BYTES_AT_ONCE * counts.total() // size):
+    for islands in _read_together(counts, SORTED_BYTES * counts.total() // size):
         for own in _of_islands(folder, table, islands):
             numbers = pa.array(range(rows, rows + own.num_rows), pa.int64())
             rows += own.num_rows
@@ -156,6 +158,30 @@ def _of_islands(
     rows = pa.Table.from_batches(own, TABLES[table]).combine_chunks()
     # The sort is stable: rows of an island keep their order.
     yield from rows.take(pc.sort_indices(rows["island"])).to_batches()
+
+
+def in_groups(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.Table]:
+    """Yield rows in tables of about ``GROUP_BYTES``, or of one larger batch.
+
+    Each column is in one piece: many small ones take long to write.
+    """
+    waiting: list[pa.RecordBatch] = []
+    size = 0
+    for batch in batches:
+        waiting.append(batch)
+        size += batch.nbytes
+        if size >= GROUP_BYTES:
+            yield _joined(waiting)
+            size = 0
+    if waiting:
+        yield _joined(waiting)
+
+
+def _joined(batches: list[pa.RecordBatch]) -> pa.Table:
+    """Return batches as one; empty the list, so that they are in memory only once."""
+    rows = pa.Table.from_batches(batches)
+    batches.clear()
+    return rows.combine_chunks()
 
 
 def stored_rows(folder: Path, table: str) -> Stored:
@@ -255,14 +281,22 @@ def damage_of(folder: Path, table: str) -> str:
     return f"{found[0]}: {why}: resume the run to write it again" if why else ""
 
 
-def read_table(folder: Path, table: str) -> pa.Table:
-    """Return all rows of a table of a run, finished or not, island by island.
+def read_table(
+    folder: Path,
+    table: str,
+    columns: Sequence[str] | None = None,
+    where: pc.Expression | None = None,
+) -> pa.Table:
+    """Return rows of a table of a run, finished or not, island by island.
 
-    Rows of each island are in a repeatable order.
+    Rows of each island are in a repeatable order. Beside the result, about
+    ``GROUP_BYTES`` are in memory.
 
     Args:
         folder: the run folder.
         table: its name, a key of ``TABLES``.
+        columns: those to read; None: all.
+        where: condition of the rows to read, on any columns; None: all.
 
     Raises:
         RunFolderError: no such folder, a file that is damaged or cannot be read, or
@@ -270,19 +304,51 @@ def read_table(folder: Path, table: str) -> pa.Table:
     """
     if not folder.is_dir():
         raise RunFolderError(f"{folder}: no such folder")
+    names = TABLES[table].names if columns is None else list(columns)
     path = finished_path(folder, table)
     if path is None:
-        batches = batches_by_island(folder, table)
-        rows = pa.Table.from_batches(batches, TABLES[table])
+        groups = in_groups(batches_by_island(folder, table))
+        rows = _selected(groups, table, names, where)
         # A run that ends meanwhile removes its segments.
         path = finished_path(folder, table)
         if path is None:
             return rows
     try:
         with ParquetFile(path, page_checksum_verification=True) as file:
-            return completed(file.read(), TABLES[table], run_columns(folder))
+            # The condition may be on other columns.
+            read = names if where is None else TABLES[table].names
+            groups = _row_groups(file, folder, table, read)
+            return _selected(groups, table, names, where)
     except (ValueError, OSError) as error:
         raise RunFolderError(f"{path}: cannot be read: {error}") from None
+
+
+def _row_groups(
+    file: ParquetFile, folder: Path, table: str, names: list[str]
+) -> Iterator[pa.Table]:
+    """Yield some columns of each row group, also those that the file lacks."""
+    schema, of_run = _of(table, names), run_columns(folder)
+    stored = [name for name in names if name in file.schema_arrow.names]
+    for number in range(file.num_row_groups):
+        yield completed(file.read_row_group(number, stored), schema, of_run)
+
+
+def _selected(
+    groups: Iterable[pa.Table],
+    table: str,
+    names: list[str],
+    where: pc.Expression | None,
+) -> pa.Table:
+    """Return some columns of the rows that meet a condition."""
+    kept = (group if where is None else group.filter(where) for group in groups)
+    parts = [rows.select(names) for rows in kept]
+    return pa.concat_tables([_of(table, names).empty_table(), *parts])
+
+
+def _of(table: str, names: list[str]) -> pa.Schema:
+    """Return the schema of some columns of a table."""
+    schema = TABLES[table]
+    return pa.schema([schema.field(name) for name in names], schema.metadata)
 
 
 def campaign(root: Path, table: str) -> "pa.dataset.Dataset":

@@ -47,12 +47,13 @@ def best_ever(folder: Path) -> list[Row]:
         RunFolderError: a table is damaged.
     """
     keys = ["island", "birth_island", "birth"]
-    samples = read_table(folder, "fitness").filter(pc.field("is_mature"))
-    judged = (read_table(folder, "evaluations"), samples)
-    every = pa.concat_tables(
-        [each.select([*keys, "fitness"]) for each in judged],
-        promote_options="default",  # the fitness of a sample is never null
-    )
+    columns, is_mature = [*keys, "fitness"], pc.field("is_mature")
+    judged = [
+        read_table(folder, "evaluations", columns),
+        read_table(folder, "fitness", columns, is_mature),
+    ]
+    # The fitness of a sample is never null.
+    every = pa.concat_tables(judged, promote_options="default")
     greatest = every.group_by(keys).aggregate([("fitness", "max")]).to_pylist()
     return fittest({**row, "fitness": row["fitness_max"]} for row in greatest)
 

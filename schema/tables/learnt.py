@@ -9,13 +9,22 @@ from schema.robot.ids import BirthId
 from schema.tables.files import read_table
 
 
-def learnt_births(folder: Path) -> pa.Table:
-    """Return the births of a run, as ``with_learnt``.
+def learnt_births(folder: Path, where: pc.Expression | None = None) -> pa.Table:
+    """Return births of a run, as ``with_learnt``.
+
+    Args:
+        folder: the run folder.
+        where: condition on ``island`` and ``birth``; None: all births.
 
     Raises:
         RunFolderError: a table is damaged.
     """
-    return with_learnt(read_table(folder, "births"), read_table(folder, "learning"))
+    names = ["island", "birth", "robot"]
+    births, learning = (
+        read_table(folder, "births", where=where),
+        read_table(folder, "learning", names, where),
+    )
+    return with_learnt(births, learning)
 
 
 def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:

@@ -77,7 +77,7 @@ def read_population(folder: Path) -> Population:
     allow_plugins_of(folder)
     experiment = own_experiment(runs["document"][0].as_py())
     names = ["island", "birth", "genome", "robot"]
-    births = read_table(folder, "births").select(names).to_pylist()
+    births = read_table(folder, "births", names).to_pylist()
     born = {(row["island"], row["birth"]): row for row in births}
     evaluations = read_table(folder, "evaluations").to_pylist()
     evaluated = [row for row in evaluations if row["fitness"] is not None]

@@ -56,7 +56,7 @@ def test_rows_are_sorted_by_island_and_numbered_anew(
     """The first pass counts the rows of each island."""
     batches = list(stored_batches(folder, "evaluations"))
     size = int(share * sum(batch.nbytes for batch in batches))
-    monkeypatch.setattr(files, "BYTES_AT_ONCE", size)
+    monkeypatch.setattr(files, "SORTED_BYTES", size)
     rows = pa.Table.from_batches(batches).to_pylist()
     rows.sort(key=lambda row: row["island"])
     passes = count_passes(monkeypatch)
