@@ -53,10 +53,10 @@ _COMMANDS = {
         ),
     ),
     "compare": (
-        "Compare two runs row by row, in all columns that are equal for equal seeds.",
+        "Compare two runs, or the runs of two campaigns, in all repeatable columns.",
         (
             "revolve compare runs/a runs/b",
-            "revolve compare runs/before/scenario1-0 runs/after/scenario1-0",
+            "revolve compare runs/before runs/after    # two campaigns",
         ),
     ),
     "bench dispatch": (
@@ -85,8 +85,8 @@ def parser(command: str) -> Flags:
         allow_abbrev=False,
     )
     if command == "compare":
-        flags.add_argument("first", metavar="RUN", help="run folder")
-        flags.add_argument("second", metavar="RUN", help="run folder")
+        flags.add_argument("first", metavar="FOLDER", help="run or campaign folder")
+        flags.add_argument("second", metavar="FOLDER", help="another of the same kind")
         return flags
     if command == "bench dispatch":
         _add_bench(flags)

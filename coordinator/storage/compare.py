@@ -1,4 +1,4 @@
-"""Comparison of two runs in all repeatable columns."""
+"""Comparison of two runs or campaigns in all repeatable columns."""
 
 from operator import itemgetter
 from pathlib import Path
@@ -7,8 +7,9 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute
 
+from coordinator.storage.campaign import is_campaign, read_campaign
 from coordinator.storage.folder import read_details
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, RunFolderError, counted
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.tables.columns import TABLES, repeatable
 from schema.tables.description import read_state
@@ -16,14 +17,17 @@ from schema.tables.files import read_table
 
 LONGEST = 60
 """Characters of a value that a message shows."""
+_PLATFORM = "platform"
+_AT_ONCE = 1000
+"""Rows whose values are compared one by one in search of the first difference."""
 
 
 def compare(first: Path, second: Path) -> list[str]:
-    """Return the differences of two runs in their repeatable columns.
+    """Return the differences of two runs or campaigns in their repeatable columns.
 
     Args:
-        first: a run folder, finished or not.
-        second: another run folder.
+        first: a run folder, finished or not, or the folder of a campaign.
+        second: another one of the same kind.
 
     Returns:
         One line for each run that has no births or is the shorter one and not
@@ -32,11 +36,15 @@ def compare(first: Path, second: Path) -> list[str]:
         if the runs are equal. A line also names the population of a last brood that
         is smaller than in the longer run, as it has no counterpart there. If the runs
         differ and ran on different platforms, a last line says so, because equality
-        is only guaranteed on one platform.
+        is only guaranteed on one platform. Of campaigns, such lines for each run, which
+        they begin with; a last line names the runs that differ, are damaged or are
+        missing in one campaign.
 
     Raises:
         RunFolderError: a folder holds no run, or a table cannot be read.
     """
+    if is_campaign(first) and is_campaign(second):
+        return _of_campaigns(first, second)
     for folder in (first, second):
         read_details(folder)
     lines: list[str] = []
@@ -51,9 +59,9 @@ def compare(first: Path, second: Path) -> list[str]:
         lines += _difference(name, tables, repeatable(schema))
         if name == "births":
             lines += _unfinished((first, second), tables)
-        if "platform" in schema.names:
+        if _PLATFORM in schema.names:
             for found, table in zip(platforms, tables, strict=True):
-                found.update(pa.compute.unique(table["platform"]).to_pylist())
+                found.update(pa.compute.unique(table[_PLATFORM]).to_pylist())
     # Arenas do not record their platform before they end.
     if lines and all(platforms) and platforms[0] != platforms[1]:
         ours, theirs = (", ".join(sorted(each)) for each in platforms)
@@ -64,13 +72,43 @@ def compare(first: Path, second: Path) -> list[str]:
     return lines
 
 
+def _of_campaigns(first: Path, second: Path) -> list[str]:
+    """Return the differences of two campaigns, run by run."""
+    ours, theirs = (
+        {path.name: path for path, _ in read_campaign(folder).runs(folder)}
+        for folder in (first, second)
+    )
+    every = dict.fromkeys((*ours, *theirs))
+    lines: list[str] = []
+    differing: list[str] = []
+    for name in every:
+        if name in ours and name in theirs:
+            try:
+                found = compare(ours[name], theirs[name])
+            except RunFolderError as error:
+                found = [str(error)]
+        else:
+            found = [f"only {first if name in ours else second} has this run"]
+        if found:
+            lines += [f"{name}: {line}" for line in found]
+            differing.append(name)
+    if differing:
+        total = counted(len(every), "run")
+        lines.append(f"{len(differing)} of {total} differ: {', '.join(differing)}")
+    return lines
+
+
 def _read(folder: Path, name: str) -> pa.Table:
-    """Return a table; experiment documents of older versions get all defaults.
+    """Return the columns of a table that are compared, and its platforms.
+
+    Experiment documents of older versions get all defaults.
 
     Raises:
         RunFolderError: it cannot be read.
     """
-    table = read_table(folder, name)
+    schema = TABLES[name]
+    has_platform = _PLATFORM in schema.names
+    table = read_table(folder, name, [*repeatable(schema), *[_PLATFORM] * has_platform])
     if name != "runs":
         return table
     index = table.schema.get_field_index("document")
@@ -201,12 +239,15 @@ def _first_difference(ours: pa.ChunkedArray, theirs: pa.ChunkedArray) -> int | N
     Values are equal if their representations are: a NaN equals itself.
     """
     common = min(len(ours), len(theirs))
-    ours, theirs = ours[:common], theirs[:common]
-    if ours.equals(theirs):
-        return None
-    pairs = zip(ours.to_pylist(), theirs.to_pylist(), strict=True)
-    rows = (row for row, (a, b) in enumerate(pairs) if repr(a) != repr(b))
-    return next(rows, None)
+    for start in range(0, common, _AT_ONCE):
+        length = min(_AT_ONCE, common - start)
+        pieces = ours.slice(start, length), theirs.slice(start, length)
+        if not pieces[0].equals(pieces[1]):
+            pairs = zip(*(piece.to_pylist() for piece in pieces), strict=True)
+            for row, (one, other) in enumerate(pairs, start):
+                if repr(one) != repr(other):
+                    return row
+    return None
 
 
 def _short(value: Any) -> str:  # noqa: ANN401 - any value of any column

@@ -11,7 +11,7 @@ COMMANDS = {
     "status": ("coordinator.cli.status", "show the progress of runs"),
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
-    "compare": (_COORDINATOR, "compare two runs that should be equal"),
+    "compare": (_COORDINATOR, "compare two runs or campaigns that should be equal"),
     "plugins": (_COORDINATOR, "list plug-ins, built-in or found"),
     "check": (_COORDINATOR, "check plug-ins as a run does"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),

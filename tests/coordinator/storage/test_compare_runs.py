@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 
 from coordinator.islands.events import Record
+from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.recorder import Recorder
@@ -76,3 +77,46 @@ def test_platforms_of_arenas_are_compared(
             "guaranteed to be equal"
         )
     ]
+
+
+def campaign(
+    folder: Path, births: dict[str, Record], experiments: str = "ab", repeats: int = 2
+) -> Path:
+    """Write a campaign whose finished runs have one birth each, by name of the run."""
+    documents = tuple(Experiment(name=name) for name in experiments)
+    folder.mkdir()
+    write_campaign(folder, Campaign(documents, repeats, 1))
+    for name, birth in births.items():
+        written(folder / name, birth)
+    return folder
+
+
+def test_campaigns_are_compared_run_by_run(
+    tmp_path: Path,
+    make_records: Any,  # noqa: ANN401 - the fixture
+) -> None:
+    birth = make_records(1)[0]
+    same = dict.fromkeys(("a-0", "b-0", "a-1", "b-1"), birth)
+    first = campaign(tmp_path / "first", same)
+    assert compare(first, campaign(tmp_path / "equal", same)) == []
+    rank, other = birth.row["rank"], Record("births", {**birth.row, "rank": 9})
+    second = campaign(tmp_path / "second", {"a-0": birth, "b-0": other, "b-1": birth})
+    assert compare(first, second) == [
+        f"b-0: births: first at record 0, column rank: {rank} against 9",
+        f"a-1: {second / 'a-1'}: no such folder",
+        "2 of 4 runs differ: b-0, a-1",
+    ]
+
+
+def test_runs_of_only_one_campaign_are_named(
+    tmp_path: Path,
+    make_records: Any,  # noqa: ANN401 - the fixture
+) -> None:
+    birth = make_records(1)[0]
+    first = campaign(tmp_path / "a", {"a-0": birth}, "a", repeats=1)
+    second = campaign(tmp_path / "b", {"a-0": birth, "b-0": birth}, "ab", repeats=1)
+    for pair in ((first, second), (second, first)):
+        assert compare(*pair) == [
+            f"b-0: only {second} has this run",
+            "1 of 2 runs differ: b-0",
+        ]
