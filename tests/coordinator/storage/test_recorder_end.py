@@ -14,6 +14,7 @@ from pyarrow.parquet import ParquetFile, ParquetWriter
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
+from schema.tables import files
 from schema.tables.files import campaign, parquet_path, read_table
 from tests.coordinator.conftest import Check, Feed, Make
 
@@ -82,7 +83,7 @@ def test_the_end_may_be_interrupted_at_any_step(
 
 
 @pytest.mark.parametrize("every", [1, 25, 1000])
-def test_row_groups_are_full_and_written_in_one_piece(
+def test_row_groups_are_small_and_written_in_one_piece(
     tmp_path: Path,
     make_records: Make,
     feed_rows: Feed,
@@ -90,23 +91,26 @@ def test_row_groups_are_full_and_written_in_one_piece(
     every: int,
 ) -> None:
     """Columns in many chunks take time quadratic in their number."""
-    chunks = []
+    chunks, sizes = [], []
     real = ParquetWriter.write_table
 
     def write(self: ParquetWriter, table: pa.Table) -> None:
         chunks.append(table["record"].num_chunks)
+        sizes.append(table.num_rows)
         real(self, table)
 
     monkeypatch.setattr(ParquetWriter, "write_table", write)
-    monkeypatch.setattr("coordinator.storage.recorder.ROW_GROUP", 10)
     recorder = feed_rows(tmp_path, make_records(24), every=every)
     recorder.flush()
     rows = read_table(tmp_path, "births")
+    monkeypatch.setattr(files, "GROUP_BYTES", rows.nbytes // 3)
     recorder.finish()
     assert read_table(tmp_path, "births").equals(rows)
     about = ParquetFile(parquet_path(tmp_path, "a/b c", 2, "births")).metadata
-    sizes = [about.row_group(each).num_rows for each in range(about.num_row_groups)]
-    assert sizes == [10, 10, 4]
+    found = [about.row_group(each).num_rows for each in range(about.num_row_groups)]
+    births = sizes[: len(found)]
+    assert found == births
+    assert len(births) == (1 if every == 1000 else 3)
     assert set(chunks) == {1}
 
 

@@ -91,6 +91,30 @@ def test_child_returns_unused_memory() -> None:
     assert alone_mib > 40
 
 
+@pytest.mark.parametrize(
+    ("before", "expected"), [("", "system"), ("mimalloc", "mimalloc")]
+)
+def test_arrow_returns_unused_memory_unless_the_user_chose_its_allocator(
+    before: str, expected: str
+) -> None:
+    chosen = "ARROW_DEFAULT_MEMORY_POOL"
+    clean = {name: value for name, value in os.environ.items() if name != chosen}
+    text = (
+        "from schema.agent.supervisor import prepare_process\n"
+        "prepare_process()\n"
+        "import pyarrow as pa\n"
+        "print(pa.default_memory_pool().backend_name)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", text],
+        check=True,
+        capture_output=True,
+        text=True,
+        env=clean | ({chosen: before} if before else {}),
+    )
+    assert done.stdout.strip() == expected
+
+
 _SHIELDED = """
 import pathlib, signal, sys
 from schema.agent.supervisor import ProcessPool
