@@ -3,7 +3,6 @@
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.distance import tree_distances
 from analysis.measures.outputs import run_schema
 from analysis.measures.population_table import (
     Numbers,
@@ -51,6 +50,9 @@ def distances_of(trees: Trees, first: Integers, second: Integers) -> Integers:
         first: (P,) index of the first tree of each pair.
         second: (P,) index of the second.
     """
+    # Numba takes 110 MB, which only the processes that measure need.
+    from analysis.measures.distance import tree_distances  # noqa: PLC0415
+
     count = len(trees.starts)
     keys = np.minimum(first, second) * count + np.maximum(first, second)
     different, where = np.unique(keys, return_inverse=True)

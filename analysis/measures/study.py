@@ -19,9 +19,6 @@ from analysis.measures.trees import SlotRule
 from schema.agent.import_path import safe_import_path
 from schema.tables.description import run_columns
 
-_FEW = 3
-"""Number of runs that are measured faster than another process starts."""
-
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRun:
@@ -46,15 +43,15 @@ def measure_runs(
 ) -> Iterator[MeasuredRun]:
     """Yield the measures of runs, in their order.
 
+    They are measured in other processes, also one run: the memory of tables, of Numba
+    and of what it compiles is free when figures are drawn.
+
     Args:
         runs: the runs.
         slots: slot that labels a part in tree edit distance.
         processes: number of runs measured in parallel.
     """
-    if processes == 1 or len(runs) <= _FEW:
-        yield from map(measure_run, runs, repeat(slots))
-        return
-    pool = ProcessPoolExecutor(processes, get_context("spawn"))
+    pool = ProcessPoolExecutor(min(processes, len(runs)), get_context("spawn"))
     with safe_import_path(), pool:
         try:
             yield from pool.map(measure_run, runs, repeat(slots))

@@ -211,7 +211,8 @@ def _better_ever(folder: Path, best: Row) -> list[str]:
 
 def _read_best(folder: Path, best: Row, experiment: Experiment) -> tuple[int, Robot]:
     """Return the rank in ancestry and the robot of a population row."""
-    (row,) = learnt_births(folder, born_as(individual(best))).to_pylist()
+    where = born_as(individual(best))
+    (row,) = learnt_births(folder, ["genome", "rank"], where).to_pylist()
     return row["rank"], robot_of_birth(row["genome"], row["robot"], experiment)
 
 

@@ -38,7 +38,7 @@ from schema.tables.segments import (
 
 SORTED_BYTES = 32 * 2**20
 """Size of the rows of several islands that are sorted in memory together, about."""
-GROUP_BYTES = 8 * 2**20
+GROUP_BYTES = 4 * 2**20
 """Size of the rows that are written, or read and filtered, at once, about."""
 
 
@@ -296,7 +296,7 @@ def read_table(
         folder: the run folder.
         table: its name, a key of ``TABLES``.
         columns: those to read; None: all.
-        where: condition of the rows to read, on any columns; None: all.
+        where: condition on these columns for the rows to read; None: all.
 
     Raises:
         RunFolderError: no such folder, a file that is damaged or cannot be read, or
@@ -315,9 +315,7 @@ def read_table(
             return rows
     try:
         with ParquetFile(path, page_checksum_verification=True) as file:
-            # The condition may be on other columns.
-            read = names if where is None else TABLES[table].names
-            groups = _row_groups(file, folder, table, read)
+            groups = _row_groups(file, folder, table, names)
             return _selected(groups, table, names, where)
     except (ValueError, OSError) as error:
         raise RunFolderError(f"{path}: cannot be read: {error}") from None
@@ -330,7 +328,9 @@ def _row_groups(
     schema, of_run = _of(table, names), run_columns(folder)
     stored = [name for name in names if name in file.schema_arrow.names]
     for number in range(file.num_row_groups):
-        yield completed(file.read_row_group(number, stored), schema, of_run)
+        yield completed(
+            file.read_row_group(number, stored, use_threads=False), schema, of_run
+        )
 
 
 def _selected(
@@ -339,9 +339,9 @@ def _selected(
     names: list[str],
     where: pc.Expression | None,
 ) -> pa.Table:
-    """Return some columns of the rows that meet a condition."""
-    kept = (group if where is None else group.filter(where) for group in groups)
-    parts = [rows.select(names) for rows in kept]
+    """Return some columns of the rows that meet a condition on them."""
+    rows = (group.select(names) for group in groups)
+    parts = rows if where is None else (group.filter(where) for group in rows)
     return pa.concat_tables([_of(table, names).empty_table(), *parts])
 
 

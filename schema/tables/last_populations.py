@@ -47,13 +47,12 @@ def best_ever(folder: Path) -> list[Row]:
         RunFolderError: a table is damaged.
     """
     keys = ["island", "birth_island", "birth"]
-    columns, is_mature = [*keys, "fitness"], pc.field("is_mature")
-    judged = [
-        read_table(folder, "evaluations", columns),
-        read_table(folder, "fitness", columns, is_mature),
-    ]
+    columns = [*keys, "fitness"]
+    alone = read_table(folder, "evaluations", columns)
+    columns.append("is_mature")
+    samples = read_table(folder, "fitness", columns, pc.field("is_mature"))
     # The fitness of a sample is never null.
-    every = pa.concat_tables(judged, promote_options="default")
+    every = pa.concat_tables([alone, samples], promote_options="default")
     greatest = every.group_by(keys).aggregate([("fitness", "max")]).to_pylist()
     return fittest({**row, "fitness": row["fitness_max"]} for row in greatest)
 

@@ -1,5 +1,6 @@
 """Brains that robots learnt: those of arenas in the births table, and best trials."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pyarrow as pa
@@ -8,23 +9,27 @@ import pyarrow.compute as pc
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
 
+_BRAINS = ("island", "birth", "robot")
 
-def learnt_births(folder: Path, where: pc.Expression | None = None) -> pa.Table:
+
+def learnt_births(
+    folder: Path,
+    columns: Iterable[str] | None = None,
+    where: pc.Expression | None = None,
+) -> pa.Table:
     """Return births of a run, as ``with_learnt``.
 
     Args:
         folder: the run folder.
+        columns: those to read beside ``island``, ``birth`` and ``robot``; None: all.
         where: condition on ``island`` and ``birth``; None: all births.
 
     Raises:
         RunFolderError: a table is damaged.
     """
-    names = ["island", "birth", "robot"]
-    births, learning = (
-        read_table(folder, "births", where=where),
-        read_table(folder, "learning", names, where),
-    )
-    return with_learnt(births, learning)
+    names = None if columns is None else [*_BRAINS, *columns]
+    births = read_table(folder, "births", names, where)
+    return with_learnt(births, read_table(folder, "learning", _BRAINS, where))
 
 
 def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:

@@ -18,7 +18,7 @@ from analysis.comparison.findings import findings
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.progression import progression
 from analysis.measures.load import read_runs
-from analysis.measures.study import concatenated, measure_runs
+from analysis.measures.study import concatenated, measure_run
 from docs import campaign, campaign_rows
 from docs.campaign_check import check
 from docs.campaign_data import (
@@ -315,7 +315,7 @@ def test_kept_outcomes_give_the_same_comparison(
     place: Path, parts: Parts, data: Path
 ) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    measured = list(measure_runs(runs))
+    measured = [measure_run(run, "parent") for run in runs]
     rows = kept(data, "outcomes")
     ours, theirs = KeptOutcomes(rows), Outcomes(measured)
     names = ["scenario1", "scenario2", "scenario3"]
@@ -339,7 +339,8 @@ def test_progression_of_kept_rows_equals_that_of_the_runs(
     place: Path, parts: Parts, data: Path
 ) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    complete = progression(concatenated(list(measure_runs(runs)))["populations"])
+    measured = [measure_run(run, "parent") for run in runs]
+    complete = progression(concatenated(measured)["populations"])
     ours = progression(kept(data, "populations"))
     is_kept = pc.is_in(complete["births"], pa.array([MARK, BIRTHS]))
     assert ours == complete.filter(is_kept)

@@ -92,8 +92,8 @@ def test_a_column_or_a_row_is_read_in_the_same_memory_whatever_their_number(
         assert read_table(folder, "births", where=row).equals(whole.filter(row))
         some = read_table(folder, "births", ["birth", "record"])
         assert some.equals(whole.select(["birth", "record"]))
-        one = read_table(folder, "births", ["genome"], row)
-        assert one.equals(whole.filter(row).select(["genome"]))
+        one = read_table(folder, "births", ["genome", "record"], row)
+        assert one.equals(whole.filter(row).select(["genome", "record"]))
         del whole
         peaks += [
             peak(lambda folder=folder: read_table(folder, "births", ["birth"])),
