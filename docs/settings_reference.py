@@ -27,11 +27,12 @@ _HEAD = """# Settings of experiments
 Written from the code by `python -m docs.reference_pages`.
 [Experiments](../experiments.md) is the introduction.
 
-Every setting is a key of an experiment's TOML file, and every key may change a birth.
-Settings that may not are flags of the [commands](commands.md). Seeds and points of a
-sweep are below 2^63. The unit 1 is that of shares, factors and other numbers without a
-dimension. Beyond the limits of single keys, a run checks that keys
-agree with each other, and names the key that does not.
+The TOML file of an experiment has the settings that may change a birth; this page lists
+its keys. All other settings, such as the number of workers, are flags of the
+[commands](commands.md). Seeds and points of a sweep are below 2^63.
+The unit 1 stands for shares, factors and other numbers without a dimension. Besides the
+limits of single keys, a run checks that the values of different keys fit together; the
+error names a key that does not fit.
 
 """
 _KEYS = {

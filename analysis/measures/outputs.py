@@ -157,8 +157,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         **PER_PART,
         "fitness_max": "greatest fitness recorded at a birth, or the last one; in an "
         "arena it can be greater than the last",
-        "births": "births on its island up to its own; in an arena the founders are "
-        "born in descending order of their numbers",
+        "births": "births on its island up to its own; in an arena the founder with "
+        "the highest number is born first",
         "is_failed": "whether all its evaluations failed, which counts as 0, or as "
         "the least fitness below 0",
     },

@@ -7,6 +7,7 @@ The new process of a slot is told which jobs crashed the earlier ones.
 """
 
 import contextlib
+import ctypes
 import math
 import os
 import signal
@@ -51,7 +52,9 @@ AGENT_THREADS = (
 # Size from which glibc maps memory separately and returns it to the system [bytes]. By
 # default glibc raises it to the size of a robot's simulation, and the memory becomes
 # fragmented: that of a worker grows by a tenth over 3000 births.
-_MAP_BYTES = "131072"
+_MAP_BYTES = 131072
+_MAPPED = "MALLOC_MMAP_THRESHOLD_"
+_MAP_OPTION = -3
 # Arrow's own allocator keeps what tables needed once, in each of its threads: 40 to
 # 80 MB more at the end of a run.
 _ARROW_POOL = "system"
@@ -69,13 +72,17 @@ def prepare_process() -> None:
     """Prepare this process and its children to share a machine with many others.
 
     Libraries and the network use one thread; a process that wakes up does not interrupt
-    one that computes, for a few milliseconds; Arrow and children return unused memory.
+    one that computes, for a few milliseconds; unused memory is returned to the system.
     """
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     given = os.environ.get("ZENOH_RUNTIME", HUB_THREADS)
     if given not in (HUB_THREADS, AGENT_THREADS):  # those of a parent process
         warn_user(f"ZENOH_RUNTIME: has no effect here, got {shown(given)}")
-    os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", _MAP_BYTES)
+    if _MAPPED not in os.environ:
+        os.environ[_MAPPED] = str(_MAP_BYTES)  # glibc reads it at the start of children
+        # Other C libraries have no such function.
+        with contextlib.suppress(AttributeError):
+            ctypes.CDLL(None).mallopt(_MAP_OPTION, _MAP_BYTES)
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", _ARROW_POOL)
     _use_batch_policy()
 

@@ -48,7 +48,7 @@ def robot_to_yaml(
 
     Raises:
         InvalidRobot: the robot is not well formed in this body space, has neurons of
-            other kinds, is nested too deeply (about 150 parts, each on the last), or
+            other kinds, is nested too deeply (a chain of about 150 parts), or
             gives a text beyond the limits of reading.
     """
     check_robot(robot, space, kinds)
