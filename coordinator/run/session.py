@@ -195,10 +195,10 @@ class RunSession:
         self.loop.start(self._replay())
 
     def _replay(self) -> Iterator[JournalledEvent]:
-        """Yield the journalled events; the feed condenses the rows of each."""
-        events, self._events = self._events, ()
-        for event in events:
-            yield event
+        """Yield the journalled events and forget them; the feed condenses their rows."""
+        events, self._events = list(reversed(self._events)), ()
+        while events:
+            yield events.pop()
             if self.feed is not None:
                 self.feed.read()
 

@@ -27,7 +27,8 @@ def check_stored_genomes(folder: Path, experiment: Experiment) -> None:
     """
     if experiment.encoding.type == REVOLVE_ANGLE:
         return
-    births = read_table(folder, "births", where=pc.field("record") == 0).to_pylist()
+    names = ["record", "birth", "genome", "robot"]
+    births = read_table(folder, "births", names, pc.field("record") == 0).to_pylist()
     if not births:
         return
     row, encoding = births[0], encoding_of(experiment)
