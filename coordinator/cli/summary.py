@@ -34,7 +34,7 @@ from schema.tables.last_populations import (
     best_of,
     last_populations,
 )
-from schema.tables.learnt import learnt_births
+from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual, read_levels
 
@@ -211,8 +211,10 @@ def _better_ever(folder: Path, best: Row) -> list[str]:
 
 def _read_best(folder: Path, best: Row, experiment: Experiment) -> tuple[int, Robot]:
     """Return the rank in ancestry and the robot of a population row."""
-    where = born_as(individual(best))
-    (row,) = learnt_births(folder, ["genome", "rank"], where).to_pylist()
+    where, names = born_as(individual(best)), ["island", "birth", "robot"]
+    births = read_table(folder, "births", [*names, "genome", "rank"], where)
+    learning = read_table(folder, "learning", names, where)
+    (row,) = with_learnt(births, learning).to_pylist()
     return row["rank"], robot_of_birth(row["genome"], row["robot"], experiment)
 
 
@@ -255,9 +257,8 @@ def has_evaluated(folder: Path) -> bool:
     """
     evaluations = read_table(folder, "evaluations", ["status"])
     is_success = pc.not_equal(evaluations["status"], "failed")
-    if pc.any(is_success).as_py():
-        return True
-    return read_table(folder, "fitness", ["record"]).num_rows > 0
+    samples = read_table(folder, "fitness", ["record"]).num_rows
+    return bool(pc.any(is_success).as_py() or samples)
 
 
 def _failures(folder: Path) -> str:

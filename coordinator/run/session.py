@@ -195,7 +195,7 @@ class RunSession:
         self.loop.start(self._replay())
 
     def _replay(self) -> Iterator[JournalledEvent]:
-        """Yield the journalled events and forget them; the feed condenses their rows."""
+        """Yield and forget the journalled events; the feed condenses their rows."""
         events, self._events = list(reversed(self._events)), ()
         while events:
             yield events.pop()

@@ -17,9 +17,6 @@ from schema.tables.files import read_table
 
 LONGEST = 60
 """Characters of a value that a message shows."""
-_PLATFORM = "platform"
-_AT_ONCE = 1000
-"""Rows whose values are compared one by one in search of the first difference."""
 
 
 def compare(first: Path, second: Path) -> list[str]:
@@ -59,9 +56,9 @@ def compare(first: Path, second: Path) -> list[str]:
         lines += _difference(name, tables, repeatable(schema))
         if name == "births":
             lines += _unfinished((first, second), tables)
-        if _PLATFORM in schema.names:
+        if "platform" in schema.names:
             for found, table in zip(platforms, tables, strict=True):
-                found.update(pa.compute.unique(table[_PLATFORM]).to_pylist())
+                found.update(pa.compute.unique(table["platform"]).to_pylist())
     # Arenas do not record their platform before they end.
     if lines and all(platforms) and platforms[0] != platforms[1]:
         ours, theirs = (", ".join(sorted(each)) for each in platforms)
@@ -72,30 +69,20 @@ def compare(first: Path, second: Path) -> list[str]:
     return lines
 
 
-def _of_campaigns(first: Path, second: Path) -> list[str]:
+def _of_campaigns(*folders: Path) -> list[str]:
     """Return the differences of two campaigns, run by run."""
-    ours, theirs = (
-        {path.name: path for path, _ in read_campaign(folder).runs(folder)}
-        for folder in (first, second)
-    )
-    every = dict.fromkeys((*ours, *theirs))
-    lines: list[str] = []
-    differing: list[str] = []
-    for name in every:
-        if name in ours and name in theirs:
-            try:
-                found = compare(ours[name], theirs[name])
-            except RunFolderError as error:
-                found = [str(error)]
-        else:
-            found = [f"only {first if name in ours else second} has this run"]
-        if found:
-            lines += [f"{name}: {line}" for line in found]
-            differing.append(name)
-    if differing:
-        total = counted(len(every), "run")
-        lines.append(f"{len(differing)} of {total} differ: {', '.join(differing)}")
-    return lines
+    runs = [path.name for each in folders for path, _ in read_campaign(each).runs(each)]
+    differences: dict[str, list[str]] = {}
+    for name in dict.fromkeys(runs):
+        try:
+            differences[name] = compare(*(folder / name for folder in folders))
+        except RunFolderError as error:
+            differences[name] = [str(error)]
+    differing = [name for name, found in differences.items() if found]
+    lines = [f"{name}: {line}" for name in differing for line in differences[name]]
+    total = counted(len(differences), "run")
+    last = f"{len(differing)} of {total} differ: {', '.join(differing)}"
+    return [*lines, last] if lines else []
 
 
 def _read(folder: Path, name: str) -> pa.Table:
@@ -106,9 +93,8 @@ def _read(folder: Path, name: str) -> pa.Table:
     Raises:
         RunFolderError: it cannot be read.
     """
-    schema = TABLES[name]
-    has_platform = _PLATFORM in schema.names
-    table = read_table(folder, name, [*repeatable(schema), *[_PLATFORM] * has_platform])
+    platform = [each for each in TABLES[name].names if each == "platform"]
+    table = read_table(folder, name, repeatable(TABLES[name]) + platform)
     if name != "runs":
         return table
     index = table.schema.get_field_index("document")
@@ -239,15 +225,14 @@ def _first_difference(ours: pa.ChunkedArray, theirs: pa.ChunkedArray) -> int | N
     Values are equal if their representations are: a NaN equals itself.
     """
     common = min(len(ours), len(theirs))
-    for start in range(0, common, _AT_ONCE):
-        length = min(_AT_ONCE, common - start)
-        pieces = ours.slice(start, length), theirs.slice(start, length)
-        if not pieces[0].equals(pieces[1]):
-            pairs = zip(*(piece.to_pylist() for piece in pieces), strict=True)
-            for row, (one, other) in enumerate(pairs, start):
-                if repr(one) != repr(other):
-                    return row
-    return None
+    ours, theirs = ours[:common], theirs[:common]
+    if ours.equals(theirs):
+        return None
+    pairs = zip(ours, theirs, strict=True)
+    rows = (
+        row for row, (a, b) in enumerate(pairs) if repr(a.as_py()) != repr(b.as_py())
+    )
+    return next(rows, None)
 
 
 def _short(value: Any) -> str:  # noqa: ANN401 - any value of any column

@@ -80,8 +80,7 @@ def prepare_process() -> None:
         warn_user(f"ZENOH_RUNTIME: has no effect here, got {shown(given)}")
     if _MAPPED not in os.environ:
         os.environ[_MAPPED] = str(_MAP_BYTES)  # glibc reads it at the start of children
-        # Other C libraries have no such function.
-        with contextlib.suppress(AttributeError):
+        with contextlib.suppress(AttributeError):  # of other C libraries
             ctypes.CDLL(None).mallopt(_MAP_OPTION, _MAP_BYTES)
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", _ARROW_POOL)
     _use_batch_policy()

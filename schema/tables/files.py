@@ -171,17 +171,10 @@ def in_groups(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.Table]:
         waiting.append(batch)
         size += batch.nbytes
         if size >= GROUP_BYTES:
-            yield _joined(waiting)
-            size = 0
+            yield pa.Table.from_batches(waiting).combine_chunks()
+            waiting, size = [], 0
     if waiting:
-        yield _joined(waiting)
-
-
-def _joined(batches: list[pa.RecordBatch]) -> pa.Table:
-    """Return batches as one; empty the list, so that they are in memory only once."""
-    rows = pa.Table.from_batches(batches)
-    batches.clear()
-    return rows.combine_chunks()
+        yield pa.Table.from_batches(waiting).combine_chunks()
 
 
 def stored_rows(folder: Path, table: str) -> Stored:
@@ -304,51 +297,38 @@ def read_table(
     """
     if not folder.is_dir():
         raise RunFolderError(f"{folder}: no such folder")
-    names = TABLES[table].names if columns is None else list(columns)
+    schema = TABLES[table]
+    if columns is not None:
+        schema = pa.schema(map(schema.field, columns), schema.metadata)
     path = finished_path(folder, table)
     if path is None:
-        groups = in_groups(batches_by_island(folder, table))
-        rows = _selected(groups, table, names, where)
+        rows = _kept(in_groups(batches_by_island(folder, table)), schema, where)
         # A run that ends meanwhile removes its segments.
         path = finished_path(folder, table)
         if path is None:
             return rows
+    of_run = run_columns(folder)
     try:
         with ParquetFile(path, page_checksum_verification=True) as file:
-            groups = _row_groups(file, folder, table, names)
-            return _selected(groups, table, names, where)
+            stored = [each for each in schema.names if each in file.schema_arrow.names]
+            groups = (
+                # More threads would keep memory of their own.
+                file.read_row_group(number, stored, use_threads=False)
+                for number in range(file.num_row_groups)
+            )
+            whole = (completed(group, schema, of_run) for group in groups)
+            return _kept(whole, schema, where)
     except (ValueError, OSError) as error:
         raise RunFolderError(f"{path}: cannot be read: {error}") from None
 
 
-def _row_groups(
-    file: ParquetFile, folder: Path, table: str, names: list[str]
-) -> Iterator[pa.Table]:
-    """Yield some columns of each row group, also those that the file lacks."""
-    schema, of_run = _of(table, names), run_columns(folder)
-    stored = [name for name in names if name in file.schema_arrow.names]
-    for number in range(file.num_row_groups):
-        yield completed(
-            file.read_row_group(number, stored, use_threads=False), schema, of_run
-        )
-
-
-def _selected(
-    groups: Iterable[pa.Table],
-    table: str,
-    names: list[str],
-    where: pc.Expression | None,
+def _kept(
+    groups: Iterable[pa.Table], schema: pa.Schema, where: pc.Expression | None
 ) -> pa.Table:
     """Return some columns of the rows that meet a condition on them."""
-    rows = (group.select(names) for group in groups)
-    parts = rows if where is None else (group.filter(where) for group in rows)
-    return pa.concat_tables([_of(table, names).empty_table(), *parts])
-
-
-def _of(table: str, names: list[str]) -> pa.Schema:
-    """Return the schema of some columns of a table."""
-    schema = TABLES[table]
-    return pa.schema([schema.field(name) for name in names], schema.metadata)
+    rows = (group.select(schema.names) for group in groups)
+    kept = rows if where is None else (group.filter(where) for group in rows)
+    return pa.concat_tables([schema.empty_table(), *kept])
 
 
 def campaign(root: Path, table: str) -> "pa.dataset.Dataset":

@@ -1,6 +1,5 @@
 """Brains that robots learnt: those of arenas in the births table, and best trials."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import pyarrow as pa
@@ -9,27 +8,14 @@ import pyarrow.compute as pc
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
 
-_BRAINS = ("island", "birth", "robot")
 
-
-def learnt_births(
-    folder: Path,
-    columns: Iterable[str] | None = None,
-    where: pc.Expression | None = None,
-) -> pa.Table:
-    """Return births of a run, as ``with_learnt``.
-
-    Args:
-        folder: the run folder.
-        columns: those to read beside ``island``, ``birth`` and ``robot``; None: all.
-        where: condition on ``island`` and ``birth``; None: all births.
+def learnt_births(folder: Path) -> pa.Table:
+    """Return the births of a run, as ``with_learnt``.
 
     Raises:
         RunFolderError: a table is damaged.
     """
-    names = None if columns is None else [*_BRAINS, *columns]
-    births = read_table(folder, "births", names, where)
-    return with_learnt(births, read_table(folder, "learning", _BRAINS, where))
+    return with_learnt(read_table(folder, "births"), read_table(folder, "learning"))
 
 
 def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:

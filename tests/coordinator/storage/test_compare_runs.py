@@ -117,6 +117,6 @@ def test_runs_of_only_one_campaign_are_named(
     second = campaign(tmp_path / "b", {"a-0": birth, "b-0": birth}, "ab", repeats=1)
     for pair in ((first, second), (second, first)):
         assert compare(*pair) == [
-            f"b-0: only {second} has this run",
+            f"b-0: {first / 'b-0'}: no such folder",
             "1 of 2 runs differ: b-0",
         ]

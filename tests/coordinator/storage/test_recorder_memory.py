@@ -1,6 +1,7 @@
 """Memory for the end of a run and for its readers: the same for any number of rows."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pyarrow as pa
@@ -96,8 +97,8 @@ def test_a_column_or_a_row_is_read_in_the_same_memory_whatever_their_number(
         assert one.equals(whole.filter(row).select(["genome", "record"]))
         del whole
         peaks += [
-            peak(lambda folder=folder: read_table(folder, "births", ["birth"])),
-            peak(lambda folder=folder: read_table(folder, "births", where=row)),
+            peak(partial(read_table, folder, "births", ["birth"])),
+            peak(partial(read_table, folder, "births", where=row)),
         ]
     column = 8 * BATCH * (LONG - SHORT)
     assert peaks[2] < 1.3 * peaks[0] + column
