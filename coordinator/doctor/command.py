@@ -13,7 +13,7 @@ from pathlib import Path
 
 from coordinator.doctor import machine, system
 from coordinator.doctor.finding import Finding
-from schema.agent.address import CONNECT_VARIABLE, runtime_directory
+from schema.agent.address import CONNECT_VARIABLE, can_lock, runtime_directory
 from schema.agent.command import (
     access_of,
     add_access,
@@ -61,16 +61,17 @@ def _machine() -> Iterator[Finding]:
     yield machine.check_versions(system.versions())
     flags = cpu_flags(Path("/proc/cpuinfo"))
     yield machine.check_cpu(platform.machine().lower(), flags, platform_tag())
-    group = system.control_group()
-    quota = system.core_quota(group)
-    yield machine.check_cores(cores(), os.cpu_count() or 1, quota)
-    limit = system.group_bytes(group)
+    yield Finding("ok", "cores", f"{cores()} of {os.cpu_count()}")
+    limit = system.group_bytes()
     yield machine.check_memory(system.available_bytes(), limit, cores())
     built_s = Path(__file__).stat().st_mtime
     yield machine.check_clock(time.time(), built_s)
-    here = Path.cwd()
+    here = Path("runs" if Path("runs").is_dir() else "").absolute()
     free = shutil.disk_usage(here).free
     yield machine.check_disk(here, free, is_writable=os.access(here, os.W_OK))
+    if not can_lock(here):
+        advice = "do not resume a run there on another machine while it may go on"
+        yield Finding("warn", "disk", f"no file locks in {here}", advice)
     try:
         yield machine.check_runtime(str(runtime_directory()), "")
     except NetworkError as error:

@@ -59,23 +59,6 @@ def check_cpu(machine: str, flags: Collection[str], tag: str) -> Finding:
     return Finding("ok", "cpu", tag)
 
 
-def check_cores(usable: int, total: int, quota: float | None) -> Finding:
-    """Check how many cores a run can use.
-
-    Args:
-        usable: by this process's affinity.
-        total: of the machine.
-        quota: cores' worth of time that a control group allows; None: no limit.
-    """
-    text = f"{usable} of {total}"
-    if quota is not None and quota < usable:
-        advice = f"--workers {max(1, int(quota))} instead of one per core"
-        return Finding(
-            "warn", "cores", f"{text}, limited to the time of {quota:g}", advice
-        )
-    return Finding("ok", "cores", text)
-
-
 def check_memory(available: int | None, limit: int | None, cores: int) -> Finding:
     """Check that there is memory for a worker per core.
 

@@ -8,6 +8,8 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
+from schema.agent.capacity import group_numbers, system_text
+from schema.agent.import_path import environment
 from schema.agent.platform_tag import our_version, wire_version
 from schema.plugins.permission import GROUP
 
@@ -24,7 +26,7 @@ import sys
 from analysis.render.stage import choose_engine
 engine = choose_engine()
 if engine == "disable":
-    print("ray casting: neither EGL nor OSMesa is installed")
+    print("ray casting: neither EGL nor OSMesa works")
     sys.exit()
 import mujoco
 context = mujoco.GLContext(64, 64)
@@ -50,48 +52,18 @@ def versions() -> dict[str, str | None]:
 
 def available_bytes(meminfo: Path = Path("/proc/meminfo")) -> int | None:
     """Return the memory that programs can get [bytes]; None if it is unknown."""
-    for line in _text(meminfo).splitlines():
+    for line in system_text(meminfo).splitlines():
         key, _, value = line.partition(":")
         if key == "MemAvailable" and value.split()[:1]:
             return int(value.split()[0]) * 1024
     return None
 
 
-def core_quota(group: Path | None) -> float | None:
-    """Return the cores' worth of time of a control group (version 2); None: no limit.
-
-    Args:
-        group: folder of the group, see ``control_group``.
-    """
-    words = _text(group / "cpu.max").split() if group else []
-    if len(words) == 2 and all(word.isdecimal() for word in words):  # noqa: PLR2004 - quota and period
-        return int(words[0]) / int(words[1])
-    return None
-
-
-def group_bytes(group: Path | None) -> int | None:
-    """Return the memory that a control group leaves [bytes]; None: no limit."""
-    if group is None:
-        return None
-    limit, used = (
-        _text(group / f"memory.{name}").strip() for name in ("max", "current")
-    )
-    if limit.isdecimal() and used.isdecimal():
-        return max(0, int(limit) - int(used))
-    return None
-
-
-def control_group(
-    root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")
-) -> Path | None:
-    """Return the folder of this process's control group; None without version 2."""
-    for line in _text(own).splitlines():
-        number, _, path = line.split(":", 2)
-        if number == "0":
-            # In a container the path is that of the host, the limits are at the root.
-            group = root / path.lstrip("/")
-            return group if (group / "cpu.max").is_file() else root
-    return None
+def group_bytes() -> int | None:
+    """Return the memory that control groups leave [bytes]; None: no limit."""
+    known = group_numbers("memory.max", "memory.current")
+    known += group_numbers("memory.limit_in_bytes", "memory.usage_in_bytes")
+    return min((max(0, limit - used) for limit, used in known), default=None)
 
 
 def display() -> str:
@@ -115,14 +87,13 @@ def plugin_modules() -> dict[str, bool]:
 
 def start_rendering() -> "subprocess.Popen[str]":
     """Start a process that renders nothing, as ``revolve robot render`` would."""
-    paths = os.pathsep.join(path for path in sys.path if path)
     return subprocess.Popen(  # noqa: S603 - our own code
         [sys.executable, "-P", "-c", _RENDER],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        env={**os.environ, "PYTHONPATH": paths},
+        env=environment(),
     )
 
 
@@ -146,11 +117,3 @@ def end_rendering(
         return None, ""
     lines = output.strip().splitlines()
     return process.returncode, lines[-1] if lines else ""
-
-
-def _text(file: Path) -> str:
-    """Return the text of a system file; empty if there is none."""
-    try:
-        return file.read_text("utf-8", errors="replace")
-    except OSError:
-        return ""

@@ -1,17 +1,15 @@
 """Checks of this machine, with made-up readings."""
 
+import errno
 from pathlib import Path
 
 import pytest
 
-from coordinator.doctor import machine
+from coordinator.doctor import command, machine
 from coordinator.doctor.machine import GIB, MIB
 from coordinator.doctor.system import (
     available_bytes,
-    control_group,
-    core_quota,
     end_rendering,
-    group_bytes,
     start_rendering,
     versions,
 )
@@ -23,10 +21,9 @@ V3 = (
 
 
 def test_a_finding_is_one_line_with_the_advice_at_its_end() -> None:
-    line = str(machine.check_cores(8, 16, 1.5))
-    assert line.startswith("warn  cores ")
-    assert line.endswith("8 of 16, limited to the time of 1.5; --workers 1 instead of "
-                         "one per core")  # fmt: skip
+    line = str(machine.check_memory(800 * MIB, None, 8))
+    assert line.startswith("warn  memory ")
+    assert line.endswith("0.8 GiB free; --workers 2: a worker needs about 300 MiB")
 
 
 def test_versions_name_what_is_missing() -> None:
@@ -47,12 +44,6 @@ def test_versions_name_what_is_missing() -> None:
 )
 def test_cpu(architecture: str, flags: str, level: str) -> None:
     assert machine.check_cpu(architecture, flags.split(), "tag").level == level
-
-
-def test_cores_are_those_of_affinity_and_quota() -> None:
-    assert machine.check_cores(2, 8, None).level == "ok"
-    assert machine.check_cores(2, 8, 2.0).level == "ok"
-    assert "--workers 3" in machine.check_cores(8, 8, 3.5).advice
 
 
 @pytest.mark.parametrize(
@@ -127,35 +118,28 @@ def test_disk(free: int, level: str, *, is_writable: bool) -> None:
     assert found.level == level
 
 
+@pytest.mark.parametrize("has_locks", [True, False])
+def test_output_folder_without_locks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, has_locks: bool
+) -> None:
+    def flock(*_: object) -> None:
+        if not has_locks:
+            raise OSError(errno.ENOLCK, "No locks available")
+
+    (tmp_path / "runs").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("fcntl.flock", flock)
+    told = [str(each) for each in command._machine() if "locks" in each.text]
+    assert len(told) == (not has_locks)
+    assert all(f"no file locks in {tmp_path / 'runs'}; do" in line for line in told)
+
+
 def test_sockets_and_plugins() -> None:
     assert machine.check_runtime("/run/x", "").level == "ok"
     assert machine.check_runtime("", "others could join").level == "fail"
     assert machine.check_plugins({}).level == "ok"
     assert machine.check_plugins({"a": True, "b": True}).text == "a, b"
     assert "no module b" in machine.check_plugins({"a": True, "b": False}).text
-
-
-def test_limits_are_read_from_control_groups(tmp_path: Path) -> None:
-    own = tmp_path / "own"
-    own.write_text("12:pids:/a\n0::/user/x\n")
-    group = tmp_path / "user" / "x"
-    group.mkdir(parents=True)
-    (group / "cpu.max").write_text("150000 100000\n")
-    (group / "memory.max").write_text("1000\n")
-    (group / "memory.current").write_text("300\n")
-    assert control_group(tmp_path, own) == group
-    assert core_quota(group) == 1.5
-    assert group_bytes(group) == 700
-    (group / "cpu.max").write_text("max 100000\n")
-    (group / "memory.max").write_text("max\n")
-    assert core_quota(group) is None
-    assert group_bytes(group) is None
-    own.write_text("0::/gone\n")
-    assert control_group(tmp_path, own) == tmp_path
-    assert core_quota(tmp_path) is None
-    assert core_quota(None) is group_bytes(None) is None
-    own.write_text("1:cpu:/\n")
-    assert control_group(tmp_path, own) is None
 
 
 def test_available_memory_is_read(tmp_path: Path) -> None:

@@ -1,16 +1,23 @@
-"""Number of arenas that a process keeps."""
+"""Cores and memory of a process, and number of arenas that it keeps."""
 
+import math
 import os
 from pathlib import Path
 
 import pytest
 
+from coordinator.doctor.system import group_bytes
+from schema.agent import capacity
 from schema.agent.capacity import (
     MOST_SHARDS,
     SHARD_BYTES,
+    core_quota,
     memory_bytes,
     shards_that_fit,
 )
+from schema.agent.supervisor import cores
+
+MACHINE = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
 @pytest.mark.parametrize(
@@ -27,10 +34,54 @@ def test_half_of_the_memory_is_shared(memory: int, processes: int, shards: int) 
     assert shards_that_fit(memory, processes) == shards
 
 
-def test_memory_is_that_of_the_machine_or_of_its_container(tmp_path: Path) -> None:
-    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    limit = tmp_path / "memory.max"
-    assert memory_bytes(limit) == machine
-    for text, expected in (("max\n", machine), ("1000000\n", 10**6)):
-        limit.write_text(text)
-        assert memory_bytes(limit) == expected
+@pytest.fixture
+def groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of control groups; this process is in ``/a/b``."""
+    own = tmp_path / "own"
+    own.write_text("4:memory:/a/b\n2:cpu,cpuacct:/a/b\n0::/a/b\n")
+    monkeypatch.setattr(capacity, "_OWN", own)
+    monkeypatch.setattr(capacity, "_ROOT", tmp_path / "groups")
+    return tmp_path / "groups"
+
+
+def _write(folder: Path, **files: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / name.replace("__", ".")).write_text(text)
+
+
+@pytest.mark.usefixtures("groups")
+def test_without_limits_a_process_has_the_whole_machine() -> None:
+    assert (core_quota(), memory_bytes(), group_bytes()) == (math.inf, MACHINE, None)
+
+
+# The root is where a container sees its own group; a parent's limit counts as well.
+@pytest.mark.parametrize("place", ["", "a", "a/b"])
+def test_limits_of_version_2(groups: Path, place: str) -> None:
+    _write(groups / "a" / "b", cpu__max="max 100000\n", memory__max="max\n")
+    _write(groups / place, cpu__max="150000 100000\n", memory__max="1000\n")
+    assert (core_quota(), memory_bytes(), group_bytes()) == (1.5, 1000, None)
+    _write(groups / place, memory__current="300\n")
+    assert group_bytes() == 700
+
+
+@pytest.mark.parametrize("place", ["", "a", "a/b"])
+def test_limits_of_version_1(groups: Path, place: str) -> None:
+    cpu, memory = groups / "cpu,cpuacct" / place, groups / "memory" / place
+    _write(cpu, cpu__cfs_quota_us="-1\n", cpu__cfs_period_us="100000\n")
+    _write(memory, memory__limit_in_bytes=f"{2**63 - 4096}\n")
+    assert (core_quota(), memory_bytes()) == (math.inf, MACHINE)
+    _write(cpu, cpu__cfs_quota_us="250000\n")
+    _write(memory, memory__limit_in_bytes="1000\n", memory__usage_in_bytes="1300\n")
+    assert (core_quota(), memory_bytes(), group_bytes()) == (2.5, 1000, 0)
+
+
+@pytest.mark.parametrize(
+    ("quota", "expected"), [("max", 8), ("250000", 2), ("20000", 1), ("1600000", 8)]
+)
+def test_a_containers_quota_counts_as_cores(
+    groups: Path, monkeypatch: pytest.MonkeyPatch, quota: str, expected: int
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(8), raising=False)
+    _write(groups, cpu__max=f"{quota} 100000\n")
+    assert cores() == expected
