@@ -51,7 +51,7 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     store = Snapshots(folder, until=until)
     with tempfile.TemporaryDirectory() as place:
         # A copy: opening a journal repairs it, and its run may be active.
-        shutil.copy(folder / NAME, place)
+        shutil.copyfile(folder / NAME, Path(place) / NAME)
         with Journal.open(Path(place)) as journal:
             loop = replayed(details, context, journal.replay(), store=store)
     return context.arena[island], loop.shard_requests.past(island)

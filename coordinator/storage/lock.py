@@ -1,10 +1,15 @@
-"""Exclusive lock on a run or campaign folder."""
+"""Exclusive lock on a run or campaign folder.
+
+On a file system without locks, a name on this machine replaces it. A coordinator on
+another machine then takes the run over, and its epoch stops the first.
+"""
 
 import contextlib
 import fcntl
 import os
 import socket
 import time
+from hashlib import sha256
 from pathlib import Path
 from typing import Self
 
@@ -12,6 +17,7 @@ from coordinator.storage.disk import storage_errors
 from schema.errors import RunFolderError
 from schema.limits import printable
 from schema.tables.description import make_folder
+from schema.tables.segments import warn_once
 
 LOCK = "lock"
 
@@ -35,7 +41,7 @@ class FolderLock:
             flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC
             self._descriptor = os.open(folder / LOCK, flags, 0o644)
             try:
-                _lock(self._descriptor)
+                self._name = _lock(self._descriptor, folder)
             except BlockingIOError:
                 holder = _holder(self._descriptor)
                 os.close(self._descriptor)
@@ -43,6 +49,8 @@ class FolderLock:
                     f"{folder}: in use by {holder}; stop that process first, or wait "
                     "for it"
                 ) from None
+        if self._name:
+            warn_once(f"{folder}: no file locks; do not resume it on another machine")
         # A full disk must not refuse a coordinator: only messages show the name.
         with contextlib.suppress(OSError):
             os.ftruncate(self._descriptor, 0)
@@ -55,8 +63,11 @@ class FolderLock:
         if descriptor >= 0:
             # A child process that is just starting may share the descriptor: closing
             # alone would keep the lock until the child replaces its image.
-            fcntl.flock(descriptor, fcntl.LOCK_UN)
+            with contextlib.suppress(OSError):
+                fcntl.flock(descriptor, fcntl.LOCK_UN)
             os.close(descriptor)
+        if self._name:
+            self._name.close()
 
     def __enter__(self) -> Self:
         return self
@@ -78,30 +89,46 @@ def read_holder(folder: Path) -> str:
         return f"another process, perhaps ({LOCK}: {error.strerror})"
     try:
         # Shared: two processes that look at the same time do not see each other.
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        name = _take(descriptor, folder, fcntl.LOCK_SH)
+        holder = _holder(descriptor)
     except BlockingIOError:
         return _holder(descriptor)
     finally:
         os.close(descriptor)
-    return ""
+    if name:
+        name.close()
+    # Without a lock it is unknown whether a process of another machine still runs.
+    return "" if not name or holder.endswith(f" on {socket.gethostname()}") else holder
 
 
-def _lock(descriptor: int) -> None:
-    """Lock a file exclusively.
-
-    Raises:
-        BlockingIOError: another process keeps it locked.
-    """
+def _lock(descriptor: int, folder: Path) -> socket.socket | None:
+    """Lock exclusively, as ``_take``, and retry for an instant."""
     until_s = time.monotonic() + _RETRY_FOR_S
     while True:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return _take(descriptor, folder, fcntl.LOCK_EX)
         except BlockingIOError:
             if time.monotonic() >= until_s:
                 raise
             time.sleep(_RETRY_EVERY_S)
-        else:
-            return
+
+
+def _take(descriptor: int, folder: Path, how: int) -> socket.socket | None:
+    """Lock a folder's file, or return the name that replaces the lock."""
+    try:
+        fcntl.flock(descriptor, how | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:
+        name = socket.socket(socket.AF_UNIX)
+        try:
+            # On Linux it is no file, and ends with its process.
+            name.bind(b"\0revolve" + sha256(bytes(folder.resolve())).digest())
+        except OSError:
+            name.close()
+            raise BlockingIOError from None
+        return name
+    return None
 
 
 def _holder(descriptor: int) -> str:

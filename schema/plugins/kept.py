@@ -15,7 +15,6 @@ import hmac
 import os
 import secrets
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
@@ -226,8 +225,11 @@ def _write_key(file: Path) -> None:
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         os.write(descriptor, secrets.token_bytes(_KEY_BYTES))
-        with suppress(FileExistsError):
+        try:
             os.link(new, file)
+        except OSError:
+            if not file.exists():  # Its file system has no hard links.
+                new.rename(file)
     finally:
         os.close(descriptor)
-        new.unlink()
+        new.unlink(missing_ok=True)

@@ -1,9 +1,15 @@
 """Files that are created or replaced as a whole, even across a power loss."""
 
 import contextlib
+import errno
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from schema.tables.segments import warn_once
+
+# Of file systems that cannot, such as some of networks and containers.
+_CANNOT = (errno.EACCES, errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.EPERM)
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
@@ -48,7 +54,7 @@ def new_path(path: Path) -> Path:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder durable."""
+    """Make the names in a folder durable, if its file system can."""
     _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
 
 
@@ -63,8 +69,13 @@ def _removed_on_error(temporary: Path) -> Iterator[Path]:
 
 
 def _sync(path: Path, flags: int) -> None:
-    descriptor = os.open(path, flags | os.O_CLOEXEC)
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        descriptor = os.open(path, flags | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        if error.errno not in _CANNOT:
+            raise
+        warn_once(f"a power loss may damage files: fsync: {error.strerror}")

@@ -3,6 +3,7 @@
 import errno
 import os
 import shutil
+import stat
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -10,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.storage.disk import AppendedFile, replace_durably
+from coordinator.storage.disk import AppendedFile, replace_durably, replace_text
 from schema.errors import RunFolderError
+from schema.tables.segments import warn_once
 
 ROOM = 64 * 1024
 PAGE = 4096
@@ -118,3 +120,44 @@ def test_a_file_is_continued_at_its_end(tmp_path: Path) -> None:
 def test_a_missing_folder_is_a_run_folder_error(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="No such file"):
         AppendedFile(tmp_path / "none" / "f")
+
+
+@pytest.fixture
+def fails(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """Let ``fsync`` of folders fail with the last of these numbers, if there is one."""
+    numbers: list[int] = []
+    real = os.fsync
+
+    def fsync(descriptor: int) -> None:
+        if numbers and stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(numbers[-1], os.strerror(numbers[-1]))
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    warn_once.cache_clear()
+    yield numbers
+    warn_once.cache_clear()
+
+
+@pytest.mark.parametrize(
+    "number", [errno.EINVAL, errno.EACCES, errno.ENOSYS, errno.EOPNOTSUPP, errno.EPERM]
+)
+def test_a_file_system_that_does_not_sync_folders_costs_one_warning(
+    tmp_path: Path, fails: list[int], caplog: pytest.LogCaptureFixture, number: int
+) -> None:
+    fails.append(number)
+    for text in ("a", "b"):
+        replace_text(tmp_path / "f", text)
+        AppendedFile(tmp_path / "g", fsync=True).close()
+    assert (tmp_path / "f").read_text() == "b"
+    assert [record.getMessage() for record in caplog.records] == [
+        f"a power loss may damage files: fsync: {os.strerror(number)}"
+    ]
+
+
+def test_a_disk_that_fails_to_sync_a_folder_is_an_error(
+    tmp_path: Path, fails: list[int]
+) -> None:
+    fails.append(errno.EIO)
+    with pytest.raises(RunFolderError, match="f: cannot be written"):
+        replace_text(tmp_path / "f", "a")

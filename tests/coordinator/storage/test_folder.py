@@ -400,3 +400,65 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(RunFolderError, match="cannot be written"):
         RunFolder(tmp_path / "run", DETAILS)
+
+
+NO_LOCKS = """
+import errno, fcntl
+def flock(*_):
+    raise OSError(errno.ENOSYS, "Function not implemented")
+fcntl.flock = flock
+"""
+
+
+@pytest.fixture
+def _no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def flock(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.usefixtures("_no_locks")
+def test_without_file_locks_a_second_coordinator_of_this_machine_is_refused(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "run"
+    for details in (DETAILS, None):
+        with RunFolder(path, details):
+            assert (
+                read_holder(path) == f"process {os.getpid()} on {socket.gethostname()}"
+            )
+        assert read_holder(path) == ""
+    assert caplog.text.count(f"{path}: no file locks") == 1
+    with subprocess.Popen(
+        [sys.executable, "-c", NO_LOCKS + HOLD, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == b"held\n"
+        (tmp_path / "link").symlink_to(path)
+        name = f"process {child.pid} on {socket.gethostname()}"
+        for each in (path, tmp_path / "link"):
+            assert read_holder(each) == name
+            with pytest.raises(RunFolderError, match=f"in use by {name}"):
+                RunFolder(each)
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        assert read_holder(path) == ""
+        RunFolder(path).close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.usefixtures("_no_locks")
+def test_without_file_locks_a_coordinator_of_another_machine_is_replaced(
+    tmp_path: Path,
+) -> None:
+    first = RunFolder(tmp_path, DETAILS)
+    first._lock.close()
+    (tmp_path / "lock").write_text("process 7 on far")
+    # It may run still.
+    assert read_holder(tmp_path) == "process 7 on far"
+    with RunFolder(tmp_path), pytest.raises(RunFolderError, match="has taken it over"):
+        first.confirm()

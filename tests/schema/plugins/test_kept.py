@@ -1,5 +1,6 @@
 """Copies of plug-ins in run folders: only the user's own ones are imported."""
 
+import errno
 import hmac
 import os
 import py_compile
@@ -393,3 +394,20 @@ def test_a_new_run_has_the_present_source(
     original.unlink()
     invalidate_caches()
     assert allowed(is_new=True) == (f"kept_lab={copy}",)
+
+
+def test_the_key_needs_no_hard_links(
+    tmp_path: Path,
+    original: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def link(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr("os.link", link)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "new"))
+    allow([str(original)])
+    seals = {keep(tmp_path / "run", DOCUMENT, write)["kept_lab"].seal for _ in "ab"}
+    assert (len(seals), "" in seals) == (1, False)
+    (key,) = (tmp_path / "new" / "revolve").iterdir()
+    assert (key.name, key.stat().st_mode & 0o777) == ("plugin-key", 0o600)
