@@ -9,12 +9,14 @@ import fcntl
 import os
 import re
 import secrets
+import socket
 import stat
 import tempfile
 import time
 from pathlib import Path
 from typing import NamedTuple
 
+from schema.agent.log import warn_user
 from schema.errors import NetworkError
 
 ADDRESS = "address"
@@ -82,10 +84,17 @@ def user_hub() -> str:
 def new_socket() -> str:
     """Return the address of a Unix socket that no other process uses.
 
+    Where no file system has the locks that it needs, it is an address of loopback.
+
     Raises:
         NetworkError: there is no directory that only this user can enter.
     """
-    place = runtime_directory()
+    # A run goes on when its user logs out.
+    place = runtime_directory(is_of_login=False)
+    if not can_lock(place):
+        warn_user(f"{place}: no file locks; 127.0.0.1 is used, which any user reaches")
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            return f"tcp/127.0.0.1:{free.getsockname()[1]}"
     _remove_unused(place)
     return f"{UNIX}/{place / f'{secrets.token_hex(8)}.sock'}"
 
@@ -113,31 +122,64 @@ def default_connect() -> str:
     return os.environ.get(CONNECT_VARIABLE) or user_hub()
 
 
-def runtime_directory() -> Path:
+def runtime_directory(*, is_of_login: bool = True) -> Path:
     """Return the directory of this user's sockets; create it if it is missing.
 
     It is ``revolve`` in ``$XDG_RUNTIME_DIR``, else ``revolve-UID`` among the temporary
-    files. Nobody but its owner can enter it.
+    files or in ``/tmp``: the first that can be used and has file locks. Nobody but its
+    owner can enter it.
+
+    Args:
+        is_of_login: prefer the first, which may be removed when the user logs out.
 
     Raises:
         NetworkError: it cannot be created, or others could enter it.
     """
-    base = os.environ.get("XDG_RUNTIME_DIR", "")
-    place = Path(base) / "revolve"
-    if not base or not os.access(base, os.W_OK):
-        place = Path(tempfile.gettempdir()) / f"revolve-{os.getuid()}"
+    login, own = os.environ.get("XDG_RUNTIME_DIR"), f"revolve-{os.getuid()}"
+    places = [Path("/tmp") / own]  # noqa: S108 - refused if it is not private
+    with contextlib.suppress(OSError):
+        places.insert(0, Path(tempfile.gettempdir()) / own)
+    if login:
+        places.insert(0 if is_of_login else 1, Path(login) / "revolve")
+    places = list(filter(_is_usable, places)) or places[:1]
+    for place in places:
+        _make_private(place)
+        if can_lock(place):
+            return place
+    return places[0]
+
+
+def _is_usable(place: Path) -> bool:
+    """Return whether this user may have a directory there, and paths fit sockets."""
+    longest = f"{place}/{secrets.token_hex(8)}.sock"
+    is_path = _SOCKET.fullmatch(f"{UNIX}/{longest}") and len(longest) <= _LONGEST_PATH
+    found = place if os.path.lexists(place) else place.parent
+    return bool(is_path) and os.access(found, os.W_OK)
+
+
+def can_lock(folder: Path) -> bool:
+    """Return whether a folder's file system has locks; True if that is unknown."""
+    with contextlib.suppress(OSError), tempfile.TemporaryFile(dir=folder) as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX)
+        except OSError:
+            return False
+    return True
+
+
+def _make_private(place: Path) -> None:
     try:
         place.mkdir(mode=0o700, exist_ok=True)
         found = place.lstat()
     except OSError as error:
-        raise NetworkError(f"{place}: cannot be used: {error.strerror}") from None
+        why = f"{error.strerror}; set XDG_RUNTIME_DIR to another directory"
+        raise NetworkError(f"{place}: cannot be used: {why}") from None
     is_private = stat.S_IMODE(found.st_mode) == stat.S_IRWXU
     if not (stat.S_ISDIR(found.st_mode) and is_private and found.st_uid == os.getuid()):
         raise NetworkError(
             f"{place}: must be a directory of this user with mode 0700, or others "
             "could join the fleet: remove it, or set XDG_RUNTIME_DIR"
         )
-    return place
 
 
 def listen_address(place: str) -> str:

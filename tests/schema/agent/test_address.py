@@ -1,9 +1,11 @@
 """Addresses of hubs: forms, defaults, the private directory, files of run folders."""
 
+import errno
 import fcntl
 import os
 import socket
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -17,6 +19,12 @@ from schema.agent.address import (
     user_hub,
 )
 from schema.errors import NetworkError
+
+
+@pytest.fixture(autouse=True)
+def _temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let temporary files lie in a folder that does not exist yet."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "t"))
 
 
 @pytest.fixture
@@ -36,17 +44,89 @@ def test_without_runtime_directory_a_private_temporary_one_is_used(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
-    assert runtime_directory() == tmp_path / f"revolve-{os.getuid()}"
+    (tmp_path / "t").mkdir()
+    assert runtime_directory() == tmp_path / "t" / f"revolve-{os.getuid()}"
     assert runtime_directory().stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("name", ["l" * 60 + "o" * 30, "with space", "missing"])
+@pytest.mark.parametrize("variable", ["XDG_RUNTIME_DIR", "TMPDIR"])
+def test_a_directory_that_sockets_cannot_use_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, variable: str
+) -> None:
+    bad, good = tmp_path / name, tmp_path / "t"
+    good.mkdir()
+    if name != "missing":
+        bad.mkdir()
+    places = {"XDG_RUNTIME_DIR": good, variable: bad}
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(places["XDG_RUNTIME_DIR"]))
+    monkeypatch.setattr("tempfile.tempdir", str(places.get("TMPDIR", good)))
+    for address in (new_socket(), user_hub()):
+        assert parse_address(address).host.startswith(f"{good}/revolve")
+
+
+def test_a_directory_of_another_user_is_replaced(
+    runtime: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another user may create ours among the temporary files, to be in the way."""
+    theirs = runtime / "t" / f"revolve-{os.getuid()}"
+    theirs.mkdir(parents=True)
+    real = os.access
+    monkeypatch.setattr(
+        "os.access", lambda path, mode: path != theirs and real(path, mode)
+    )
+    assert parse_address(new_socket()).host.startswith(f"{runtime}/revolve/")
+
+
+def test_sockets_of_runs_outlive_the_login_of_their_user(runtime: Path) -> None:
+    """The system removes ``$XDG_RUNTIME_DIR`` when the user logs out."""
+    (runtime / "t").mkdir()
+    assert user_hub().startswith(f"unixsock-stream/{runtime}/revolve/")
+    assert new_socket().startswith(f"unixsock-stream/{runtime}/t/revolve-")
+
+
+def test_without_any_file_locks_a_run_listens_on_loopback(
+    runtime: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unix sockets of Zenoh need file locks; a directory that has some is preferred."""
+    lacking = {runtime}
+    real = fcntl.flock
+
+    def flock(file: IO[bytes], how: int) -> None:
+        place = Path(f"/proc/self/fd/{file.fileno()}").resolve()
+        if any(each in place.parents for each in lacking):
+            raise OSError(errno.ENOSYS, "Function not implemented")
+        real(file, how)
+
+    monkeypatch.setattr("fcntl.flock", flock)
+    (runtime / "t").mkdir()
+    assert new_socket().startswith("unixsock-stream//tmp/revolve-")
+    lacking.add(Path("/"))
+    protocol, host, port = parse_address(new_socket())
+    assert (protocol, host) == ("tcp", "127.0.0.1")
+    with socket.create_server((host, port)):
+        pass
+
+
+def test_a_full_disk_does_not_open_a_run_to_other_users(
+    runtime: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise a user who fills ``/tmp`` could join the runs of others."""
+
+    def full(**_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", full)
+    assert new_socket().startswith(f"unixsock-stream/{runtime}/revolve/")
 
 
 @pytest.mark.parametrize("mode", [0o755, 0o770, 0o701])
 def test_directory_that_others_can_enter_is_refused(runtime: Path, mode: int) -> None:
     (runtime / "revolve").mkdir()
     (runtime / "revolve").chmod(mode)
-    with pytest.raises(NetworkError, match="mode 0700"):
-        new_socket()
+    for address in (new_socket, user_hub):
+        with pytest.raises(NetworkError, match="mode 0700"):
+            address()
 
 
 def test_link_to_a_private_directory_is_refused(runtime: Path) -> None:
