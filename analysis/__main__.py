@@ -9,6 +9,7 @@ from typing import Any
 from analysis.extras import extra
 from analysis.viewer.flags import FILM_ENDING
 from schema.agent.flags import Flags, add_plugins, whole_number
+from schema.agent.supervisor import cores
 from schema.plugins.permission import allow
 
 
@@ -34,6 +35,8 @@ def main(arguments: list[str]) -> int:
     if arguments[0] == "view":
         return _view(options)
     allow(options.plugins)
+    # Before matplotlib is imported: it refuses backends of other programs.
+    os.environ["MPLBACKEND"] = "agg"
     with extra("analysis needs", "analysis"):
         from analysis.analyze_command import analyze
     return analyze(options, arguments, _simulation)
@@ -87,7 +90,7 @@ def parser(command: str) -> Flags:
     flags.add_argument(
         "--processes",
         type=whole_number(),
-        default=os.cpu_count() or 1,
+        default=cores(),
         metavar="N",
         help="number of processes, which measure runs in parallel (default: number of "
         "cores)",

@@ -101,6 +101,7 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public object
         raise AttributeError(f"module 'revolve' has no attribute {name!r}{hint}")
     if line := stranger():
         raise ImportError(line)
+    import_module("schema.agent.import_path").check_graphics()
     found = globals()[name] = getattr(import_module(home), name)
     return found
 

@@ -11,7 +11,7 @@ from typing import Any
 import plotnine as p9
 import pyarrow as pa
 from matplotlib import pyplot as plt
-from matplotlib import rc_context
+from matplotlib import rc_context, rcdefaults
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -178,6 +178,11 @@ def theme_of_size(height_in: float) -> Any:  # noqa: ANN401 - untyped
         panel_spacing_x=0.04,
         panel_spacing_y=0.05,
     )
+
+
+def reset_settings() -> None:
+    """Forget the settings of the user's file ``matplotlibrc``."""
+    rcdefaults()
 
 
 def save(figure: p9.ggplot | Figure, stem: Path) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.render.framing import framed
+from schema.agent.import_path import GRAPHICS, NO_GRAPHICS, check_graphics
 from schema.agent.log import tell_user
 from schema.errors import one_line
 from schema.experiment.environment import LIGHT_COLOUR, LIGHT_M
@@ -26,8 +27,7 @@ Picture = npt.NDArray[np.uint8]
 """(H, W, 3) red, green, blue."""
 
 _LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
-_SETTING = "MUJOCO_GL"
-_OFF = ("disable", "disabled", "off", "false", "0")
+_OFF = (NO_GRAPHICS, "disabled", "off", "false", "0")
 """Values of the setting for which MuJoCo loads no graphics library."""
 AZIMUTH = 130.0
 """Direction of the camera's view, as MuJoCo's [degrees]."""
@@ -48,11 +48,12 @@ def choose_engine() -> str:
     """Choose the backend of MuJoCo's renderer, and return its name.
 
     Returns:
-        The value of ``MUJOCO_GL``; "disable" if neither EGL nor OSMesa is installed.
+        The value of ``MUJOCO_GL``; "disable" if neither EGL nor OSMesa works.
     """
-    if "mujoco" not in sys.modules and not os.environ.get(_SETTING):
-        os.environ[_SETTING] = _installed() or _OFF[0]
-    return os.environ.get(_SETTING, "")
+    if "mujoco" not in sys.modules:
+        os.environ[GRAPHICS] = os.environ.get(GRAPHICS) or _installed() or NO_GRAPHICS
+        check_graphics()
+    return os.environ.get(GRAPHICS, "")
 
 
 def _installed() -> str | None:
@@ -153,7 +154,7 @@ def _renderer(
 
     width, height = size
     if engine.lower() in _OFF:
-        why = f"{_SETTING} is {engine}" if _installed() else "no EGL or OSMesa here"
+        why = f"{GRAPHICS} is {engine}" if _installed() else "no EGL or OSMesa here"
     else:
         try:
             return mujoco.Renderer(model, height, width)

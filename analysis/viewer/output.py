@@ -122,7 +122,10 @@ def ways_to_view(output: Output) -> list[str]:
     lines = [f"serving; to view: rerun --connect {output.url}"]
     tunnel = ""
     if host in _LOOPBACK:
-        to = f"{getpass.getuser()}@{socket.gethostname()}"
+        to = socket.gethostname()
+        # A user of a container may have no name; the error depends on the version.
+        with contextlib.suppress(KeyError, OSError):
+            to = f"{getpass.getuser()}@{to}"
         lines.append(
             f"from another machine: ssh -N -L {port}:{host}:{port} {to}, and there the "
             "same"

@@ -5,6 +5,7 @@ poses as batches of columns, and a ``Clear`` at the death. Times are integer
 nanoseconds. Rerun keeps the current time per thread, so one thread logs everything.
 """
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
@@ -63,6 +64,8 @@ class Recording:
             ViewerError: the file cannot be written, or the port cannot be served.
         """
         kept = "".join(c if c.isalnum() or c in "_-" else "-" for c in name)
+        # Off, as set for another program, it would turn all of this into nothing.
+        os.environ.pop("RERUN", None)
         self._stream = rr.RecordingStream(APPLICATION, recording_id=kept)
         self._stream.set_log_time_enabled(False)
         sinks: list[rr.GrpcServerSink | rr.FileSink] = []

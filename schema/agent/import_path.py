@@ -1,4 +1,4 @@
-"""Import path of child processes.
+"""Imports that must not depend on where a process runs or what is set there.
 
 ``python -m`` and ``python -c``, which starts spawned processes, search the current
 folder first. A file ``random.py`` of the user there would replace the module of the
@@ -9,8 +9,15 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 
+from schema.agent.log import warn_user
+from schema.errors import one_line
+
+GRAPHICS = "MUJOCO_GL"
+"""Environment variable: graphics library that MuJoCo loads when it is imported."""
+NO_GRAPHICS = "disable"
 _FLAG = "PYTHONSAFEPATH"
 
 
@@ -37,3 +44,14 @@ def safe_import_path() -> Iterator[None]:
             del os.environ[_FLAG]
         else:
             os.environ[_FLAG] = before
+
+
+def check_graphics() -> None:
+    """Turn graphics off if MuJoCo cannot be imported with the library that is set."""
+    chosen = os.environ.get(GRAPHICS)
+    if chosen and chosen != NO_GRAPHICS:
+        try:
+            import_module("mujoco")
+        except Exception as error:  # noqa: BLE001 - which one depends on the library
+            os.environ[GRAPHICS] = NO_GRAPHICS
+            warn_user(f"{GRAPHICS}={chosen} does not work: {one_line(error)}")

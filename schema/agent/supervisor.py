@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import math
 import os
+import resource
 import signal
 import sys
 import threading
@@ -20,7 +21,8 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
-from schema.agent.import_path import safe_import_path
+from schema.agent.capacity import core_quota
+from schema.agent.import_path import check_graphics, safe_import_path
 from schema.agent.log import warn_user
 from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import (
@@ -83,7 +85,12 @@ def prepare_process() -> None:
         with contextlib.suppress(AttributeError):  # of other C libraries
             ctypes.CDLL(None).mallopt(_MAP_OPTION, _MAP_BYTES)
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", _ARROW_POOL)
+    # A hub has a file for each process of its fleet.
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     _use_batch_policy()
+    check_graphics()
 
 
 def _use_batch_policy() -> None:
@@ -99,9 +106,10 @@ def _use_batch_policy() -> None:
 
 
 def cores() -> int:
-    """Return the number of cores that this process may use."""
+    """Return the number of cores that this process may use, or its container."""
     affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
+    usable = len(affinity(0)) if affinity else os.cpu_count() or 1
+    return max(1, int(min(usable, core_quota())))
 
 
 def most_processes() -> int:

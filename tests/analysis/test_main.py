@@ -1,5 +1,6 @@
 """Commands whose libraries are not installed name the command that installs them."""
 
+import os
 import subprocess
 import sys
 
@@ -38,3 +39,16 @@ def test_a_missing_library_is_named_with_its_extra(
     assert done.returncode == 0, done.stderr
     assert f"[{extra}]" in done.stdout
     assert "install" in done.stdout
+
+
+def test_the_backend_of_a_notebook_does_not_stop_an_analysis() -> None:
+    """Its name is refused by matplotlib where the notebook's package is missing."""
+    script = "from analysis.__main__ import main; main(['analyze', 'nowhere'])"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "MPLBACKEND": "module://matplotlib_inline.backend_inline"},
+    )
+    assert "RunFolderError: nowhere: no such folder" in done.stderr

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
+from matplotlib import rc_context
 from PIL import Image
 from rich.progress import Progress
 
@@ -95,3 +97,16 @@ def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors(
     figure_writer._add_tree(writer, shown, robots, "m/s")
     (tree,) = writer.drawn
     assert "its ancestors over four levels of reproduction" in tree.caption
+
+
+def test_figures_do_not_depend_on_a_users_settings(tmp_path: Path) -> None:
+    def drawn(name: str) -> bytes:
+        (tmp_path / name).mkdir()
+        writer = FigureWriter(tmp_path / name)
+        writer.add(replace(tree_of("x"), draw=lambda _: plt.subplots()[0]), {})
+        return writer.drawn[0].picture.read_bytes()
+
+    plain = drawn("plain")
+    users: dict[Any, Any] = {"axes.facecolor": "red", "font.size": 40}
+    with rc_context(users):
+        assert drawn("users") == plain

@@ -252,6 +252,25 @@ for _ in range(2):
     assert done.stderr == line
 
 
+def test_graphics_that_cannot_be_imported_are_replaced(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    script = """
+from analysis.render.stage import choose_engine
+choose_engine()
+from tests.analysis.render.test_picture import ROBOT, settings_of
+from analysis.render.picture import RobotRenderer
+with RobotRenderer(ROBOT, settings_of(None), size=(40, 30)) as renderer:
+    print(renderer.picture().shape)
+"""
+    monkeypatch.setenv("MUJOCO_GL", "bogus")
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "(30, 40, 3)\n", done.stderr
+    assert "robots are drawn without OpenGL" in done.stderr
+
+
 @pytest.mark.parametrize("engine", ["gl"], indirect=True)
 def test_both_engines_draw_the_same_robot(
     renderer: RobotRenderer, monkeypatch: pytest.MonkeyPatch

@@ -2,6 +2,7 @@
 
 import os
 import re
+import socket
 import sys
 import threading
 from pathlib import Path
@@ -22,7 +23,7 @@ from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
 from analysis.viewer.output import Output, Window, keep_serving, ways_to_view
-from analysis.viewer.recording import ViewerError
+from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import shown_run
 from analysis.viewer.resimulate import Simulators
 from analysis.viewer.scene import scene_of
@@ -202,6 +203,31 @@ def test_a_server_tells_how_to_view_it_from_elsewhere() -> None:
     assert "-L 9090:127.0.0.1:9090" in browser
     open_to_all = ways_to_view(Output(None, ("192.0.2.1", 9877), has_window=False))
     assert not any("ssh" in line or "SSH" in line for line in open_to_all)
+
+
+@pytest.mark.parametrize("error", [KeyError("uid not found"), OSError("no user name")])
+def test_a_user_without_a_name_can_serve(
+    monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """The type of the error depends on the version of Python."""
+
+    def nobody() -> str:
+        raise error
+
+    monkeypatch.setattr("getpass.getuser", nobody)
+    _, far, _ = ways_to_view(Output(None, ("127.0.0.1", 9877), has_window=False))
+    assert f"127.0.0.1:9877 {socket.gethostname()}, and there" in far
+
+
+@pytest.mark.parametrize("value", ["0", "off"])
+def test_a_recording_is_written_though_rerun_is_turned_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: str
+) -> None:
+    monkeypatch.setenv("RERUN", value)
+    scene = scene_of(Experiment(name="a"))
+    with Recording("a", layout(scene), file=tmp_path / "a.rrd") as recording:
+        recording.add_scene(scene)
+    assert (tmp_path / "a.rrd").stat().st_size > 0
 
 
 def test_a_file_with_another_ending_or_folder_is_refused(tmp_path: Path) -> None:

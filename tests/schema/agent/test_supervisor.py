@@ -174,3 +174,38 @@ def test_second_ctrl_c_at_once_does_not_count(
     monkeypatch.setattr("schema.agent.supervisor._REPEAT_S", 0.0)
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)
+
+
+def test_a_process_that_draws_nothing_needs_no_graphics() -> None:
+    """MuJoCo would refuse the value when it is imported."""
+    script = (
+        "from schema.agent.supervisor import prepare_process\n"
+        "prepare_process()\n"
+        "import mujoco, os\n"
+        "print(mujoco.MjModel.__name__, os.environ['MUJOCO_GL'])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "MUJOCO_GL": "bogus"},
+    )
+    assert done.stdout == "MjModel disable\n", done.stderr
+    assert "MUJOCO_GL=bogus does not work: invalid value" in done.stderr
+
+
+def test_a_process_may_open_as_many_files_as_the_system_allows() -> None:
+    script = (
+        "import resource\n"
+        "files = resource.RLIMIT_NOFILE\n"
+        "_, most = resource.getrlimit(files)\n"
+        "resource.setrlimit(files, (64, most))\n"
+        "from schema.agent.supervisor import prepare_process\n"
+        "prepare_process()\n"
+        "print(resource.getrlimit(files) == (most, most))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "True\n"
