@@ -7,6 +7,8 @@ because only cores have no parent and no other part is a core.
 The functions are compiled at the first call and cached on disk.
 """
 
+from typing import Any
+
 import numba
 import numpy as np
 
@@ -39,7 +41,19 @@ def tree_distances(trees: Trees, first: Integers, second: Integers) -> Integers:
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+def _compiled(function: Any) -> Any:  # noqa: ANN401 - of Numba, which has no types
+    # With NUMBA_DISABLE_JIT Python would compute, and its numbers do not wrap around.
+    config: Any = numba.config
+    is_off, config.DISABLE_JIT = config.DISABLE_JIT, 0
+    try:
+        return numba.njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # No folder for the cache can be written.
+        return numba.njit(nogil=True)(function)
+    finally:
+        config.DISABLE_JIT = is_off
+
+
+@_compiled
 def _distances(starts, nodes, pairs):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN202
     kinds, slots, lefts, key_roots = nodes
     largest = 0
@@ -68,7 +82,7 @@ def _distances(starts, nodes, pairs):  # type: ignore[no-untyped-def] # noqa: AN
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@_compiled
 def _fill(costs, a, b, subtrees, forests):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN202
     """Compute the distances of the subtrees that end with two key roots.
 

@@ -51,7 +51,11 @@ def measure_runs(
         slots: slot that labels a part in tree edit distance.
         processes: number of runs measured in parallel.
     """
-    pool = ProcessPoolExecutor(min(processes, len(runs)), get_context("spawn"))
+    try:
+        pool = ProcessPoolExecutor(min(processes, len(runs)), get_context("spawn"))
+    except OSError:  # This system has no semaphores.
+        yield from map(measure_run, runs, repeat(slots))
+        return
     with safe_import_path(), pool:
         try:
             yield from pool.map(measure_run, runs, repeat(slots))

@@ -1,11 +1,15 @@
 """Tests of tree edit distance: known values, another implementation, a metric."""
 
+import importlib
+
+import numba
 import numpy as np
 import pytest
 import zss
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from analysis.measures import distance as module
 from analysis.measures.distance import tree_distances
 from analysis.measures.trees import SlotRule, encode
 from schema.errors import InvalidRobot
@@ -161,3 +165,32 @@ def test_no_bodies_give_no_trees() -> None:
     trees = encode(column([]))
     empty = np.zeros(0, np.int64)
     assert tree_distances(trees, empty, empty).tolist() == []
+
+
+def test_without_a_folder_for_its_cache_the_distance_is_compiled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As in a container whose user can write neither to the package nor at home."""
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 0)
+
+    def no_locator(*_: object) -> None:
+        raise RuntimeError("cannot cache function: no locator available")
+
+    monkeypatch.setattr("numba.core.caching.FunctionCache.__init__", no_locator)
+
+    def minus(a: int, b: int) -> int:
+        return a - b
+
+    with pytest.raises(RuntimeError, match="no locator"):
+        numba.njit(cache=True)(minus)
+    assert module._compiled(minus)(7, 4) == 3
+
+
+def test_distances_do_not_depend_on_the_users_settings_of_numba(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Plain Python, without wrapping numbers, gave another distance here."""
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 1)
+    importlib.reload(module)
+    assert vars(numba.config)["DISABLE_JIT"] == 1
+    assert distance(BRICK, [*CORE, part(1, 0, 3, "ActiveHinge")]) == 2

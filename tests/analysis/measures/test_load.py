@@ -1,5 +1,6 @@
 """Tests of damaged, unfinished and duplicate runs, and runs of other versions."""
 
+import errno
 import json
 import shutil
 from collections.abc import Callable
@@ -396,6 +397,21 @@ def test_immigrants_keep_their_birth_id(made: Maker) -> None:
     )
     tables, _ = read_tables(found_in(folder))
     assert tables["population"]["birth_island"].to_pylist() == [0, 0]
+
+
+def test_without_semaphores_runs_are_measured_one_by_one(
+    made: Maker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They lie in ``/dev/shm``, which cannot be written in some containers."""
+
+    def no_semaphores(*_: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr("analysis.measures.study.ProcessPoolExecutor", no_semaphores)
+    for number in range(4):
+        made(f"run-{number}", seed=number)
+    runs, _ = read_runs([tmp_path])
+    assert [one.run for one in measure_runs(runs, processes=2)] == runs
 
 
 @pytest.mark.slow
