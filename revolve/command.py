@@ -1,6 +1,7 @@
 """The command ``revolve``: dispatches to the commands of all rooms."""
 
 import codecs
+import errno
 import io
 import os
 import sys
@@ -115,6 +116,11 @@ def _run_command(words: list[str], tell: Callable[[Exception], None]) -> int:
         return int(room.main(words))
     except error_type as error:
         tell(error)
+        return 2
+    except OSError as error:
+        if error.errno != errno.EMFILE:
+            raise
+        tell(error_type("too many open files: raise the limit (ulimit -n)"))
         return 2
     except UnicodeEncodeError as error:
         if "surrogates" not in error.reason:

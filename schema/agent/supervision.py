@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from ctypes import Array, c_char
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, heap
 
 CPU_LIMIT_S = 3600.0
 """CPU time limit of one job [s]: far above that of any job that ends."""
@@ -77,6 +77,9 @@ class CurrentJob:
     """The current job of a process, in memory that it shares with its parent."""
 
     def __init__(self) -> None:
+        if not os.access("/dev/shm", os.W_OK):  # noqa: S108 - as multiprocessing
+            # Use a temporary file; this is how its own tests choose the folder.
+            heap.Arena._dir_candidates = []  # type: ignore[attr-defined] # noqa: SLF001
         self._memory: Array[c_char] = get_context("spawn").RawArray(c_char, _SIZE)
 
     @property

@@ -1,6 +1,7 @@
 """Help, examples and versions of all commands."""
 
 import argparse
+import errno
 import re
 import shlex
 import sys
@@ -193,3 +194,14 @@ def test_a_run_shows_at_once_on_a_terminal_that_it_starts(
     assert len(error.splitlines()[0]) > len(start)
     assert "nonsense: no such experiment" in error
     assert not any("starting" in lines[key] for key in lines if key != (True,))
+
+
+def test_a_process_with_too_few_files_says_so(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(_: list[str]) -> int:
+        raise OSError(errno.EMFILE, "Too many open files", "run/segments")
+
+    monkeypatch.setattr("coordinator.cli.status.main", fail)
+    assert main(["status", "run"]) == 2
+    assert "revolve: too many open files: raise the limit (ulimit -n)" in caplog.text

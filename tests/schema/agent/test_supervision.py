@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from multiprocessing import heap
 from pathlib import Path
 
 import pytest
@@ -232,3 +233,15 @@ def test_clock_of_a_thread_counts_its_own_work_only() -> None:
     assert clock() - begun_s < 0.1
     work()
     assert clock() - begun_s >= 0.2
+
+
+def test_a_note_needs_no_shared_memory_of_the_system(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In some containers ``/dev/shm`` is missing or cannot be written."""
+    monkeypatch.setattr(heap.BufferWrapper, "_heap", heap.Heap())
+    monkeypatch.setattr(heap.Arena, "_dir_candidates", ["/nowhere"])
+    monkeypatch.setattr("os.access", lambda *_: False)
+    note = CurrentJob()
+    note.begin(TASK)
+    assert note.read() == TASK
