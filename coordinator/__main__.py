@@ -59,8 +59,9 @@ from schema.tables.arrow import skip_pandas
 
 # Flags that --in-process excludes.
 _OF_NETWORK = (
-    *("access", "connect", "listen", "view"),
+    *("access", "connect", "fleet", "listen", "view", "give-up-after"),
     *("tls-ca", "tls-certificate", "tls-key"),
+    *("cpu-limit", "wait-limit", "oversubscribe"),
 )
 
 
@@ -209,8 +210,9 @@ def _deployment(
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
     for flag in _OF_NETWORK if options.in_process else ():
-        if getattr(options, flag.replace("-", "_")):
-            raise NetworkError(f"--{flag} needs a network, but --in-process has none")
+        name = flag.replace("-", "_")
+        if getattr(options, name) != run_flags(options.command).get_default(name):
+            raise NetworkError(f"--{flag} needs processes, but --in-process has none")
     if options.in_process and options.command != "coordinator" and options.workers:
         raise NetworkError("--workers: --in-process starts no other processes")
     tls = None if options.in_process else tls_of(options)

@@ -1,12 +1,16 @@
 """Checks of the arguments of the Python API."""
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from operator import index
 from typing import TypeVar
 
 from schema.errors import RevolveError, shown
 
 T = TypeVar("T")
+_TLS = re.compile(r"--tls-(\w+)")
+_FLAG = re.compile(r"--(births|connect|experiment|fleet|out|plugins|seed|workers)\b")
 
 MOST_NUMBER = 2**32 - 1
 """Greatest number of a birth, or of a robot of a seed."""
@@ -35,6 +39,16 @@ def whole_number(
     raise RevolveError(
         f"{name}: must be a whole number from {least} to {most}, got {shown(value)}"
     )
+
+
+@contextmanager
+def naming_arguments() -> Iterator[None]:
+    """Let errors name arguments and environment variables instead of flags."""
+    try:
+        yield
+    except RevolveError as error:
+        line = _TLS.sub(lambda flag: f"$REVOLVE_TLS_{flag[1].upper()}", str(error))
+        raise type(error)(_FLAG.sub(r"\1", line)) from None
 
 
 def in_order(name: str, values: Iterable[T]) -> Iterable[T]:

@@ -8,14 +8,13 @@ input is closed, which happens at the latest with its parent.
 import os
 import signal
 import sys
-import threading
-from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any, TextIO, cast
 
 import msgspec
 
 from revolve.command import main as run_command
+from schema.agent.supervisor import prepare_process, stop_with_input
 
 _SIMULATE = "simulate"
 _MISTAKE = 2
@@ -30,9 +29,9 @@ def main(words: list[str]) -> int:
     """
     connection = Connection(int(words[0]))
     if words[1] == _SIMULATE:
-        _end_with_input(lambda: os._exit(0))
+        stop_with_input(lambda: os._exit(0))
         return _serve(connection)
-    _end_with_input(lambda: os.kill(os.getpid(), signal.SIGTERM))
+    stop_with_input(lambda: os.kill(os.getpid(), signal.SIGTERM))
     sys.argv[1:] = words[2:]
     return _run(connection)
 
@@ -79,23 +78,9 @@ class _StandardError:
         return self._stream.write(text)
 
 
-def _end_with_input(end: Callable[[], None]) -> None:
-    """Call a function when standard input is closed."""
-
-    def watch() -> None:
-        while os.read(0, 1024):
-            pass
-        end()
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
 def _serve(connection: Connection) -> int:
     """Do tasks one by one."""
-    # Before NumPy is imported, as the command does.
-    from schema.agent.supervisor import prepare_process  # noqa: PLC0415
-
-    prepare_process()
+    prepare_process()  # before NumPy is imported, as the command does
     from revolve.solo import outcome_of  # noqa: PLC0415
     from schema.agent.stopping import STOPPED  # noqa: PLC0415
 

@@ -15,6 +15,7 @@ from multiprocessing.connection import Connection, Pipe
 
 import msgspec
 
+from revolve.arguments import naming_arguments
 from revolve.messages import Outcome, Problem, Task, error_of
 from schema.agent.import_path import environment, python_command
 from schema.agent.stopping import STOPPED
@@ -84,7 +85,8 @@ def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:
     finally:
         child.end()
     if problem is not None:
-        raise error_of(_PROBLEMS.decode(problem))
+        with naming_arguments():
+            raise error_of(_PROBLEMS.decode(problem))
     if code not in (0, 1):
         raise RevolveError(f"revolve {words[0]} ended with exit code {code}")
     return code

@@ -20,7 +20,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from schema.agent.log import tell_user, warn_user
 from schema.agent.topics import unique_name
-from schema.errors import NetworkError, RevolveError, error_text
+from schema.errors import NetworkError, RevolveError, counted, error_text
 
 _WAIT_S = 0.2
 _CHORES_S = 1.0
@@ -54,18 +54,23 @@ class Order:
 class Engine:
     """Thread with a connection to agents; ``close`` ends it."""
 
-    def __init__(self, network: Network, find_fault: Callable[[], str]) -> None:
+    def __init__(
+        self, network: Network, find_fault: Callable[[], str], give_up_after_s: float
+    ) -> None:
         """Open the network and start the thread.
 
         Args:
             network: not yet open.
             find_fault: returns why no worker can do a job any more, or "".
+            give_up_after_s: time for which jobs wait without a worker that can do
+                them [s].
 
         Raises:
             NetworkError: there is no hub, or none can be opened.
         """
         self._network = network
         self._find_fault = find_fault
+        self._give_up_after_s = give_up_after_s
         self._orders: SimpleQueue[Order] = SimpleQueue()
         self._cancelled: SimpleQueue[Future[Any]] = SimpleQueue()
         self._client = Client(
@@ -167,7 +172,7 @@ class Engine:
         Raises:
             RevolveError: no worker can do a job any more.
         """
-        began_s = done_s = time.monotonic()
+        alone_s = done_s = time.monotonic()
         is_told = False
         while not self._is_closing:
             for order in _all_of(self._orders):
@@ -182,10 +187,24 @@ class Engine:
                 continue
             done_s = now_s
             self._do_chores(fleet)
-            if self._open and not self.workers and not is_told:
-                is_told = now_s - began_s >= _ALONE_S
-                if is_told:
-                    tell_user(f"no worker has joined at {self._network.address} yet")
+            if not self._open or self.workers:
+                alone_s, is_told = now_s, False
+            elif now_s - alone_s >= self._give_up_after_s:
+                after = f"gave up after {self._give_up_after_s:g} s"
+                raise NetworkError(f"{after}: {self._lack(fleet)}")
+            elif now_s - alone_s >= _ALONE_S and not is_told:
+                is_told = True
+                tell_user(self._lack(fleet))
+
+    def _lack(self, fleet: Fleet) -> str:
+        """Return why no worker can do the jobs."""
+        refused = {**self._network.refused, **fleet.dispatch.unfit()}
+        place = self._network.address
+        if not refused:
+            return f"no worker is connected at {place}"
+        agent, why = [*refused.items()][-1]
+        joined = f"{counted(len(refused), 'agent')} joined at {place}"
+        return f"{joined} and cannot do the jobs, the last of them {agent}: {why}"
 
     def _do_chores(self, fleet: Fleet) -> None:
         """Tell the user what is wrong with agents.

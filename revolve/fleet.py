@@ -1,8 +1,10 @@
 """Fleets as the Python API has them: workers for a loop of the user's own."""
 
 import atexit
+import math
 import os
 import threading
+from argparse import Namespace
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
@@ -18,14 +20,13 @@ from coordinator.dispatch.events import Deliver
 from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
 from coordinator.run.requests import read_evaluation
-from revolve.arguments import in_order, whole_number
+from revolve.arguments import in_order, naming_arguments, whole_number
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
 from revolve.experiment import Experiment
 from revolve.robot import Robot, checked
 from revolve.workers import Workers
-from schema.agent.address import hub_of
-from schema.agent.command import name_at
+from schema.agent.command import connect_of, name_at, tls_of
 from schema.agent.network import DEFAULT_FLEET, Tls
 from schema.agent.supervisor import cores, most_processes
 from schema.agent.topics import unique_name
@@ -49,6 +50,7 @@ from schema.wire.codec import Answer, encode_request, encode_robot
 
 T = TypeVar("T")
 
+_NO_FLAGS = Namespace(tls_ca=None, tls_certificate=None, tls_key=None)
 _LEAST_AHEAD = 256
 _AHEAD_PER_WORKER = 20
 
@@ -75,6 +77,7 @@ class Fleet:
         fleet: str = DEFAULT_FLEET,
         tls: tuple[str, str, str] | None = None,
         plugins: Iterable[str] = (),
+        give_up_after_s: float = math.inf,
     ) -> None:
         """Configure a fleet; ``with`` opens it.
 
@@ -85,9 +88,13 @@ class Fleet:
             connect: address of a hub whose workers do the jobs, or folder of an active
                 run; None: only the workers that this fleet starts.
             fleet: name of the fleet at that hub.
-            tls: files of certificate authority, certificate and key, for ``tls/``.
+            tls: files of certificate authority, certificate and key, for ``tls/``;
+                None: those that the variables ``REVOLVE_TLS_CA``,
+                ``REVOLVE_TLS_CERTIFICATE`` and ``REVOLVE_TLS_KEY`` name.
             plugins: modules or ``.py`` files that may be imported here and by the
                 workers that this fleet starts.
+            give_up_after_s: time for which jobs wait without a worker that can do them;
+                then all fail with ``NetworkError``, which says why [s].
 
         Raises:
             RevolveError: a number of workers that is no whole number, too small or too
@@ -98,15 +105,19 @@ class Fleet:
         least = 0 if connect else 1
         wanted = least * cores() if workers is None else workers
         self._count = whole_number("workers", wanted, least, most_processes())
-        allow(plugins)
-        files = Tls(*tls) if tls else None
-        address = hub_of(connect) if connect else ""
-        self._network = Network(
-            name=unique_name(name_at(address, files, "python")),
-            fleet=fleet,
-            connect=address,
-            tls=files,
-        )
+        if not give_up_after_s > 0.0:
+            raise RevolveError(f"give_up_after_s: must be > 0, got {give_up_after_s}")
+        self._give_up_after_s = give_up_after_s
+        with naming_arguments():
+            allow(plugins)
+            files = Tls(*tls) if tls else tls_of(_NO_FLAGS)
+            address = connect_of(Namespace(connect=connect)) if connect else ""
+            self._network = Network(
+                name=unique_name(name_at(address, files, "python")),
+                fleet=fleet,
+                connect=address,
+                tls=files,
+            )
         self._engine: Engine | None = None
         self._workers: list[Workers] = []
         self._owner = os.getpid()
@@ -120,7 +131,7 @@ class Fleet:
         """
         # Its workers import the sources as they are now.
         forget_digests()
-        self._engine = Engine(self._network, self._fault)
+        self._engine = Engine(self._network, self._fault, self._give_up_after_s)
         atexit.register(self.close)
         return self
 

@@ -13,9 +13,11 @@ from revolve.arguments import whole_number
 from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
+from schema.agent.supervisor import most_processes
 from schema.errors import RevolveError, RunFolderError, nearest, rounded, shown
 from schema.experiment.document import island_experiment, island_experiments
 from schema.experiment.file import own_experiment
+from schema.limits import MOST_SEED
 from schema.plugins.permission import allowed
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
@@ -323,14 +325,15 @@ def run(
         RevolveError: the run stopped before its end; ``resume`` continues it.
         KeyboardInterrupt: after Ctrl-C; ``resume`` continues the run.
     """
+    seed = whole_number("seed", seed, most=MOST_SEED)
+    births = births if births is None else whole_number("births", births, 1)
     document = document_of(experiment)
     folder = Path(out or Path("runs") / f"{document.name}-seed{seed}")
     words = ["--seed", str(seed), "--out", str(folder)]
-    for flag, value in (
-        ("--births", births), ("--workers", workers), ("--connect", connect)
-    ):  # fmt: skip
+    for flag, value in (("--births", births), ("--connect", connect)):
         words += [] if value is None else [flag, str(value)]
-    words += _common((*allowed(is_new=True), *plugins), progress=progress)
+    ours = (*allowed(is_new=True), *plugins)
+    words += _common(workers, ours, progress=progress)
     if not isinstance(experiment, Experiment):
         return _done(("run", str(experiment), *words), folder, progress=progress)
     with tempfile.TemporaryDirectory() as place:
@@ -360,13 +363,17 @@ def resume(
         KeyboardInterrupt: as for ``run``.
     """
     read_description(Path(folder))
-    words = [] if workers is None else ["--workers", str(workers)]
-    words += _common(plugins, progress=progress)
+    words = _common(workers, plugins, progress=progress)
     return _done(("resume", str(folder), *words), Path(folder), progress=progress)
 
 
-def _common(plugins: Iterable[str], *, progress: bool) -> list[str]:
+def _common(
+    workers: int | None, plugins: Iterable[str], *, progress: bool
+) -> list[str]:
     words = [word for entry in dict.fromkeys(plugins) for word in ("--plugins", entry)]
+    if workers is not None:
+        most = most_processes()
+        words += ["--workers", str(whole_number("workers", workers, 0, most))]
     return words if progress else [*words, "--quiet"]
 
 

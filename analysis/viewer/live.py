@@ -16,7 +16,7 @@ import zenoh
 from analysis.viewer.presence import Presence
 from schema.agent.log import tell_user, warn_user
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
-from schema.agent.service import HubWatch, start_engine
+from schema.agent.service import HubWatch, start_engine, why_no_hub
 from schema.agent.topics import (
     Member,
     agents_alive,
@@ -120,7 +120,7 @@ class LiveSource:
         self._lock = threading.Lock()
         self._has_news = threading.Event()
         self._presence = Presence()
-        self._hub = HubWatch(connect, tell_user, warn_user)
+        self._hub = HubWatch(connect, tell_user, warn_user, tls=tls, fleet=fleet)
         self._has_told = False
         self._has_told_end = False
         self._sequel = Sequel()
@@ -141,7 +141,7 @@ class LiveSource:
                 config = zenoh.Config.from_json5(self._config)
                 self._session = opened.enter_context(zenoh.open(config))
             except zenoh.ZError:
-                raise NetworkError(f"no coordinator at {self._connect}") from None
+                raise NetworkError(why_no_hub(self._connect, self._hub.tls)) from None
             put = zenoh.handlers.Callback(self._take, indirect=False)
             token = zenoh.handlers.Callback(self._take_token, indirect=False)
             tokens = agents_alive(self._fleet, "coordinator")

@@ -129,6 +129,17 @@ class Dispatch:
         """Return the names of the agents of a kind that can do a client's jobs."""
         return set(self._pools[kind].fit(client))
 
+    def unfit(self) -> dict[str, str]:
+        """Return the agents that cannot do the jobs of some client, and why."""
+        agents = [
+            each for pool in self._pools.values() for each in pool.agents.values()
+        ]
+        return {
+            agent.joined.agent: reason
+            for agent in agents
+            for reason in agent.unfit_for.values()
+        }
+
     def names(self, kind: AgentKind) -> list[str]:
         """Return the names of the agents of a kind, ascending."""
         return sorted(self._pools[kind].agents)
@@ -249,7 +260,7 @@ class Dispatch:
             yield from self._withdrawn(Withdrawn(pending.job.number))
         for pool in self._pools.values():
             for agent in pool.agents.values():
-                agent.unfit_for.discard(event.client)
+                agent.unfit_for.pop(event.client, None)
 
     def _returned(self, event: Returned) -> Iterator[DispatchCommand]:
         kind = self._kind_of.get(event.agent)
@@ -272,7 +283,7 @@ class Dispatch:
         pending = self._jobs.get(event.number)
         if pending and event.outcome == "unfit":
             self._faults.note("refused", event.agent, event.reason)
-            agent.unfit_for.add(pending.job.client)
+            agent.unfit_for[pending.job.client] = event.reason
             self._put_back(pending, event.agent)
         elif pending:
             answer, reason = self._read(pending.job, event)

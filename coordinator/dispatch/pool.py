@@ -94,7 +94,7 @@ class AgentState:
         is_silent: it is silent until its next answer or report. Its jobs go to others,
             and it gets no more while it holds any; later ones go to others, too.
         is_told: the user knows that it is silent.
-        unfit_for: clients whose jobs it cannot do.
+        unfit_for: clients whose jobs it cannot do, and why.
     """
 
     joined: Joined
@@ -110,7 +110,7 @@ class AgentState:
     asked_s: float = -inf
     is_silent: bool = False
     is_told: bool = False
-    unfit_for: set[Client] = field(default_factory=set)
+    unfit_for: dict[Client, str] = field(default_factory=dict)
 
     def occupy(self) -> None:
         """Update the number of slots that its advances occupy."""

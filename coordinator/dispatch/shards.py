@@ -360,7 +360,7 @@ class ShardDispatch:
         """Note that a worker did not make an advance."""
         shard = self._shards[number]
         if event.outcome == "unfit":
-            self._workers.agents[agent].unfit_for.add(shard.client)
+            self._workers.agents[agent].unfit_for[shard.client] = event.reason
             return []
         if event.outcome == "lost":
             shard.lost[event.number] = agent

@@ -26,6 +26,7 @@ from schema.agent.command import (
 from schema.agent.flags import Flags
 from schema.agent.network import Tls
 from schema.agent.platform_tag import cpu_flags, platform_tag
+from schema.agent.service import why_no_hub
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError
 
@@ -129,7 +130,7 @@ def _hub(
         return
     found = probe(connect, options.fleet, tls, name)
     if found.error:
-        yield hub.refused(connect, found.error)
+        yield hub.refused(why_no_hub(connect, tls, f": {found.error}"))
         return
     yield from hub.check_hub(found, connect)
 

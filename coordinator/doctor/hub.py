@@ -24,13 +24,13 @@ def no_hub(connect: str, why: str, *, is_wanted: bool) -> Finding:
     return Finding("ok", "hub", text)
 
 
-def refused(connect: str, error: str) -> Finding:
+def refused(error: str) -> Finding:
     """Return the finding about a hub that answers but refuses the connection."""
     advice = (
         "check that the hub is one of Revolve Islands of this version, that both "
         "certificates are of one authority, and that the hub's has this host name"
     )
-    return Finding("fail", "hub", f"{connect}: {printable(error)}", advice)
+    return Finding("fail", "hub", printable(error), advice)
 
 
 def check_hub(probe: HubProbe, connect: str) -> list[Finding]:

@@ -1,12 +1,14 @@
 """A hub without a coordinator: routes the messages of a fleet."""
 
+import json
 import threading
 
 import zenoh
 
-from schema.agent.log import tell_user
+from schema.agent.log import tell_user, warn_user
 from schema.agent.network import cannot_listen
 from schema.agent.service import start_engine
+from schema.limits import printable
 
 
 def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) -> None:
@@ -28,4 +30,22 @@ def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) ->
     with session:
         for address in addresses:
             tell_user(f"listening on {address}")
+        _watch = watch_unlisted(session, config)
         stop.wait()
+
+
+def watch_unlisted(session: zenoh.Session, config: str) -> object:
+    """Tell, while the result is kept, which certificates a hub's rules do not name."""
+    subjects = json.loads(config).get("access_control", {}).get("subjects", [])
+    known = {name for each in subjects for name in each.get("cert_common_names", ())}
+
+    def note(event: zenoh.LinkEvent) -> None:
+        name = event.link.auth_identifier
+        if subjects and name and name not in known:
+            known.add(name)
+            warn_user(
+                f"certificate {printable(name)!r} is not in --access, so that all it "
+                "sends is dropped: it was revoked, or is of a newer list"
+            )
+
+    return session.info.declare_link_events_listener(note, history=True)

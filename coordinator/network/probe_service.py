@@ -4,7 +4,6 @@ import socket
 import threading
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from secrets import token_hex
 from uuid import uuid4
@@ -14,7 +13,7 @@ import zenoh
 from coordinator.network.client_service import coordinators, reply_of
 from schema.agent.address import UNIX, parse_address
 from schema.agent.network import Tls, client_config
-from schema.agent.service import start_engine
+from schema.agent.service import start_engine, usable
 from schema.agent.topics import Member, Role
 from schema.errors import MalformedMessage
 from schema.wire.operator import (
@@ -28,7 +27,6 @@ from schema.wire.operator import (
 ROLES: tuple[Role, ...] = ("worker", "analyzer", "coordinator")
 _STEP_S = 1.0
 _MOST_ASKED = 3
-_POLL_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +105,7 @@ def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
     with session:
         round_trip_s, members = _look(session, fleet)
         has_tls = connect.startswith("tls/")
-        roles = _roles(session, config, fleet, name) if has_tls else None
+        roles = _roles(session, connect, tls, fleet, name) if has_tls else None
         replies: dict[str, OperatorReply] = {}
         malformed: list[str] = []
         offset_s: float | None = None
@@ -149,31 +147,13 @@ def _look(session: zenoh.Session, fleet: str) -> tuple[float | None, list[Member
 
 
 def _roles(
-    session: zenoh.Session, config: zenoh.Config, fleet: str, name: str
+    session: zenoh.Session, connect: str, tls: Tls | None, fleet: str, name: str
 ) -> tuple[Role, ...]:
-    """Return the roles whose keys a certificate may use.
-
-    A message through the hub to this process itself arrives where the rules allow both
-    ways; no other process takes notice.
-    """
+    """Return the roles whose keys a certificate may use."""
     nonce = token_hex(4)
     keys: dict[str, Role] = {}
     for role in ROLES:
         separator = "." if role == "coordinator" else "-"
         keys[Member(fleet, role, f"{name}{separator}doctor-{nonce}").trial] = role
-    heard: set[Role] = set()
-
-    def hear(sample: zenoh.Sample) -> None:
-        heard.add(keys[str(sample.key_expr)])
-
-    until_s = time.monotonic() + _STEP_S
-    # If the hub is gone meanwhile, what was heard counts.
-    with ExitStack() as opened, suppress(zenoh.ZError):
-        for key in keys:
-            opened.enter_context(session.declare_subscriber(key, hear))
-        other = opened.enter_context(zenoh.open(config))
-        while time.monotonic() < until_s and len(heard) < len(keys):
-            for key in keys:
-                other.put(key, b"")
-            time.sleep(_POLL_S)
-    return tuple(role for role in ROLES if role in heard)
+    heard = usable(keys, session, connect, tls, _STEP_S) or ()
+    return tuple(role for key, role in keys.items() if key in heard)

@@ -19,6 +19,7 @@ import zenoh
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
 from coordinator.dispatch.faults import FaultKind, PeerFaults
+from coordinator.network.hub_service import watch_unlisted
 from coordinator.network.membership import InfoQueue, Membership
 from coordinator.network.operator_service import Queries
 from schema.agent.access import Certificate
@@ -42,6 +43,7 @@ from schema.agent.service import (
     Outlet,
     session_config,
     start_engine,
+    why_no_hub,
 )
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
@@ -187,7 +189,9 @@ class Network:
             else hub_config((*listen, self.own_address), tls, certificates)
         )
         self._is_hub = not connect
-        self._hub = HubWatch(self.address, tell_user, warn_user, give_up_after_s)
+        self._hub = HubWatch(
+            self.address, tell_user, warn_user, give_up_after_s, tls=tls, fleet=fleet
+        )
         self._look_s = 0.0
         self._inbox: Inbox[_News] = Inbox()
         self._membership = Membership(wire_version(), self.faults)
@@ -213,9 +217,10 @@ class Network:
                 config = session_config(self._config, self._me)
                 self._session = opened.enter_context(zenoh.open(config))
             except zenoh.ZError as error:
-                if not self._is_hub:
-                    raise NetworkError(f"no hub at {self.address}") from None
-                raise cannot_listen(self.address, str(error)) from None
+                if self._is_hub:
+                    raise cannot_listen(self.address, str(error)) from None
+                line = why_no_hub(self.address, self._hub.tls)
+                raise NetworkError(line) from None
             self._declare()
             self._opened = opened.pop_all()
         return self
@@ -238,6 +243,8 @@ class Network:
             self._session.declare_queryable(key, self._enqueue(key), complete=True)
             for key in (self._me.command, self._me.state)
         ]
+        if self._is_hub:
+            self._links = watch_unlisted(self._session, self._config)
         self._outlet.lead_to(self._session)
         self._token = self._session.liveliness().declare_token(self._me.alive)
 
@@ -312,7 +319,7 @@ class Network:
         now_s = time.monotonic()
         if not self._is_hub and now_s >= self._look_s:
             self._look_s = now_s + _LOOK_S
-            self._hub.seen(self._session.info.routers_zid())
+            self._hub.look(self._session, self._me)
         while (began_s := time.monotonic()) >= self._info_queue.due_s:
             self._ask_info(self._info_queue.take())
             self._info_queue.spent(began_s, time.monotonic())
@@ -380,7 +387,8 @@ class Network:
             return
         self._asked_infos.add(member)
         asked = _Asked(member, -1, self._inbox, ASK_TIMEOUT_S)
-        self._ask(asked, member.info, None)
+        # An agent of another version tells its user.
+        self._ask(asked, member.info, wire_version().encode())
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
         """Let an agent join if its properties are valid and its version is equal."""

@@ -36,7 +36,7 @@ _LAST_PORT = 65535
 # The system's limit is 104 to 108 bytes, and the lock file's name has 5 more.
 _LONGEST_PATH = 98
 _LONGEST_FILE = 4096
-_SETTLED_S = 60.0
+_SETTLED_S = 5.0
 
 
 class Address(NamedTuple):
@@ -102,14 +102,15 @@ def new_socket() -> str:
 def _remove_unused(place: Path) -> None:
     """Remove the sockets that killed processes have left behind.
 
-    The engine keeps a lock beside each socket while it listens.
+    The engine keeps a lock beside each socket while it listens. That of the user's hub
+    stays: the next hub uses it again.
     """
-    for lock in place.glob("*.sock.lock"):
+    for lock in place.glob(f"{'?' * 16}.sock.lock"):
         with contextlib.suppress(OSError), lock.open("rb") as file:
             # A new socket's lock may be created but not taken yet.
             if time.time() - lock.stat().st_mtime > _SETTLED_S:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                lock.with_suffix("").unlink()
+                lock.with_suffix("").unlink(missing_ok=True)
                 lock.unlink()
 
 

@@ -4,10 +4,13 @@ Importing this module raises ``NetworkError`` where ``cryptography`` is not inst
 import it only where there are certificates.
 """
 
+import socket
+import ssl
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from schema.agent.address import parse_address
 from schema.agent.extras import install_advice
 from schema.agent.network import Tls
 from schema.errors import NetworkError
@@ -20,6 +23,8 @@ except ImportError:
     raise NetworkError(
         f"certificates need the package cryptography: {install_advice('cluster')}"
     ) from None
+
+_REPLY_S = 0.5
 
 
 def certificate_name(file: str) -> str:
@@ -76,6 +81,29 @@ def examine(tls: Tls) -> CertificateFacts:
         is_issued,
         key.public_key() == own.public_key(),
     )
+
+
+def why_refused(connect: str, tls: Tls) -> str:
+    """Return why a hub with TLS refuses a connection; empty if it does not answer."""
+    _, host, port = parse_address(connect)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    try:
+        context.load_verify_locations(tls.ca)
+        context.load_cert_chain(tls.certificate, tls.key)
+        with (
+            socket.create_connection((host, port), _REPLY_S) as plain,
+            context.wrap_socket(plain, server_hostname=host) as link,
+        ):
+            link.recv(1)  # a refusal comes after the handshake
+    except ssl.SSLCertVerificationError as error:
+        return f"the hub's certificate is not accepted: {error.verify_message}"
+    except ssl.SSLError as error:
+        name = certificate_name(tls.certificate)
+        reason = str(error.reason or error).replace("_", " ").lower()
+        return f"certificate {name!r} is not accepted: {reason}"
+    except OSError:
+        pass  # it is gone, or waits for the first message
+    return ""
 
 
 def _read(file: str) -> x509.Certificate:

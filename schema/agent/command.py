@@ -20,7 +20,6 @@ from schema.agent.address import (
     default_connect,
     hub_of,
     listen_address,
-    parse_address,
 )
 from schema.agent.flags import Flags, add_plugins, positive_number, whole_number
 from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
@@ -269,7 +268,7 @@ def run_pool(
     check_load(flags, "--processes", options.processes, options)
     stop = stop_on_signals()
     if options.until_closed:
-        stop_with_input(stop)
+        stop_with_input(stop.set)
     restarts = deaths = 0
     try:
         with ProcessPool(body, (agent,), size=options.processes) as process_pool:
@@ -297,16 +296,12 @@ def _name(given: str | None, connect: str, tls: Tls | None) -> str:
     Raises:
         NetworkError: an invalid name, or another one than the certificate's.
     """
-    if tls is None or parse_address(connect).protocol != "tls":
-        return check_name(given or host_name(), "--name")
-    from schema.agent.certificate import certificate_name
-
-    name = certificate_name(tls.certificate)
-    if given not in (None, name):
+    name = name_at(connect, tls, given or host_name())
+    if tls and given not in (None, name):
         raise NetworkError(
             f"--name: must be {name!r}, the name of {tls.certificate}, got {given!r}"
         )
-    return check_name(name, tls.certificate)
+    return check_name(name, "--name")
 
 
 def name_at(hub: str, tls: Tls | None, default: str) -> str:

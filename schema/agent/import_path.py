@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from multiprocessing import spawn
 from pathlib import Path
 
 from schema.agent.log import warn_user
@@ -34,12 +35,22 @@ def environment() -> dict[str, str]:
 
 @contextmanager
 def safe_import_path() -> Iterator[None]:
-    """Let processes spawned in the block not import from the current folder."""
-    before = os.environ.get(_FLAG)
+    """Let processes spawned in the block not import from the current folder.
+
+    One whose parent dies before it has passed on what to do ends without a traceback.
+    """
+    before, command_line = os.environ.get(_FLAG), spawn.get_command_line
+
+    def quiet(**names: object) -> list[str]:
+        *words, program, mark = command_line(**names)
+        return [*words, f"try:\n  {program}\nexcept EOFError:\n  pass", mark]
+
     os.environ[_FLAG] = "1"
+    spawn.get_command_line = quiet
     try:
         yield
     finally:
+        spawn.get_command_line = command_line
         if before is None:
             del os.environ[_FLAG]
         else:

@@ -8,10 +8,12 @@ counted; they never end the loop.
 import json
 import math
 import os
+import shlex
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from queue import Empty
@@ -23,7 +25,14 @@ from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.fair_queue import FairQueue
 from schema.agent.inbox import Inbox
 from schema.agent.log import start_log, tell_user, warn_user
-from schema.agent.network import UNFIT, Agent, client_config
+from schema.agent.network import (
+    DEFAULT_FLEET,
+    UNFIT,
+    Agent,
+    Tls,
+    client_config,
+    network_flags,
+)
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import ReplyCounts, Server
 from schema.agent.supervision import LOOK_S, ProcessSlot
@@ -35,13 +44,15 @@ from schema.agent.supervisor import (
 )
 from schema.agent.topics import Member, check_name, unique_name
 from schema.errors import NetworkError, counted
-from schema.limits import MOST_SHOWN
+from schema.limits import MOST_SHOWN, printable
 from schema.plugins.permission import allow
 
 _POLL_S = 0.2
 # Queries that are taken before a job is done.
 _MOST_QUERIES = 1000
 _RETRY_S = 0.3
+# Between two messages to this process itself, and two looks why a hub refuses it.
+_BETWEEN_S, _TELL_AGAIN_S = 0.02, 10.0
 # Different lines about refused runs that are written.
 _MOST_REFUSALS = 20
 
@@ -108,6 +119,8 @@ class HubWatch:
         warn: called with a line when the hub is lost, or a run is refused.
         give_up_after_s: time without a hub after which ``seen`` raises [s].
         tells_first: say that the hub is there the first time, too.
+        tls: files for a ``tls/`` address, to tell why the hub refuses them.
+        fleet: name of the fleet.
     """
 
     address: str
@@ -115,7 +128,11 @@ class HubWatch:
     warn: Callable[[str], None]
     give_up_after_s: float = math.inf
     tells_first: bool = False
+    tls: Tls | None = None
+    fleet: str = DEFAULT_FLEET
     _lost_s: float | None = None
+    _told: str = ""
+    _tell_s: float = 0.0
     _hubs: frozenset[str] = frozenset()
     _refusals: set[str] = field(default_factory=set)
 
@@ -125,13 +142,23 @@ class HubWatch:
             self._refusals.add(line)
             self.warn(line)
 
+    def met(self, theirs: zenoh.ZBytes | None, own: str) -> None:
+        """Tell if a coordinator is of another version than this agent, ``own``."""
+        text = (
+            theirs.to_bytes()[:MOST_SHOWN].decode("ascii", "replace") if theirs else own
+        )
+        if text != own:
+            self.refused(
+                f"refused by a coordinator of version {printable(text)}: this is {own}"
+            )
+
     @property
     def is_lost(self) -> bool:
         """Whether the last line was that there is no hub."""
         return self._lost_s is not None
 
-    def seen(self, hubs: Iterable[object]) -> None:
-        """Note the ids of the connected hubs; a new id means a new hub.
+    def seen(self, hubs: Iterable[object]) -> bool:
+        """Note the ids of the connected hubs; return whether one is new.
 
         Raises:
             HubLost: none has been there for too long.
@@ -141,21 +168,87 @@ class HubWatch:
             # Also if another hub is there already: it was lost between two looks.
             if self._hubs or not there:
                 self._lost_s = now_s
-                gone = " (it ended, or the network is down)" if self._hubs else ""
-                self.warn(
-                    f"no hub at {self.address}{gone}; retrying; press Ctrl-C to stop"
-                )
+                self._tell_lost()
             elif self.tells_first:
                 self.say(f"connected to {self.address}")
         if there:
             if self._lost_s is not None:
                 again = "re" if self._hubs else ""
                 self.say(f"{again}connected to {self.address}")
-            self._lost_s, self._hubs = None, there
-            return
+            is_new = self._lost_s is not None or not self._hubs
+            self._lost_s, self._hubs, self._told = None, there, ""
+            return is_new
+        if self.tls and now_s >= self._tell_s:
+            self._tell_lost()
         waited_s = now_s - (self._lost_s or now_s)
         if waited_s > 0.0 and waited_s >= self.give_up_after_s:
             raise HubLost(gave_up(self.address, self.give_up_after_s))
+        return False
+
+    def _tell_lost(self) -> None:
+        """Tell that there is no hub, or why it refuses this process, if that is new."""
+        gone = " (it ended, or the network is down)" if self._hubs else ""
+        line = why_no_hub(self.address, self.tls, gone)
+        if line != self._told:
+            self.warn(f"{line}{self._advice}; retrying; press Ctrl-C to stop")
+        self._told, self._tell_s = line, time.monotonic() + _TELL_AGAIN_S
+
+    def look(self, session: zenoh.Session, me: Member) -> None:
+        """Do ``seen`` for a session; tell if a new hub drops what it sends."""
+        if not self.seen(session.info.routers_zid()) or not self._advice:
+            return
+        if usable([me.trial], session, self.address, self.tls) == []:
+            self.warn(
+                f"the hub at {self.address} drops all that this {me.role} sends: its "
+                "certificate was revoked, or is not in the access list of the hub as "
+                f"that of a {me.role}{self._advice}"
+            )
+
+    @property
+    def _advice(self) -> str:
+        """Which command tells why a hub refuses a certificate; empty without one."""
+        if self.tls is None or not self.address.startswith("tls/"):
+            return ""
+        flags = network_flags(self.address, self.fleet, self.tls)
+        return f"; {shlex.join(['revolve', 'doctor', *flags])} tells more"
+
+
+def usable(
+    keys: Collection[str],
+    session: zenoh.Session,
+    connect: str,
+    tls: Tls | None,
+    within_s: float = 3.0,
+) -> list[str] | None:
+    """Return which keys of its own a process may use; None without a second connection.
+
+    A hub drops what its rules do not allow, without an answer. A message through the
+    hub to this process itself arrives where they allow both ways.
+    """
+    heard: dict[str, None] = {}
+    with ExitStack() as opened, suppress(zenoh.ZError):
+        for key in keys:
+            hear = partial(heard.setdefault, key)
+            opened.enter_context(session.declare_subscriber(key, hear))
+        config = zenoh.Config.from_json5(client_config(connect, tls))
+        other = opened.enter_context(zenoh.open(config))
+        until_s = time.monotonic() + within_s
+        while time.monotonic() < until_s and len(heard) < len(keys):
+            for key in keys:
+                other.put(key, b"")
+            time.sleep(_BETWEEN_S)
+        return list(heard)
+    return None
+
+
+def why_no_hub(connect: str, tls: Tls | None, gone: str = "") -> str:
+    """Return that there is no hub, and ``gone``; or why it refuses these files."""
+    if tls and connect.startswith("tls/"):
+        from schema.agent.certificate import why_refused  # noqa: PLC0415
+
+        if why := why_refused(connect, tls):
+            return f"{connect}: {why}"
+    return f"no hub at {connect}{gone}"
 
 
 def gave_up(address: str, after_s: float) -> str:
@@ -243,6 +336,9 @@ def serve(
         warn or say,
         agent.give_up_after_s,
         tells_first=agent.tells_hub,
+        # The first process of a pool speaks for all.
+        tls=None if slot.index else agent.tls,
+        fleet=agent.fleet,
     )
     start_engine(is_agent=True)
     session = _open(config, hub, stop)
@@ -355,6 +451,7 @@ def _serve_session(
     def reply_info(query: zenoh.Query) -> None:
         with query:
             query.reply(me.info, server.info)
+        hub.met(query.payload, server.agent.version)
 
     def cancel(sample: zenoh.Sample) -> None:
         server.cancel(sample.payload.to_bytes())
@@ -375,17 +472,17 @@ def _serve_session(
         ),
         session.liveliness().declare_token(me.alive),
     ):
-        hub.seen(session.info.routers_zid())
+        hub.look(session, me)
         turns: FairQueue[zenoh.Query] = FairQueue()
         # Replies under a declared key are shorter and faster to handle at the hub.
         jobs = session.declare_keyexpr(me.jobs)
         while not stop.is_set():
             if not _queue_all(inbox, turns, server.counts):
                 if not stop.is_set():
-                    hub.seen(session.info.routers_zid())
+                    hub.look(session, me)
                 continue
             if hub.is_lost:
-                hub.seen(session.info.routers_zid())
+                hub.look(session, me)
             began_s = time.monotonic()
             with turns.take() as query:
                 _answer(query, server, jobs, hub)

@@ -1,7 +1,8 @@
 """Signals that stop a command, and the time limit within which it ends.
 
-A terminal sends SIGINT and SIGHUP, service managers SIGTERM, batch systems SIGUSR1
-before the walltime ends. SIGHUP has no effect on a command that ``nohup`` started.
+A terminal sends SIGINT and SIGHUP, service managers SIGTERM, batch systems SIGUSR1,
+SIGUSR2 or SIGXCPU before the walltime ends. SIGHUP has no effect on a command that
+``nohup`` started.
 """
 
 import os
@@ -16,7 +17,10 @@ from multiprocessing import active_children
 from pathlib import Path
 from types import FrameType
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+STOP_SIGNALS = (
+    *(signal.SIGINT, signal.SIGTERM, signal.SIGHUP),
+    *(signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU),
+)
 LIMIT_S = 4.0
 """Time after the first signal at which a command is ended with its children [s]."""
 STOPPED = 130

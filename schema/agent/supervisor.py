@@ -264,14 +264,14 @@ def stop_on_signals() -> threading.Event:
     return stop
 
 
-def stop_with_input(stop: threading.Event) -> None:
-    """Set an event when standard input is closed."""
+def stop_with_input(stop: Callable[[], object]) -> None:
+    """Call a function when standard input is closed."""
 
     def watch() -> None:
         # Not by sys.stdin: its lock would be held when this process ends.
         while os.read(0, 1024):
             pass
-        stop.set()
+        stop()
 
     threading.Thread(target=watch, daemon=True).start()
 
