@@ -451,7 +451,7 @@ def _serve_session(
     def reply_info(query: zenoh.Query) -> None:
         with query:
             query.reply(me.info, server.info)
-        hub.met(query.payload, server.agent.version)
+            hub.met(query.payload, server.agent.version)
 
     def cancel(sample: zenoh.Sample) -> None:
         server.cancel(sample.payload.to_bytes())

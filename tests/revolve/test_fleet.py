@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import suppress
+from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from typing import Any
 import pytest
 
 import revolve as rv
+from coordinator.cluster.kit import Cluster, Kit
 from coordinator.network.service import Network
 from revolve.workers import Workers
 from schema.agent.supervisor import cores
@@ -201,7 +203,8 @@ def test_map_runs_only_what_the_owner_of_a_worker_allows(
         # A worker of another owner, who allows nothing.
         stranger = Workers(hub.own_address, 1, ())
         try:
-            with rv.Fleet(connect=hub.own_address) as fleet:
+            with rv.Fleet(connect=hub.own_address, give_up_after_s=2.0) as fleet:
+                until(lambda: fleet.workers == 1)
                 future = fleet.submit(robots(1)[0], SHORT)
                 assert future.result(60).failure == ""
                 permission.allow_references(["lab_of_others:f"], tmp_path)
@@ -209,9 +212,79 @@ def test_map_runs_only_what_the_owner_of_a_worker_allows(
                 until(lambda: fleet.workers == 0)
                 (told,) = fleet._network.faults.counts
                 assert (told.kind, told.count > 0) == ("refused", True)
-            assert call.cancelled()
+                why = (
+                    r"gave up after 2 s: 1 agent joined at .* and cannot do the jobs, "
+                    rf"the last of them {told.peer}: has no plug-in 'lab_of_others'"
+                )
+                with pytest.raises(rv.NetworkError, match=why):
+                    call.result(60)
         finally:
             stranger.end()
+
+
+def test_a_fleet_without_workers_gives_up_if_it_is_told_to() -> None:
+    place = Path(tempfile.mkdtemp(prefix="rv-"))
+    with (
+        Network(name="hub", listen=(f"unixsock-stream/{place / 'hub'}",)) as hub,
+        rv.Fleet(connect=hub.own_address, give_up_after_s=1.0) as fleet,
+    ):
+        future = fleet.submit(robots(1)[0], SHORT)
+        why = f"^gave up after 1 s: no worker is connected at {hub.own_address}$"
+        with pytest.raises(rv.NetworkError, match=why):
+            future.result(30)
+        with pytest.raises(rv.NetworkError, match=why):
+            fleet.submit(robots(1)[0], SHORT)
+    with pytest.raises(rv.RevolveError, match=r"^give_up_after_s: must be > 0, got 0$"):
+        rv.Fleet(give_up_after_s=0)
+
+
+def test_certificates_come_from_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kit = Kit.new(tmp_path / "lab", Cluster("h", 1, 90), lambda: datetime.now(UTC))
+    kit.add("ada", "coordinator")
+    needs = r"^tls/h:1 needs \$REVOLVE_TLS_CA, \$REVOLVE_TLS_CERTIFICATE and"
+    with pytest.raises(rv.NetworkError, match=needs):
+        rv.Fleet(connect="tls/h:1")
+    with pytest.raises(rv.NetworkError, match=needs):
+        rv.run("scenario1", connect="tls/h:1", out=tmp_path / "run")
+    files = {"CA": "ca", "CERTIFICATE": "certificate", "KEY": "key"}
+    paths = [str(tmp_path / f"lab/members/ada/{file}.pem") for file in files.values()]
+    fleets = [rv.Fleet(connect="tls/h:1", tls=tuple(paths))]  # type: ignore[arg-type]
+    for name, path in zip(files, paths, strict=True):
+        monkeypatch.setenv(f"REVOLVE_TLS_{name}", path)
+    fleets.append(rv.Fleet(connect="tls/h:1"))
+    for fleet in fleets:
+        assert fleet._network._me.name.startswith("ada.")
+    monkeypatch.setenv("REVOLVE_TLS_KEY", "gone")
+    with pytest.raises(
+        rv.NetworkError, match=r"^\$REVOLVE_TLS_KEY: no such file: gone$"
+    ):
+        rv.Fleet(connect="tls/h:1")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"workers": 1000}, "^workers: must be a whole number from 0 to "),
+        ({"births": 0}, "^births: must be a whole number from 1 to "),
+        ({"seed": -1}, "^seed: must be a whole number from 0 to "),
+        ({"connect": "what"}, "^connect: must be tcp/HOST:PORT"),
+        ({"plugins": ["what"]}, "^plugins: no module 'what' is installed"),
+    ],
+)
+def test_errors_name_arguments_of_python(
+    tmp_path: Path, arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(rv.RevolveError, match=message) as run_error:
+        rv.run("scenario1", out=tmp_path / "run", **arguments)
+    errors = [run_error]
+    if "connect" in arguments or "plugins" in arguments:
+        with pytest.raises(rv.RevolveError, match=message) as error:
+            rv.Fleet(**arguments)
+        errors.append(error)
+    for each in errors:
+        assert "--" not in str(each.value)
 
 
 def test_closed_fleet_cancels_and_refuses() -> None:

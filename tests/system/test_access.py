@@ -16,7 +16,7 @@ from schema.agent.network import Tls, client_config
 from schema.agent.topics import Member, agents_alive, member_of
 from tests.system.fleet import make_certificate
 from tests.system.test_agents import free_address
-from tests.system.workspace import Workspace, runtime_directory, wait_until
+from tests.system.workspace import Workspace, runtime_directory, said, wait_until
 
 pytestmark = pytest.mark.system
 
@@ -184,6 +184,19 @@ def test_name_of_an_agent_is_that_of_its_certificate(lab: Lab) -> None:
     assert process.wait(60) == 2
     assert process.stderr is not None
     assert "--name: must be 'good', the name of " in process.stderr.read()
+
+
+def test_a_worker_and_the_hub_say_that_a_certificate_is_not_listed(lab: Lab) -> None:
+    lab.tls["unlisted"] = lab.certified("unlisted", "ca")
+    worker = lab.start("unlisted", "worker", "--processes", "2")
+    assert worker.stderr is not None
+    assert lab.hub.stderr is not None
+    first, second = worker.stderr.readline(), worker.stderr.readline()
+    assert said(first) == [f"connected to {lab.address}"]
+    assert "drops all that this worker sends: its certificate was revoked" in second
+    assert f"; revolve doctor --connect {lab.address} --tls-ca" in second
+    told = said(lab.hub.stderr.readline())
+    assert told[0].startswith("certificate 'unlisted' is not in --access, so that all")
 
 
 def test_hub_closes_links_when_their_certificate_expires(workspace: Workspace) -> None:

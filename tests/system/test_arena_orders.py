@@ -119,4 +119,4 @@ def test_orders_without_a_coordinator_are_refused_in_one_line(
     workspace: Workspace,
 ) -> None:
     output = workspace.run("arena", "list", "--connect", "tcp/127.0.0.1:9", code=2)
-    assert output.strip() == "revolve: no coordinator at tcp/127.0.0.1:9"
+    assert output.strip() == "revolve: no hub at tcp/127.0.0.1:9"

@@ -72,13 +72,16 @@ def test_a_seed_above_64_bits_is_refused(workspace: Workspace) -> None:
 
 @pytest.mark.parametrize(
     "flag",
-    ["--access", "--connect", "--listen", "--tls-ca", "--tls-certificate", "--tls-key"],
+    [
+        *("--access", "--connect", "--fleet", "--listen"),
+        *("--tls-ca", "--tls-certificate", "--tls-key"),
+    ],
 )
 def test_a_flag_of_the_network_is_refused_where_nothing_is_sent(
     workspace: Workspace, flag: str
 ) -> None:
     words = ("scenario1", flag, "tcp/127.0.0.1:1", "--in-process", "--out", "x")
-    message = f"{flag} needs a network, but --in-process has none"
+    message = f"{flag} has no effect with --in-process: it has no network and no limits"
     assert message in _refused(workspace, "run", *words)
     assert not (workspace.folder / "x").exists()
 

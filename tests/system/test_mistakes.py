@@ -139,7 +139,7 @@ MISTAKES = {
     ),
     "no coordinator": (
         "status --connect tcp/127.0.0.1:1",
-        "no coordinator at tcp/127.0.0.1:1",
+        "no hub at tcp/127.0.0.1:1",
         2,
     ),
     "no hub": (

@@ -21,7 +21,10 @@ pytestmark = [
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 5.0
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+SIGNALS = (
+    *(signal.SIGINT, signal.SIGTERM, signal.SIGHUP),
+    *(signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU),
+)
 NOWHERE = "tcp/127.0.0.1:9"
 Workspace = Any
 _STARTED: list[int] = []
@@ -150,9 +153,9 @@ def stop(process: Any, number: int, family_before: set[int]) -> tuple[float, str
 def cases() -> Iterator[Any]:
     """Yield command and signal; in CI, not each command gets each signal."""
     for position, name in enumerate(COMMANDS):
-        in_ci = {signal.SIGINT, SIGNALS[1 + position % 3]}
+        in_ci = {signal.SIGINT, SIGNALS[1 + position % 5]}
         for number in SIGNALS:
-            is_short = name in ("run", "worker") or number in in_ci
+            is_short = name == "worker" or number in in_ci
             marks = () if is_short else (pytest.mark.long,)
             yield pytest.param(name, number, id=f"{name}-{number.name}", marks=marks)
 

@@ -308,7 +308,7 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
         ),
         (
             ("view", "--connect", "tcp/127.0.0.1:1", "--save", "a.rrd"),
-            "no coordinator at",
+            "no hub at",
         ),
         (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
         (("view", "nowhere", "--follow", "x"), "must be BIRTH or ISLAND:BIRTH"),

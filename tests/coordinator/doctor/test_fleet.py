@@ -99,4 +99,4 @@ def test_a_hub_that_is_missing_fails_only_if_the_user_named_it() -> None:
     assert no_hub("hub", "Connection refused", is_wanted=True).level == "fail"
     idle = no_hub("hub", "Connection refused", is_wanted=False)
     assert (idle.level, idle.text[:15]) == ("ok", "none is running")
-    assert refused("tls/h:1", "x" * 500).level == "fail"
+    assert refused("x" * 500).level == "fail"

@@ -2,6 +2,7 @@
 
 import pytest
 
+from schema.agent.network import Tls
 from schema.agent.service import HubLost, HubWatch
 
 
@@ -31,6 +32,26 @@ def test_it_tells_when_the_hub_comes_and_goes(
         "reconnected to hub": "back",
     }
     assert [names.get(line, line) for line in lines] == told
+
+
+def test_it_tells_again_when_the_reason_changes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A hub that comes back may refuse this process; it is looked for every 10 s."""
+    clock, reason = [0.0], [""]
+    lines: list[str] = []
+    monkeypatch.setattr("schema.agent.service.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr(
+        "schema.agent.service.why_no_hub",
+        lambda address, _tls, gone: reason[0] or f"no hub at {address}{gone}",
+    )
+    files = Tls("ca", "own", "key")
+    watch = HubWatch("tls/h:1", lines.append, lines.append, tls=files)
+    for now_s, why in ((0.0, ""), (11.0, ""), (12.0, "expired"), (22.0, "expired")):
+        clock[0], reason[0] = now_s, why
+        watch.seen(())
+    first, second = (line.partition(";")[0] for line in lines)
+    assert (first, second) == ("no hub at tls/h:1", "expired")
 
 
 def test_it_gives_up_after_the_time() -> None:

@@ -8,6 +8,8 @@ from schema.agent.address import new_socket
 from schema.agent.network import Agent, hub_config
 from schema.agent.request_handler import ReplyCounts
 from schema.agent.service import Outlet, serve
+from schema.agent.topics import Member
+from tests.system.workspace import wait_until
 
 
 class NotedOutlet(Outlet):
@@ -40,3 +42,33 @@ def test_totals_are_told_before_the_session_closes() -> None:
             totals=totals,
         )
     assert steps == ["open", "0 refused", "closing"]
+
+
+def replies(session: zenoh.Session, key: str, payload: bytes | None) -> list[bytes]:
+    """Return the replies to a query."""
+    found = session.get(key, payload=payload, timeout=5.0)
+    return [each.ok.payload.to_bytes() for each in found if each.ok]
+
+
+def test_an_agent_says_that_a_coordinator_has_another_version() -> None:
+    """The coordinator sends its version when it asks an agent for its properties."""
+    stop, lines, address = threading.Event(), list[str](), new_socket()
+    agent = Agent("worker", "w", address, version="2")
+    key = Member("default", "worker", "w").info
+    with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))) as hub:
+        thread = threading.Thread(
+            target=serve, args=(lambda job: job, agent, stop, lines.append)
+        )
+        thread.start()
+        try:
+            wait_until(lambda: bool(replies(hub, key, None)), "the agent is there", 30)
+            for version in (b"2", b"1\x1b", b"1\x1b", b"\xff" * 500):
+                replies(hub, key, version)
+            wait_until(lambda: len(lines) >= 2, "both are told", 30)
+        finally:
+            stop.set()
+            thread.join()
+    one, other = lines
+    assert one == "refused by a coordinator of version 1?: this is 2"
+    assert other.startswith("refused by a coordinator of version ")
+    assert len(other) < 300

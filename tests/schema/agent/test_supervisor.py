@@ -5,10 +5,12 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from multiprocessing import spawn
 from pathlib import Path
 
 import pytest
 
+from schema.agent.import_path import safe_import_path
 from schema.agent.supervisor import stop_on_signals
 
 _ASK = "import os; print(os.sched_getscheduler(0) == os.SCHED_{policy})"
@@ -209,3 +211,16 @@ def test_a_process_may_open_as_many_files_as_the_system_allows() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert done.stdout == "True\n"
+
+
+def test_a_child_whose_parent_dies_while_it_starts_is_silent() -> None:
+    """It finds the end of the pipe that was to say what it has to do."""
+    reader, writer = os.pipe()
+    with safe_import_path():
+        words = spawn.get_command_line(tracker_fd=reader, pipe_handle=reader)
+    os.close(writer)
+    with os.fdopen(reader):
+        files = [reader]
+        child = subprocess.run(words, pass_fds=files, capture_output=True, check=True)
+    assert (child.stdout, child.stderr) == (b"", b"")
+    assert "except" not in spawn.get_command_line(pipe_handle=0)[-2]
