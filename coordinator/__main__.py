@@ -212,10 +212,7 @@ def _deployment(
     for flag in _OF_NETWORK if options.in_process else ():
         name = flag.replace("-", "_")
         if getattr(options, name) != run_flags(options.command).get_default(name):
-            raise NetworkError(
-                f"--{flag} has no effect with --in-process: it has no network and no "
-                "limits"
-            )
+            raise NetworkError(f"--{flag} has no effect with --in-process")
     if options.in_process and options.command != "coordinator" and options.workers:
         raise NetworkError("--workers: --in-process starts no other processes")
     tls = None if options.in_process else tls_of(options)

@@ -62,8 +62,7 @@ class Engine:
         Args:
             network: not yet open.
             find_fault: returns why no worker can do a job any more, or "".
-            give_up_after_s: time for which jobs wait without a worker that can do
-                them [s].
+            give_up_after_s: time for which jobs wait without a fit worker [s].
 
         Raises:
             NetworkError: there is no hub, or none can be opened.

@@ -95,9 +95,9 @@ def execute_runs(
                     if server is not None:
                         server.serve(now_s)
                     if publish is not None:
-                        refused = {*scheduler.fleet.dispatch.unfit()}
-                        refused |= {*(network.refused if network else ())}
-                        publish(scheduler.status(now_s), len(refused))
+                        refused = len(scheduler.fleet.dispatch.unfit())
+                        refused += 0 if network is None else len(network.refused)
+                        publish(scheduler.status(now_s), refused)
                     display.update(now_s)
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s

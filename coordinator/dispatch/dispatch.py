@@ -130,15 +130,11 @@ class Dispatch:
         return set(self._pools[kind].fit(client))
 
     def unfit(self) -> dict[str, str]:
-        """Return the agents that cannot do the jobs of some client, and why."""
-        agents = [
+        """Return why agents cannot do the jobs of some client, by name."""
+        states = [
             each for pool in self._pools.values() for each in pool.agents.values()
         ]
-        return {
-            agent.joined.agent: reason
-            for agent in agents
-            for reason in agent.unfit_for.values()
-        }
+        return {a.joined.agent: why for a in states for why in a.unfit_for.values()}
 
     def names(self, kind: AgentKind) -> list[str]:
         """Return the names of the agents of a kind, ascending."""

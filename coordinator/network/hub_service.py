@@ -43,9 +43,7 @@ def watch_unlisted(session: zenoh.Session, config: str) -> object:
         name = event.link.auth_identifier
         if subjects and name and name not in known:
             known.add(name)
-            warn_user(
-                f"certificate {printable(name)!r} is not in --access, so that all it "
-                "sends is dropped: it was revoked, or is of a newer list"
-            )
+            about = "is not in --access (revoked?): what it sends is dropped"
+            warn_user(f"certificate {printable(name)!r} {about}")
 
     return session.info.declare_link_events_listener(note, history=True)

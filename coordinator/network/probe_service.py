@@ -94,18 +94,17 @@ def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
     Raises:
         NetworkError: an address that needs files.
     """
-    config = zenoh.Config.from_json5(client_config(connect, tls))
-    config.insert_json5("connect/timeout_ms", "1500")
+    config = client_config(connect, tls)
     start_engine()
     try:
-        session = zenoh.open(config)
+        session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError as error:
         # What follows is a place in the engine's source.
         return HubProbe(str(error).partition(" at /")[0])
     with session:
         round_trip_s, members = _look(session, fleet)
         has_tls = connect.startswith("tls/")
-        roles = _roles(session, connect, tls, fleet, name) if has_tls else None
+        roles = _roles(session, config, fleet, name) if has_tls else None
         replies: dict[str, OperatorReply] = {}
         malformed: list[str] = []
         offset_s: float | None = None
@@ -147,7 +146,7 @@ def _look(session: zenoh.Session, fleet: str) -> tuple[float | None, list[Member
 
 
 def _roles(
-    session: zenoh.Session, connect: str, tls: Tls | None, fleet: str, name: str
+    session: zenoh.Session, config: str, fleet: str, name: str
 ) -> tuple[Role, ...]:
     """Return the roles whose keys a certificate may use."""
     nonce = token_hex(4)
@@ -155,5 +154,5 @@ def _roles(
     for role in ROLES:
         separator = "." if role == "coordinator" else "-"
         keys[Member(fleet, role, f"{name}{separator}doctor-{nonce}").trial] = role
-    heard = usable(keys, session, connect, tls, _STEP_S) or ()
+    heard = usable(keys, session, config, _STEP_S) or ()
     return tuple(role for key, role in keys.items() if key in heard)

@@ -14,7 +14,7 @@ from coordinator.network.service import Network
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from schema.agent.import_path import environment, python_command
-from schema.agent.network import Tls, network_flags
+from schema.agent.network import Tls
 from schema.errors import MalformedMessage
 from schema.plugins.permission import allowed
 from schema.wire.updates import WorkerInfo, decode_page, encode_update, pages_of
@@ -101,7 +101,10 @@ def open_viewer(address: str, fleet: str, tls: Tls | None) -> None:
         fleet: name of the fleet.
         tls: files for a ``tls/`` address.
     """
-    words = network_flags(address, fleet, tls)
+    words = ["--connect", address, "--fleet", fleet]
+    if tls is not None:
+        words += ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
+        words += ["--tls-key", tls.key]
     for entry in allowed():
         words += ["--plugins", entry]
     # In its own session: a Ctrl-C that stops the run leaves the window open.

@@ -24,8 +24,6 @@ except ImportError:
         f"certificates need the package cryptography: {install_advice('cluster')}"
     ) from None
 
-_REPLY_S = 0.5
-
 
 def certificate_name(file: str) -> str:
     """Return the common name of a certificate: its owner's name in the fleet.
@@ -90,19 +88,17 @@ def why_refused(connect: str, tls: Tls) -> str:
     try:
         context.load_verify_locations(tls.ca)
         context.load_cert_chain(tls.certificate, tls.key)
-        with (
-            socket.create_connection((host, port), _REPLY_S) as plain,
-            context.wrap_socket(plain, server_hostname=host) as link,
-        ):
+        plain = socket.create_connection((host, port), 0.5)
+        with context.wrap_socket(plain, server_hostname=host) as link:
             link.recv(1)  # a refusal comes after the handshake
     except ssl.SSLCertVerificationError as error:
         return f"the hub's certificate is not accepted: {error.verify_message}"
     except ssl.SSLError as error:
-        name = certificate_name(tls.certificate)
         reason = str(error.reason or error).replace("_", " ").lower()
+        name = certificate_name(tls.certificate)
         return f"certificate {name!r} is not accepted: {reason}"
     except OSError:
-        pass  # it is gone, or waits for the first message
+        return ""  # it is gone, or waits for the first message
     return ""
 
 

@@ -35,12 +35,10 @@ def environment() -> dict[str, str]:
 
 @contextmanager
 def safe_import_path() -> Iterator[None]:
-    """Let processes spawned in the block not import from the current folder.
-
-    One whose parent dies before it has passed on what to do ends without a traceback.
-    """
+    """Let processes spawned in the block not import from the current folder."""
     before, command_line = os.environ.get(_FLAG), spawn.get_command_line
 
+    # Without a traceback if the parent dies before it has said what to do.
     def quiet(**names: object) -> list[str]:
         *words, program, mark = command_line(**names)
         return [*words, f"try:\n  {program}\nexcept EOFError:\n  pass", mark]

@@ -58,16 +58,6 @@ class Tls:
     key: str
 
 
-def network_flags(connect: str, fleet: str, tls: Tls | None) -> list[str]:
-    """Return the flags with which a command joins a fleet as this process does."""
-    words = ["--connect", connect]
-    words += [] if fleet == DEFAULT_FLEET else ["--fleet", fleet]
-    if tls is not None:
-        words += ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
-        words += ["--tls-key", tls.key]
-    return words
-
-
 @dataclass(frozen=True, slots=True)
 class Agent:
     """A process that does jobs, and the address of its hub.

@@ -25,14 +25,7 @@ from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.fair_queue import FairQueue
 from schema.agent.inbox import Inbox
 from schema.agent.log import start_log, tell_user, warn_user
-from schema.agent.network import (
-    DEFAULT_FLEET,
-    UNFIT,
-    Agent,
-    Tls,
-    client_config,
-    network_flags,
-)
+from schema.agent.network import DEFAULT_FLEET, UNFIT, Agent, Tls, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import ReplyCounts, Server
 from schema.agent.supervision import LOOK_S, ProcessSlot
@@ -142,15 +135,11 @@ class HubWatch:
             self._refusals.add(line)
             self.warn(line)
 
-    def met(self, theirs: zenoh.ZBytes | None, own: str) -> None:
-        """Tell if a coordinator is of another version than this agent, ``own``."""
-        text = (
-            theirs.to_bytes()[:MOST_SHOWN].decode("ascii", "replace") if theirs else own
-        )
-        if text != own:
-            self.refused(
-                f"refused by a coordinator of version {printable(text)}: this is {own}"
-            )
+    def met(self, theirs: bytes, own: str) -> None:
+        """Tell if a coordinator is of another version than this agent."""
+        if theirs not in (b"", own.encode()):
+            shown = printable(theirs[:MOST_SHOWN].decode("ascii", "replace"))
+            self.refused(f"refused by a coordinator of version {shown}: this is {own}")
 
     @property
     def is_lost(self) -> bool:
@@ -197,7 +186,8 @@ class HubWatch:
         """Do ``seen`` for a session; tell if a new hub drops what it sends."""
         if not self.seen(session.info.routers_zid()) or not self._advice:
             return
-        if usable([me.trial], session, self.address, self.tls) == []:
+        config = client_config(self.address, self.tls)
+        if usable([me.trial], session, config) == []:
             self.warn(
                 f"the hub at {self.address} drops all that this {me.role} sends: its "
                 "certificate was revoked, or is not in the access list of the hub as "
@@ -209,16 +199,13 @@ class HubWatch:
         """Which command tells why a hub refuses a certificate; empty without one."""
         if self.tls is None or not self.address.startswith("tls/"):
             return ""
-        flags = network_flags(self.address, self.fleet, self.tls)
-        return f"; {shlex.join(['revolve', 'doctor', *flags])} tells more"
+        words = ["revolve", "doctor", "--connect", self.address, "--fleet", self.fleet]
+        words += ["--tls-ca", self.tls.ca, "--tls-certificate", self.tls.certificate]
+        return f"; {shlex.join([*words, '--tls-key', self.tls.key])} tells more"
 
 
 def usable(
-    keys: Collection[str],
-    session: zenoh.Session,
-    connect: str,
-    tls: Tls | None,
-    within_s: float = 3.0,
+    keys: Collection[str], session: zenoh.Session, config: str, within_s: float = 3.0
 ) -> list[str] | None:
     """Return which keys of its own a process may use; None without a second connection.
 
@@ -230,8 +217,7 @@ def usable(
         for key in keys:
             hear = partial(heard.setdefault, key)
             opened.enter_context(session.declare_subscriber(key, hear))
-        config = zenoh.Config.from_json5(client_config(connect, tls))
-        other = opened.enter_context(zenoh.open(config))
+        other = opened.enter_context(zenoh.open(zenoh.Config.from_json5(config)))
         until_s = time.monotonic() + within_s
         while time.monotonic() < until_s and len(heard) < len(keys):
             for key in keys:
@@ -451,7 +437,8 @@ def _serve_session(
     def reply_info(query: zenoh.Query) -> None:
         with query:
             query.reply(me.info, server.info)
-            hub.met(query.payload, server.agent.version)
+            version = query.payload.to_bytes() if query.payload else b""
+            hub.met(version, server.agent.version)
 
     def cancel(sample: zenoh.Sample) -> None:
         server.cancel(sample.payload.to_bytes())
