@@ -73,8 +73,7 @@ def main(arguments: list[str]) -> int:
 
     Returns:
         0 for success; 1 if ``compare`` found a difference, a plug-in is refused, a run
-        of a campaign failed, or all evaluations failed; 130 after Ctrl-C, SIGTERM,
-        SIGHUP or SIGUSR1.
+        of a campaign failed, or all evaluations failed; 130 after a stop signal.
     """
     command, words = arguments[0], arguments[1:]
     if command in ("check", "plugins"):

@@ -31,7 +31,7 @@ def main(
     Returns:
         The command's exit code; 1 if the reader closed standard output, 2 for a
         user's error or output that cannot be written (one line on stderr), 130 after
-        Ctrl-C, SIGTERM, SIGHUP or SIGUSR1.
+        a stop signal.
     """
     # Without standard output the next file to be opened would get its descriptor.
     problem = "standard output is closed" if sys.stdout is None else stranger()
