@@ -89,8 +89,7 @@ class Fleet:
                 run; None: only the workers that this fleet starts.
             fleet: name of the fleet at that hub.
             tls: files of certificate authority, certificate and key, for ``tls/``;
-                None: those that the variables ``REVOLVE_TLS_CA``,
-                ``REVOLVE_TLS_CERTIFICATE`` and ``REVOLVE_TLS_KEY`` name.
+                None: of the variables ``REVOLVE_TLS_CA``, ``_CERTIFICATE``, ``_KEY``.
             plugins: modules or ``.py`` files that may be imported here and by the
                 workers that this fleet starts.
             give_up_after_s: time for which jobs wait without a worker that can do them;
@@ -110,8 +109,9 @@ class Fleet:
         self._give_up_after_s = give_up_after_s
         with naming_arguments():
             allow(plugins)
-            files = Tls(*tls) if tls else tls_of(_NO_FLAGS)
             address = connect_of(Namespace(connect=connect)) if connect else ""
+            named = tls_of(_NO_FLAGS) if address.startswith("tls/") else None
+            files = Tls(*tls) if tls else named
             self._network = Network(
                 name=unique_name(name_at(address, files, "python")),
                 fleet=fleet,

@@ -60,9 +60,10 @@ def reach(connect: str, timeout_s: float) -> str:
         timeout_s: how long to wait, for the name's address included [s].
     """
     protocol, host, port = parse_address(connect)
-    result: list[str] = []
+    result = f"no answer within {timeout_s:g} s"
 
     def try_it() -> None:
+        nonlocal result
         try:
             if protocol == UNIX:
                 with socket.socket(socket.AF_UNIX) as link:
@@ -70,16 +71,15 @@ def reach(connect: str, timeout_s: float) -> str:
                     link.connect(host)
             else:
                 socket.create_connection((host, port), timeout_s).close()
+            result = ""
         except OSError as error:
-            result.append(error.strerror or str(error))
-        else:
-            result.append("")
+            result = error.strerror or str(error)
 
     # The resolver of names has no timeout.
     thread = threading.Thread(target=try_it, daemon=True)
     thread.start()
     thread.join(timeout_s)
-    return result[0] if result else f"no answer within {timeout_s:g} s"
+    return result
 
 
 def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
@@ -103,8 +103,8 @@ def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
         return HubProbe(str(error).partition(" at /")[0])
     with session:
         round_trip_s, members = _look(session, fleet)
-        has_tls = connect.startswith("tls/")
-        roles = _roles(session, config, fleet, name) if has_tls else None
+        is_tls = connect.startswith("tls/")
+        roles = _roles(session, config, fleet, name) if is_tls else None
         replies: dict[str, OperatorReply] = {}
         malformed: list[str] = []
         offset_s: float | None = None

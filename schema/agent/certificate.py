@@ -96,9 +96,9 @@ def why_refused(connect: str, tls: Tls) -> str:
     except ssl.SSLError as error:
         reason = str(error.reason or error).replace("_", " ").lower()
         name = certificate_name(tls.certificate)
-        return f"certificate {name!r} is not accepted: {reason}"
+        return f"no TLS connection with certificate {name!r}: {reason}"
     except OSError:
-        return ""  # it is gone, or waits for the first message
+        pass  # it is gone, or waits for the first message
     return ""
 
 

@@ -382,6 +382,7 @@ def test_an_unfit_worker_gets_jobs_of_other_clients_only(
     assert (unfit, other) == ("one", "two")
     assert agents.sent[1][1] == other
     assert fleet.faults.total("refused") == 1
+    assert fleet.dispatch.unfit() == {"one": "has no plug-in 'x'"}
     for _ in range(4):
         request(fleet, CLIENT)
     assert {agent for _, agent, _ in agents.sent[1:]} == {other}
@@ -418,8 +419,10 @@ def test_a_worker_is_fit_again_for_a_client_that_has_ended(
     agents.news = [Returned(number, agent, "unfit", reason="has no plug-in 'x'")]
     fleet.listen(0.0, 1.0)
     assert agent not in fleet.dispatch.fit("worker", CLIENT)
+    assert fleet.dispatch.unfit() == {agent: "has no plug-in 'x'"}
     fleet.leave(CLIENT)
     assert agent in fleet.dispatch.fit("worker", CLIENT)
+    assert fleet.dispatch.unfit() == {}
 
 
 def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: Agents) -> None:

@@ -111,8 +111,8 @@ def test_a_process_says_that_the_hub_drops_what_it_sends(
 @pytest.mark.parametrize(
     ("name", "kit", "authority", "why"),
     [
-        ("late", "lab", "lab", "certificate 'late' is not accepted: .*expired"),
-        ("alien", "foreign", "lab", "certificate 'alien' is not accepted: "),
+        ("late", "lab", "lab", "no TLS connection with certificate 'late': .*expired"),
+        ("alien", "foreign", "lab", "no TLS connection with certificate 'alien': "),
         ("alien", "foreign", "foreign", "the hub's certificate is not accepted: "),
         ("good", "lab", "lab", ""),
     ],
