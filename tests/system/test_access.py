@@ -194,7 +194,7 @@ def test_a_worker_and_the_hub_say_that_a_certificate_is_not_listed(lab: Lab) -> 
     first, second = worker.stderr.readline(), worker.stderr.readline()
     assert said(first) == [f"connected to {lab.address}"]
     assert "drops all that this worker sends: its certificate was revoked" in second
-    assert f"; revolve doctor --connect {lab.address} --tls-ca" in second
+    assert f"; revolve doctor --connect {lab.address} --fleet default" in second
     told = said(lab.hub.stderr.readline())
     assert told[0].startswith("certificate 'unlisted' is not in --access (revoked?)")
 
