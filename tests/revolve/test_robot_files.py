@@ -16,7 +16,7 @@ from schema.experiment.file import experiment_text
 from schema.experiment.settings import evaluation_settings_of
 from schema.formats.run_settings import read_with_settings
 from schema.plugins import permission
-from schema.plugins.kept import kept_file, plugins_to_keep
+from schema.plugins.kept import keep
 from schema.tables.description import Description, description_text
 from schema.tables.files import parquet_path
 from tests.analysis.tables import table
@@ -40,6 +40,10 @@ BODY = "body: {type: Core, children: {0: {slot: 0, type: Paddle}}}\nbrain: {}\n"
 pytestmark = pytest.mark.usefixtures("_nothing_allowed")
 
 
+def write(file: Path, data: bytes) -> None:
+    file.write_bytes(data)
+
+
 @pytest.fixture
 def best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return ``best.yaml`` of a run that keeps a plug-in; it is of island 1."""
@@ -49,11 +53,9 @@ def best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     text = TWO.replace("MODULE", module)
     document = experiment_text(parse_experiment(text, str(tmp_path / "x.toml")))
     run = tmp_path / "run"
-    kept = plugins_to_keep(document)
-    for name, (_, source) in kept.items():
-        kept_file(run, name).parent.mkdir(parents=True)
-        kept_file(run, name).write_bytes(source)
-    notes = {name: note for name, (note, _) in kept.items()}
+    (run / "plugins").mkdir(parents=True)
+    notes = keep(run, document, write)
+    monkeypatch.setattr(permission, "_copies", {})
     found = Description("two", 0, 7, document, plugins=notes)
     (run / "run.json").write_text(description_text(found))
     rows: list[dict[str, Any]] = [
