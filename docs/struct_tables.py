@@ -139,8 +139,6 @@ def _default(field: kinds.Field) -> str:
         return "not given"
     if isinstance(value, Struct):
         return "its defaults"
-    if value == b"":
-        return "no bytes"
     if isinstance(value, tuple) and value and isinstance(value[0], str):
         return ", ".join(f"`{json.dumps(each)}`" for each in value)
     return f"`{json.dumps(value)}`"

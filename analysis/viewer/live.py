@@ -310,7 +310,7 @@ class LiveSource:
         if (member := there.pop(self._asked, None)) is None:
             return
         there[self._asked] = member
-        wanted = Page(sequence=self._sequence, page=len(self._part))
+        wanted = Page(b"", sequence=self._sequence, page=len(self._part))
         self._session.get(
             member.state,
             zenoh.handlers.Callback(partial(self._take_reply, member), indirect=False),

@@ -86,7 +86,7 @@ def parser(command: str) -> Flags:
     )
     if command == "compare":
         flags.add_argument("first", metavar="FOLDER", help="run or campaign folder")
-        flags.add_argument("second", metavar="FOLDER", help="another of the same kind")
+        flags.add_argument("second", metavar="FOLDER", help="run or campaign folder")
         return flags
     if command == "bench dispatch":
         _add_bench(flags)

@@ -149,17 +149,17 @@ class Page(Message, frozen=True):
     Without data it is a viewer's request for this page and some that follow.
 
     Attributes:
+        data: part of the bytes of the ``Update``.
         run: name of the run.
         sequence: of the state; if it is outdated, page 0 of a newer one is sent.
         page, pages: number of this page, from 0, and of all pages.
-        data: part of the bytes of the ``Update``.
     """
 
+    data: Annotated[bytes, Meta(max_length=PAGE_BYTES)]
     run: str = ""
     sequence: Count = 0
     page: Count = 0
     pages: Annotated[int, Meta(ge=0, le=UPDATE_BYTES // PAGE_BYTES)] = 0
-    data: Annotated[bytes, Meta(max_length=PAGE_BYTES)] = b""
 
 
 _UPDATE = Decoder(Update)
@@ -195,7 +195,7 @@ def decode_page(data: bytes) -> Page:
     Raises:
         MalformedMessage: not the bytes of a page.
     """
-    return unpack(_PAGE, data, 2 * PAGE_BYTES) if data else Page()
+    return unpack(_PAGE, data, 2 * PAGE_BYTES) if data else Page(b"")
 
 
 def pages_of(state: Update) -> list[bytes]:
@@ -203,7 +203,7 @@ def pages_of(state: Update) -> list[bytes]:
     data = encode(state)
     parts = [data[at : at + PAGE_BYTES] for at in range(0, len(data), PAGE_BYTES)]
     return [
-        encode(Page(state.run, state.sequence, number, len(parts), part))
+        encode(Page(part, state.run, state.sequence, number, len(parts)))
         for number, part in enumerate(parts)
     ]
 

@@ -135,6 +135,6 @@ def test_a_viewer_gets_pages_that_were_lost_and_the_updates_meanwhile(
                 got += source.receive(0.1, time.monotonic())
             assert source.dropped == 0
         assert got == [news(8), state]
-        assert chief.asked == [Page(), Page(sequence=7, page=1)]
+        assert chief.asked == [Page(b""), Page(b"", sequence=7, page=1)]
         assert chief.sent == [0, 1, 2]
         del token, ignored

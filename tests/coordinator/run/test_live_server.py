@@ -110,7 +110,7 @@ class Live:
         queries = 0
         while not pages or len(pages) < pages[0].pages:
             sequence = pages[0].sequence if pages else 0
-            request = Page(sequence=sequence, page=len(pages))
+            request = Page(b"", sequence=sequence, page=len(pages))
             viewer = self.ask(encode_update(request))
             queries += 1
             self.server.serve(now_s + 0.25 * queries)
@@ -168,7 +168,7 @@ def test_a_viewer_begins_again_when_its_state_is_outdated(
     first = live.ask()
     live.server.serve(1.0)
     sequence = first.pages[0].sequence
-    request = encode_update(Page(sequence=sequence, page=6))
+    request = encode_update(Page(b"", sequence=sequence, page=6))
     live.born(1)
     same, newest = live.ask(request), live.ask()
     live.server.serve(1000.0)
@@ -181,7 +181,7 @@ def test_a_viewer_begins_again_when_its_state_is_outdated(
 
 def test_damaged_requests_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     live = Live(monkeypatch)
-    damaged, beyond = live.ask(b"\xff"), live.ask(encode_update(Page(page=10**9)))
+    damaged, beyond = live.ask(b"\xff"), live.ask(encode_update(Page(b"", page=10**9)))
     live.server.serve(1.0)
     assert damaged.is_done
     assert damaged.replies == []

@@ -228,7 +228,7 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "ground.toml": (
         lambda: (
             "name = 'x'\n[environment]\nroughness_m = 1.0\n"
-            "extent_m = 1e300\npatch_m = 1e-300"
+            "extent_m = 1e6\npatch_m = 1e-300"
         ),
         "patch_m: must be >=",
     ),

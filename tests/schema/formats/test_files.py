@@ -254,7 +254,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     with pytest.raises(InvalidRobot, match="cannot be written: Is a directory"):
         write_robot(read(TEXT), path)
     (path / "best.yaml").write_text(TEXT)
-    with pytest.raises(InvalidRobot, match=r"got a folder; its best .*/best\.yaml"):
+    with pytest.raises(InvalidRobot, match=r"got a folder; the best .*/best\.yaml"):
         read_robot(path)
 
 

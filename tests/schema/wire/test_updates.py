@@ -85,7 +85,8 @@ def test_a_state_is_cut_into_pages_that_a_connection_sends_at_once() -> None:
 
 
 @pytest.mark.parametrize(
-    "page", [Page(pages=10**6), Page(data=bytes(PAGE_BYTES + 1)), Page(page=-1)]
+    "page",
+    [Page(b"", pages=10**6), Page(data=bytes(PAGE_BYTES + 1)), Page(b"", page=-1)],
 )
 def test_pages_of_too_large_a_state_are_malformed(page: Page) -> None:
     with pytest.raises(MalformedMessage):
