@@ -4,13 +4,13 @@ An answer that passes is one that a correct agent may give. A wrong value that i
 plausible is not found here; cross-checks find it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 
 from msgspec import structs
 
-from coordinator.dispatch.events import Deliver, Job, JobKind, Read
+from coordinator.dispatch.events import Deliver, Job, JobKind
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import (
     QUARANTINED,
@@ -82,6 +82,9 @@ class Requests:
             kind: JobKind = "vet"
             steps, settings, identity = 0, context.vetting, NO_IDENTITY
             robot, simulated_s = self._body(command), 0.0
+            read: Callable[..., Answer] = partial(
+                read_vetting, robot=command.robot, space=context.space
+            )
         else:
             kind = "evaluate"
             requester = requester_of(command)
@@ -89,8 +92,12 @@ class Requests:
             origin = structs.replace(context.origin, island=requester)
             identity = Identity(origin, command.birth, command.trial)
             robot = self._robot(command)
-            clock = context.experiments[requester].simulation
+            experiment = context.experiments[requester]
+            clock, measures = experiment.simulation, experiment.measures.names
             simulated_s = (steps or clock.evaluation_steps) * clock.timestep_s
+            read = partial(
+                read_evaluation, simulated_s=simulated_s, measures=len(measures)
+            )
         run, epoch = context.client
         for number, paired in self._numbers(command):
             payload = encode_request(
@@ -103,34 +110,9 @@ class Requests:
                 identity=identity,
                 plugins=plugins_of(settings),
             )
-            read = self._reader(command, (epoch, number), simulated_s)
-            about = (context.client, command, read, simulated_s)
+            own_read = partial(read, expected=(epoch, number))
+            about = (context.client, command, own_read, simulated_s)
             self._fleet.request(Job(number, kind, payload, paired, *about))
-
-    def _reader(
-        self, command: Vet | Evaluate, expected: Expected, simulated_s: float
-    ) -> Read:
-        """Return what decodes the answer to a job, and checks it against the job.
-
-        Args:
-            command: of the job.
-            expected: epoch and number of the job.
-            simulated_s: length of the evaluation [s].
-        """
-        context = self._context
-        if isinstance(command, Vet):
-            return partial(
-                read_vetting,
-                expected=expected,
-                robot=command.robot,
-                space=context.space,
-            )
-        return partial(
-            read_evaluation,
-            expected=expected,
-            simulated_s=simulated_s,
-            measures=len(context.experiments[requester_of(command)].measures.names),
-        )
 
     def _body(self, command: Vet) -> bytes:
         """Return the bytes of a body, and keep them for its robot's evaluation."""
