@@ -84,38 +84,20 @@ def _machine() -> Iterator[Finding]:
 
 
 def _fleet(options: argparse.Namespace) -> Iterator[Finding]:
+    subject, name = "certificate", host_name()
     try:
-        tls = tls_of(options)
+        if (tls := tls_of(options)) is not None:
+            from coordinator.doctor.certificate import check_certificate
+            from schema.agent.certificate import examine
+
+            facts, accepted = examine(tls), access_of(options)
+            mode = stat.S_IMODE(Path(tls.key).stat().st_mode)
+            yield from check_certificate(facts, mode, accepted, datetime.now(UTC))
+            name = facts.name
+        subject = "hub"
+        yield from _hub(connect_of(options), options, tls, name)
     except NetworkError as error:
-        yield Finding("fail", "certificate", str(error))
-        return
-    name = host_name()
-    if tls is not None:
-        try:
-            from schema.agent.certificate import certificate_name
-
-            name = certificate_name(tls.certificate)
-            yield from _certificate(tls, options)
-        except NetworkError as error:
-            yield Finding("fail", "certificate", str(error))
-            return
-    try:
-        connect = connect_of(options)
-        yield from _hub(connect, options, tls, name)
-    except NetworkError as error:
-        yield Finding("fail", "hub", str(error))
-
-
-def _certificate(tls: Tls, options: argparse.Namespace) -> list[Finding]:
-    from coordinator.doctor.certificate import check_certificate
-    from schema.agent.certificate import examine
-
-    return check_certificate(
-        examine(tls),
-        stat.S_IMODE(Path(tls.key).stat().st_mode),
-        access_of(options),
-        datetime.now(UTC),
-    )
+        yield Finding("fail", subject, str(error))
 
 
 def _hub(
