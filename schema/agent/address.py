@@ -240,11 +240,10 @@ def read_address(folder: Path) -> str:
         raise NetworkError(
             f"{file}: damaged ({error}): give the address itself to --connect"
         ) from None
-    is_here = [
-        parts.protocol != UNIX or _is_socket(parts.host) for _, parts in addresses
-    ]
     here = [
-        address for (address, _), yes in zip(addresses, is_here, strict=True) if yes
+        address
+        for address, parts in addresses
+        if parts.protocol != UNIX or _is_socket(parts.host)
     ]
     if not here:
         raise NetworkError(f"{file}: no address that this machine can reach")

@@ -83,13 +83,7 @@ def whole_number(least: int = 1, most: int | None = None) -> Callable[[str], int
 
 def add_seed(flags: argparse.ArgumentParser, default: int) -> None:
     """Add the flag for a seed of evolution, which has 64 bits."""
-    flags.add_argument(
-        "--seed",
-        type=whole_number(0, MOST_SEED),
-        default=default,
-        metavar="N",
-        help="random seed (default: %(default)s)",
-    )
+    add_count(flags, "--seed", default, "random seed", least=0, most=MOST_SEED)
 
 
 def birth_name(text: str) -> tuple[int | None, int]:
@@ -110,6 +104,8 @@ def add_count(
     default: int | None,
     what: str,
     least: int = 1,
+    *,
+    most: int | None = None,
 ) -> None:
     """Add a flag for a whole number.
 
@@ -119,10 +115,11 @@ def add_count(
         default: value if the flag is not given; ``what`` explains None.
         what: meaning of the number, for the help.
         least: smallest number allowed; not negative.
+        most: greatest number allowed; None for no limit.
     """
     flags.add_argument(
         name,
-        type=whole_number(least),
+        type=whole_number(least, most),
         default=default,
         metavar="N",
         help=what if default is None else f"{what} (default: %(default)s)",

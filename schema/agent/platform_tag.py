@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
 from pathlib import Path
 
+from schema.agent.capacity import system_text
 from schema.wire.revolve_pb2 import DESCRIPTOR
 
 MEANING = 1
@@ -69,11 +70,7 @@ def cpu_class(machine: str, flags: Collection[str]) -> str:
 
 def cpu_flags(cpuinfo: Path) -> frozenset[str]:
     """Return the features of the first CPU of Linux's list; empty without a list."""
-    try:
-        lines = cpuinfo.read_text("utf-8", errors="replace").splitlines()
-    except OSError:
-        return frozenset()
-    for line in lines:
+    for line in system_text(cpuinfo).splitlines():
         key, _, value = line.partition(":")
         if key.strip().lower() in {"flags", "features"}:
             return frozenset(value.split())
