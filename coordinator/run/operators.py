@@ -219,21 +219,20 @@ def _carry_out(request: OperatorRequest, scheduler: RunScheduler) -> OperatorRep
     """Return the reply of a run; a run that fails here is stopped.
 
     Raises:
-        Refused: no running run with an arena has the given name, or several have.
+        Refused: as for ``_run``, or the run recovers poses or has failed.
     """
     run = _run(request.run, scheduler)
     if run.recovery is not None:
         done, total = run.recovery.progress
-        return OperatorReply(
+        raise Refused(
             f"lost poses are computed again (advance {done} of {total}): try again "
-            "when that is done",
-            is_refused=True,
+            "when that is done"
         )
     replies: list[OperatorReply] = []
     scheduler.guard(run, lambda: replies.append(reply_to(request, run.loop)))
-    if replies:
-        return replies[0]
-    return OperatorReply("the run cannot go on", is_refused=True)
+    if not replies:
+        raise Refused("the run cannot go on")
+    return replies[0]
 
 
 def _run(name: str, scheduler: RunScheduler) -> RunSession:

@@ -153,7 +153,7 @@ class RunSession:
         if has_lost_poses(self._events, self._recorder.stored(POSES)):
             self._recover()
         else:
-            self._begin()
+            self.loop.start(self._replay())
         self.held.set_state("running")
 
     def _recover(self) -> None:
@@ -188,11 +188,7 @@ class RunSession:
         self.recovery.act(ends)
         if self.recovery.is_done:
             self.recovery = None
-            self._begin()
-
-    def _begin(self) -> None:
-        """Replay the journal, then send the requests that are open."""
-        self.loop.start(self._replay())
+            self.loop.start(self._replay())
 
     def _replay(self) -> Iterator[JournalledEvent]:
         """Yield and forget the journalled events; the feed condenses their rows."""
