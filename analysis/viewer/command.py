@@ -132,7 +132,11 @@ def _motions(
     options: argparse.Namespace, run: Run, simulators: Simulators
 ) -> list[Motion]:
     """Return the motion of the robots of ``--robot``; print if it is as recorded."""
-    wanted = _wanted(options)
+    names = [each for each in options.robot if isinstance(each, str)]
+    known = {name: named_robot(run.folder, name) for name in names}
+    for _, line in known.values():
+        tell_user(line)
+    wanted = [known[each][0] if each in known else each for each in options.robot]
     births = selected_robots(run.folder, wanted, has_ancestry=options.ancestry)
     if not births:
         return []
@@ -144,19 +148,6 @@ def _motions(
     for motion in motions:
         tell_user(motion.verdict)
     return motions
-
-
-def _wanted(options: argparse.Namespace) -> list[BirthId]:
-    """Return the robots of ``--robot``; print which ones are the best."""
-    wanted: list[BirthId] = []
-    for each in options.robot:
-        if isinstance(each, BirthId):
-            wanted.append(each)
-        else:
-            birth, line = named_robot(options.run, each)
-            tell_user(line)
-            wanted.append(birth)
-    return wanted
 
 
 def _span(options: argparse.Namespace, folder: Path) -> tuple[float, float]:

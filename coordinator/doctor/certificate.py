@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
-from coordinator.doctor.finding import Finding
+from coordinator.doctor.finding import Finding, Level
 from schema.agent.access import Certificate
 from schema.agent.certificate import CertificateFacts
 
 _SOON = timedelta(days=14)
+_RENEW = "revolve cluster renew, and copy the folder again"
 
 
 def check_certificate(
@@ -27,28 +28,28 @@ def check_certificate(
     role = next((each.role for each in accepted or () if each.name == facts.name), None)
     days = (facts.ends - now) // timedelta(days=1)
     title = f"{facts.name!r}" + (f", {role}" if role else "")
-    text = f"{title}, {days} days left"
-    renew = "revolve cluster renew, and copy the folder again"
+    level: Level = "fail"
+    text, advice = f"{title}, {days} days left", "copy both of one kit"
     if not facts.is_issued:
-        why = f"{title} is not of the authority of --tls-ca"
-        certificate = Finding("fail", "certificate", why, "copy both of one kit")
+        text = f"{title} is not of the authority of --tls-ca"
     elif not facts.fits_key:
-        why = f"{title} does not fit the key of --tls-key"
-        certificate = Finding("fail", "certificate", why, "copy both of one kit")
+        text = f"{title} does not fit the key of --tls-key"
     elif now < facts.begins:
-        why = f"{title} is valid from {facts.begins.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
-        certificate = Finding("fail", "certificate", why, "set the clock")
+        begins = facts.begins.astimezone(UTC)
+        text, advice = (
+            f"{title} is valid from {begins:%Y-%m-%d %H:%M} UTC",
+            "set the clock",
+        )
     elif now >= facts.ends:
-        why = f"{title} has expired on {facts.ends.astimezone(UTC):%Y-%m-%d}"
-        certificate = Finding("fail", "certificate", why, renew)
+        text = f"{title} has expired on {facts.ends.astimezone(UTC):%Y-%m-%d}"
+        advice = _RENEW
     elif accepted is not None and role is None:
-        why = f"{text}, but it is not in --access"
+        text += ", but it is not in --access"
         advice = "it was revoked, or the list is of another kit"
-        certificate = Finding("fail", "certificate", why, advice)
-    elif facts.ends - now < _SOON:
-        certificate = Finding("warn", "certificate", text, renew)
     else:
-        certificate = Finding("ok", "certificate", text)
+        is_soon = facts.ends - now < _SOON
+        level, advice = ("warn", _RENEW) if is_soon else ("ok", "")
+    certificate = Finding(level, "certificate", text, advice)
     if key_mode & 0o077:
         why = f"others may read it (mode {key_mode & 0o777:o})"
         return [certificate, Finding("fail", "key", why, "chmod 600 its file")]
