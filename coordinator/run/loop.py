@@ -8,6 +8,7 @@ point makes the same decisions again when it replays its journal.
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from itertools import chain
 from typing import Protocol
 
 from coordinator.arena.arena import Arena
@@ -210,28 +211,23 @@ class Loop:
     def _take(self, events: Sequence[JournalledEvent]) -> None:
         """Store events, then act on them, and on the answers of learners."""
         while events:
-            events = self._answers(events)
-
-    def _answers(self, events: Sequence[JournalledEvent]) -> list[Asked]:
-        """Store events, then act on them; return what learners answer."""
-        # A process that was suspended while another took over must not write a byte.
-        self.confirm()
-        for event in events:
-            if isinstance(event, Advanced) and event.pose_rows:
-                poses = event.advance.poses
-                self.rows.store(Append("poses", event.pose_rows, poses))
-        self.log.append(events)
-        answers: list[Asked] = []
-        for event in events:
-            for request in self._act_on(event):
+            # A process that was suspended while another took over must not write.
+            self.confirm()
+            for event in events:
+                if isinstance(event, Advanced) and event.pose_rows:
+                    poses = event.advance.poses
+                    self.rows.store(Append("poses", event.pose_rows, poses))
+            self.log.append(events)
+            answers: list[Asked] = []
+            for request in chain.from_iterable(map(self._act_on, events)):
                 if isinstance(request, AdvanceShard):
                     self._advance(request)
                 elif isinstance(request, Ask):
                     answers.append(self._learners.answer(request))
                 else:
                     self._requests.send(request)
-        self._warn(events)
-        return answers
+            self._warn(events)
+            events = answers
 
     def _act_on(self, event: JournalledEvent) -> list[Request]:
         """Act on an event that the journal holds; return the requests to send."""
