@@ -114,16 +114,8 @@ class _Asked:
         """Report a reply that does not count, once for each query."""
         if not self.has_stray:
             self.has_stray = True
-            self.inbox.put(_Stray(self.member.name, kind, self.number))
-
-
-@dataclass(frozen=True, slots=True)
-class _Stray:
-    """A reply that does not count."""
-
-    agent: str
-    kind: FaultKind
-    number: int
+            about = "properties" if self.number < 0 else f"job {self.number}"
+            self.inbox.put((kind, self.member.name, about))
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +126,8 @@ class _Queried:
     key: str
 
 
+_Stray = tuple[FaultKind, str, str]
+"""A reply that does not count, as ``PeerFaults.note`` takes it."""
 _Told = _Asked | _Stray | _Queried | zenoh.Sample
 _News = _Told | None
 """What ``receive`` waits for; None only ends its wait."""
@@ -354,9 +348,8 @@ class Network:
         if isinstance(news, _Queried):
             self.queries.add(news.query, news.key)
             return []
-        if isinstance(news, _Stray):
-            about = "properties" if news.number < 0 else f"job {news.number}"
-            self.faults.note(news.kind, news.agent, about)
+        if isinstance(news, tuple):
+            self.faults.note(*news)
             return []
         try:
             if isinstance(news, zenoh.Sample):

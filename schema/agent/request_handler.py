@@ -161,16 +161,14 @@ class Server:
             self.watch.begin(task)
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
-        except (UnknownPlugin, PluginDiffers) as error:
-            self.counts.refused += 1
-            return Reply(reason=printable(f"{UNFIT}{error}", LONGEST_REASON))
-        except RevolveError as error:
-            self.counts.refused += 1
-            self.counts.malformed += isinstance(error, MalformedMessage)
-            return Reply(reason=printable(str(error), LONGEST_REASON))
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
             self.counts.refused += 1
-            return Reply(reason=printable(error_text(error), LONGEST_REASON))
+            self.counts.malformed += isinstance(error, MalformedMessage)
+            is_ours = isinstance(error, RevolveError)
+            reason = str(error) if is_ours else error_text(error)
+            if isinstance(error, UnknownPlugin | PluginDiffers):
+                reason = f"{UNFIT}{reason}"
+            return Reply(reason=printable(reason, LONGEST_REASON))
         finally:
             self.watch.end()
         self.counts.answered += 1
