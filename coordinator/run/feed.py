@@ -36,13 +36,7 @@ class Feed:
     """
 
     def __init__(self, run: str, epoch: int, details: RunDetails) -> None:
-        """Initialise without rows.
-
-        Args:
-            run: name of the run.
-            epoch: of the coordinator.
-            details: of the run.
-        """
+        """Initialise without rows; ``epoch`` is that of the coordinator."""
         self.unread: list[Record] = []
         self._past = Update(
             run, epoch, 0, is_whole=True, experiment=details.name,

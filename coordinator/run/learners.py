@@ -31,12 +31,7 @@ class Learners:
     """
 
     def __init__(self, experiments: Mapping[int, Experiment], origin: Origin) -> None:
-        """Initialise without learners.
-
-        Args:
-            experiments: settings of each island.
-            origin: seed and number of the run.
-        """
+        """Initialise without learners, for the settings of each island."""
         self._experiments = experiments
         self._origin = origin
         self._known: dict[BirthId, _Known] = {}

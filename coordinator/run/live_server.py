@@ -31,14 +31,7 @@ class LiveServer:
     """Server of the viewers of one run."""
 
     def __init__(self, feed: Feed, loop: Loop, fleet: Fleet, network: Network) -> None:
-        """Initialise.
-
-        Args:
-            feed: of the run.
-            loop: of the run.
-            fleet: of connected workers.
-            network: to the viewers.
-        """
+        """Initialise the server; ``feed`` and ``loop`` are those of its run."""
         self._feed = feed
         self._loop = loop
         self._fleet = fleet

@@ -100,16 +100,11 @@ def _order(
     arena: Arena,
     island: int,
 ) -> Order:
-    """Return the order of an action.
-
-    Args:
-        action: what to do.
-        arena: where.
-        island: number of the arena.
+    """Return the order of an action in the arena of an island.
 
     Raises:
-        Refused: no living robot has the given birth number.
-        Refused: a robot outside the limits of ``[space]``, or a place too far away.
+        Refused: no living robot has the given birth number, a robot outside the limits
+            of ``[space]``, or a place too far away.
         InvalidRobot: a robot that breaks the rules of the experiment, or that its
             encoding cannot describe.
     """

@@ -318,11 +318,7 @@ def name_at(hub: str, tls: Tls | None, default: str) -> str:
 
 
 def tell_restart(role: Role) -> str:
-    """Return a line about a process that ended.
-
-    Args:
-        role: of the process.
-    """
+    """Return a line about a process of a role that ended."""
     article = "an" if role == "analyzer" else "a"
     return f"{article} {role} process ended and is restarted"
 
