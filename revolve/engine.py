@@ -12,10 +12,11 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from coordinator.dispatch.events import Client, Deliver, Job, JobKind, Read, Withdrawn
+from coordinator.dispatch.events import Client, Deliver, Job, JobKind, Withdrawn
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from schema.agent.log import tell_user, warn_user
@@ -37,7 +38,7 @@ class Order:
     Attributes:
         kind: of the job.
         encode: returns the request, given run, epoch and number of the job.
-        read: decodes and checks an answer, given epoch and number.
+        read: decodes and checks an answer, given ``expected``, epoch and number.
         settle: returns the future's value for the end of the job, or raises.
         simulated_s: as of ``Job``.
         future: gets the value or the exception.
@@ -45,7 +46,7 @@ class Order:
 
     kind: JobKind
     encode: Callable[..., bytes]
-    read: Callable[[tuple[int, int]], Read]
+    read: Callable[..., object]
     settle: Callable[[Deliver], Any]
     simulated_s: float | None = None
     future: "Future[Any]" = field(default_factory=Future)
@@ -225,7 +226,8 @@ class Engine:
         run, epoch = self._client
         payload = order.encode(run=run, epoch=epoch, number=number)
         self._open[number] = order
-        about = (self._client, order, order.read((_EPOCH, number)), order.simulated_s)
+        read = partial(order.read, expected=(_EPOCH, number))
+        about = (self._client, order, read, order.simulated_s)
         fleet.request(Job(number, order.kind, payload, -1, *about))
 
     def _withdraw(self, fleet: Fleet) -> None:

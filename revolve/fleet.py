@@ -267,7 +267,7 @@ class Fleet:
                 argument=argument,
                 plugins=plugins_of(settings),
             ),
-            lambda expected: partial(read_call_answer, expected=expected),
+            read_call_answer,
             partial(_value, number=number),
         )
         return self._order(order)
@@ -289,9 +289,8 @@ class Fleet:
                 identity=identity,
                 plugins=plugins_of(data),
             ),
-            lambda expected: partial(
+            partial(
                 read_evaluation,
-                expected=expected,
                 simulated_s=simulated_s,
                 measures=len(settings.measures.names),
             ),
