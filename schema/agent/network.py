@@ -130,22 +130,19 @@ def hub_config(
         NetworkError: no address, an invalid one, one that other machines reach
             without TLS, one that needs files, or names of certificates that clash.
     """
-    protocols = set()
     if not listen:
         raise NetworkError("a hub must listen on one address at least, got none")
-    for address in listen:
-        protocol, host, _ = parse_address(address)
+    places = list(map(parse_address, listen))
+    protocols = {place.protocol for place in places}
+    for address, (protocol, host, _) in zip(listen, places, strict=True):
         _check_tls(address, protocol, tls)
         if protocol == "tcp" and not _is_loopback(host):
             raise NetworkError(
                 f"{address} would listen beyond this machine without protection: "
                 "use tls/HOST:PORT with --tls-ca, --tls-certificate and --tls-key"
             )
-        protocols.add(protocol)
-    if "tls" in protocols and any(
-        protocol != UNIX and port == 0
-        for protocol, _, port in map(parse_address, listen)
-    ):
+    has_open_port = any(each.protocol != UNIX and each.port == 0 for each in places)
+    if "tls" in protocols and has_open_port:
         raise NetworkError("with a tls/ address each address needs a port, got 0")
     link = _link(protocols)
     if tls and "tls" in protocols:
