@@ -35,11 +35,7 @@ class CrossChecks:
     """Evaluations of a run that are done twice."""
 
     def __init__(self, share: float) -> None:
-        """Initialise the checks.
-
-        Args:
-            share: of the evaluations, from 0 to 1.
-        """
+        """Initialise the checks of a share of the evaluations, from 0 to 1."""
         self._share = share
         self._others: dict[int, int] = {}
         self._outcomes: dict[int, Outcome] = {}

@@ -123,13 +123,7 @@ class ShardRequests:
     def __init__(
         self, context: RunContext, snapshot_store: SnapshotStore, fleet: Fleet
     ) -> None:
-        """Initialise without shards.
-
-        Args:
-            context: what all requests have in common.
-            snapshot_store: storage of the snapshots.
-            fleet: the workers.
-        """
+        """Initialise without shards; ``fleet`` has the workers."""
         self._context = context
         self._snapshot_store = snapshot_store
         self._fleet = fleet
