@@ -6,7 +6,8 @@ that no request can disturb or delay a run.
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Protocol, Self
+from contextlib import AbstractContextManager
+from typing import Protocol
 
 from coordinator.dispatch.faults import MEANINGS
 from schema.agent.extras import install_advice
@@ -26,7 +27,7 @@ _STATES = ("waiting", "running", "stopped", "finished", "failed", "damaged")
 _NOTHING = Status((), 0, 0, 0.0)
 
 
-class MetricsServer:
+class MetricsServer(AbstractContextManager["MetricsServer"]):
     """HTTP server of the metrics; use it in a ``with``.
 
     Attributes:
@@ -55,9 +56,6 @@ class MetricsServer:
                 f"--metrics: cannot listen on {host}:{port}: {error.strerror or error}"
             ) from None
         self.url = f"http://{host}:{self._server.server_port}/metrics"
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._server.shutdown()

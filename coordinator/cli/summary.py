@@ -13,7 +13,7 @@ from msgspec import to_builtins
 
 from coordinator.arena.arena import Arena
 from coordinator.run.session import RunSession
-from coordinator.storage.disk import replace_durably, storage_errors
+from coordinator.storage.disk import replace_text, storage_errors
 from coordinator.storage.folder import read_details
 from coordinator.storage.hints import command
 from schema.agent.log import tell_user, warn_user
@@ -232,7 +232,7 @@ def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
             # It may be another robot, of an earlier end of the run.
             file.unlink(missing_ok=True)
             return f"it has no file {file}: {error}"
-    replace_durably(file, lambda path: path.write_bytes(text.encode()))
+    replace_text(file, text)
     return f"its file: {file}"
 
 

@@ -92,7 +92,7 @@ class Dispatch:
             "worker": self.workers,
             "analyzer": Pool(VETS_AT_HAND),
         }
-        self._kind_of: dict[str, AgentKind] = {}
+        self._pool_of: dict[str, Pool] = {}
         self._deadlines = Deadlines(LEAST_S)
         self._next_look_s = 0.0
         self._pairs = PairedJobs()
@@ -131,9 +131,7 @@ class Dispatch:
 
     def unfit(self) -> dict[str, str]:
         """Return why agents cannot do the jobs of some client, by name."""
-        states = [
-            each for pool in self._pools.values() for each in pool.agents.values()
-        ]
+        states = self._states()
         return {a.joined.agent: why for a in states for why in a.unfit_for.values()}
 
     def names(self, kind: AgentKind) -> list[str]:
@@ -150,9 +148,12 @@ class Dispatch:
 
     def silent(self) -> dict[str, int]:
         """Return how many jobs and advances the silent agents hold, by their names."""
-        agents = [a for pool in self._pools.values() for a in pool.agents.values()]
-        held = {a.joined.agent: (*a.held, *a.advances) for a in agents if a.is_silent}
-        return {name: len(numbers) for name, numbers in held.items() if numbers}
+        silent = [a for a in self._states() if a.is_silent and (a.held or a.advances)]
+        return {a.joined.agent: len(a.held) + len(a.advances) for a in silent}
+
+    def _states(self) -> list[AgentState]:
+        # Copies, as in ``Pool.fit``.
+        return [a for each in self._pools.values() for a in list(each.agents.values())]
 
     @property
     def credits(self) -> int:
@@ -162,8 +163,8 @@ class Dispatch:
 
     def platform(self, agent: str) -> str:
         """Return the platform of an agent; empty once it has left."""
-        kind = self._kind_of.get(agent)
-        return self._pools[kind].agents[agent].joined.platform if kind else ""
+        pool = self._pool_of.get(agent)
+        return pool.agents[agent].joined.platform if pool else ""
 
     def wait_s(self, job: Job) -> float:
         """Return for how long the network waits for the reply to a job [s]."""
@@ -203,22 +204,20 @@ class Dispatch:
     def _joined(self, event: Joined) -> Iterator[DispatchCommand]:
         if event.slots < 1:
             raise UnexpectedEvent(f"{event.agent}: slots must be >= 1: {event.slots}")
-        if kind := self._kind_of.get(event.agent):
-            known = self._pools[kind].agents[event.agent].joined
+        if pool := self._pool_of.get(event.agent):
+            known = pool.agents[event.agent].joined
             if known != event:
                 raise UnexpectedEvent(f"joins as {event}, is there as {known}")
             return
-        pool = self._pools[event.kind]
-        self._kind_of[event.agent] = event.kind
+        pool = self._pool_of[event.agent] = self._pools[event.kind]
         pool.agents[event.agent] = AgentState(event)
         pool.offer(event.agent)
         yield from self._assign(pool)
 
     def _left(self, event: Left) -> Iterator[DispatchCommand]:
-        kind = self._kind_of.pop(event.agent, None)
-        if kind is None:
+        pool = self._pool_of.pop(event.agent, None)
+        if pool is None:
             return
-        pool = self._pools[kind]
         for number, pending in pool.agents.pop(event.agent).held.items():
             if number in self._jobs:
                 pending.lost[event.agent] += 1
@@ -253,16 +252,14 @@ class Dispatch:
     def _ended(self, event: Ended) -> Iterator[DispatchCommand]:
         jobs = [j for j in self._jobs.values() if j.job.client == event.client]
         for pending in jobs:
-            yield from self._withdrawn(Withdrawn(pending.job.number))
-        for pool in self._pools.values():
-            for agent in pool.agents.values():
-                agent.unfit_for.pop(event.client, None)
+            yield from self._close(pending)
+        for agent in self._states():
+            agent.unfit_for.pop(event.client, None)
 
     def _returned(self, event: Returned) -> Iterator[DispatchCommand]:
-        kind = self._kind_of.get(event.agent)
-        if kind is None:
+        pool = self._pool_of.get(event.agent)
+        if pool is None:
             return
-        pool = self._pools[kind]
         agent = pool.agents[event.agent]
         if event.outcome != "lost":
             pool.hear(event.agent)
@@ -398,8 +395,7 @@ class Dispatch:
             yield from self._look(event.now_s)
 
     def _progressed(self, event: Progressed) -> Iterator[DispatchCommand]:
-        if kind := self._kind_of.get(event.agent):
-            pool = self._pools[kind]
+        if pool := self._pool_of.get(event.agent):
             pool.agents[event.agent].worked_s = self._now_s or 0.0
             pool.hear(event.agent)
             yield from self._assign(pool)

@@ -372,9 +372,7 @@ class PairedJobs:
 
     def avoided(self, pending: Pending) -> tuple[str, ...]:
         """Return the agents that a job avoids if there are others."""
-        others = self._agents.get(pending.job.paired)
-        if not others:
-            return pending.avoid
+        others = self._agents.get(pending.job.paired, {})
         return (*pending.avoid, *(each for each in others if each not in pending.avoid))
 
     def forget(self, job: Job) -> None:

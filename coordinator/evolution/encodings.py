@@ -6,7 +6,6 @@ from traceback import extract_tb
 from types import TracebackType
 from typing import Any, cast
 
-import msgspec
 import numpy as np
 
 from coordinator.evolution.cppn.encoding import Cppn
@@ -19,7 +18,7 @@ from schema.errors import (
     one_line,
     shown,
 )
-from schema.experiment.brains import types_of
+from schema.experiment.brains import NoParameters, types_of
 from schema.experiment.document import (
     REVOLVE_ANGLE,
     Experiment,
@@ -49,10 +48,6 @@ METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
 """Methods that an own encoding must have."""
 
 
-class _NoParameters(msgspec.Struct, frozen=True):
-    """Parameters of an encoding that declares none."""
-
-
 @lru_cache(maxsize=64)
 def encoding_of(experiment: Experiment) -> "IslandEncoding":
     """Return the encoding of one island.
@@ -71,7 +66,7 @@ def encoding_of(experiment: Experiment) -> "IslandEncoding":
         raise ExperimentError(f"{WHERE}: {name!r} must be a class, not an object")
     kind = getattr(found, "Parameters", None)
     table = experiment.encoding.parameters
-    parameters = read_parameters(table, kind or _NoParameters, "encoding.parameters")
+    parameters = read_parameters(table, kind or NoParameters, "encoding.parameters")
     types = body_space(experiment.space)
     with _Guard(name, "the class"):
         made = found(experiment, types, parameters if kind else None)

@@ -17,13 +17,8 @@ from typing import Annotated
 import msgspec
 from msgspec.structs import replace
 
-from coordinator.storage.disk import replace_text
-from coordinator.storage.folder import (
-    RunDetails,
-    forget_plugins,
-    holds_run,
-    keep_plugins,
-)
+from coordinator.storage.disk import replace_bytes, replace_text
+from coordinator.storage.folder import RunDetails, forget_plugins, holds_run
 from coordinator.storage.hints import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.check import naming
@@ -36,7 +31,7 @@ from schema.experiment.file import (
     shipped_experiments,
 )
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
-from schema.plugins.kept import KeptPlugin
+from schema.plugins.kept import KeptPlugin, keep
 from schema.tables.description import read_small
 
 CAMPAIGN = "campaign.toml"
@@ -197,7 +192,7 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
     ]
     plugins: dict[str, KeptPlugin] = {}
     for document in documents:
-        plugins |= keep_plugins(folder, document)
+        plugins |= keep(folder, document, replace_bytes)
     numbers = (campaign.seed, campaign.repeats, campaign.first)
     digest = _digest(numbers, documents, plugins)
     lines = [

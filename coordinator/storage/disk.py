@@ -90,13 +90,14 @@ def replace_durably(path: Path, write: Callable[[Path], object]) -> None:
         replace_file(path, write)
 
 
-def replace_text(path: Path, text: str) -> None:
-    """Create or replace a UTF-8 file as ``replace_durably`` does.
+def replace_bytes(path: Path, data: bytes) -> None:
+    """Create or replace a file as ``replace_durably`` does."""
+    replace_durably(path, lambda file: file.write_bytes(data))
 
-    Raises:
-        RunFolderError: the disk is full or failed; an old file is unchanged.
-    """
-    replace_durably(path, lambda file: file.write_text(text, encoding="utf-8"))
+
+def replace_text(path: Path, text: str) -> None:
+    """Create or replace a UTF-8 file as ``replace_durably`` does."""
+    replace_bytes(path, text.encode())
 
 
 @contextlib.contextmanager

@@ -14,11 +14,11 @@ import socket
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Self
 
 from msgspec import structs
 
 from coordinator.storage.disk import (
+    replace_bytes,
     replace_durably,
     replace_text,
     storage_errors,
@@ -80,7 +80,7 @@ class RunDetails:
         return Origin(seed=self.seed, run=self.run)
 
 
-class RunFolder:
+class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
     """A run folder that this process has locked.
 
     Attributes:
@@ -119,7 +119,7 @@ class RunFolder:
                     **asdict(details),
                     nonce=secrets.token_hex(4),
                     checksums=True,
-                    plugins=keep_plugins(path, details.document),
+                    plugins=keep(path, details.document, replace_bytes),
                 )
                 replace_text(path / DETAILS, description_text(new))
             self.details = read_details(path)
@@ -201,9 +201,6 @@ class RunFolder:
         """Unlock the folder."""
         self._lock.close()
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_error: object) -> None:
         self.close()
 
@@ -230,26 +227,6 @@ def read_details(path: Path) -> RunDetails:
     return RunDetails(found.name, found.run, found.seed, found.document)
 
 
-def keep_plugins(path: Path, document: str) -> dict[str, KeptPlugin]:
-    """Copy the plug-ins of an experiment to a folder; describe them.
-
-    Args:
-        path: folder of a run or campaign.
-        document: the experiment as JSON.
-
-    Raises:
-        ExperimentError: as of ``keep``.
-        RunFolderError: the disk is full or failed.
-    """
-    kept = keep(path, document, _write)
-    for name in (name for name, note in kept.items() if not note.file):
-        warn_once(
-            f"plug-in {name}: {path} keeps no copy of it, as it is compiled or large: "
-            "do not change it before the run has finished"
-        )
-    return kept
-
-
 def forget_plugins(path: Path, plugins: Mapping[str, KeptPlugin]) -> None:
     """Remove the copies of plug-ins from a folder.
 
@@ -268,10 +245,6 @@ def forget_plugins(path: Path, plugins: Mapping[str, KeptPlugin]) -> None:
     with contextlib.suppress(OSError):
         # Not there, or with other files.
         (path / PLUGINS).rmdir()
-
-
-def _write(path: Path, data: bytes) -> None:
-    replace_durably(path, lambda new: new.write_bytes(data))
 
 
 def _refuse_used(path: Path, wanted: RunDetails) -> None:

@@ -14,6 +14,7 @@ the records that it found.
 import shlex
 import struct
 from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -72,7 +73,7 @@ MOST_RECORDED_EPOCH = (1 << 64) // _RECORDS - 1
 """Greatest epoch that the number of a record can hold."""
 
 
-class Journal:
+class Journal(AbstractContextManager["Journal"]):
     """A journal that is open for writing.
 
     Attributes:
@@ -139,9 +140,6 @@ class Journal:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_error: object) -> None:
         self.close()

@@ -11,7 +11,6 @@ import socket
 import time
 from hashlib import sha256
 from pathlib import Path
-from typing import Self
 
 from coordinator.storage.disk import storage_errors
 from schema.errors import RunFolderError
@@ -27,7 +26,7 @@ _RETRY_EVERY_S = 0.005
 _LONGEST_HOLDER = 200
 
 
-class FolderLock:
+class FolderLock(contextlib.AbstractContextManager["FolderLock"]):
     """Exclusive lock on a folder; the operating system releases it at a kill."""
 
     def __init__(self, folder: Path) -> None:
@@ -68,9 +67,6 @@ class FolderLock:
             os.close(descriptor)
         if self._name:
             self._name.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_error: object) -> None:
         self.close()

@@ -11,7 +11,7 @@ import re
 from hashlib import sha256
 from pathlib import Path
 
-from coordinator.storage.disk import replace_durably, storage_errors
+from coordinator.storage.disk import replace_bytes, storage_errors
 from schema.errors import RunFolderError, unreadable
 
 FOLDER = "snapshots"
@@ -50,7 +50,7 @@ class Snapshots:
         Raises:
             RunFolderError: the disk is full or failed.
         """
-        replace_durably(self._path(shard, step), lambda path: path.write_bytes(data))
+        replace_bytes(self._path(shard, step), data)
 
     def read(self, shard: int, step: int) -> bytes:
         """Return the state of a shard at a step.

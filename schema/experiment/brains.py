@@ -29,7 +29,7 @@ _TYPE = "brain.type"
 
 
 class NoParameters(Struct, frozen=True):
-    """Parameters of a brain type that has none."""
+    """Parameters of a plug-in that declares none."""
 
 
 class _BuiltIn(NamedTuple):

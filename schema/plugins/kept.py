@@ -59,7 +59,7 @@ def keep(
     Args:
         folder: of a run or campaign.
         document: an experiment as JSON.
-        write: writes a file of the folder.
+        write: writes a file durably; what it raises is passed on.
 
     Returns:
         The description of each module.

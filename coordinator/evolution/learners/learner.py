@@ -10,6 +10,7 @@ from msgspec import Struct
 from coordinator.evolution.learners.cma_es import CmaEs
 from coordinator.evolution.learners.simple import OnePlusOne, RandomSearch
 from schema.errors import ExperimentError
+from schema.experiment.brains import NoParameters
 from schema.experiment.learning import LEARNERS, Learning
 from schema.plugins.load import load_object
 from schema.plugins.origin import raised_by, where_defined
@@ -30,10 +31,6 @@ Batch = tuple[Points, tuple[float, ...]]
 """Points and their fitness, -inf for a failed trial."""
 
 
-class _NoParameters(Struct, frozen=True):
-    """Parameters of a learner that declares none."""
-
-
 @lru_cache(maxsize=64)
 def learner_class(rules: Learning) -> tuple[Callable[..., Learner], Struct | None]:
     """Return the class of a learner, and its parameters or None.
@@ -50,7 +47,7 @@ def learner_class(rules: Learning) -> tuple[Callable[..., Learner], Struct | Non
         )
     kind = getattr(found, "Parameters", None)
     table = rules.parameters
-    parameters = read_parameters(table, kind or _NoParameters, "learning.parameters")
+    parameters = read_parameters(table, kind or NoParameters, "learning.parameters")
     return found, parameters if kind else None
 
 

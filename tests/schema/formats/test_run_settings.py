@@ -7,7 +7,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from coordinator.storage.folder import keep_plugins
+from coordinator.storage.disk import replace_bytes
 from schema.__main__ import main
 from schema.errors import ExperimentError, InvalidRobot, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
@@ -15,6 +15,7 @@ from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import settings_of, write_robot
 from schema.formats.run_settings import experiment_of, read_with_settings
 from schema.plugins import permission
+from schema.plugins.kept import keep
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
 from schema.tables.description import Description, description_text
@@ -38,7 +39,7 @@ def written(folder: Path, text: str) -> Path:
     """Write the description of a run; return the path of a robot file beside it."""
     folder.mkdir(exist_ok=True)
     document = experiment_text(parse_experiment(text, str(folder.parent / "x.toml")))
-    notes = keep_plugins(folder, document)
+    notes = keep(folder, document, replace_bytes)
     found = Description("bumpy", 0, 7, document, plugins=notes)
     (folder / "run.json").write_text(description_text(found))
     return folder / "best.yaml"
