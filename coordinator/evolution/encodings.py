@@ -1,9 +1,9 @@
 """The encoding of an island: loading, and checks of what it returns."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from traceback import extract_tb
-from types import TracebackType
 from typing import Any, cast
 
 import numpy as np
@@ -68,7 +68,7 @@ def encoding_of(experiment: Experiment) -> "IslandEncoding":
     table = experiment.encoding.parameters
     parameters = read_parameters(table, kind or NoParameters, "encoding.parameters")
     types = body_space(experiment.space)
-    with _Guard(name, "the class"):
+    with _guarded(name, "the class"):
         made = found(experiment, types, parameters if kind else None)
     return IslandEncoding(made, experiment)
 
@@ -92,9 +92,6 @@ class IslandEncoding:
         self._mates = encoding if isinstance(encoding, OneStepMating) else None
         self._space = experiment.space
         self._is_thesis = self.name == REVOLVE_ANGLE
-        self._guards = {
-            method: _Guard(self.name, method) for method in (*METHODS, "mate")
-        }
         self.no_child = "its parents' genomes gave no child"
         if self._is_thesis:
             self.no_child = (
@@ -107,7 +104,7 @@ class IslandEncoding:
         Raises:
             ExperimentError: the method raises, or no robot meets the restrictions.
         """
-        with self._guards["random"]:
+        with _guarded(self.name, "random"):
             return self._encoding.random(rng, birth)
 
     def mate(
@@ -119,13 +116,13 @@ class IslandEncoding:
             ExperimentError: a method raises.
         """
         if self._mates is not None:
-            with self._guards["mate"]:
+            with _guarded(self.name, "mate"):
                 return self._mates.mate(first, second, rng, birth)
-        with self._guards["crossover"]:
+        with _guarded(self.name, "crossover"):
             child = self._encoding.crossover(first, second, rng)
         if child is None:
             return None
-        with self._guards["mutate"]:
+        with _guarded(self.name, "mutate"):
             return self._encoding.mutate(child, rng, birth)
 
     def develop(self, genome: object) -> Robot:
@@ -138,7 +135,7 @@ class IslandEncoding:
         """
         if self._is_thesis:
             return self._encoding.develop(genome)
-        with self._guards["develop"]:
+        with _guarded(self.name, "develop"):
             found: object = self._encoding.develop(genome)
             parts, brain = (getattr(found, each, None) for each in ("parts", "brain"))
             if not isinstance(parts, tuple | list) or not isinstance(brain, Brain):
@@ -167,7 +164,7 @@ class IslandEncoding:
         Raises:
             ExperimentError: the method raises, or returns no or too many bytes.
         """
-        with self._guards["to_bytes"]:
+        with _guarded(self.name, "to_bytes"):
             data: object = self._encoding.to_bytes(genome)
         if not isinstance(data, bytes) or len(data) > ROBOT_BYTES:
             raise ExperimentError(
@@ -264,30 +261,17 @@ def outside_limits(robot: Robot, space: Space, types: BodySpace) -> str:
     return ""
 
 
-class _Guard:
-    """Context that turns errors of an encoding's own code into one line."""
-
-    __slots__ = ("_method", "_name")
-
-    def __init__(self, name: str, method: str) -> None:
-        self._name, self._method = name, method
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Raise an ExperimentError for any error but those of this project."""
-        if error is None or isinstance(error, RevolveError):
-            return
-        if isinstance(error, Exception | SystemExit):
-            frame = extract_tb(trace)[-1]
-            file = frame.filename.replace("\\", "/").rpartition("/")[2]
-            raise ExperimentError(
-                f"{WHERE}: {self._name!r}: {self._method} failed in "
-                f"{file}:{frame.lineno}: {error_text(error)}"
-            ) from error
+@contextmanager
+def _guarded(name: str, method: str) -> Iterator[None]:
+    """Turn errors of an encoding's own code into one line; not those of Revolve."""
+    try:
+        yield
+    except RevolveError:
+        raise
+    except (Exception, SystemExit) as error:
+        frame = extract_tb(error.__traceback__)[-1]
+        file = frame.filename.replace("\\", "/").rpartition("/")[2]
+        raise ExperimentError(
+            f"{WHERE}: {name!r}: {method} failed in {file}:{frame.lineno}: "
+            f"{error_text(error)}"
+        ) from error

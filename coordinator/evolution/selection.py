@@ -18,7 +18,7 @@ from coordinator.evolution.random_streams import BufferedRng
 from schema.errors import ExperimentError, shown
 from schema.experiment.document import Arena, Culling, Selection
 from schema.experiment.selection_rules import own_rule
-from schema.plugins.origin import raised_by, where_defined
+from schema.plugins.origin import naming_plugin, where_defined
 from schema.plugins.protocols import ParentSelection, Selectable, SurvivorSelection
 
 S = TypeVar("S", bound=Selectable)
@@ -68,11 +68,8 @@ class Rule:
                 its list.
         """
         given = list(population)
-        try:
+        with naming_plugin(self.function, self.key):
             answer = self.function(given, *rest, self.parameters)
-        except (Exception, SystemExit) as error:
-            what = raised_by(self.function, error)
-            raise ExperimentError(f"{self.key}: {what}") from error
         place_of = {id(one): place for place, one in enumerate(population)}
         try:
             left = [place_of.pop(id(one)) for one in given]

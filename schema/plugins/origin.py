@@ -3,12 +3,14 @@
 import ast
 import inspect
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
 
-from schema.errors import error_text
+from schema.errors import ExperimentError, error_text
 
 _CONSTANTS = (bool, int, float, complex, str, bytes, tuple, frozenset, type(None))
 
@@ -89,15 +91,23 @@ def raised_text(error: BaseException, where: str) -> str:
     return error_text(error) + (f" ({line})" if line else "")
 
 
-def raised_by(plugin: object, error: BaseException) -> str:
-    """Return a line of where a plug-in is defined, what it raised, and where.
+@contextmanager
+def naming_plugin(plugin: object, key: str) -> Iterator[None]:
+    """Say where a plug-in is defined, what it raised, and where, if it raises.
 
     Args:
-        plugin: function, class or object.
-        error: that a call of it raised.
+        plugin: function, class or object that is called.
+        key: of the experiment, which names it.
+
+    Raises:
+        ExperimentError: for any error of its code, ``exit`` included.
     """
-    where = where_defined(plugin)
-    return f"{where}: raised {raised_text(error, where)}"
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        where = where_defined(plugin)
+        story = raised_text(error, where)
+        raise ExperimentError(f"{key}: {where}: raised {story}") from error
 
 
 def _where_assigned(value: object) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -13,7 +12,7 @@ from schema.errors import ExperimentError
 from schema.experiment.brains import NoParameters
 from schema.experiment.learning import LEARNERS, Learning
 from schema.plugins.load import load_object
-from schema.plugins.origin import raised_by, where_defined
+from schema.plugins.origin import naming_plugin, where_defined
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Learner
 from schema.robot.results import Floats
@@ -69,9 +68,8 @@ class NewbornLearner:
         self._class, parameters = learner_class(rules)
         self._count = len(start)
         point = np.array(start, float)
-        self._learner: Learner = self._called(
-            self._class, point, rules.sigma, parameters
-        )
+        with naming_plugin(self._class, WHERE):
+            self._learner: Learner = self._class(point, rules.sigma, parameters)
 
     def tell(self, batch: Batch) -> None:
         """Tell the fitness of all points that were tried together.
@@ -80,7 +78,8 @@ class NewbornLearner:
             ExperimentError: the learner raises.
         """
         points, fitness = (np.array(each, float) for each in batch)
-        self._called(self._learner.tell, points, fitness)
+        with naming_plugin(self._class, WHERE):
+            self._learner.tell(points, fitness)
 
     def ask(self, rng: np.random.Generator, most: int) -> Points:
         """Return the next points to try together.
@@ -92,7 +91,8 @@ class NewbornLearner:
         Raises:
             ExperimentError: the learner raises, or returns anything else.
         """
-        answer = self._called(self._learner.ask, rng, most)
+        with naming_plugin(self._class, WHERE):
+            answer = self._learner.ask(rng, most)
         try:
             points: Floats = np.array(answer, float)
         except (TypeError, ValueError):
@@ -116,14 +116,3 @@ class NewbornLearner:
             f"{WHERE}: {where_defined(self._class)}: ask must return {expected}, "
             f"got {got}"
         )
-
-    def _called(
-        self,
-        function: Callable[..., Any],
-        *arguments: Any,  # noqa: ANN401 - those of the function
-    ) -> Any:  # noqa: ANN401 - what it returns
-        try:
-            return function(*arguments)
-        except (Exception, SystemExit) as error:
-            what = raised_by(self._class, error)
-            raise ExperimentError(f"{WHERE}: {what}") from error

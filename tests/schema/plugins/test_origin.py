@@ -6,9 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from schema.errors import ExperimentError
 from schema.plugins import permission
 from schema.plugins.load import load_object
-from schema.plugins.origin import raised_by, where_defined, where_named, where_raised
+from schema.plugins.origin import (
+    naming_plugin,
+    where_defined,
+    where_named,
+    where_raised,
+)
 
 SOURCE = '''"""Plug-ins of a lab."""
 
@@ -90,8 +96,13 @@ def test_line_that_raised(lab: str) -> None:
     with pytest.raises(ZeroDivisionError) as caught_inside:
         load_object(f"{lab}:fails", "key", dict[str, Callable[[], None]]())()
     assert where_raised(caught_inside.value, f"{lab}.py") == f"{lab}.py:24"
-    assert raised_by(judge, ValueError("two\nlines")) == (
-        f"{where_defined(judge)}: raised ValueError: two lines"
+    with pytest.raises(ExperimentError) as told, naming_plugin(judge, "key"):
+        raise ValueError("two\nlines")
+    assert str(told.value) == (
+        f"key: {where_defined(judge)}: raised ValueError: two lines"
     )
-    told = raised_by(judge, caught_inside.value)
-    assert told.endswith(f"raised ZeroDivisionError: division by zero ({lab}.py:24)")
+    with pytest.raises(ExperimentError) as told, naming_plugin(judge, "key"):
+        raise caught_inside.value
+    assert str(told.value).endswith(
+        f"raised ZeroDivisionError: division by zero ({lab}.py:24)"
+    )
