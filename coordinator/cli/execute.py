@@ -225,11 +225,7 @@ def _execute_campaign(
 ) -> int:
     """Execute a campaign's runs, print the outcome, return the exit code.
 
-    Args:
-        folder: of the campaign.
-        planned: its runs.
-        failed: folders of finished runs in which all evaluations failed.
-        deployment: processes and network.
+    ``failed`` are folders of finished runs in which all evaluations failed.
     """
     advise(stopped(folder, deployment.resume_flags))
     finished = sum(one.is_finished for one in planned)

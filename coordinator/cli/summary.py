@@ -105,10 +105,6 @@ def _is_extinct(experiment: Experiment, births: Mapping[int, int]) -> bool:
 
     An arena with all births of the experiment is none, even if its last robots are
     too few to mate.
-
-    Args:
-        experiment: of the run.
-        births: number of births on each island.
     """
     return all(
         own.arena is not None and births[number] < own.births
@@ -237,11 +233,7 @@ def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
 
 
 def _windows(islands: Iterable[Experiment]) -> list[str]:
-    """Return a line about the windows in which robots of arenas were judged, if any.
-
-    Args:
-        islands: settings of each island.
-    """
+    """Return a line about the windows in which robots of arenas were judged, if any."""
     clocks = [each.simulation for each in islands if each.arena is not None]
     seconds = sorted({each.window_steps * each.timestep_s for each in clocks})
     lasts = " or ".join(f"{each:g}" for each in seconds)

@@ -132,11 +132,9 @@ class Returned:
 
 @dataclass(frozen=True, slots=True)
 class Expired:
-    """The network waited too long for a reply: the job is sent again to its agent.
+    """The network waited too long for the reply to a job or an advance.
 
-    Attributes:
-        number: of the job or the advance.
-        agent: that has it.
+    It is sent again to its agent.
     """
 
     number: int
@@ -261,7 +259,7 @@ class ShardSeen:
     """A shard was advanced on a platform, according to the journal.
 
     Attributes:
-        shard: the shard.
+        shard: its number.
         platform: empty if it was never advanced.
         may_drift: it may move to another platform, provided that drift is allowed at
             all.
@@ -278,9 +276,7 @@ class ShardSeen:
 class ShardRequested:
     """A shard is to be advanced; may be repeated only after ``ShardDone``.
 
-    Attributes:
-        shard: the shard.
-        simulated_s: time that the advance simulates [s]; None: unknown.
+    ``simulated_s`` is the time that the advance simulates [s]; None: unknown.
     """
 
     shard: int
@@ -318,13 +314,7 @@ class Released:
 
 @dataclass(frozen=True, slots=True)
 class Killed:
-    """An assigned advance crashed its worker.
-
-    Attributes:
-        number: of the ``AssignShard``.
-        agent: that died.
-        cause: such as "SIGSEGV".
-    """
+    """An assigned advance crashed its worker, by a cause such as "SIGSEGV"."""
 
     number: int
     agent: str
@@ -365,13 +355,7 @@ class AssignShard:
 
 @dataclass(frozen=True, slots=True)
 class ShardDone:
-    """The advance of a shard is done.
-
-    Attributes:
-        shard: that was advanced.
-        agent: the worker that did it.
-        answer: decoded.
-    """
+    """A worker has done the advance of a shard; its answer is decoded."""
 
     shard: int
     agent: str
@@ -380,12 +364,9 @@ class ShardDone:
 
 @dataclass(frozen=True, slots=True)
 class ShardFailed:
-    """The advance of a shard is given up.
+    """The advance of a shard is given up, for the reason of its last failure.
 
-    Attributes:
-        shard: number of the shard.
-        agent: the last that tried; empty if the request could not be made.
-        reason: of the last failure.
+    ``agent`` is the last that tried; empty if the request could not be made.
     """
 
     shard: int
@@ -395,13 +376,7 @@ class ShardFailed:
 
 @dataclass(frozen=True, slots=True)
 class CancelShard:
-    """An assigned advance goes to another worker.
-
-    Attributes:
-        number: of the ``AssignShard``.
-        shard: that it advances.
-        agent: the worker that had it.
-    """
+    """The advance of an ``AssignShard`` goes to another worker than its agent."""
 
     number: int
     shard: int
@@ -410,12 +385,7 @@ class CancelShard:
 
 @dataclass(frozen=True, slots=True)
 class Crowded:
-    """Tell the user that there are more shards than the workers keep.
-
-    Attributes:
-        shards: number of shards.
-        kept: number of states that all workers keep.
-    """
+    """Tell the user that there are more shards than states that all workers keep."""
 
     shards: int
     kept: int

@@ -122,7 +122,7 @@ def allowed(*, is_new: bool = False) -> tuple[str, ...]:
         top = _top(name)
         copy = None if is_new and (file or _source(top)) else _copies.get(top)
         # A document may name a module that is not there.
-        if any(source.exists() for source in source_of(top)):
+        if source_of(top):
             found.append(f"{name}={copy}" if copy else str(file or name))
     return tuple(found)
 
