@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,13 @@ from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
-from coordinator.evolution.selection import PARENTS, SURVIVORS, Rule
+from coordinator.evolution.selection import (
+    PARENTS,
+    SURVIVORS,
+    Rule,
+    parents_rule,
+    survivors_rule,
+)
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
@@ -31,7 +36,6 @@ from schema.experiment.document import (
 )
 from schema.experiment.kinds import Kind, Use
 from schema.experiment.learning import Learning
-from schema.experiment.selection_rules import own_rule
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
@@ -43,6 +47,12 @@ Labels = tuple[str, ...] | None
 _CHILDREN = 15
 _FAILED = 4
 """One of so many robots of a population has failed."""
+_RULES = {"parents": parents_rule, "survivors": survivors_rule}
+_ASKED: Mapping[str, tuple[int, int, tuple[int, ...]]] = {
+    "selection.parents": (2, 2, ()),
+    "selection.survivors": (_CHILDREN + 1, _CHILDREN, (_CHILDREN,)),
+}
+"""Least size of a population for a rule, number of places, and further arguments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,64 +88,37 @@ def _populations(least: int, labels: Labels) -> Iterator[list[_Example]]:
         yield [_example(number, fitness(number), labels) for number in range(count)]
 
 
-def check_parents(
-    function: Callable[..., Any], parameters: object = None, labels: Labels = None
-) -> None:
-    """Raise unless a selection of parents keeps its contract on simple populations.
+def check_rule(rule: Rule, labels: Labels = None) -> None:
+    """Raise unless a rule of selection keeps its contract on simple populations.
 
     Args:
-        function: a ``ParentSelection``.
-        parameters: its last argument.
+        rule: of parents or survivors.
         labels: measures of the individuals.
 
     Raises:
-        ExperimentError: it raises, returns other than two different places, or other
-            ones for the same population and stream.
+        ExperimentError: it raises, returns other than as many different places as it
+            must, or different ones for the same population and stream.
     """
-    rule = Rule("selection.parents", function, parameters)
-    for population in _populations(2, labels):
-        _check_twice(rule, 2, population)
-
-
-def check_survivors(
-    function: Callable[..., Any], parameters: object = None, labels: Labels = None
-) -> None:
-    """Raise unless a selection of survivors keeps its contract on simple populations.
-
-    Args:
-        function: a ``SurvivorSelection``.
-        parameters: its last argument.
-        labels: measures of the individuals.
-
-    Raises:
-        ExperimentError: it raises, returns other than ``count`` different places, or
-            different ones for the same population and stream.
-    """
-    rule = Rule("selection.survivors", function, parameters)
-    for population in _populations(_CHILDREN + 1, labels):
-        _check_twice(rule, _CHILDREN, population, _CHILDREN)
-
-
-def _check_twice(
-    rule: Rule, count: int, population: list[_Example], *rest: int
-) -> None:
-    first, second = (
-        rule.places(count, population, *rest, np.random.default_rng(1))
-        for _ in range(2)
-    )
-    if first != second:
-        raise ExperimentError(
-            f"{rule.key}: {where_defined(rule.function)}: must return the same for the "
-            f"same population and rng, got {first} and {second}"
+    least, count, rest = _ASKED[rule.key]
+    for population in _populations(least, labels):
+        first, second = (
+            rule.places(count, population, *rest, np.random.default_rng(1))
+            for _ in range(2)
         )
+        if first != second:
+            raise ExperimentError(
+                f"{rule.key}: {where_defined(rule.function)}: must return the same for "
+                f"the same population and rng, got {first} and {second}"
+            )
 
 
-def _advise(name: str, function: Callable[..., Any], parameters: object) -> str:
+def _advise(rule: Rule) -> str:
     """Return what a rule raises for a population with failed robots, or nothing.
 
     It is not an error: a run in which no robot fails goes on.
     """
-    *_, population = _populations(_CHILDREN + 1, None)
+    least, count, rest = _ASKED[rule.key]
+    *_, population = _populations(least, None)
     failed = failed_fitness(one.fitness for one in population)
     mixed = [
         replace(one, fitness=failed, measures=NO_MEASURES)
@@ -143,35 +126,23 @@ def _advise(name: str, function: Callable[..., Any], parameters: object) -> str:
         else one
         for number, one in enumerate(population)
     ]
-    is_parents = name == "parents"
-    count, rest = (2, ()) if is_parents else (_CHILDREN, (_CHILDREN,))
-    rule = Rule(f"selection.{name}", function, parameters)
     try:
         rule.places(count, mixed, *rest, np.random.default_rng(1))
     except ExperimentError as error:
-        why = str(error).removeprefix(f"{rule.key}: {where_defined(function)}: ")
+        why = str(error).removeprefix(f"{rule.key}: {where_defined(rule.function)}: ")
         return f"of a population with failed robots (fitness 0, no measures): {why}"
     return ""
 
 
 def _use(name: str, selection: Selection, labels: Labels) -> Use:
     """Return the use of an own rule of a section; ``name`` as of ``own_rule``."""
-
-    def own() -> tuple[Callable[..., Any], Any]:
-        found = own_rule(selection, name)
-        assert found is not None
-        return found
-
-    def check(function: Callable[..., Any]) -> None:
-        keeps = check_parents if name == "parents" else check_survivors
-        keeps(function, own()[1], labels)
-
+    rule = partial(_RULES[name], selection)
     return Use(
         f"selection.{name}",
         getattr(selection, name),
-        lambda: own()[0],
-        check,
-        lambda function: _advise(name, function, own()[1]),
+        lambda: rule().function,
+        lambda _: check_rule(rule(), labels),
+        lambda _: _advise(rule()),
     )
 
 

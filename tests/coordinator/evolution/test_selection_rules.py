@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coordinator.evolution.breeding import Individual
-from coordinator.evolution.kinds import check_parents, check_survivors
+from coordinator.evolution.kinds import check_rule
 from coordinator.evolution.selection import (
     PARENTS,
     SURVIVORS,
@@ -89,10 +89,10 @@ def population(*sizes: int) -> list[Individual]:
 
 def test_built_in_rules_keep_their_contract() -> None:
     # A tournament of one draws from any population.
-    check_parents(PARENTS["tournament"], Tournament(1))
-    check_parents(PARENTS["random"])
+    check_rule(Rule("selection.parents", PARENTS["tournament"], Tournament(1)))
+    check_rule(Rule("selection.parents", PARENTS["random"], None))
     for survivors in SURVIVORS.values():
-        check_survivors(survivors)
+        check_rule(Rule("selection.survivors", survivors, None))
 
 
 def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
@@ -172,8 +172,8 @@ def test_rule_that_replaces_individuals_is_refused(lab: Callable[[str], str]) ->
     parents, survivors = rules(lab, "population[0] = population[-1]")
     everybody, rng = population(9, 5, 7, 4), np.random.default_rng(0)
     for call in (
-        lambda: check_parents(parents.function),
-        lambda: check_survivors(survivors.function),
+        lambda: check_rule(parents),
+        lambda: check_rule(survivors),
         lambda: select_parents(everybody, rng, parents),
         lambda: select_survivors(
             everybody[:2], everybody[2:], rng, Selection(population=2), survivors
@@ -187,8 +187,8 @@ def test_rule_that_sorts_its_list_chooses_from_the_sorted_one(
     lab: Callable[[str], str],
 ) -> None:
     parents, survivors = rules(lab, "population.sort(key=lambda one: one.size)")
-    check_parents(parents.function)
-    check_survivors(survivors.function)
+    check_rule(parents)
+    check_rule(survivors)
     everybody, rng = tuple(population(9, 5, 7, 4)), np.random.default_rng(0)
     # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
     couple = select_parents(everybody, rng, parents)
@@ -206,7 +206,7 @@ def test_bad_rule_is_refused_with_file_and_line(
     rule = parents_rule(Selection(parents=f"{name}:rule"))
     expected = ANSWERS[answer].replace("NAME", name)
     with pytest.raises(ExperimentError) as caught:
-        check_parents(rule.function, rule.parameters)
+        check_rule(rule)
     message = str(caught.value)
     assert re.match(rf"selection\.parents: {name}\.py:2: {expected}", message), message
 
@@ -216,7 +216,7 @@ def test_survivors_of_wrong_number_are_refused(lab: Callable[[str], str]) -> Non
     rule = survivors_rule(Selection(survivors=f"{name}:few"))
     expected = rf"survivors: {name}\.py:1: must return 15 different .* 0 to 15, got \[0"
     with pytest.raises(ExperimentError, match=expected):
-        check_survivors(rule.function, rule.parameters)
+        check_rule(rule)
 
 
 @pytest.mark.parametrize(
