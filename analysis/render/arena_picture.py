@@ -1,7 +1,8 @@
 """Pictures of the robots that live together in an arena."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from contextlib import AbstractContextManager
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ _HEIGHTS = (2, 9)
 """Columns of a wall: z of its centre, half its height."""
 
 
-class ArenaRenderer:
+class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
     """Renders robots on the ground of their arena; a context manager.
 
     The camera stands still, so that it sees all robots of some frames.
@@ -84,9 +85,6 @@ class ArenaRenderer:
             for birth, (prefix, _) in zip(robots, specs, strict=True)
         }
         self._camera = self._framing(frames)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._stage.close()

@@ -2,9 +2,10 @@
 
 import io
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -34,7 +35,7 @@ class NoPictures(RevolveError):  # noqa: N818 - names what is missing
     """A picture cannot be rendered or written."""
 
 
-class RobotRenderer:
+class RobotRenderer(AbstractContextManager["RobotRenderer"]):
     """Renders one robot on a tiled floor; a context manager.
 
     Attributes:
@@ -81,9 +82,6 @@ class RobotRenderer:
         self._middle = 0.5 * (low + high) - data.qpos[:3]
         away = np.linalg.norm(centres - 0.5 * (low + high), axis=1)
         self._radius = float((away + reaches[:, 0]).max())
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._stage.close()

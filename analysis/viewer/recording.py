@@ -7,8 +7,8 @@ nanoseconds. Rerun keeps the current time per thread, so one thread logs everyth
 
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -40,7 +40,7 @@ class ViewerError(RevolveError):
     """The viewer cannot be opened, or there is nothing to show."""
 
 
-class Recording:
+class Recording(AbstractContextManager["Recording"]):
     """An open recording to a file, a server or both; a context manager."""
 
     def __init__(
@@ -80,9 +80,6 @@ class Recording:
             self._stream.set_sinks(*sinks, default_blueprint=blueprint)
         except RuntimeError as error:
             raise ViewerError(f"cannot open the recording: {error}") from None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._stream.flush()

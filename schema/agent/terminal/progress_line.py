@@ -3,9 +3,8 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from threading import Event, Thread
-from typing import Self
 
 from rich.console import Console
 from rich.status import Status
@@ -18,7 +17,7 @@ SOON_S = 2.0
 _TURN_S = 0.2
 
 
-class ProgressLine:
+class ProgressLine(AbstractContextManager["ProgressLine"]):
     """Progress of a task of unknown length; a context manager.
 
     A line that is updated on a terminal; in a log, a line every ``SPAN_S`` if it has
@@ -33,9 +32,6 @@ class ProgressLine:
         self._line = Status("", console=self._console)
         self._next_s = -math.inf
         self._last = ""
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._line.stop()
