@@ -21,7 +21,7 @@ from analysis.figures.robot_pictures import (
     robot_picture,
     shown_document,
 )
-from analysis.figures.style import PICTURE_ENDING, in_order, label, reset_settings, save
+from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
@@ -88,7 +88,6 @@ class FigureWriter:
         Args:
             folder: an existing folder.
         """
-        reset_settings()
         self._folder = folder
         self._names = FileNames()
         for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif", _EARLIER):

@@ -19,6 +19,8 @@ from plotnine.exceptions import PlotnineWarning
 
 from analysis.measures.distinct_names import MARK
 
+# Not the settings of a user's file matplotlibrc.
+rcdefaults()
 WIDTH_IN = 7.0
 DPI = 300
 
@@ -178,11 +180,6 @@ def theme_of_size(height_in: float) -> Any:  # noqa: ANN401 - untyped
         panel_spacing_x=0.04,
         panel_spacing_y=0.05,
     )
-
-
-def reset_settings() -> None:
-    """Forget the settings of the user's file ``matplotlibrc``."""
-    rcdefaults()
 
 
 def save(figure: p9.ggplot | Figure, stem: Path) -> None:

@@ -1,6 +1,7 @@
 """Evaluation of the robots of finished runs once more, by workers, into a table."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
+from analysis.comparison.robustness import Columns, table_of
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.style import save
 from analysis.progress import bars, replaced
@@ -42,7 +44,7 @@ class Job(NamedTuple):
     robot: Robot | PlainRobot
 
 
-def reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
+def _reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
     """Yield a row for each job with columns, in their order; show progress.
 
     Equal evaluations are computed once.
@@ -50,9 +52,6 @@ def reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
     Args:
         jobs: evaluations, for each robot the one without a change first.
         workers: worker processes on this machine.
-
-    Raises:
-        RevolveError: no worker is left.
     """
     robots = counted(len({id(job.one) for job in jobs}), "robot")
     title = f"re-evaluating {robots} {len(jobs)} times in all"
@@ -80,33 +79,38 @@ def reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
 
 
 def write_results(
-    rows: Callable[[], pa.Table],
-    folders: Iterable[Path],
-    stem: Path,
+    options: Namespace,
+    name: str,
+    jobs: Sequence[Job],
+    *,
+    columns: Columns,
     summary: Callable[[pa.Table], str],
     figure: Callable[[pa.Table], Any],
 ) -> None:
-    """Write a table and its figure; print a line about each run and each file.
+    """Evaluate; write a table and its figure; print a line about each run and file.
 
     An earlier table in the folder is replaced, as the report of ``analyze`` is.
 
     Args:
-        rows: returns the table, once its folder can be written.
-        folders: of the runs, as in the table's column ``folder``.
-        stem: path of the files without ending.
+        options: of the command: runs, output folder and workers.
+        name: of the files, without ending.
+        jobs: as of ``_reevaluated``.
+        columns: of the table.
         summary: returns the line about a run, from its rows.
         figure: returns the figure of the table.
 
     Raises:
         RunFolderError: the folder cannot be written.
+        RevolveError: no worker is left.
     """
+    stem: Path = options.out / name
     make_folder(stem.parent)
     path = stem.with_suffix(".parquet")
     for line in replaced(path, "the table", "its runs and its figure"):
         print(line, flush=True)
-    table = rows()
+    table = table_of(_reevaluated(jobs, options.workers), columns)
     pq.write_table(table, path)
-    for folder in folders:
+    for folder in options.runs:
         own = table.filter(pc.field("folder") == str(folder))
         print(f"{folder}: {summary(own)}")
     print(f"{path}: {table.num_rows} evaluations under changes")
