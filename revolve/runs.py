@@ -3,7 +3,6 @@
 import html
 import tempfile
 from collections.abc import Iterable, Sequence
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -230,11 +229,16 @@ class Run:
 
     def _first(self, rows: Iterable[Row], count: int) -> list[Robot]:
         """Return the robots of the first rows, each once."""
+        most = whole_number("count", count)
         islands: dict[BirthId, int] = {}
         for row in rows:
+            if len(islands) == most:
+                break
             islands.setdefault(individual(row), row["island"])
-        first = islice(islands.items(), whole_number("count", count))
-        return [self._robots(self._birth(one), [home])[0] for one, home in first]
+        return [
+            self._robots(self._birth(birth), [home])[0]
+            for birth, home in islands.items()
+        ]
 
     def __repr__(self) -> str:
         return f"<Run {self.name}, seed {self.seed}: {self.state}, {self.folder}>"
@@ -242,7 +246,7 @@ class Run:
     def _repr_html_(self) -> str:
         """Return the summary that a notebook shows."""
         best = best_of(last_populations(self.folder))
-        ever = next(iter(best_ever(self.folder)), None)
+        ever = next(best_ever(self.folder), None)
         document = document_of(self.experiment)
         born = read_table(self.folder, "births", ["record"]).num_rows
         planned = sum(own.births for own in island_experiments(document))

@@ -28,12 +28,7 @@ from schema.formats.yaml import robot_to_yaml
 from schema.robot.robot import Robot, motor_count
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import born_as, read_table
-from schema.tables.last_populations import (
-    Row,
-    best_ever,
-    best_of,
-    last_populations,
-)
+from schema.tables.last_populations import Row, best_ever, best_of, last_populations
 from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual, read_levels
@@ -197,7 +192,7 @@ def _best_robot(run: RunSession, best: Row) -> list[str]:
 
 def _better_ever(folder: Path, best: Row) -> list[str]:
     """Return a line about the best robot ever if it had more fitness than this one."""
-    ever = best_ever(folder)[0]
+    ever = next(best_ever(folder))
     if ever["fitness"] <= best["fitness"]:
         return []
     shown = command("view", folder, "--robot", "best-ever")

@@ -89,8 +89,8 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         raise RunFolderError(f"{folder}: no robot was evaluated")
     order, is_last = _fittest_first(found), found["is_last"].to_pylist()
     last = set([row for row in order if is_last[row]][:most])
-    judged = [*best_ever(folder), found.slice(order[0], 1).to_pylist()[0]]
-    ever = individual(judged[0])
+    first = found.slice(order[0], 1).to_pylist()[0]
+    ever = individual(next(best_ever(folder), first))
     own = OwnRun(folder)
     births = tables["births"]
     recorded = _recorded(tables)

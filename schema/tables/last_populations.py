@@ -5,7 +5,9 @@ ever* the fittest that was ever evaluated, dead or alive. Of both, ``fittest_fir
 says which of equally fit robots is meant.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,8 @@ import pyarrow.compute as pc
 from schema.tables.files import read_table
 
 Row = Mapping[str, Any]
+_AT_ONCE = 100
+"""Number of rows that become Python objects together."""
 
 
 def last_populations(folder: Path) -> list[Row]:
@@ -35,12 +39,13 @@ def last_populations(folder: Path) -> list[Row]:
     return pa.concat_tables(last).to_pylist() if last else []
 
 
-def best_ever(folder: Path) -> list[Row]:
-    """Return rows of all robots with a fitness, the best ever first.
+def best_ever(folder: Path) -> Iterator[Row]:
+    """Yield rows of all robots with a fitness, the best ever first.
 
-    Robots of arenas count with their samples while they were mature.
+    Robots of arenas count with their samples while they were mature. Arrow sorts the
+    rows by fitness; only those that are taken, and equal ones, become Python objects.
 
-    Returns:
+    Yields:
         Island, individual and greatest fitness of each robot on each island.
 
     Raises:
@@ -48,13 +53,20 @@ def best_ever(folder: Path) -> list[Row]:
     """
     keys = ["island", "birth_island", "birth"]
     columns = [*keys, "fitness"]
-    alone = read_table(folder, "evaluations", columns)
+    alone = read_table(folder, "evaluations", columns, pc.field("fitness").is_valid())
     columns.append("is_mature")
     samples = read_table(folder, "fitness", columns, pc.field("is_mature"))
     # The fitness of a sample is never null.
     every = pa.concat_tables([alone, samples], promote_options="default")
-    greatest = every.group_by(keys).aggregate([("fitness", "max")]).to_pylist()
-    return fittest({**row, "fitness": row["fitness_max"]} for row in greatest)
+    greatest = every.group_by(keys).aggregate([("fitness", "max")])
+    falling = greatest.sort_by([("fitness_max", "descending")])
+    rows = (
+        {**row, "fitness": row["fitness_max"]}
+        for batch in falling.to_batches(max_chunksize=_AT_ONCE)
+        for row in batch.to_pylist()
+    )
+    for _, equal in groupby(rows, itemgetter("fitness")):
+        yield from sorted(equal, key=fittest_first)
 
 
 def best_of(rows: Iterable[Row]) -> Row | None:
