@@ -34,7 +34,7 @@ def whole_number(
         number = index(value)  # type: ignore[arg-type]
     except TypeError:
         number = least - 1
-    if least <= number <= most:
+    if least <= number <= most and not isinstance(value, bool):
         return number
     raise RevolveError(
         f"{name}: must be a whole number from {least} to {most}, got {shown(value)}"

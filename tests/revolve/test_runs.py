@@ -145,14 +145,17 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
     [
         (
             {"seed": -1},
-            "--seed: must be a whole number in 0..18446744073709551615, got '-1'",
+            "seed: must be a whole number from 0 to 18446744073709551615, got -1",
         ),
-        ({"births": 0}, "--births: must be a whole number >= 1, got '0'"),
-        ({"births": 2.5}, "--births: must be a whole number >= 1, got '2.5'"),
-        ({"workers": True}, "--workers: must be "),
+        ({"births": 0}, "births: must be a whole number from 1 to 4294967295, got 0"),
+        (
+            {"births": 2.5},
+            "births: must be a whole number from 1 to 4294967295, got 2.5",
+        ),
+        ({"workers": True}, "workers: must be "),
     ],
 )
-def test_wrong_numbers_raise_the_line_of_the_command(
+def test_wrong_numbers_are_refused_before_a_command_starts(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
     keys: dict[str, Any],
@@ -160,8 +163,8 @@ def test_wrong_numbers_raise_the_line_of_the_command(
 ) -> None:
     with pytest.raises(rv.RevolveError) as caught:
         rv.run("scenario1", out=tmp_path / "x", **keys)
-    assert expected in str(caught.value)
-    assert capfd.readouterr().err == f"{caught.value}\n"
+    assert str(caught.value).startswith(expected)
+    assert capfd.readouterr().err == ""
 
 
 def test_analysis_of_nothing_raises_the_line_of_the_command() -> None:
