@@ -21,7 +21,8 @@ from schema.errors import (
     shown,
 )
 from schema.experiment.brains import types_of
-from schema.experiment.settings import EvaluationSettings, experiment_with
+from schema.experiment.document import Experiment as Document
+from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import settings_of, types_for, write_robot
 from schema.formats.run_settings import read_with_settings
 from schema.formats.yaml_reader import OTHER_TYPES
@@ -92,7 +93,9 @@ class Robot:
         except MalformedMessage as error:
             raise InvalidRobot(str(error)) from None
         if own is None and settings != settings_of(None):
-            own = experiment_with(settings, Path(path).stem)
+            sections = msgspec.structs.asdict(settings)
+            del sections["ablation"]
+            own = Document(name=Path(path).stem, **sections)
         return cls(found.parts, found.brain, None if own is None else Experiment(own))
 
     @classmethod

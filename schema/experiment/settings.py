@@ -141,13 +141,6 @@ def evaluation_settings_of(experiment: Experiment) -> EvaluationSettings:
     return replace(settings, environment=replace(settings.environment, light=light))
 
 
-def experiment_with(settings: EvaluationSettings, name: str) -> Experiment:
-    """Return an experiment with the sections of settings, without their ablation."""
-    sections = msgspec.structs.asdict(settings)
-    del sections["ablation"]
-    return Experiment(name=name, **sections)
-
-
 def evaluation_settings(experiment: Experiment) -> bytes:
     """Return the JSON that every evaluation request of an experiment holds."""
     return msgspec.json.encode(evaluation_settings_of(experiment))

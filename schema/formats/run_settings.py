@@ -40,13 +40,14 @@ def experiment_of(
     ``read_with_settings``.
     """
     if named:
-        experiment = read_experiment(named) if isinstance(named, str) else named
-        own = _of_island(experiment, island or 0)
-        if island is None and _differs(experiment):
+        given = read_experiment(named) if isinstance(named, str) else named
+        own = _of_island(given, island or 0)
+        if island is None and _differs(given):
             say(f"with the settings of {named}, island 0; --island names another")
         return own
     folder = file.parent
-    if not (folder / DETAILS).is_file():
+    experiment = _experiment_of_run(folder)
+    if experiment is None:
         if island is not None:
             raise ExperimentError(
                 "--island: the robot file is in no run folder; name an experiment with "
@@ -55,8 +56,6 @@ def experiment_of(
         if tells_default:
             say("with the settings of scenario1; --experiment names others")
         return None
-    allow_plugins_of(folder)
-    experiment = own_experiment(read_description(folder).document)
     where = f"with the settings of {folder} ({experiment.name})"
     number = island or 0
     if _differs(experiment):
@@ -111,9 +110,9 @@ def read_with_settings(
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 
-        is_of_run = _allow_run_of(file)
+        of_run = _experiment_of_run(file.parent)
         robot, settings = read_mjcf(file)
-        if is_of_run or tells_default:
+        if of_run or tells_default:
             say(f"with the settings in {file}; --experiment names others")
         return robot, settings, None
     found = experiment_of(file, named, island, tells_default=tells_default, say=say)
@@ -121,17 +120,12 @@ def read_with_settings(
     return robot, settings_of(found), found
 
 
-def _allow_run_of(file: Path) -> bool:
-    """Allow the plug-ins of the run whose folder holds a robot file.
-
-    Returns:
-        Whether the file is in the folder of a run.
-    """
-    if not (file.parent / DETAILS).is_file():
-        return False
-    allow_plugins_of(file.parent)
-    own_experiment(read_description(file.parent).document)
-    return True
+def _experiment_of_run(folder: Path) -> Experiment | None:
+    """Return the experiment of a run, whose plug-ins are allowed; None: no run."""
+    if not (folder / DETAILS).is_file():
+        return None
+    allow_plugins_of(folder)
+    return own_experiment(read_description(folder).document)
 
 
 def _differs(experiment: Experiment) -> bool:
