@@ -44,6 +44,11 @@ _OF_ROBOTS = ("island", "birth", "genome", "robot")
 """Columns of births that the robots are made from."""
 
 
+def _table(name: str, rows: str) -> property:
+    """Return the property of a run that reads a table; ``rows`` says what it has."""
+    return property(lambda run: run.table(name), doc=rows)
+
+
 class Run:
     """A run folder: its description and its tables, as they are now.
 
@@ -76,65 +81,22 @@ class Run:
         """``finished``, ``stopped``, or ``running`` (also after a kill)."""
         return read_state(self.folder)
 
-    @property
-    def births(self) -> pa.Table:
-        """One row per individual born."""
-        return self.table("births")
-
-    @property
-    def evaluations(self) -> pa.Table:
-        """One row per finished evaluation, off-line."""
-        return self.table("evaluations")
-
-    @property
-    def learning(self) -> pa.Table:
-        """One row per trial of a newborn that learns."""
-        return self.table("learning")
-
-    @property
-    def population(self) -> pa.Table:
-        """Members of each recorded population."""
-        return self.table("population")
-
-    @property
-    def fitness(self) -> pa.Table:
-        """One row per living robot and sample, on-line."""
-        return self.table("fitness")
-
-    @property
-    def poses(self) -> pa.Table:
-        """One row per living robot and pose, on-line."""
-        return self.table("poses")
-
-    @property
-    def deaths(self) -> pa.Table:
-        """One row per individual gone, on-line."""
-        return self.table("deaths")
-
-    @property
-    def touches(self) -> pa.Table:
-        """One row per pair of robots that touched, on-line, if recorded."""
-        return self.table("touches")
-
-    @property
-    def migrations(self) -> pa.Table:
-        """One row per migrant."""
-        return self.table("migrations")
-
-    @property
-    def audits(self) -> pa.Table:
-        """One row per evaluation that was repeated on a second worker."""
-        return self.table("audits")
-
-    @property
-    def drifts(self) -> pa.Table:
-        """One row per move of an arena to another platform."""
-        return self.table("drifts")
-
-    @property
-    def runs(self) -> pa.Table:
-        """One row about a finished run."""
-        return self.table("runs")
+    births = _table("births", "One row per individual born.")
+    evaluations = _table("evaluations", "One row per finished evaluation, off-line.")
+    learning = _table("learning", "One row per trial of a newborn that learns.")
+    population = _table("population", "Members of each recorded population.")
+    fitness = _table("fitness", "One row per living robot and sample, on-line.")
+    poses = _table("poses", "One row per living robot and pose, on-line.")
+    deaths = _table("deaths", "One row per individual gone, on-line.")
+    touches = _table(
+        "touches", "One row per pair of robots that touched, on-line, if recorded."
+    )
+    migrations = _table("migrations", "One row per migrant.")
+    audits = _table(
+        "audits", "One row per evaluation that was repeated on a second worker."
+    )
+    drifts = _table("drifts", "One row per move of an arena to another platform.")
+    runs = _table("runs", "One row about a finished run.")
 
     def table(self, name: str) -> pa.Table:
         """Return a table.
@@ -336,8 +298,7 @@ def run(
     words = ["--seed", str(seed), "--out", str(folder)]
     for flag, value in (("--births", births), ("--connect", connect)):
         words += [] if value is None else [flag, str(value)]
-    ours = (*allowed(is_new=True), *plugins)
-    words += _common(workers, ours, progress=progress)
+    words += _common(workers, (*allowed(is_new=True), *plugins), progress=progress)
     if not isinstance(experiment, Experiment):
         return _done(("run", str(experiment), *words), folder, progress=progress)
     with tempfile.TemporaryDirectory() as place:
