@@ -41,9 +41,15 @@ def test_a_missing_library_is_named_with_its_extra(
     assert "install" in done.stdout
 
 
-def test_the_backend_of_a_notebook_does_not_stop_an_analysis() -> None:
+@pytest.mark.parametrize(
+    ("module", "command"),
+    [("analysis.__main__", "analyze"), ("revolve.cli.reevaluate", "robustness")],
+)
+def test_the_backend_of_a_notebook_does_not_stop_an_analysis(
+    module: str, command: str
+) -> None:
     """Its name is refused by matplotlib where the notebook's package is missing."""
-    script = "from analysis.__main__ import main; main(['analyze', 'nowhere'])"
+    script = f"from {module} import main; main([{command!r}, 'nowhere'])"
     done = subprocess.run(
         [sys.executable, "-c", script],
         capture_output=True,

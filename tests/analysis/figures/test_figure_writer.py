@@ -1,13 +1,14 @@
 """Tests of the files of figures and films."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
-from matplotlib import rc_context
 from PIL import Image
 from rich.progress import Progress
 
@@ -99,14 +100,20 @@ def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors(
     assert "its ancestors over four levels of reproduction" in tree.caption
 
 
-def test_figures_do_not_depend_on_a_users_settings(tmp_path: Path) -> None:
-    def drawn(name: str) -> bytes:
-        (tmp_path / name).mkdir()
-        writer = FigureWriter(tmp_path / name)
-        writer.add(replace(tree_of("x"), draw=lambda _: plt.subplots()[0]), {})
-        return writer.drawn[0].picture.read_bytes()
+DRAW = """
+import sys
+from pathlib import Path
+from analysis.figures.style import save
+from matplotlib import pyplot
+save(pyplot.subplots()[0], Path(sys.argv[1]))
+"""
 
-    plain = drawn("plain")
-    users: dict[Any, Any] = {"axes.facecolor": "red", "font.size": 40}
-    with rc_context(users):
-        assert drawn("users") == plain
+
+def test_figures_do_not_depend_on_a_users_settings(tmp_path: Path) -> None:
+    (tmp_path / "matplotlibrc").write_text("axes.facecolor: red\nfont.size: 40\n")
+    drawn = []
+    for name, settings in (("plain", {}), ("users", {"MATPLOTLIBRC": str(tmp_path)})):
+        command = [sys.executable, "-c", DRAW, str(tmp_path / name)]
+        subprocess.run(command, env={**os.environ, **settings}, check=True)
+        drawn.append((tmp_path / name).with_suffix(".png").read_bytes())
+    assert drawn[0] == drawn[1]
