@@ -16,7 +16,7 @@ import zenoh
 from analysis.viewer.presence import Presence
 from schema.agent.log import tell_user, warn_user
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
-from schema.agent.service import HubWatch, start_engine, why_no_hub
+from schema.agent.service import HubWatch, open_session, why_no_hub
 from schema.agent.topics import (
     Member,
     agents_alive,
@@ -135,11 +135,10 @@ class LiveSource:
         Raises:
             NetworkError: no hub answers.
         """
-        start_engine()
         with ExitStack() as opened:
             try:
                 config = zenoh.Config.from_json5(self._config)
-                self._session = opened.enter_context(zenoh.open(config))
+                self._session = opened.enter_context(open_session(config))
             except zenoh.ZError:
                 raise NetworkError(why_no_hub(self._connect, self._hub.tls)) from None
             put = zenoh.handlers.Callback(self._take, indirect=False)

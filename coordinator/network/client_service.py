@@ -6,7 +6,7 @@ from threading import Event
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, DEFAULT_FLEET, Tls, client_config
-from schema.agent.service import start_engine, why_no_hub
+from schema.agent.service import open_session, why_no_hub
 from schema.agent.topics import Member, agents_alive, check_name, member_of
 from schema.errors import MalformedMessage, NetworkError
 
@@ -36,9 +36,8 @@ def ask_coordinators(
     """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
-    start_engine()
     try:
-        session = zenoh.open(zenoh.Config.from_json5(config))
+        session = open_session(zenoh.Config.from_json5(config))
     except zenoh.ZError:
         raise NetworkError(why_no_hub(connect, tls)) from None
     replies_of: dict[str, bytes] = {}

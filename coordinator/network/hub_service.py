@@ -7,7 +7,7 @@ import zenoh
 
 from schema.agent.log import tell_user, warn_user
 from schema.agent.network import cannot_listen
-from schema.agent.service import start_engine
+from schema.agent.service import open_session
 from schema.limits import printable
 
 
@@ -22,9 +22,8 @@ def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) ->
     Raises:
         NetworkError: an address that cannot be listened on.
     """
-    start_engine()
     try:
-        session = zenoh.open(zenoh.Config.from_json5(config))
+        session = open_session(zenoh.Config.from_json5(config))
     except zenoh.ZError as error:
         raise cannot_listen(", ".join(addresses), str(error)) from None
     with session:

@@ -13,7 +13,7 @@ import zenoh
 from coordinator.network.client_service import coordinators, reply_of
 from schema.agent.address import UNIX, parse_address
 from schema.agent.network import Tls, client_config
-from schema.agent.service import start_engine, usable
+from schema.agent.service import open_session, usable
 from schema.agent.topics import Member, Role
 from schema.errors import MalformedMessage
 from schema.wire.operator import (
@@ -95,9 +95,8 @@ def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
         NetworkError: an address that needs files.
     """
     config = client_config(connect, tls)
-    start_engine()
     try:
-        session = zenoh.open(zenoh.Config.from_json5(config))
+        session = open_session(zenoh.Config.from_json5(config))
     except zenoh.ZError as error:
         # What follows is a place in the engine's source.
         return HubProbe(str(error).partition(" at /")[0])

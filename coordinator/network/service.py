@@ -41,8 +41,8 @@ from schema.agent.platform_tag import wire_version
 from schema.agent.service import (
     HubWatch,
     Outlet,
+    open_session,
     session_config,
-    start_engine,
     why_no_hub,
 )
 from schema.agent.topics import Member, agents_alive, check_name
@@ -205,11 +205,10 @@ class Network:
         Raises:
             NetworkError: an address in use, or no hub.
         """
-        start_engine()
         with ExitStack() as opened:
             try:
                 config = session_config(self._config, self._me)
-                self._session = opened.enter_context(zenoh.open(config))
+                self._session = opened.enter_context(open_session(config))
             except zenoh.ZError as error:
                 if self._is_hub:
                     raise cannot_listen(self.address, str(error)) from None

@@ -66,24 +66,30 @@ normal: the job is sent again.
 """
 
 
-def start_engine(*, is_agent: bool = False) -> None:
-    """Choose Zenoh's threads; start its log, on descriptor 1, at level "warn".
+def open_session(config: zenoh.Config, *, is_agent: bool = False) -> zenoh.Session:
+    """Return a new session; Zenoh logs on descriptor 1, at level "warn".
 
     RUST_LOG has no effect: at lower levels the log shows secrets. Commands lead the
     descriptor to standard error, see ``revolve.command.main``. ZENOH_RUNTIME has none:
     with some values a hub cannot forward, with others the engine panics.
 
     Args:
+        config: of the session.
         is_agent: this process is a worker or an analyzer.
+
+    Raises:
+        zenoh.ZError: no hub answers, or an address cannot be listened on.
     """
+    names = ("RUST_LOG", "ZENOH_RUNTIME")
+    chosen = {name: os.environ.pop(name) for name in names if name in os.environ}
     # Read when a process opens its first session.
     os.environ["ZENOH_RUNTIME"] = AGENT_THREADS if is_agent else HUB_THREADS
-    chosen = os.environ.pop("RUST_LOG", None)
     try:
         zenoh.init_log_from_env_or(_ENGINE_LOG)
+        return zenoh.open(config)
     finally:
-        if chosen is not None:
-            os.environ["RUST_LOG"] = chosen
+        del os.environ["ZENOH_RUNTIME"]
+        os.environ.update(chosen)
 
 
 def session_config(text: str, member: Member) -> zenoh.Config:
@@ -327,7 +333,6 @@ def serve(
         tls=None if slot.index else agent.tls,
         fleet=agent.fleet,
     )
-    start_engine(is_agent=True)
     session = _open(config, hub, stop)
     if session is not None:
         with session:
@@ -416,7 +421,7 @@ def _open(
     """Return a session as soon as there is a hub; None if stopped before."""
     while not stop.is_set():
         try:
-            return zenoh.open(config)
+            return open_session(config, is_agent=True)
         except zenoh.ZError:
             # A process that is told to stop meanwhile needs no hub.
             if not stop.is_set():

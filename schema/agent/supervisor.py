@@ -77,8 +77,8 @@ def prepare_process() -> None:
     one that computes, for a few milliseconds; unused memory is returned to the system.
     """
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-    given = os.environ.get("ZENOH_RUNTIME", HUB_THREADS)
-    if given not in (HUB_THREADS, AGENT_THREADS):  # those of a parent process
+    given = os.environ.pop("ZENOH_RUNTIME", None)
+    if given is not None:
         warn_user(f"ZENOH_RUNTIME: has no effect here, got {shown(given)}")
     if _MAPPED not in os.environ:
         os.environ[_MAPPED] = str(_MAP_BYTES)  # glibc reads it at the start of children
