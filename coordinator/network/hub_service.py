@@ -2,6 +2,7 @@
 
 import json
 import threading
+from contextlib import AbstractContextManager, nullcontext
 
 import zenoh
 
@@ -26,23 +27,31 @@ def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) ->
         session = open_session(zenoh.Config.from_json5(config))
     except zenoh.ZError as error:
         raise cannot_listen(", ".join(addresses), str(error)) from None
-    with session:
+    with session, watch_unlisted(session, config):
         for address in addresses:
             tell_user(f"listening on {address}")
-        _watch = watch_unlisted(session, config)
         stop.wait()
 
 
-def watch_unlisted(session: zenoh.Session, config: str) -> object:
-    """Tell, while the result is kept, which certificates a hub's rules do not name."""
+def watch_unlisted(
+    session: zenoh.Session, config: str
+) -> AbstractContextManager[object]:
+    """Tell in a context which certificates connect that a hub's rules do not name.
+
+    The context must end before the session is closed: an event that comes later, while
+    the interpreter ends, would abort the process.
+    """
     subjects = json.loads(config).get("access_control", {}).get("subjects", [])
+    if not subjects:
+        return nullcontext()
     known = {name for each in subjects for name in each.get("cert_common_names", ())}
 
     def note(event: zenoh.LinkEvent) -> None:
         name = event.link.auth_identifier
-        if subjects and name and name not in known:
+        if name and name not in known:
             known.add(name)
             about = "is not in --access (revoked?): what it sends is dropped"
             warn_user(f"certificate {printable(name)!r} {about}")
 
-    return session.info.declare_link_events_listener(note, history=True)
+    listener = zenoh.handlers.Callback(note, indirect=False)
+    return session.info.declare_link_events_listener(listener, history=True)

@@ -215,6 +215,8 @@ class Network:
                 line = why_no_hub(self.address, self._hub.tls)
                 raise NetworkError(line) from None
             self._declare()
+            if self._is_hub:
+                opened.enter_context(watch_unlisted(self._session, self._config))
             self._opened = opened.pop_all()
         return self
 
@@ -236,8 +238,6 @@ class Network:
             self._session.declare_queryable(key, self._enqueue(key), complete=True)
             for key in (self._me.command, self._me.state)
         ]
-        if self._is_hub:
-            self._links = watch_unlisted(self._session, self._config)
         self._outlet.lead_to(self._session)
         self._token = self._session.liveliness().declare_token(self._me.alive)
 

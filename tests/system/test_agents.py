@@ -184,7 +184,7 @@ def test_only_agents_with_a_certificate_connect(
         command("worker", *flags(stranger), "--name", "stranger") as outside,
     ):
         assert outside.stderr is not None
-        assert "no hub at" in outside.stderr.readline()
+        assert "unknown ca" in outside.stderr.readline()
         with command("worker", *flags(friend), "--name", "friend"):
             (name,) = agents(until(network, 1))
             assert name.startswith("friend-0.")

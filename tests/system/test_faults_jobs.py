@@ -78,6 +78,7 @@ def reasons(folder: Path) -> dict[int, str]:
     return {row["birth"]: row["reason"] for row in rows if row["status"] == "failed"}
 
 
+ALONE = ("harm.toml", "--seed", "1", "--quiet", "--in-process")
 WORDS = ("harm.toml", "--seed", "1", "--cpu-limit", "0.7", "--quiet")
 
 
@@ -159,7 +160,7 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
     workspace: Workspace, fleet_of: Fleets
 ) -> None:
     write_plug_in(workspace)
-    workspace.run("run", *WORDS, "--in-process", "--out", "calm")
+    workspace.run("run", *ALONE, "--out", "calm")
     fleet = fleet_of(workspace, *WORDS)
     elsewhere = workspace.folder / "elsewhere"
     elsewhere.mkdir()
@@ -216,7 +217,7 @@ def test_disagreeing_workers_are_reported_and_stop_the_run(
     module = workspace.folder / "plugged.py"
     drift = 'return value * (1 + 3e-16) if os.environ.get("DRIFT") else value'
     module.write_text(module.read_text().replace("return value", drift))
-    workspace.run("run", *WORDS, "--in-process", "--out", "calm")
+    workspace.run("run", *ALONE, "--out", "calm")
     fleet = fleet_of(workspace, *WORDS, "--audit", "1")
     fleet.join("sound", "worker", "--plugins", "plugged")
     fleet.join("broken", "worker", "--plugins", "plugged", environment={"DRIFT": "1"})
