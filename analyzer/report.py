@@ -1,46 +1,41 @@
-"""Report on a body (size, mass, motors, intersections), also as an encoded answer."""
+"""Report on a body: size, mass, motors, intersections."""
 
-import time
 from functools import lru_cache
 
 from analyzer.overlap import bounding_box, intersecting_parts, place_boxes
+from schema.errors import MalformedMessage
 from schema.experiment.document import Vetting, body_space
-from schema.experiment.settings import read_vetting_settings
+from schema.experiment.settings import VettingSettings, read_vetting_settings
 from schema.parts import BodySpace
 from schema.robot.results import Report
-from schema.robot.robot import Robot, check_body, motor_count
-from schema.wire.codec import Answer, decode_body, decode_request, encode_answer
+from schema.robot.robot import Robot, check_body, check_tree, motor_count
+from schema.wire.messages import Request, Vet
 
 
-def answer(request: bytes) -> bytes:
-    """Return the encoded answer to an encoded request.
+def answer(request: Request) -> Report:
+    """Return the report on the body of a request; a brain in it is ignored.
 
     Args:
-        request: a ``Request`` with ``VettingSettings`` about a body; a brain in it is
-            ignored.
-
-    Returns:
-        An ``Answer`` with a report; apart from ``wall_s`` it depends on the request
-        alone.
+        request: a ``Vet`` with ``VettingSettings``.
 
     Raises:
-        MalformedMessage: the bytes are no request.
+        MalformedMessage: other work.
         ExperimentError: the settings are invalid or name what does not exist.
         InvalidRobot: the body space does not allow the body.
     """
-    start = time.perf_counter()
-    decoded = decode_request(request, decode_body, _body_space)
-    settings = read_vetting_settings(decoded.settings)
-    space = _body_space(decoded.settings)
-    check_body(decoded.robot.parts, space)
-    report = analyze(decoded.robot, space, settings.vetting)
-    wall_s = time.perf_counter() - start
-    return encode_answer(Answer(decoded.epoch, decoded.number, wall_s, report))
+    if not isinstance(request.work, Vet):
+        raise MalformedMessage("an analyzer vets bodies only")
+    settings, space = _read(request.settings)
+    robot = request.work.robot
+    check_tree(robot.parts)
+    check_body(robot.parts, space)
+    return analyze(robot, space, settings.vetting)
 
 
 @lru_cache(maxsize=64)
-def _body_space(settings: bytes) -> BodySpace:
-    return body_space(read_vetting_settings(settings).space)
+def _read(settings: bytes) -> tuple[VettingSettings, BodySpace]:
+    read = read_vetting_settings(settings)
+    return read, body_space(read.space)
 
 
 def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:

@@ -45,6 +45,7 @@ from schema.agent.command import (
 from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
 from schema.agent.log import start_log, tell_user, warn_user
+from schema.agent.request_handler import Compute
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
@@ -226,7 +227,7 @@ def _deployment(
     threads = options.threads or (cores() if is_one_arena else 1)
     most_held = shards_that_fit(memory_bytes(), processes=1)
     shards = Shards(World, most_held=most_held, threads=threads)
-    answers: dict[AgentKind, Callable[[bytes], bytes]] = {
+    answers: dict[AgentKind, Compute] = {
         "analyzer": analyzer.report.answer,
         "worker": Jobs(shards).answer,
     }

@@ -38,7 +38,7 @@ from schema.experiment.settings import evaluation_settings_of
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_genome
+from schema.wire.protobuf import decode_genome
 from worker.robot.evaluation import evaluate
 
 ROOT = Path(__file__).resolve().parents[1]

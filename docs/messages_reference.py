@@ -22,7 +22,7 @@ import schema.wire.updates
 from docs.struct_tables import attributes, introduction, rows
 from schema.agent import topics
 from schema.agent.topics import Member, Role
-from schema.wire.decoding import Message
+from schema.wire.codec import Message
 
 _TOP = Path(__file__).parents[1]
 _PROTO = "schema/wire/revolve.proto"

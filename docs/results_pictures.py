@@ -177,7 +177,7 @@ def _robots(tables: Tables) -> dict[str, Figure]:
     from schema.experiment.identity import Origin  # noqa: PLC0415
     from schema.robot.genome import develop  # noqa: PLC0415
     from schema.robot.ids import BirthId  # noqa: PLC0415
-    from schema.wire.codec import decode_genome  # noqa: PLC0415
+    from schema.wire.protobuf import decode_genome  # noqa: PLC0415
     from worker.robot.evaluation import simulate  # noqa: PLC0415
 
     pictures, relatives = {}, {}

@@ -22,6 +22,10 @@ from coordinator.network.service import Network
 from schema.agent.log import tell_user, warn_user
 from schema.agent.topics import unique_name
 from schema.errors import NetworkError, RevolveError, counted, error_text
+from schema.experiment.identity import NO_ORIGIN, Origin
+from schema.plugins.source import plugins_of
+from schema.wire.codec import encode
+from schema.wire.messages import Request, Work
 
 _WAIT_S = 0.2
 _CHORES_S = 1.0
@@ -37,18 +41,22 @@ class Order:
 
     Attributes:
         kind: of the job.
-        encode: returns the request, given run, epoch and number of the job.
+        work: what to do.
+        settings: JSON of the settings of the work.
         read: decodes and checks an answer, given ``expected``, epoch and number.
         settle: returns the future's value for the end of the job, or raises.
         simulated_s: as of ``Job``.
+        origin: as of ``Request``.
         future: gets the value or the exception.
     """
 
     kind: JobKind
-    encode: Callable[..., bytes]
+    work: Work
+    settings: bytes
     read: Callable[..., object]
     settle: Callable[[Deliver], Any]
     simulated_s: float | None = None
+    origin: Origin = NO_ORIGIN
     future: "Future[Any]" = field(default_factory=Future)
 
 
@@ -224,11 +232,20 @@ class Engine:
             return
         number = fleet.new_number()
         run, epoch = self._client
-        payload = order.encode(run=run, epoch=epoch, number=number)
+        settings = order.settings
+        request = Request(
+            run,
+            epoch,
+            number,
+            order.work,
+            settings,
+            plugins_of(settings),
+            order.origin,
+        )
         self._open[number] = order
         read = partial(order.read, expected=(_EPOCH, number))
         about = (self._client, order, read, order.simulated_s)
-        fleet.request(Job(number, order.kind, payload, -1, *about))
+        fleet.request(Job(number, order.kind, encode(request), -1, *about))
 
     def _withdraw(self, fleet: Fleet) -> None:
         """Drop the jobs of cancelled futures."""

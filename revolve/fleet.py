@@ -19,7 +19,7 @@ import msgspec
 from coordinator.dispatch.events import Deliver
 from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
-from coordinator.run.requests import read_evaluation
+from coordinator.run.requests import failure_of, read_answer, read_evaluation
 from revolve.arguments import in_order, naming_arguments, whole_number
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
@@ -34,19 +34,14 @@ from schema.errors import ExperimentError, JobRefused, RevolveError, shown
 from schema.experiment.brains import types_of
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
+from schema.limits import ANSWER_BYTES, VALUE_BYTES
 from schema.plugins.load import load_function
 from schema.plugins.permission import allow, allow_references, allowed
-from schema.plugins.source import forget_digests, plugins_of
+from schema.plugins.source import forget_digests
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
-from schema.wire.calls import (
-    Failed,
-    call_settings,
-    encode_call_request,
-    pack_value,
-    read_call_answer,
-)
-from schema.wire.codec import Answer, encode_request, encode_robot
+from schema.wire.calls import call_settings, check_plain
+from schema.wire.messages import Answer, Call, CallValue, Evaluate
 
 T = TypeVar("T")
 
@@ -256,21 +251,12 @@ class Fleet:
 
     def _call(self, settings: bytes, item: object, number: int) -> "Future[Any]":
         try:
-            argument = pack_value(item)
+            check_plain(item)
         except ExperimentError as error:
             raise ExperimentError(f"item {number}: {error}") from None
-        order = Order(
-            "call",
-            partial(
-                encode_call_request,
-                settings=settings,
-                argument=argument,
-                plugins=plugins_of(settings),
-            ),
-            read_call_answer,
-            partial(_value, number=number),
-        )
-        return self._order(order)
+        read = partial(read_answer, kind=CallValue, most=VALUE_BYTES + ANSWER_BYTES)
+        settle = partial(_value, number=number)
+        return self._order(Order("call", Call(item), settings, read, settle))
 
     def _submit(
         self,
@@ -278,26 +264,15 @@ class Fleet:
         settings: EvaluationSettings,
         identity: Identity = NO_IDENTITY,
     ) -> "Future[Result]":
-        encoded = encode_robot(checked(robot, types_of(settings)))
+        plain = checked(robot, types_of(settings))
+        work = Evaluate(identity.birth, plain, identity.trial)
         data, simulated_s = _job_of(settings)
-        order = Order(
-            "evaluate",
-            partial(
-                encode_request,
-                settings=data,
-                robot=encoded,
-                identity=identity,
-                plugins=plugins_of(data),
-            ),
-            partial(
-                read_evaluation,
-                simulated_s=simulated_s,
-                measures=len(settings.measures.names),
-            ),
-            partial(_settle, settings=settings),
-            simulated_s,
+        measures = len(settings.measures.names)
+        read = partial(read_evaluation, measures=measures)
+        settle = partial(_settle, settings=settings)
+        return self._order(
+            Order("evaluate", work, data, read, settle, simulated_s, identity.origin)
         )
-        return self._order(order)
 
     def _order(self, order: Order) -> "Future[T]":
         engine = self._opened
@@ -372,10 +347,10 @@ def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
     if end.reason:
         raise refusal(end)
     assert isinstance(end.answer, Answer)
-    found = end.answer.result
-    if isinstance(found, Evaluation):
-        return result_of(found, settings)
-    return Result(failure=str(found))
+    outcome = end.answer.result
+    if isinstance(outcome, Evaluation):
+        return result_of(outcome, settings)
+    return Result(failure=failure_of(outcome))
 
 
 def _path_of(function: str | Callable[[Any], Any]) -> str:
@@ -410,9 +385,11 @@ def _value(end: Deliver, *, number: int) -> object:
     """
     if end.reason:
         raise refusal(end)
-    if isinstance(end.answer, Failed):
-        raise RevolveError(f"item {number}: {end.answer.reason}")
-    return end.answer
+    assert isinstance(end.answer, Answer)
+    outcome = end.answer.result
+    if isinstance(outcome, CallValue):
+        return outcome.value
+    raise RevolveError(f"item {number}: {failure_of(outcome)}")
 
 
 def refusal(end: Deliver) -> JobRefused:

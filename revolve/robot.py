@@ -33,7 +33,7 @@ from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
-from schema.wire.codec import encode_robot
+from schema.wire.protobuf import encode_robot
 
 DEFAULT = "scenario1"
 """Experiment of a robot that has no other one."""

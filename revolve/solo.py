@@ -17,7 +17,7 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot, check_types
-from schema.wire.codec import decode_robot
+from schema.wire.protobuf import decode_robot
 
 _TASKS = msgspec.msgpack.Decoder(Task)
 

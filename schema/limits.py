@@ -5,6 +5,11 @@ number of its submessages before they are made, and texts are cut. What a reques
 the state of an arena limits further is checked by ``coordinator.run``.
 """
 
+import sys
+from typing import Annotated
+
+from msgspec import Meta
+
 KIB = 1024
 MIB = 1024 * KIB
 
@@ -46,30 +51,10 @@ OPERATOR_REQUEST_BYTES = 2 * MIB
 OPERATOR_REPLY_BYTES = 16 * MIB
 """The reply to an operator."""
 
-# Parts of an answer about an arena in bytes
-
-JUDGEMENT_BYTES = 4 * LONGEST_REASON + 256
-"""A living robot, or one that diverged, with its reason."""
-TOUCH_BYTES = 64
-"""A pair of robots that touched."""
-COLUMNS_BYTES = 16 * KIB
-"""Columns without rows."""
-POSE_BYTES = 128
-"""A pose without joint angles."""
-ANGLE_BYTES = 8
-"""A joint angle."""
-SNAPSHOT_BYTES = 1 * MIB
-"""A snapshot without robots."""
-SNAPSHOT_ROBOT_BYTES = 256 * KIB
-"""A robot in a snapshot, without its window."""
-SNAPSHOT_SAMPLE_BYTES = 32
-"""A sample of a robot's window in a snapshot."""
-CHANNEL_NUMBERS = 8
-"""Numbers of such a sample's channels that are not of a part or a sensor."""
-
 # Counts
 
 MOST_PARTS = 1000
+MOST_PAIRS = MOST_PARTS * (MOST_PARTS - 1) // 2
 MOST_NEURONS = 10_000
 MOST_CONNECTIONS = 50_000
 """Parts, neurons and connections of a robot, or of a genome."""
@@ -79,13 +64,10 @@ MOST_NEURON_STATES = 16
 """State variables of a neuron."""
 MOST_LIVE_ROWS = 500_000
 """Poses in a message to viewers."""
-UNCOUNTED_BYTES = 1 * MIB
-"""Messages up to this length are parsed without counting their submessages first."""
-MOST_SUBMESSAGES = 500_000
-"""Submessages of a message; each takes some 100 bytes of memory."""
-MOST_FIELDS = 4_000_000
-"""Fields of a message, those of submessages included."""
-
+MOST_LIVING = 100_000
+"""Living robots of an arena."""
+MOST_TOUCHES = 500_000
+"""Pairs of robots that touch in one advance."""
 MOST_MEASURES = 100
 """Measures of an experiment; an answer has the number of each."""
 MOST_PIXELS = 4096
@@ -181,14 +163,12 @@ MOST_PLUGIN_CHARACTERS = 10_000
 
 # Numbers
 
+Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+"""Float that is neither infinite nor NaN: NaN satisfies no bound."""
 MOST_LENGTH_M = 1e6
 """Greatest length in an experiment [m]: beyond it contacts lose their precision."""
 GREATEST_COORDINATE = 1e10
 """Coordinate above which the physics engine resets its state [m]."""
-GREATEST_VELOCITY = 1e12
-"""Mean velocity over one sample interval between such coordinates [m/s]."""
-GREATEST_MASS = 1e9
-"""Mass of a robot [kg]."""
 LONGEST_WALL_S = 1e9
 """Duration of a job by the clock [s]."""
 

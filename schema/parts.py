@@ -15,7 +15,9 @@ from typing import Any, Literal, Protocol
 
 from msgspec import Struct
 
-Vector = tuple[float, float, float]
+from schema.limits import Finite
+
+Vector = tuple[Finite, Finite, Finite]
 Matrix = tuple[Vector, Vector, Vector]
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

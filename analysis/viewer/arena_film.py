@@ -27,9 +27,8 @@ from schema.experiment.file import own_experiment
 from schema.experiment.settings import arena_settings_of
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
+from schema.robot.robot import Part, Robot
 from schema.tables.description import allow_plugins_of
-from schema.wire.codec import decode_body
 
 SPEED = 2.0
 """Simulated time by time of the film."""
@@ -170,7 +169,7 @@ def _renderer(
     experiment: Experiment,
     island: int,
     frames: Frames,
-    bodies: Mapping[BirthId, bytes | None],
+    bodies: Mapping[BirthId, tuple[Part, ...] | None],
     size: tuple[int, int],
 ) -> ArenaRenderer:
     """Return the renderer of an arena."""
@@ -178,6 +177,6 @@ def _renderer(
     for birth in sorted({birth for poses in frames.values() for birth in poses}):
         body = bodies[birth]
         assert body is not None
-        robots[birth] = decode_body(body)
+        robots[birth] = Robot(body)
     settings = arena_settings_of(island_experiment(experiment, island))
     return ArenaRenderer(robots, settings, list(frames.values()), size=size)

@@ -35,8 +35,8 @@ from schema.agent.supervisor import stop_on_signals
 from schema.experiment.file import own_experiment
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
 from schema.tables.description import allow_plugins_of
-from schema.wire.codec import decode_body
 
 
 def view(options: argparse.Namespace, simulators: Simulators) -> int:
@@ -112,7 +112,7 @@ def _replay(
         for lane, motion in enumerate(motions):
             body = bodies[motion.birth]
             assert body is not None
-            drawn = box_model(decode_body(body), scene.space, is_plain=False)
+            drawn = box_model(Robot(body), scene.space, is_plain=False)
             is_there = motion.birth.island in scene.arenas
             show_motion(recording, motion, drawn, None if is_there else lane)
         stop = stop_on_signals()

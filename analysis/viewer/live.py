@@ -27,8 +27,9 @@ from schema.agent.topics import (
 )
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import LIVE_BYTES, MIB, UPDATE_BYTES
-from schema.wire.arena_codec import Live, decode_live
-from schema.wire.updates import Page, Update, decode_page, decode_update, encode_update
+from schema.wire.arena import Live
+from schema.wire.codec import decode, encode
+from schema.wire.updates import Page, Update, decode_page
 
 _MOST = 2000
 """Most messages in the queue."""
@@ -257,11 +258,11 @@ class LiveSource:
 
     def _understood(self, message: _Message) -> LiveMessage | None:
         if not message.key.endswith(("/events", "/state")):
-            return decode_live(message.data)
+            return decode(Live, message.data, LIVE_BYTES)
         data = self._joined(message) if message.asked else message.data
         if data is None:
             return None
-        news = decode_update(data)
+        news = decode(Update, data, UPDATE_BYTES)
         if news.is_whole and not message.asked:
             raise MalformedMessage("update: a complete state that was not requested")
         if not self._sequel.take(news):
@@ -313,7 +314,7 @@ class LiveSource:
         self._session.get(
             member.state,
             zenoh.handlers.Callback(partial(self._take_reply, member), indirect=False),
-            payload=encode_update(wanted),
+            payload=encode(wanted),
             timeout=ASK_TIMEOUT_S,
             # No other process can keep the request from the coordinator.
             target=zenoh.QueryTarget.ALL,

@@ -13,10 +13,9 @@ from schema.limits import (
     MOST_LIVE_ROWS,
 )
 from schema.parts import BodySpace
-from schema.robot.robot import check_body
+from schema.robot.robot import Part, check_body, check_tree
 from schema.tables.received import received_columns
-from schema.wire.arena_codec import Live
-from schema.wire.codec import decode_body
+from schema.wire.arena import Live
 from schema.wire.updates import Update
 
 _LATEST_S = LONGEST_WALL_S
@@ -61,9 +60,10 @@ def check_update(news: Update, scene: Scene) -> None:
             _check_body(each.body, scene.space)
 
 
-def _check_body(body: bytes, space: BodySpace) -> None:
+def _check_body(body: tuple[Part, ...], space: BodySpace) -> None:
     try:
-        check_body(decode_body(body).parts, space)
+        check_tree(body)
+        check_body(body, space)
     except InvalidRobot as error:
         raise MalformedMessage(f"update: {error}") from None
 

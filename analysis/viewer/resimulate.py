@@ -30,7 +30,7 @@ from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.files import born_as, read_table
 from schema.tables.learnt import best_trials
-from schema.wire.arena_codec import Rebuild
+from schema.wire.arena import Rebuild
 from schema.wire.born import robot_of_birth
 
 _TRACK = ("sim_time_s", "x", "y", "z", "qw", "qx", "qy", "qz", "angles")

@@ -21,7 +21,7 @@ from analysis.viewer.recording import Recording
 from analysis.viewer.replay import rows_by_robot
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
-from schema.wire.codec import decode_body
+from schema.robot.robot import Robot
 from schema.wire.updates import Birth, Death, Level, Migrant, Update, WorkerInfo
 
 _REPEAT_S = 10.0
@@ -191,7 +191,7 @@ class Show:
 
     def _born(self, one: Birth) -> None:
         if one.body is not None:
-            body = decode_body(one.body)
+            body = Robot(one.body)
             model = cache(partial(box_model, body, self._space, is_plain=True))
             self._models.setdefault(one.birth, model)
         if not self._lineage.add(one):

@@ -20,7 +20,7 @@ from schema.errors import MalformedMessage, NetworkError, RevolveError, counted
 from schema.experiment.file import experiment_from_text
 from schema.limits import printable
 from schema.robot.ids import BirthId
-from schema.wire.arena_codec import Live
+from schema.wire.arena import Live
 from schema.wire.updates import Update
 
 _POLL_S = 0.2

@@ -23,7 +23,6 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.selection import select_culled
 from coordinator.islands.events import (
     Advanced,
-    AdvanceShard,
     Append,
     ArenaCommand,
     ArenaEvent,
@@ -41,6 +40,7 @@ from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, steps_of
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
+from schema.wire.arena import AdvanceShard
 
 
 class Arena:

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from math import inf
 
 from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
-from coordinator.islands.events import Verdict, Vet
+from coordinator.islands.events import Verdict
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
+from schema.wire.messages import Vet
 
 
 class VettingQueue:

@@ -18,7 +18,6 @@ from coordinator.islands.events import (
     Advanced,
     Ask,
     Asked,
-    Evaluate,
     Evaluated,
     EvaluationFailed,
     Record,
@@ -28,7 +27,8 @@ from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from schema.robot.robot import Robot
-from schema.wire.codec import encode_robot
+from schema.wire.messages import Evaluate
+from schema.wire.protobuf import encode_robot
 
 
 @dataclass(slots=True)

@@ -50,8 +50,7 @@ class Orders:
     def prevent_extinction(self) -> bool:
         """A robot is to be inserted, at the next decision or when there is room."""
         return bool(self.insertions) or any(
-            isinstance(order, Insert) and order.prevents_extinction
-            for order in self.pending
+            isinstance(order, Insert) for order in self.pending
         )
 
     def take(self, event: Commanded) -> None:

@@ -12,7 +12,7 @@ from schema.agent.log import tell_user
 from schema.errors import NetworkError
 from schema.formats.run_settings import read_with_settings
 from schema.robot.ids import BirthId
-from schema.wire.codec import encode_robot
+from schema.robot.robot import Robot
 from schema.wire.operator import (
     InsertRobot,
     ListRobots,
@@ -121,15 +121,15 @@ def _action(options: argparse.Namespace) -> OperatorAction:
     return SetBrain(birth, _robot(options))
 
 
-def _robot(options: argparse.Namespace) -> bytes:
-    """Return the encoded robot of a file.
+def _robot(options: argparse.Namespace) -> Robot:
+    """Return the robot of a file.
 
     Raises:
         InvalidRobot: the file holds no robot.
         ExperimentError: an invalid experiment.
     """
     robot, *_ = read_with_settings(Path(options.file), options.experiment)
-    return encode_robot(robot)
+    return robot
 
 
 def parser(_command: str = "arena") -> Flags:

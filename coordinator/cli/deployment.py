@@ -20,6 +20,7 @@ from schema.agent.command import name_at
 from schema.agent.log import tell_user
 from schema.agent.network import Agent, Tls
 from schema.agent.platform_tag import platform_tag
+from schema.agent.request_handler import Compute
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
@@ -55,7 +56,7 @@ class Deployment:
 
     workers: int
     bodies: Mapping[AgentKind, Callable[[Agent, ProcessSlot], None]]
-    answers: Mapping[AgentKind, Callable[[bytes], bytes]] | None
+    answers: Mapping[AgentKind, Compute] | None
     listen: str | None
     connect: str | None
     fleet: str

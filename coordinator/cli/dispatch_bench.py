@@ -41,7 +41,9 @@ from schema.experiment.document import body_space
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.settings import evaluation_settings
 from schema.robot.genome import develop
-from schema.wire.codec import encode_request, encode_robot
+from schema.robot.ids import BirthId
+from schema.wire.codec import encode
+from schema.wire.messages import Evaluate, Request
 
 Body = Callable[[Agent, ProcessSlot], None]
 """Function that a process of a pool runs."""
@@ -93,7 +95,7 @@ class Stream:
         self._settings = evaluation_settings(experiment)
         rngs = map(np.random.default_rng, range(_ROBOTS))
         robots = (develop(generate(rng, experiment), space) for rng in rngs)
-        self._robots = list(map(encode_robot, robots))
+        self._robots = list(robots)
         for _ in range(in_flight):
             self._ask()
 
@@ -101,9 +103,8 @@ class Stream:
         number = self._fleet.new_number()
         robot = self._robots[number % _ROBOTS]
         run, epoch = _CLIENT
-        payload = encode_request(
-            run=run, epoch=epoch, number=number, settings=self._settings, robot=robot
-        )
+        work = Evaluate(BirthId(0, number), robot)
+        payload = encode(Request(run, epoch, number, work, self._settings))
         self._fleet.request(Job(number, "evaluate", payload, client=_CLIENT))
 
     def listen(self, timeout_s: float, now_s: float) -> None:

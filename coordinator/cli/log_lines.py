@@ -1,8 +1,10 @@
 """Events of a journal as fields, and as aligned lines of text."""
 
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
+
+from msgspec.structs import asdict
 
 from coordinator.islands.events import (
     Advanced,

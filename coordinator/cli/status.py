@@ -33,12 +33,12 @@ from schema.limits import printable
 from schema.tables.arrow import skip_pandas
 from schema.tables.description import DETAILS, check_folder
 from schema.tables.segments import FINISHED, SEGMENTS
+from schema.wire.codec import encode
 from schema.wire.operator import (
     GetStatus,
     OperatorReply,
     OperatorRequest,
     decode_operator_reply,
-    encode_operator_request,
 )
 from schema.wire.status import RunStatus, Status
 
@@ -124,7 +124,7 @@ def ask(
         NetworkError: no coordinator answers.
     """
     replies = ask_coordinators(
-        encode_operator_request(request),
+        encode(request),
         connect=connect_of(options),
         fleet=options.fleet,
         tls=tls_of(options),

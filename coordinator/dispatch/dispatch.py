@@ -53,7 +53,7 @@ from coordinator.dispatch.pool import (
     Pool,
 )
 from schema.errors import MalformedMessage, UnexpectedEvent
-from schema.wire.decoding import fingerprint
+from schema.wire.codec import fingerprint
 
 AGENT_OF: dict[JobKind, AgentKind] = {
     "vet": "analyzer",

@@ -47,7 +47,7 @@ from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import longer_s
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage, RunFolderError
-from schema.wire.decoding import fingerprint
+from schema.wire.codec import fingerprint
 
 
 class Agents(Protocol):

@@ -35,7 +35,7 @@ from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import with_brain
 from schema.robot.robot import Robot, check_robot
-from schema.wire.codec import encode_robot
+from schema.wire.protobuf import encode_robot
 
 WHERE = "encoding.type"
 BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {

@@ -44,7 +44,7 @@ from schema.robot.genome import Genome, develop, walk
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_genome, encode_genome
+from schema.wire.protobuf import decode_genome, encode_genome
 
 
 class RevolveAngle:

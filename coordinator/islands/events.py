@@ -6,22 +6,18 @@ Events are past participles, commands imperatives; all are immutable.
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from msgspec import Struct
-
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.learners.learner import Batch, Points
+from schema.limits import Finite
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
-from schema.robot.robot import Robot
-from schema.wire.arena import Advance, Changes
+from schema.wire.arena import Advance, AdvanceShard
+from schema.wire.codec import Message
+from schema.wire.messages import Evaluate, Vet
 
 QUARANTINED = "quarantined: "
 """Begin of the reason of a failed evaluation that crashed its workers' processes."""
-
-
-class Message(Struct, frozen=True):
-    """Base of all events and commands: immutable, compared by its fields."""
 
 
 # --- Events --------------------------------------------------------
@@ -31,7 +27,7 @@ class Started(Message, frozen=True):
     """The run starts; the first event, once."""
 
 
-class Vetted(Message, frozen=True):
+class Vetted(Message, frozen=True, tag=True):
     """The analyzer reported on a candidate's body."""
 
     birth: BirthId
@@ -44,7 +40,7 @@ class Vetted(Message, frozen=True):
         return self.report.reason
 
 
-class VettingFailed(Message, frozen=True):
+class VettingFailed(Message, frozen=True, tag=True):
     """The analyzer failed on a candidate and would fail again."""
 
     birth: BirthId
@@ -57,7 +53,7 @@ Verdict = Vetted | VettingFailed
 """Answers to a request to vet a candidate."""
 
 
-class Evaluated(Message, frozen=True):
+class Evaluated(Message, frozen=True, tag=True):
     """A robot was evaluated.
 
     Attributes:
@@ -77,7 +73,7 @@ class Evaluated(Message, frozen=True):
     is_quarantined: ClassVar[bool] = False
 
 
-class EvaluationFailed(Message, frozen=True):
+class EvaluationFailed(Message, frozen=True, tag=True):
     """A robot's evaluation failed for a reason that lies in the robot.
 
     Attributes:
@@ -104,7 +100,7 @@ Outcome = Evaluated | EvaluationFailed
 """Answers to a request to evaluate a robot: either a reason or an evaluation."""
 
 
-class Asked(Message, frozen=True):
+class Asked(Message, frozen=True, tag=True):
     """A learner answered which parameters to try.
 
     Attributes:
@@ -118,7 +114,7 @@ class Asked(Message, frozen=True):
     points: Points
 
 
-class Advanced(Message, frozen=True):
+class Advanced(Message, frozen=True, tag=True):
     """An arena shard reached the requested step.
 
     Attributes:
@@ -137,37 +133,33 @@ class Advanced(Message, frozen=True):
     provenance: Provenance
 
 
-class Pause(Message, frozen=True):
+class Pause(Message, frozen=True, tag=True):
     """Pause the arena until it is resumed."""
 
 
-class Resume(Message, frozen=True):
+class Resume(Message, frozen=True, tag=True):
     """Resume a paused arena."""
 
 
-class Insert(Message, frozen=True):
+class Insert(Message, frozen=True, tag=True):
     """Insert a robot: a birth without parents that may mate like any other robot.
 
     Attributes:
         genome: bytes of its genome, in the encoding of the experiment.
         place: point of the ground plane [m]; drawn as for any birth if None.
-        prevents_extinction: the arena is not extinct at the decision at which the order
-            takes effect. Earlier versions did not count the order yet, and journals
-            that they wrote end so.
     """
 
     genome: bytes
-    place: tuple[float, float] | None = None
-    prevents_extinction: bool = True
+    place: tuple[Finite, Finite] | None = None
 
 
-class Remove(Message, frozen=True):
+class Remove(Message, frozen=True, tag=True):
     """Remove a robot; no effect if it is dead."""
 
     birth: BirthId
 
 
-class ReplaceBrain(Message, frozen=True):
+class ReplaceBrain(Message, frozen=True, tag=True):
     """Replace a robot's brain; its genome stays the same."""
 
     birth: BirthId
@@ -178,7 +170,7 @@ Order = Pause | Resume | Insert | Remove | ReplaceBrain
 """Orders that an operator may give to an arena."""
 
 
-class Commanded(Message, frozen=True):
+class Commanded(Message, frozen=True, tag=True):
     """An operator gave an order.
 
     Attributes:
@@ -226,7 +218,7 @@ MigrationEvent = Immigrated | NeighbourClosed
 """Events that follow from other islands' commands; they are not journalled."""
 
 
-class Audited(Message, frozen=True):
+class Audited(Message, frozen=True, tag=True):
     """The same evaluation was done twice, by two workers if there are two."""
 
     first: Outcome
@@ -262,32 +254,6 @@ IslandEvent = Started | Answered | MigrationEvent
 ArenaEvent = Started | Verdict | Asked | Advanced | Commanded | MigrationEvent
 
 # --- Commands ------------------------------------------------------
-
-
-class Vet(Message, frozen=True):
-    """Vet a candidate's body on an analyzer."""
-
-    birth: BirthId
-    attempt: int
-    robot: Robot
-
-
-class Evaluate(Message, frozen=True):
-    """Evaluate a robot on a worker.
-
-    Attributes:
-        birth: id of the robot.
-        robot: the robot.
-        trial: number of the evaluation of this robot, from 0.
-        steps: physics steps to simulate; 0 for the duration of the experiment.
-        requester: as in ``Evaluated``.
-    """
-
-    birth: BirthId
-    robot: Robot
-    trial: int = 0
-    steps: int = 0
-    requester: int | None = None
 
 
 class Ask(Message, frozen=True):
@@ -328,24 +294,6 @@ class Append(Message, frozen=True):
     table: str
     rows: int
     columns: bytes
-
-
-class AdvanceShard(Message, frozen=True):
-    """Change an arena shard, then advance it.
-
-    Attributes:
-        island: number of the arena.
-        number: number of the advance, from 0.
-        until: step to reach.
-        changes: changes before the advance.
-        wants_snapshot: a snapshot is due at the end of the advance.
-    """
-
-    island: int
-    number: int
-    until: int
-    changes: Changes
-    wants_snapshot: bool
 
 
 class Emigrate(Message, frozen=True):

@@ -14,7 +14,6 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.events import (
     Answered,
     Asked,
-    Evaluate,
     Evaluated,
     Finish,
     IslandCommand,
@@ -24,7 +23,6 @@ from coordinator.islands.events import (
     Record,
     Started,
     Verdict,
-    Vet,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.learning import IslandLearning, NewbornLearning
@@ -38,6 +36,7 @@ from coordinator.islands.rows import (
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
+from schema.wire.messages import Evaluate, Vet
 
 
 @dataclass(slots=True)

@@ -4,18 +4,13 @@ from collections.abc import Iterable, Sequence
 
 from coordinator.evolution.breeding import Individual, failed_last
 from coordinator.evolution.encodings import encoding_of
-from coordinator.islands.events import (
-    Emigrate,
-    Evaluate,
-    MigrationEvent,
-    Outcome,
-    Record,
-)
+from coordinator.islands.events import Emigrate, MigrationEvent, Outcome, Record
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
+from schema.wire.messages import Evaluate
 
 
 class IslandMigration:

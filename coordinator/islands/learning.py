@@ -15,19 +15,14 @@ from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.learners.brain_parameters import BrainParameters
 from coordinator.evolution.learners.learner import Batch, Points, learner_class
-from coordinator.islands.events import (
-    Ask,
-    Asked,
-    Evaluate,
-    Outcome,
-    Record,
-)
+from coordinator.islands.events import Ask, Asked, Outcome, Record
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment
 from schema.experiment.learning import Learning
 from schema.robot.robot import Robot
 from schema.robot.sums import sum_in_order
+from schema.wire.messages import Evaluate
 
 
 class IslandLearning:

@@ -15,17 +15,13 @@ from msgspec import structs
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.islands.events import (
-    Evaluate,
-    IslandCommand,
-    Outcome,
-    Record,
-)
+from coordinator.islands.events import IslandCommand, Outcome, Record
 from coordinator.islands.rows import evaluation_record
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, Simulation, steps_of
 from schema.robot.ids import BirthId
 from schema.robot.results import failed_fitness
+from schema.wire.messages import Evaluate
 
 
 def with_durations(

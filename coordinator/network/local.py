@@ -2,11 +2,15 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Joined, Returned
 from schema.agent.capacity import memory_bytes, shards_that_fit
+from schema.agent.request_handler import Compute, answer
 from schema.errors import RevolveError
+from schema.limits import ADVANCE_REQUEST_BYTES
+from schema.wire.codec import decode
+from schema.wire.messages import Request
 
 
 class LocalAgents:
@@ -14,16 +18,16 @@ class LocalAgents:
 
     def __init__(
         self,
-        answers: Mapping[AgentKind, Callable[[bytes], bytes]],
+        agents: Mapping[AgentKind, Compute],
         platform: str,
     ) -> None:
-        """Initialise agents with functions from encoded request to encoded answer."""
-        self._answers = {f"local-{kind}": answers[kind] for kind in sorted(answers)}
+        """Initialise agents with the functions that do their work."""
+        self._agents = {f"local-{kind}": agents[kind] for kind in sorted(agents)}
         self._asked: deque[tuple[int, str, bytes]] = deque()
         shards = shards_that_fit(memory_bytes(), processes=1)
         self._news: list[DispatchEvent] = [
             Joined(f"local-{kind}", kind, 1, platform, shards)
-            for kind in sorted(answers)
+            for kind in sorted(agents)
         ]
 
     def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
@@ -44,8 +48,9 @@ class LocalAgents:
         if self._asked:
             number, agent, payload = self._asked.popleft()
             try:
-                answer = self._answers[agent](payload)
-                news.append(Returned(number, agent, "ok", answer))
+                request = decode(Request, payload, ADVANCE_REQUEST_BYTES)
+                answered = answer(self._agents[agent], request)
+                news.append(Returned(number, agent, "ok", answered))
             except RevolveError as error:
                 news.append(Returned(number, agent, "error", reason=str(error)))
         elif not news:

@@ -17,16 +17,11 @@ from schema.errors import MalformedMessage
 from schema.limits import (
     INFO_BYTES,
     LONGEST_QUIET_S,
-    MOST_CORES,
-    MOST_DEATHS,
     MOST_MEMBERS,
-    MOST_PLATFORM,
-    MOST_SHARDS,
-    MOST_SLOTS,
     printable,
 )
-from schema.wire import revolve_pb2 as pb
-from schema.wire.decoding import parsed
+from schema.wire.codec import decode
+from schema.wire.messages import AgentInfo
 
 SHARE = 0.1
 """Greatest share of the coordinator's time that asking takes."""
@@ -148,9 +143,6 @@ class Membership:
             )
             return []
         kind: AgentKind = "analyzer" if member.role == "analyzer" else "worker"
-        if kind == "worker":
-            _check("shards", info.shards, MOST_SHARDS)
-            _check("cores", info.cores, MOST_CORES)
         self.joined[agent] = member
         joined = Joined(agent, kind, info.slots, info.platform, info.shards, info.cores)
         return [*self._new_deaths(member, info), joined]
@@ -168,7 +160,7 @@ class Membership:
         if self.joined.get(member.name) != member:
             return None
         info = _parsed(member, data)
-        works = info.HasField("quiet_s") and 0.0 <= info.quiet_s <= LONGEST_QUIET_S
+        works = info.quiet_s is not None and 0.0 <= info.quiet_s <= LONGEST_QUIET_S
         return Progressed(member.name) if works else None
 
     def _forget(self, member: Member) -> None:
@@ -184,7 +176,7 @@ class Membership:
             del self._gone[next(iter(self._gone))]
         return Left(member.name)
 
-    def _new_deaths(self, member: Member, info: pb.AgentInfo) -> list[Died]:
+    def _new_deaths(self, member: Member, info: AgentInfo) -> list[Died]:
         """Return the deaths of an agent's predecessors, each once.
 
         Deaths of agents that never joined happened before this coordinator began.
@@ -263,34 +255,23 @@ class InfoQueue:
         self.due_s = max(self._pause_until_s, waits_s)
 
 
-def _parsed(member: Member, data: bytes) -> pb.AgentInfo:
+def _parsed(member: Member, data: bytes) -> AgentInfo:
     """Return the message of an agent's own properties.
 
     Raises:
         MalformedMessage: see ``Membership.introduce``.
     """
-    info = parsed(data, pb.AgentInfo(), INFO_BYTES)
     role, agent = member.role, member.name
-    if (info.agent, info.kind) != (agent, role) or not 1 <= info.slots <= MOST_SLOTS:
+    try:
+        info = decode(AgentInfo, data, INFO_BYTES)
+    except MalformedMessage as error:
+        raise MalformedMessage(f"{role} {agent!r}: {error}") from None
+    if (info.agent, info.kind) != (agent, role):
         says = f"{printable(info.kind)} {printable(info.agent)!r}"
-        raise MalformedMessage(f"{role} {agent!r} says: {says}, {info.slots} slots")
-    if len(info.platform) > MOST_PLATFORM or not info.platform.isprintable():
+        raise MalformedMessage(f"{role} {agent!r} says: {says}")
+    if not info.platform.isprintable():
         raise MalformedMessage(
-            f"{role} {agent!r}: platform must be at most {MOST_PLATFORM} printable "
-            f"characters, got {printable(info.platform)!r}"
-        )
-    if len(info.deaths) > MOST_DEATHS:
-        raise MalformedMessage(
-            f"{role} {agent!r}: at most {MOST_DEATHS} deaths, got {len(info.deaths)}"
+            f"{role} {agent!r}: platform must be printable, got "
+            f"{printable(info.platform)!r}"
         )
     return info
-
-
-def _check(what: str, value: int, most: int) -> None:
-    """Check a number that an agent says about itself.
-
-    Raises:
-        MalformedMessage: it is not from 1 to ``most``.
-    """
-    if not 1 <= value <= most:
-        raise MalformedMessage(f"{what} of an agent must be 1 to {most}, got {value}")

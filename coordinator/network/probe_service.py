@@ -16,12 +16,12 @@ from schema.agent.network import Tls, client_config
 from schema.agent.service import open_session, usable
 from schema.agent.topics import Member, Role
 from schema.errors import MalformedMessage
+from schema.wire.codec import encode
 from schema.wire.operator import (
     GetStatus,
     OperatorReply,
     OperatorRequest,
     decode_operator_reply,
-    encode_operator_request,
 )
 
 ROLES: tuple[Role, ...] = ("worker", "analyzer", "coordinator")
@@ -114,7 +114,7 @@ def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
             if timeout_s <= 0.0:
                 break
             asked_s = time.time()
-            data = encode_operator_request(request)
+            data = encode(request)
             reply = reply_of(member, session, data, timeout_s)
             if reply is None:
                 continue

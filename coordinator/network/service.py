@@ -52,6 +52,7 @@ from schema.limits import (
     MOST_ASKED_INFOS,
     printable,
 )
+from schema.wire.codec import fingerprint
 
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
@@ -280,7 +281,7 @@ class Network:
             payload: the encoded request.
         """
         if member := self._membership.joined.get(agent):
-            self._session.put(member.cancelled, payload)
+            self._session.put(member.cancelled, fingerprint(payload))
 
     def ask(self, agent: str, /) -> None:
         """Ask an agent for its progress; ``receive`` returns a report, if any."""

@@ -8,8 +8,9 @@ stop the run, as it is unknown which of them is right.
 from dataclasses import dataclass
 from hashlib import sha256
 
-from coordinator.islands.events import Answered, Audited, Evaluate, Outcome, Record
+from coordinator.islands.events import Answered, Audited, Outcome, Record
 from coordinator.islands.rows import outcome_columns
+from schema.wire.messages import Evaluate
 
 _WHOLE = 2**32
 

@@ -1,7 +1,9 @@
 """Arena shards that continue on another platform, where results may differ."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
+
+from msgspec.structs import replace
 
 from coordinator.islands.events import Record
 from schema.parts import Vector

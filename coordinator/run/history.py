@@ -6,13 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from coordinator.dispatch.fleet import Fleet
-from coordinator.islands.events import (
-    Advanced,
-    AdvanceShard,
-    Append,
-    JournalledEvent,
-    Record,
-)
+from coordinator.islands.events import Advanced, Append, JournalledEvent, Record
 from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
@@ -24,7 +18,7 @@ from coordinator.storage.snapshots import Snapshots
 from schema.errors import RunFolderError
 from schema.experiment.document import steps_of
 from schema.experiment.file import experiment_from_text
-from schema.wire.arena_codec import Rebuild
+from schema.wire.arena import AdvanceShard, Rebuild
 
 
 def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebuild]:

@@ -17,7 +17,8 @@ from schema.agent.import_path import environment, python_command
 from schema.agent.network import Tls
 from schema.errors import MalformedMessage
 from schema.plugins.permission import allowed
-from schema.wire.updates import WorkerInfo, decode_page, encode_update, pages_of
+from schema.wire.codec import encode
+from schema.wire.updates import WorkerInfo, decode_page, pages_of
 
 _UPDATE_S = 0.2
 """Least time between two updates [s]."""
@@ -50,7 +51,7 @@ class LiveServer:
         self._update_s = now_s
         update = self._feed.update(self._workers())
         if update is not None and self._network.has_viewers:
-            self._network.tell(encode_update(update))
+            self._network.tell(encode(update))
         # Viewers ask again for what is dropped here or on its way.
         for order in self._network.queries.onlookers()[:_MOST_REPLIES]:
             order.reply(*self._pages_for(order, now_s))

@@ -16,7 +16,6 @@ from coordinator.dispatch.events import Deliver, ShardFailed
 from coordinator.dispatch.fleet import End, Fleet
 from coordinator.islands.events import (
     Advanced,
-    AdvanceShard,
     Answered,
     Append,
     ArenaCommand,
@@ -25,7 +24,6 @@ from coordinator.islands.events import (
     Audited,
     Commanded,
     Emigrate,
-    Evaluate,
     EvaluationFailed,
     ExternalEvent,
     Finish,
@@ -37,7 +35,6 @@ from coordinator.islands.events import (
     Outcome,
     Record,
     Started,
-    Vet,
 )
 from coordinator.islands.island import Island
 from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
@@ -53,6 +50,8 @@ from coordinator.run.shard_requests import Reached, ShardRequests, SnapshotStore
 from coordinator.run.throttle import RealTimeThrottle
 from schema.agent.log import warn_user
 from schema.errors import RunPaused, UnexpectedEvent
+from schema.wire.arena import AdvanceShard
+from schema.wire.messages import Evaluate, Vet
 
 Request = Vet | Evaluate | AdvanceShard | Ask
 """Commands of islands and arenas that agents or learners carry out."""

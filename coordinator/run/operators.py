@@ -6,8 +6,9 @@ that step before the operator gets a reply, so that a replay carries it out too.
 
 import math
 import time
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from coordinator.arena.arena import Arena
 from coordinator.arena.orders import check_order
@@ -26,10 +27,10 @@ from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.document import Experiment
-from schema.limits import LONGEST_REASON, printable
+from schema.limits import LONGEST_REASON, OPERATOR_REQUEST_BYTES, printable
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_robot
+from schema.wire.codec import decode, encode
 from schema.wire.operator import (
     GetStatus,
     InsertRobot,
@@ -41,8 +42,6 @@ from schema.wire.operator import (
     ResumeArena,
     SaveSnapshot,
     SetBrain,
-    decode_operator_request,
-    encode_operator_reply,
     selected_names,
 )
 
@@ -115,7 +114,7 @@ def _order(
             return Resume()
         case InsertRobot():
             _check_place(action.place, arena.experiment)
-            robot = decode_robot(action.robot)
+            robot = action.robot
             encoding = arena.encoding
             _check_robot(robot, arena)
             genome = encoding.to_bytes(encoding.from_robot(robot))
@@ -131,7 +130,7 @@ def _order(
         )
     if isinstance(action, RemoveRobot):
         return Remove(action.birth)
-    brain = decode_robot(action.robot).brain
+    brain = action.robot.brain
     _check_robot(replace(living, brain=brain), arena)
     return ReplaceBrain(action.birth, brain)
 
@@ -196,7 +195,7 @@ def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes
         now_s: the time, of any clock that only goes forward [s].
     """
     try:
-        request = decode_operator_request(data)
+        request = decode(OperatorRequest, data, OPERATOR_REQUEST_BYTES)
         if isinstance(request.action, GetStatus):
             status = scheduler.status(now_s)
             reply = OperatorReply("", status=status, time_s=time.time())
@@ -207,7 +206,7 @@ def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes
         reply = OperatorReply(printable(str(error), LONGEST_REASON), is_refused=True)
     except Refused as error:
         reply = OperatorReply(str(error), is_refused=True)
-    return encode_operator_reply(reply)
+    return encode(reply)
 
 
 def _carry_out(request: OperatorRequest, scheduler: RunScheduler) -> OperatorReply:

@@ -12,13 +12,14 @@ from pathlib import Path
 
 from coordinator.dispatch.events import Deliver, ShardFailed
 from coordinator.dispatch.fleet import End, Fleet
-from coordinator.islands.events import Advanced, AdvanceShard, Append, JournalledEvent
+from coordinator.islands.events import Advanced, Append, JournalledEvent
 from coordinator.run.history import replayed
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
+from schema.wire.arena import AdvanceShard
 
 TABLE = "poses"
 MOST_AHEAD = 64
@@ -101,7 +102,7 @@ class PoseRecovery:
                 if self._snapshots.has(
                     island, event.advance.step, event.advance.digest
                 ):
-                    self._requests.begin_at(own[:number])
+                    self._requests.begin_at(own[number - 1][1])
                     begin = number
                     break
             self._arenas[island] = _Arena(deque(own[begin:]), first[island])

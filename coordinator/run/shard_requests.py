@@ -4,8 +4,8 @@ The changes and advances since a shard's newest snapshot are kept, so that anoth
 worker can rebuild its state. Nothing here decides what happens in an arena.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Protocol
 
@@ -13,38 +13,31 @@ from msgspec import structs
 
 from coordinator.dispatch.events import AssignShard, Read, ShardFailed
 from coordinator.dispatch.fleet import Fleet
-from coordinator.islands.events import Advanced, AdvanceShard
+from coordinator.islands.events import Advanced
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
-    Inserted,
     check_advance,
-    check_answer,
-    inserted,
     place_poses,
     read_poses,
-    restarted,
 )
 from coordinator.run.drift import Drift, with_losses
+from coordinator.run.requests import Expected, impossible, read_answer
 from coordinator.run.run_context import RunContext
 from schema.errors import (
+    NO_MESSAGE,
     JobRefused,
     MalformedMessage,
     RunFolderError,
     UnexpectedEvent,
 )
-from schema.experiment.document import body_space
-from schema.parts import BodySpace, Vector
+from schema.limits import ADVANCE_BYTES, LONGEST_REASON, printable
+from schema.parts import Vector
 from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
-from schema.wire.arena import Advance, Changes
-from schema.wire.arena_codec import (
-    AdvanceRequest,
-    PastAdvance,
-    Rebuild,
-    decode_advance_answer,
-    encode_advance_request,
-)
+from schema.wire.arena import Advance, AdvanceShard, Changes, PastAdvance, Rebuild
+from schema.wire.codec import encode
+from schema.wire.messages import Request, StateMissing
 
 
 class SnapshotStore(Protocol):
@@ -69,10 +62,9 @@ class _Past:
 
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
-    the first; ``places`` are those of the robots that lived after it, and ``born``
-    their steps of insertion. The requested advance may have a snapshot in the store if
-    ``may_be_kept``, as in any replay. It must have the result of ``repeats``, if there
-    is one.
+    the first; ``places`` are those of the robots that lived after it. The requested
+    advance may have a snapshot in the store if ``may_be_kept``, as in any replay. It
+    must have the result of ``repeats``, if there is one.
     """
 
     step: int = 0
@@ -85,19 +77,11 @@ class _Past:
     repeats: Advanced | None = None
     wants_snapshot: bool = False
     may_be_kept: bool = True
-    born: dict[BirthId, Inserted] = field(default_factory=dict)
 
-    def born_after(self, changes: Changes, space: BodySpace) -> dict[BirthId, Inserted]:
+    def living_after(self, changes: Changes) -> set[BirthId]:
         """Return the robots that live after changes."""
-        gone = set(changes.removals)
-        born = {birth: at for birth, at in self.born.items() if birth not in gone}
-        born |= {
-            each.birth: inserted(each.robot, space, self.step)
-            for each in changes.insertions
-        }
-        for birth in restarted(changes):
-            born[birth] = replace(born[birth], window=self.step)
-        return born
+        living = self.places.keys() - set(changes.removals)
+        return living | {insertion.birth for insertion in changes.insertions}
 
     def drifts_to(self, platform: str) -> bool:
         """Return whether a platform differs from that of the last advance."""
@@ -155,32 +139,12 @@ class ShardRequests:
         """Return the advance of a shard that is requested, or noted."""
         return self._past(shard).requested
 
-    def begin_at(self, advances: Sequence[tuple[AdvanceShard, Advanced]]) -> None:
-        """Let a shard begin with a snapshot, which the store has.
-
-        Args:
-            advances: commands and results from the arena's first advance to that of
-                the snapshot.
-        """
-        windows: dict[BirthId, int] = {}
-        begin = 0
-        for command, result in advances:
-            windows |= dict.fromkeys(restarted(command.changes), begin)
-            begin = result.advance.step
-        _, event = advances[-1]
+    def begin_at(self, event: Advanced) -> None:
+        """Let a shard begin with the snapshot of an advance, which the store has."""
         past, advance = self._past(event.island), event.advance
         past.step = past.base = advance.step
         past.digest, past.platform = advance.digest, event.provenance.platform
         past.places = {one.birth: one.place for one in advance.judgements}
-        timestep_s = self._context.experiments[event.island].simulation.timestep_s
-        past.born = {
-            one.birth: Inserted(
-                advance.step - round(one.age_s / timestep_s),
-                None,
-                windows.get(one.birth, 0),
-            )
-            for one in advance.judgements
-        }
 
     def past(self, shard: int) -> Rebuild:
         """Return what a worker needs to rebuild a shard's state."""
@@ -242,9 +206,6 @@ class ShardRequests:
         if requested is None or requested.number != event.number:
             raise UnexpectedEvent(f"no such advance was requested: {event}")
         past.requested = None
-        born = past.born_after(requested.changes, self._space(event.island))
-        living = {one.birth for one in advance.judgements}
-        past.born = {birth: at for birth, at in born.items() if birth in living}
         past.step, past.digest = advance.step, advance.digest
         agent, platform = event.provenance.agent, event.provenance.platform
         drift: Drift | None = None
@@ -272,9 +233,6 @@ class ShardRequests:
             f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
 
-    def _space(self, shard: int) -> BodySpace:
-        return body_space(self._context.experiments[shard].space)
-
     def _past(self, shard: int) -> _Past:
         return self._pasts.setdefault(shard, _Past())
 
@@ -293,19 +251,16 @@ class ShardRequests:
         if command.is_whole:
             rebuild = self.past(shard)
             if is_drift:
-                rebuild = replace(rebuild, living=tuple(past.places))
-        request = AdvanceRequest(
-            run=self._context.client.run,
-            epoch=self._context.client.epoch,
-            number=command.number,
-            settings=settings,
-            shard=shard,
+                rebuild = structs.replace(rebuild, living=tuple(past.places))
+        run, epoch = self._context.client
+        work = structs.replace(
+            past.requested,
             from_step=past.step,
             from_digest=past.digest,
-            changes=requested.changes,
-            until=requested.until,
-            wants_snapshot=wants_snapshot,
             rebuild=rebuild,
+        )
+        request = Request(
+            run, epoch, command.number, work, settings, plugins_of(settings)
         )
         complete: Callable[[Advance], Advance] | None = None
         if is_drift:
@@ -317,29 +272,29 @@ class ShardRequests:
             )
         read = partial(
             _read_answer,
-            shard=shard,
-            advance_number=requested.number,
+            requested=requested,
+            job=(epoch, command.number),
+            is_whole=command.is_whole,
             repeats=past.repeats,
             expected=ExpectedAdvance(
-                (request.epoch, request.number),
                 past.step,
                 requested.until,
-                past.born_after(requested.changes, self._space(shard)),
+                past.living_after(requested.changes),
                 self._context.experiments[shard],
                 wants_snapshot,
-                command.is_whole,
             ),
             provenance=Provenance(command.agent, command.platform),
             complete=complete,
         )
-        return encode_advance_request(request, plugins_of(settings)), read
+        return encode(request), read
 
 
 def _read_answer(
     data: bytes,
     *,
-    shard: int,
-    advance_number: int,
+    requested: AdvanceShard,
+    job: Expected,
+    is_whole: bool,
     repeats: Advanced | None,
     expected: ExpectedAdvance,
     provenance: Provenance,
@@ -349,10 +304,11 @@ def _read_answer(
 
     Args:
         data: bytes of the answer.
-        shard: number of the island.
-        advance_number: number of the arena's command.
+        requested: the arena's command.
+        job: epoch and number of the job.
+        is_whole: the request had what is needed to rebuild the state.
         repeats: past result that the answer must have; None for a new advance.
-        expected: what a correct answer has.
+        expected: what a correct result has.
         provenance: of the answer, but for the time that it took.
         complete: adds what a drift between platforms lost; None without a drift.
 
@@ -360,27 +316,28 @@ def _read_answer(
         MalformedMessage: no answer, the answer to another request, or one that
             contradicts the request or the state of the arena.
     """
-    answer = decode_advance_answer(data, expected.most_bytes)
-    check_answer(answer, expected)
-    advance = answer.advance
-    if advance is None:
+    answer = read_answer(data, job, Advance | StateMissing, ADVANCE_BYTES)
+    advance = answer.result
+    if isinstance(advance, StateMissing) and not is_whole:
         return None
+    if not isinstance(advance, Advance):
+        raise impossible("answer: lacks the state that came with the request")
     if complete is not None:
         advance = complete(advance)
     check_advance(advance, expected)
-    rows = read_poses(advance.poses, advance, expected)
+    rows = read_poses(advance.poses, expected)
     if repeats is not None:
         _check_repeated(advance, rows.num_rows, repeats)
-    poses = place_poses(advance.poses, rows, shard)
-    signed = replace(provenance, wall_s=answer.wall_s)
-    event = Advanced(
-        shard,
-        advance_number,
-        replace(advance, poses=poses),
-        rows.num_rows,
-        signed,
+    shard, snapshot = requested.island, advance.snapshot
+    casualties = tuple(
+        structs.replace(one, reason=printable(one.reason, LONGEST_REASON) or NO_MESSAGE)
+        for one in advance.casualties
     )
-    return Reached(event, answer.snapshot)
+    poses = place_poses(advance.poses, rows, shard)
+    advance = structs.replace(advance, casualties=casualties, poses=poses, snapshot=b"")
+    signed = structs.replace(provenance, wall_s=answer.wall_s)
+    event = Advanced(shard, requested.number, advance, rows.num_rows, signed)
+    return Reached(event, snapshot)
 
 
 def _check_repeated(advance: Advance, rows: int, repeats: Advanced) -> None:

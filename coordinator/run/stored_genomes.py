@@ -9,7 +9,7 @@ from schema.errors import InvalidRobot, RunFolderError
 from schema.experiment.document import REVOLVE_ANGLE, Experiment
 from schema.robot.robot import Robot
 from schema.tables.files import read_table
-from schema.wire.codec import decode_robot, encode_robot
+from schema.wire.protobuf import decode_robot, encode_robot
 
 
 def check_stored_genomes(folder: Path, experiment: Experiment) -> None:

@@ -6,7 +6,7 @@ Results do not depend on it: it only delays the advances of arenas.
 from heapq import heappop, heappush
 from math import inf
 
-from coordinator.islands.events import AdvanceShard
+from schema.wire.arena import AdvanceShard
 
 
 class RealTimeThrottle:

@@ -6,19 +6,16 @@ Two machines with equal tags give equal results; others may.
 import platform
 from collections.abc import Collection
 from functools import cache
-from hashlib import sha256
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
 from pathlib import Path
 
 from schema.agent.capacity import system_text
-from schema.wire.revolve_pb2 import DESCRIPTOR
+from schema.wire.codec import format_digest
+from schema.wire.messages import OF_AGENTS
 
-MEANING = 1
-"""Number of changes in the meaning of messages whose format stayed the same.
-
-1: a vetting request holds a body, without the brain of its robot.
-"""
+MEANING = 0
+"""Number of changes in the meaning of messages whose format stayed the same."""
 # x86-64 psABI levels, by which compilers and libraries choose their code; each level
 # includes those before it.
 _LEVELS = {
@@ -45,10 +42,10 @@ def our_version() -> str:
     return _version("revolve-islands")
 
 
+@cache
 def wire_version() -> str:
     """Return this project's version and, after a ``+``, that of its messages."""
-    messages = sha256(DESCRIPTOR.serialized_pb).hexdigest()
-    return f"{our_version()}+{messages[:8]}.{MEANING}"
+    return f"{our_version()}+{format_digest(*OF_AGENTS)}.{MEANING}"
 
 
 def cpu_class(machine: str, flags: Collection[str]) -> str:

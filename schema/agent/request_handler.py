@@ -24,24 +24,20 @@ from schema.errors import (
     UnknownPlugin,
     error_text,
 )
-from schema.limits import (
-    ADVANCE_REQUEST_BYTES,
-    LONGEST_REASON,
-    MOST_EPOCH,
-    MOST_RUN_NAME,
-    printable,
-)
+from schema.limits import ADVANCE_REQUEST_BYTES, LONGEST_REASON, printable
 from schema.plugins.source import check_plugins
-from schema.wire import revolve_pb2 as pb
-from schema.wire.decoding import fingerprint, parsed, require_most
+from schema.wire.arena import AdvanceShard
+from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.messages import AgentInfo, Answer, Crash, Request, Result
 
 _MOST_REMEMBERED = 1000
 LONG_S = 60.0
 """Answers to jobs that took as long are kept: their requests may come again [s].
 
-Arenas keep the answer to their last advance by themselves, however short it was.
+So is the last answer about each arena, however short it took: the arena has moved on.
 """
 _MOST_LONG = 32
+_FINGERPRINT_BYTES = 8
 _CANCELLED_S = 10.0
 """Time after which a cancelled job that waits loses its process [s]."""
 
@@ -78,6 +74,22 @@ class Reply:
     reason: str = ""
 
 
+Compute = Callable[[Request], Result]
+"""Does the work of a request; it raises if the request is bad."""
+
+
+def answer(compute: Compute, request: Request) -> bytes:
+    """Return the encoded answer to a request.
+
+    Raises:
+        Exception: that of ``compute``.
+    """
+    began_s = time.perf_counter()
+    result = compute(request)
+    wall_s = time.perf_counter() - began_s
+    return encode(Answer(request.epoch, request.number, wall_s, result))
+
+
 @dataclass(slots=True)
 class Server:
     """Answers single requests; knows the newest coordinator of each run.
@@ -85,15 +97,14 @@ class Server:
     The thread that makes it does the jobs.
 
     Attributes:
-        compute: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
-            request is bad.
+        compute: does the work.
         agent: this agent.
         slot: its slot in a pool.
         counts: counts of its replies.
         watch: over the current job.
     """
 
-    compute: Callable[[bytes], bytes]
+    compute: Compute
     agent: Agent
     slot: ProcessSlot = field(default_factory=ProcessSlot)
     counts: ReplyCounts = field(default_factory=ReplyCounts)
@@ -102,65 +113,69 @@ class Server:
     )
     _epochs: dict[str, int] = field(default_factory=dict)
     _fenced: dict[tuple[str, int], None] = field(default_factory=dict)
-    _cancelled: dict[Task, None] = field(default_factory=dict)
-    _skipped: dict[Task, None] = field(default_factory=dict)
+    _cancelled: dict[bytes, None] = field(default_factory=dict)
+    _skipped: dict[bytes, None] = field(default_factory=dict)
     _answers: dict[Task, bytes] = field(default_factory=dict)
+    _advances: dict[tuple[str, int], tuple[Task, bytes]] = field(default_factory=dict)
 
     @property
     def info(self) -> bytes:
         """Bytes of the ``AgentInfo`` of this agent."""
         agent = self.agent
-        info = pb.AgentInfo(
-            agent=agent.name,
-            kind=agent.role,
-            slots=agent.slots,
-            platform=agent.platform,
-            version=agent.version,
-            shards=agent.shards,
-            cores=agent.threads,
-            quiet_s=self.watch.quiet_s,
-        )
-        for death in self.slot.deaths:
-            task = death.task
-            info.deaths.add(
-                agent=task.agent,
-                run=task.run,
-                epoch=task.epoch,
-                number=task.number,
-                cause=death.cause,
-                request=task.request,
+        deaths = [
+            Crash(
+                death.task.agent,
+                death.task.run,
+                death.task.epoch,
+                death.task.number,
+                death.cause,
+                death.task.request,
             )
-        return info.SerializeToString()
+            for death in self.slot.deaths
+        ]
+        return encode(
+            AgentInfo(
+                agent=agent.name,
+                kind=agent.role,
+                slots=agent.slots,
+                platform=agent.platform,
+                version=agent.version,
+                deaths=tuple(deaths),
+                shards=agent.shards,
+                cores=agent.threads,
+                quiet_s=self.watch.quiet_s,
+            )
+        )
 
     def cancel(self, data: bytes) -> None:
         """Note that a job is cancelled; may be called from any thread.
 
         Args:
-            data: bytes of the job's ``Request``.
+            data: fingerprint of the job's request.
         """
-        try:
-            task = self._task(_parsed(data), data)
-        except MalformedMessage:
+        if len(data) != _FINGERPRINT_BYTES:
             self.counts.cancels += 1
             return
-        _remember(task, None, self._cancelled)
+        _remember(data, None, self._cancelled)
 
     def reply(self, data: bytes) -> Reply:
         """Return the reply to any bytes."""
         try:
-            request = self._checked(data)
-            task = self._task(request, data)
-            if task in self._answers:
-                return Reply(self._answers[task])
+            request = decode(Request, data, ADVANCE_REQUEST_BYTES)
+            self._check(request)
+            name = (request.run, request.epoch, request.number)
+            task = Task(self.agent.name, *name, fingerprint(data))
+            if known := self._known(task, request):
+                return Reply(known)
             # A job that comes again is wanted, whatever cancelled it before.
-            if task in self._cancelled and task not in self._skipped:
-                _remember(task, None, self._skipped)
+            if task.request in self._cancelled and task.request not in self._skipped:
+                _remember(task.request, None, self._skipped)
                 self.counts.skipped += 1
                 return Reply(reason=CANCELLED)
             began_s = time.monotonic()
             self.watch.begin(task)
             with self.slot.doing(task, self.agent.cpu_limit_s):
-                answer = self.compute(data)
+                answered = answer(self.compute, request)
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
             self.counts.refused += 1
             self.counts.malformed += isinstance(error, MalformedMessage)
@@ -172,9 +187,19 @@ class Server:
         finally:
             self.watch.end()
         self.counts.answered += 1
-        if time.monotonic() - began_s >= LONG_S:
-            _remember(task, answer, self._answers, _MOST_LONG)
-        return Reply(answer)
+        if isinstance(request.work, AdvanceShard):
+            arena = (request.run, request.work.island)
+            _remember(arena, (task, answered), self._advances, self.agent.shards)
+        elif time.monotonic() - began_s >= LONG_S:
+            _remember(task, answered, self._answers, _MOST_LONG)
+        return Reply(answered)
+
+    def _known(self, task: Task, request: Request) -> bytes | None:
+        """Return the answer to a request if it is kept."""
+        if not isinstance(request.work, AdvanceShard):
+            return self._answers.get(task)
+        last = self._advances.get((request.run, request.work.island))
+        return last[1] if last and last[0] == task else None
 
     def look(self) -> None:
         """End this process if its job waits for too long; call it regularly.
@@ -186,24 +211,18 @@ class Server:
         task, quiet_s = self.watch.task, self.watch.quiet_s
         if task is None or quiet_s is None:
             return
-        if task in self._cancelled and quiet_s > _CANCELLED_S:
+        if task.request in self._cancelled and quiet_s > _CANCELLED_S:
             self.slot.end_process(is_blamed=False)
         elif quiet_s > self.agent.wait_limit_s:
             self.slot.end_process(is_blamed=True)
 
-    def _task(self, request: pb.Request, data: bytes) -> Task:
-        name = (request.run, request.epoch, request.number)
-        return Task(self.agent.name, *name, fingerprint(data))
-
-    def _checked(self, data: bytes) -> pb.Request:
-        """Return the fields that requests of all kinds share.
+    def _check(self, request: Request) -> None:
+        """Raise unless this agent takes a request.
 
         Raises:
-            MalformedMessage: see ``_parsed``.
             PluginDiffers: a plug-in that is missing or has another source here.
             RevolveError: an older epoch than the newest one of its run.
         """
-        request = _parsed(data)
         newest = max(self._epochs.pop(request.run, 0), request.epoch)
         _remember(request.run, newest, self._epochs)
         coordinator = (request.run, request.epoch)
@@ -214,28 +233,13 @@ class Server:
                 f"epoch {newest} has begun"
             )
         check_plugins(request.plugins, request.run)
-        return request
-
-
-def _parsed(data: bytes) -> pb.Request:
-    """Return the fields that requests of all kinds share.
-
-    Raises:
-        MalformedMessage: not the bytes of a request, no run, or a run's name or an
-            epoch beyond its limit.
-    """
-    request = parsed(data, pb.Request(), ADVANCE_REQUEST_BYTES)
-    if not request.run:
-        raise MalformedMessage("Request: names no run")
-    require_most(len(request.run), MOST_RUN_NAME, "characters of Request.run")
-    require_most(request.epoch, MOST_EPOCH, "as Request.epoch")
-    return request
 
 
 def _remember(
     key: K, value: V, known: dict[K, V], most: int = _MOST_REMEMBERED
 ) -> None:
     """Add an entry to a limited number of them; the oldest is forgotten."""
+    known.pop(key, None)
     known[key] = value
     if len(known) > most:
         del known[next(iter(known))]

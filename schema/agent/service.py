@@ -27,7 +27,7 @@ from schema.agent.inbox import Inbox
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import DEFAULT_FLEET, UNFIT, Agent, Tls, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
-from schema.agent.request_handler import ReplyCounts, Server
+from schema.agent.request_handler import Compute, ReplyCounts, Server
 from schema.agent.supervision import LOOK_S, ProcessSlot
 from schema.agent.supervisor import (
     AGENT_THREADS,
@@ -288,7 +288,7 @@ class Outlet:
 
 
 def serve(
-    answer: Callable[[bytes], bytes],
+    compute: Compute,
     agent: Agent,
     stop: threading.Event,
     say: Callable[[str], None] = tell_user,
@@ -304,8 +304,7 @@ def serve(
     another agent.
 
     Args:
-        answer: bytes of a ``Request`` to bytes of an ``Answer``; raises if the request
-            is bad.
+        compute: does the work of a request; raises if the request is bad.
         agent: this agent, and the address of its hub.
         stop: ends the loop; checked between jobs.
         say: called with a line when the hub is there, as ``HubWatch`` does.
@@ -322,7 +321,7 @@ def serve(
     check_name(agent.fleet, "fleet")
     me = Member(agent.fleet, agent.role, agent.name)
     config = session_config(client_config(agent.connect, agent.tls), me)
-    server = Server(answer, agent, slot)
+    server = Server(compute, agent, slot)
     hub = HubWatch(
         agent.connect,
         say,
@@ -362,7 +361,7 @@ def own_agent(agent: Agent, index: int) -> Agent:
 
 
 def serve_as_process(
-    answer: Callable[[bytes], bytes],
+    compute: Compute,
     agent: Agent,
     slot: ProcessSlot,
     outlet: Outlet | None = None,
@@ -370,7 +369,7 @@ def serve_as_process(
     """Serve as one process of a pool until a signal or until the parent is gone.
 
     Args:
-        answer: as for ``serve``.
+        compute: as for ``serve``.
         agent: of this process, or of the whole pool if it has no version yet.
         slot: of the process; only the first one writes messages about the hub.
         outlet: as for ``serve``.
@@ -385,7 +384,7 @@ def serve_as_process(
     )
     try:
         serve(
-            answer,
+            compute,
             own,
             stop,
             say,

@@ -1,9 +1,12 @@
 """Identity of an evaluation: the random draws of a worker depend on it."""
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
 
 from schema.experiment.section import Count, Section
-from schema.robot.ids import BirthId
+from schema.robot.ids import NOBODY, BirthId
 
 
 class Origin(Section, frozen=True):
@@ -15,7 +18,7 @@ class Origin(Section, frozen=True):
         island: number of the island, from 0.
     """
 
-    seed: Count = 0
+    seed: Annotated[int, Meta(ge=0)] = 0
     run: Count = 0
     island: Count = 0
 
@@ -35,5 +38,6 @@ class Identity:
     trial: int
 
 
-NO_IDENTITY = Identity(Origin(), BirthId(0, 0), 0)
+NO_ORIGIN = Origin()
+NO_IDENTITY = Identity(NO_ORIGIN, NOBODY, 0)
 """Identity outside of a run: of a robot file or a benchmark."""

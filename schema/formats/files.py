@@ -25,7 +25,7 @@ from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot, check_number, check_robot
 from schema.tables.replacement import replace_file
-from schema.wire.codec import decode_robot, encode_robot
+from schema.wire.protobuf import decode_robot, encode_robot
 
 
 def robot_from_yaml(

@@ -34,7 +34,7 @@ from schema.formats.mjcf_export import add_limits, add_sensors, exact_xml, porta
 from schema.limits import MOST_MJCF_BYTES, MOST_OTHERS
 from schema.mjcf.model import solo_spec
 from schema.robot.robot import Robot, check_number, check_robot
-from schema.wire.codec import decode_robot, encode_robot
+from schema.wire.protobuf import decode_robot, encode_robot
 
 ROBOT = "revolve_robot"
 SETTINGS = "revolve_settings"

@@ -12,11 +12,12 @@ states; from the code of the original):
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from schema.errors import InvalidRobot, shown
+from schema.limits import MOST_CONNECTIONS, MOST_NEURONS, Finite
 from schema.parts import Parameter
 
 Layer = Literal["input", "output", "hidden"]
@@ -56,25 +57,24 @@ class Widths:
         return self.outputs + self.hidden
 
 
-class Neuron(Struct, frozen=True, gc=False):
+class Neuron(Struct, frozen=True, gc=False, array_like=True):
     """Neuron; ``part`` is the index of its part."""
 
     layer: Layer
     kind: str
     part: int
-    parameters: tuple[float, ...] = ()
+    parameters: tuple[Finite, ...] = ()
 
 
-class Connection(Struct, frozen=True, gc=False):
+class Connection(Struct, frozen=True, gc=False, array_like=True):
     """Weighted edge between two neurons, given by their indices in the brain."""
 
     source: int
     target: int
-    weight: float
+    weight: Finite
 
 
-@dataclass(frozen=True, slots=True)
-class Brain:
+class Brain(Struct, frozen=True, gc=False, array_like=True):
     """Network: inputs, then outputs, then hidden neurons, each in part order.
 
     Attributes:
@@ -82,8 +82,10 @@ class Brain:
         connections: at most one per ordered pair; no target is an input.
     """
 
-    neurons: tuple[Neuron, ...] = ()
-    connections: tuple[Connection, ...] = ()
+    neurons: Annotated[tuple[Neuron, ...], Meta(max_length=MOST_NEURONS)] = ()
+    connections: Annotated[
+        tuple[Connection, ...], Meta(max_length=MOST_CONNECTIONS)
+    ] = ()
 
     def count(self, layer: Layer) -> int:
         """Return the number of neurons in a layer."""

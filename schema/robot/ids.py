@@ -18,3 +18,7 @@ class BirthId(NamedTuple):
     def name(self) -> str:
         """ISLAND:NUMBER, as commands and pictures name an individual."""
         return f"{self.island}:{self.number}"
+
+
+NOBODY = BirthId(0, 0)
+"""Id of a robot that was born in no run."""

@@ -1,23 +1,27 @@
 """Results of vetting and evaluating a robot."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Meta, Struct
 
+from schema.limits import LONGEST_WALL_S, MOST_MEASURES, MOST_PAIRS, Finite
 from schema.parts import Vector
 from schema.robot.trace import Trace
 
 Floats = npt.NDArray[np.float64]
+Measures = Annotated[tuple[Finite, ...], Meta(max_length=MOST_MEASURES)]
+WallTime = Annotated[float, Meta(ge=0, le=LONGEST_WALL_S)]
+"""Duration by the clock [s]; information only."""
 
 
 Track = Trace
 """Former name of ``Trace``, which fitness functions of users import."""
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluation:
+class Evaluation(Struct, frozen=True, tag="evaluation"):
     """Result of one simulation.
 
     Attributes:
@@ -28,20 +32,19 @@ class Evaluation:
         measures: finite, in the order of the experiment's ``measures.names``.
     """
 
-    fitness: float
-    path_velocity: float
-    straight_velocity: float
-    simulated_s: float
-    measures: tuple[float, ...] = ()
+    fitness: Finite
+    path_velocity: Finite
+    straight_velocity: Finite
+    simulated_s: Finite
+    measures: Measures = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Provenance:
+class Provenance(Struct, frozen=True):
     """Agent, platform and duration [s] of an answer; information only."""
 
     agent: str = ""
     platform: str = ""
-    wall_s: float = 0.0
+    wall_s: WallTime = 0.0
 
 
 def failed_fitness(others: Iterable[float]) -> float:
@@ -53,8 +56,7 @@ def failed_fitness(others: Iterable[float]) -> float:
     return min((0.0, *others))
 
 
-@dataclass(frozen=True, slots=True)
-class Report:
+class Report(Struct, frozen=True, tag="report"):
     """Report of the analyzer on a body in its neutral pose.
 
     Attributes:
@@ -68,8 +70,8 @@ class Report:
 
     is_viable: bool
     reason: str
-    intersections: tuple[tuple[int, int], ...]
+    intersections: Annotated[tuple[tuple[int, int], ...], Meta(max_length=MOST_PAIRS)]
     lower: Vector
     upper: Vector
-    mass: float
+    mass: Finite
     motors: int

@@ -6,12 +6,12 @@ parent). Each part has the index of its parent; index 0 is the core.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from schema.errors import InvalidRobot, shown
-from schema.limits import MOST_NEURONS, MOST_PARTS
+from schema.limits import MOST_NEURONS, MOST_PARTS, Finite
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Brain, NeuronKinds, check_brain, check_neurons
 from schema.robot.cpg import BUILT_IN_KINDS
@@ -22,7 +22,7 @@ GENES = 2**64
 NO_BRAIN = Brain()
 
 
-class Part(Struct, frozen=True, gc=False):
+class Part(Struct, frozen=True, gc=False, array_like=True):
     """Part of a body.
 
     Attributes:
@@ -40,15 +40,14 @@ class Part(Struct, frozen=True, gc=False):
     parent_slot: int
     slot: int
     orientation: int
-    parameters: tuple[float, ...]
+    parameters: tuple[Finite, ...]
     gene: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Robot:
+class Robot(Struct, frozen=True, gc=False, array_like=True):
     """A body and its brain."""
 
-    parts: tuple[Part, ...]
+    parts: Annotated[tuple[Part, ...], Meta(max_length=MOST_PARTS)]
     brain: Brain = NO_BRAIN
 
 

@@ -5,16 +5,24 @@ shard advances it to a given step. An advance is a pure function of the state of
 shard, the changes and the step.
 """
 
-from dataclasses import dataclass
+from typing import Annotated
 
+from msgspec import Meta
+
+from schema.experiment.section import Count
+from schema.limits import MOST_LIVING, MOST_TOUCHES, Finite
 from schema.parts import Vector
 from schema.robot.brain import Brain
-from schema.robot.ids import BirthId
+from schema.robot.ids import BirthId, IslandNumber
+from schema.robot.results import Measures
 from schema.robot.robot import Robot
+from schema.wire.codec import Message
+
+Births = Annotated[tuple[BirthId, ...], Meta(max_length=MOST_LIVING)]
+Digest = Annotated[bytes, Meta(min_length=32, max_length=32)]
 
 
-@dataclass(frozen=True, slots=True)
-class Insertion:
+class Insertion(Message, frozen=True):
     """Insertion of a robot into the arena.
 
     Attributes:
@@ -26,12 +34,11 @@ class Insertion:
 
     birth: BirthId
     robot: Robot
-    place: tuple[float, float]
-    heading: float = 0.0
+    place: tuple[Finite, Finite]
+    heading: Finite = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class BrainChange:
+class BrainChange(Message, frozen=True):
     """Replacement of a living robot's brain; neuron states are reset.
 
     Attributes:
@@ -45,17 +52,63 @@ class BrainChange:
     restarts_window: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Changes:
+class Changes(Message, frozen=True):
     """Changes of an arena before an advance: removals, insertions, brains."""
 
-    removals: tuple[BirthId, ...] = ()
-    insertions: tuple[Insertion, ...] = ()
-    brains: tuple[BrainChange, ...] = ()
+    removals: Births = ()
+    insertions: Annotated[tuple[Insertion, ...], Meta(max_length=MOST_LIVING)] = ()
+    brains: Annotated[tuple[BrainChange, ...], Meta(max_length=MOST_LIVING)] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Judgement:
+class PastAdvance(Message, frozen=True):
+    """Past advance to repeat: its changes, last step, and digest of the result."""
+
+    changes: Changes
+    until: Count
+    digest: Digest
+
+
+class Rebuild(Message, frozen=True):
+    """Data to rebuild the state of a shard.
+
+    Attributes:
+        snapshot: of the shard; empty for an arena before its first advance.
+        history: advances since the snapshot, oldest first.
+        living: robots that must live at the end, if the advances ran on another
+            platform, where results may differ.
+    """
+
+    snapshot: bytes
+    history: tuple[PastAdvance, ...]
+    living: Births | None = None
+
+
+class AdvanceShard(Message, frozen=True, tag="advance"):
+    """Change an arena shard, then advance it.
+
+    Attributes:
+        island: number of the arena.
+        number: number of the advance, from 0.
+        until: step to reach.
+        changes: changes before the advance.
+        wants_snapshot: a snapshot is due at the end of the advance.
+        from_step: step at which the advance starts.
+        from_digest: of the state at that step; empty before the first advance.
+        rebuild: data to rebuild the state at the start; None for a worker that
+            holds it.
+    """
+
+    island: IslandNumber
+    number: Count
+    until: Count
+    changes: Changes
+    wants_snapshot: bool
+    from_step: Count = 0
+    from_digest: Annotated[bytes, Meta(max_length=32)] = b""
+    rebuild: Rebuild | None = None
+
+
+class Judgement(Message, frozen=True, array_like=True):
     """Fitness of a living robot at the end of an advance.
 
     Attributes:
@@ -70,36 +123,33 @@ class Judgement:
     """
 
     birth: BirthId
-    age_s: float
-    path_velocity: float
-    straight_velocity: float
-    fitness: float
+    age_s: Finite
+    path_velocity: Finite
+    straight_velocity: Finite
+    fitness: Finite
     is_mature: bool
     place: Vector
-    measures: tuple[float, ...] = ()
+    measures: Measures = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Casualty:
+class Casualty(Message, frozen=True, array_like=True):
     """Removal of a robot whose simulation diverged, with the reason."""
 
     birth: BirthId
-    step: int
+    step: Count
     reason: str
     place: Vector
 
 
-@dataclass(frozen=True, slots=True)
-class Touch:
+class Touch(Message, frozen=True, array_like=True):
     """Contact of two robots during an advance, and its total duration [s]."""
 
     first: BirthId
     second: BirthId
-    duration_s: float
+    duration_s: Finite
 
 
-@dataclass(frozen=True, slots=True)
-class Advance:
+class Advance(Message, frozen=True, tag="advance"):
     """Result of an advance.
 
     Attributes:
@@ -108,12 +158,29 @@ class Advance:
         judgements: of all living robots, by birth.
         casualties: in the order in which they diverged.
         touches: by pair; empty unless the experiment records them.
-        poses: Arrow IPC stream of samples (schema.tables.columns.POSES without record).
+        poses: Arrow IPC stream of samples (schema.tables.columns.POSES without record);
+            empty in a journal.
+        snapshot: the state at that step; empty if it was not wanted, and in a journal.
     """
 
-    step: int
-    digest: bytes
-    judgements: tuple[Judgement, ...]
-    casualties: tuple[Casualty, ...]
-    touches: tuple[Touch, ...]
+    step: Count
+    digest: Digest
+    judgements: Annotated[tuple[Judgement, ...], Meta(max_length=MOST_LIVING)]
+    casualties: Annotated[tuple[Casualty, ...], Meta(max_length=MOST_LIVING)]
+    touches: Annotated[tuple[Touch, ...], Meta(max_length=MOST_TOUCHES)]
     poses: bytes
+    snapshot: bytes = b""
+
+
+class Live(Message, frozen=True):
+    """Message to viewers after each advance, published best effort.
+
+    Attributes:
+        run: name of the run.
+        shard: number of the arena's island.
+        advance: the result, poses included.
+    """
+
+    run: str
+    shard: IslandNumber
+    advance: Advance

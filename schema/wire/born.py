@@ -4,7 +4,7 @@ from schema.errors import RunFolderError
 from schema.experiment.document import REVOLVE_ANGLE, Experiment, body_space
 from schema.robot.genome import develop
 from schema.robot.robot import Robot, check_types
-from schema.wire.codec import decode_genome, decode_robot
+from schema.wire.protobuf import decode_genome, decode_robot
 
 
 def robot_of_birth(genome: bytes, robot: bytes | None, experiment: Experiment) -> Robot:

@@ -4,18 +4,17 @@ from collections.abc import Iterable
 from typing import Annotated
 
 from msgspec import Meta
-from msgspec.msgpack import Decoder, encode
 from msgspec.structs import replace
 
 from schema.limits import (
     LONGEST_NAME,
     OPERATOR_REPLY_BYTES,
-    OPERATOR_REQUEST_BYTES,
+    Finite,
     printable_lines,
 )
 from schema.robot.ids import BirthId, IslandNumber
-from schema.wire.codec import decode_robot
-from schema.wire.decoding import Finite, Message, unpack
+from schema.robot.robot import Robot
+from schema.wire.codec import Message, decode
 from schema.wire.status import Status
 
 
@@ -43,11 +42,11 @@ class InsertRobot(Message, frozen=True, tag="insert"):
     """Insert a robot into the arena.
 
     Attributes:
-        robot: its bytes (``encode_robot``).
+        robot: body and brain.
         place: of the core in the ground plane, world frame [m]; drawn if None.
     """
 
-    robot: bytes
+    robot: Robot
     place: tuple[Finite, Finite] | None = None
 
 
@@ -66,11 +65,11 @@ class SetBrain(Message, frozen=True, tag="brain"):
 
     Attributes:
         birth: of the living robot.
-        robot: bytes (``encode_robot``) of the robot that has the new brain.
+        robot: robot that has the new brain.
     """
 
     birth: BirthId
-    robot: bytes
+    robot: Robot
 
 
 OperatorAction = (
@@ -131,33 +130,6 @@ def selected_names(wanted: str, names: Iterable[str]) -> set[str]:
     return {name for name in known if name.endswith(wanted)}
 
 
-_REQUEST = Decoder(OperatorRequest)
-_REPLY = Decoder(OperatorReply)
-
-
-def encode_operator_request(request: OperatorRequest) -> bytes:
-    """Return the bytes of an operator's request."""
-    return encode(request)
-
-
-def decode_operator_request(data: bytes) -> OperatorRequest:
-    """Return the request of some bytes.
-
-    Raises:
-        MalformedMessage: not a request's bytes, an empty request_id, an unknown
-            action, a robot that breaks its rules, a place that is not finite.
-    """
-    request = unpack(_REQUEST, data, OPERATOR_REQUEST_BYTES)
-    if isinstance(request.action, InsertRobot | SetBrain):
-        decode_robot(request.action.robot)
-    return request
-
-
-def encode_operator_reply(reply: OperatorReply) -> bytes:
-    """Return the bytes of a reply."""
-    return encode(reply)
-
-
 def decode_operator_reply(data: bytes) -> OperatorReply:
     """Return the reply of some bytes; its text is safe to print.
 
@@ -165,5 +137,5 @@ def decode_operator_reply(data: bytes) -> OperatorReply:
         MalformedMessage: not a reply's bytes, too many of them, or a number that is
             not finite.
     """
-    reply = unpack(_REPLY, data, OPERATOR_REPLY_BYTES)
+    reply = decode(OperatorReply, data, OPERATOR_REPLY_BYTES)
     return replace(reply, text=printable_lines(reply.text))

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from schema.experiment.section import Count
-from schema.limits import MOST_SHOWN
-from schema.wire.decoding import Finite, Message
+from schema.limits import MOST_SHOWN, Finite
+from schema.wire.codec import Message
 
 
 class IslandStatus(Message, frozen=True):

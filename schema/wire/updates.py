@@ -11,15 +11,13 @@ from operator import itemgetter
 from typing import Annotated, Any
 
 from msgspec import Meta
-from msgspec.msgpack import Decoder, encode
 
 from schema.experiment.section import Count
-from schema.limits import PAGE_BYTES, UPDATE_BYTES
+from schema.limits import MOST_PARTS, PAGE_BYTES, UPDATE_BYTES, Finite
 from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.results import failed_fitness
-from schema.robot.robot import Part, Robot
-from schema.wire.codec import decode_body, encode_body
-from schema.wire.decoding import Finite, Message, unpack
+from schema.robot.robot import Part
+from schema.wire.codec import Message, decode, encode
 
 
 class Birth(Message, frozen=True):
@@ -31,7 +29,7 @@ class Birth(Message, frozen=True):
         rank: one more than the greatest rank of the parents.
         births: number of births on the island so far, this one included.
         sim_time_s: simulated time of the birth in an arena [s]; None off-line.
-        body: bytes of the body (``encode_body``); None if the robot is dead.
+        body: parts of the robot; None if it is dead.
     """
 
     birth: BirthId
@@ -39,7 +37,7 @@ class Birth(Message, frozen=True):
     rank: Count
     births: Count
     sim_time_s: Finite | None
-    body: bytes | None
+    body: Annotated[tuple[Part, ...], Meta(max_length=MOST_PARTS)] | None
 
 
 class Death(Message, frozen=True):
@@ -162,31 +160,10 @@ class Page(Message, frozen=True):
     pages: Annotated[int, Meta(ge=0, le=UPDATE_BYTES // PAGE_BYTES)] = 0
 
 
-_UPDATE = Decoder(Update)
-_PAGE = Decoder(Page)
 _MIGRANT = itemgetter("island", "to", "epoch", "births", "sim_time_s")
 _PART = itemgetter(
     "kind", "parent", "parent_slot", "child_slot", "rot", "params", "gene"
 )
-
-
-def encode_update(news: Update | Page) -> bytes:
-    """Return the bytes of an update, or of a page."""
-    return encode(news)
-
-
-def decode_update(data: bytes) -> Update:
-    """Return the update of some bytes.
-
-    Raises:
-        MalformedMessage: not an update's bytes, a body that is not a tree of parts,
-            a number that is not finite.
-    """
-    update = unpack(_UPDATE, data, UPDATE_BYTES)
-    for birth in update.births:
-        if birth.body is not None:
-            decode_body(birth.body)
-    return update
 
 
 def decode_page(data: bytes) -> Page:
@@ -195,7 +172,7 @@ def decode_page(data: bytes) -> Page:
     Raises:
         MalformedMessage: not the bytes of a page.
     """
-    return unpack(_PAGE, data, 2 * PAGE_BYTES) if data else Page(b"")
+    return decode(Page, data, 2 * PAGE_BYTES) if data else Page(b"")
 
 
 def pages_of(state: Update) -> list[bytes]:
@@ -221,7 +198,7 @@ def read_birth(row: Mapping[str, Any], births: int) -> Birth:
         row["rank"],
         births,
         row["sim_time_s"],
-        encode_body(Robot(tuple(map(_part, row["body"])))),
+        tuple(map(_part, row["body"])),
     )
 
 

@@ -8,7 +8,8 @@ from schema.experiment.document import Experiment, body_space
 from schema.experiment.settings import vetting_settings
 from schema.robot.brain import Brain, Neuron
 from schema.robot.robot import Part, Robot
-from schema.wire.codec import decode_answer, encode_request, encode_robot
+from schema.wire.codec import decode_answer, encode_request
+from schema.wire.protobuf import encode_robot
 
 GREY = (0.5, 0.5, 0.5)
 EXPERIMENT = Experiment(name="test")

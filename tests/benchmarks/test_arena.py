@@ -21,7 +21,7 @@ from schema.experiment.settings import arena_settings_of
 from schema.robot.genome import develop
 from schema.robot.robot import Robot
 from schema.wire.arena import Changes
-from schema.wire.codec import decode_genome
+from schema.wire.protobuf import decode_genome
 from tests.benchmarks.arena_timing import (
     ArenaTiming,
     RecordedArena,

@@ -19,7 +19,6 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.dispatch.pool import AHEAD_S
 from coordinator.evolution.generation import generate
 from coordinator.islands.events import (
-    Evaluate,
     Evaluated,
     IslandCommand,
     IslandEvent,
@@ -45,6 +44,7 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.tables.arrow import skip_pandas
+from schema.wire.messages import Evaluate
 
 # As the command does, before the first session is opened.
 prepare_process()

@@ -22,8 +22,8 @@ from schema.experiment.file import read_experiment
 from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
-from schema.wire.arena import Advance
-from schema.wire.arena_codec import Live, decode_live, encode_live
+from schema.wire.arena import Advance, Live
+from schema.wire.arena_codec import decode_live, encode_live
 from schema.wire.codec import encode_body
 from schema.wire.updates import Birth, Update
 from worker.arena.replay import alone

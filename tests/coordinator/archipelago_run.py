@@ -7,11 +7,9 @@ from typing import Any
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
-    AdvanceShard,
     ArenaCommand,
     Ask,
     Emigrate,
-    Evaluate,
     Evaluated,
     Finish,
     Immigrated,
@@ -19,7 +17,6 @@ from coordinator.islands.events import (
     NeighbourClosed,
     Record,
     Started,
-    Vet,
     Vetted,
 )
 from coordinator.islands.island import Island
@@ -29,6 +26,8 @@ from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
+from schema.wire.arena import AdvanceShard
+from schema.wire.messages import Evaluate, Vet
 from tests.coordinator.arena_world import World, distinct_fitness
 from tests.coordinator.reports import PROVENANCE, VIABLE
 

@@ -12,7 +12,6 @@ import pyarrow as pa
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
     Advanced,
-    AdvanceShard,
     Append,
     ArenaCommand,
     ArenaEvent,
@@ -21,7 +20,6 @@ from coordinator.islands.events import (
     Finish,
     Record,
     Started,
-    Vet,
     Vetted,
     VettingFailed,
 )
@@ -29,7 +27,8 @@ from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
 from schema.tables.columns import ROWS
-from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.arena import Advance, AdvanceShard, Casualty, Judgement, Touch
+from schema.wire.messages import Vet
 from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
 
 DT = 0.005

@@ -19,7 +19,8 @@ from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Part, Robot
-from schema.wire.codec import Answer, decode_body, decode_request, encode_answer
+from schema.wire.codec import decode_body, decode_request, encode_answer
+from schema.wire.messages import Answer
 
 EPOCH = 3
 CLIENT = Client("run", EPOCH)

@@ -35,7 +35,7 @@ from schema.agent.platform_tag import platform_tag
 from schema.experiment.document import body_space
 from schema.experiment.file import experiment_from_text
 from schema.robot.genome import develop
-from schema.wire.codec import decode_genome
+from schema.wire.protobuf import decode_genome
 
 BIRTHS = 30
 MARK = 15

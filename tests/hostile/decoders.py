@@ -68,13 +68,10 @@ from schema.robot.results import Provenance
 from schema.robot.robot import Robot, check_types
 from schema.tables.received import received_columns
 from schema.wire import revolve_pb2 as pb
-from schema.wire.arena import Advance, Changes, Insertion
+from schema.wire.arena import Advance, Changes, Insertion, Live, PastAdvance, Rebuild
 from schema.wire.arena_codec import (
     AdvanceAnswer,
     AdvanceRequest,
-    Live,
-    PastAdvance,
-    Rebuild,
     decode_advance_answer,
     decode_advance_request,
     decode_live,
@@ -92,19 +89,15 @@ from schema.wire.calls import (
     read_call_answer,
 )
 from schema.wire.codec import (
-    Answer,
     decode_answer,
     decode_body,
-    decode_genome,
     decode_request,
-    decode_robot,
     encode_answer,
     encode_body,
-    encode_genome,
     encode_request,
-    encode_robot,
     request_kind,
 )
+from schema.wire.messages import Answer
 from schema.wire.operator import (
     GetStatus,
     InsertRobot,
@@ -117,6 +110,12 @@ from schema.wire.operator import (
     decode_operator_request,
     encode_operator_reply,
     encode_operator_request,
+)
+from schema.wire.protobuf import (
+    decode_genome,
+    decode_robot,
+    encode_genome,
+    encode_robot,
 )
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 from schema.wire.updates import (

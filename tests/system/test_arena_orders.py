@@ -13,7 +13,8 @@ from coordinator.storage.journal import Journal
 from schema.agent.network import client_config
 from schema.tables.files import read_table
 from schema.tables.received import read_columns
-from schema.wire.arena_codec import Live, decode_live
+from schema.wire.arena import Live
+from schema.wire.arena_codec import decode_live
 from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]

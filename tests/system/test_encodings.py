@@ -12,7 +12,7 @@ from coordinator.storage.compare import compare
 from schema.parts import BUILT_IN
 from schema.robot.robot import check_robot
 from schema.tables.files import read_table
-from schema.wire.codec import decode_robot
+from schema.wire.protobuf import decode_robot
 from tests.system.documents import OFF_LINE, SMALL_ARENA
 from tests.system.fleet import size
 from tests.system.workspace import Until

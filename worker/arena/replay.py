@@ -20,7 +20,7 @@ from schema.robot.results import Evaluation, Floats
 from schema.robot.robot import Robot
 from schema.tables.columns import ROWS
 from schema.tables.received import read_columns
-from schema.wire.arena_codec import Rebuild
+from schema.wire.arena import Rebuild
 from worker.arena.changes import possible
 from worker.arena.records import pose_batch
 from worker.arena.world import World

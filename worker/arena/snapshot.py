@@ -24,7 +24,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot, check_types
 from schema.wire.arena import Casualty
-from schema.wire.codec import decode_robot
+from schema.wire.protobuf import decode_robot
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, Window
 from worker.measures.functions import functions_of

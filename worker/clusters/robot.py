@@ -14,7 +14,7 @@ from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from schema.wire.arena import Casualty, Judgement
-from schema.wire.codec import encode_robot
+from schema.wire.protobuf import encode_robot
 from worker.clusters.models import Body
 from worker.fitness import path_velocity, straight_velocity
 from worker.measures.functions import functions_of

@@ -1,36 +1,38 @@
 """Calls of users' own functions."""
 
-import time
+import msgspec
 
-from schema.errors import ExperimentError, error_text
+from schema.errors import ExperimentError, MalformedMessage, error_text
 from schema.plugins.load import load_function
-from schema.wire.calls import (
-    Failed,
-    decode_call_request,
-    encode_call_answer,
-    pack_value,
-)
+from schema.wire.calls import CallSettings, check_plain
+from schema.wire.messages import Call, CallValue, Failure
 
 
-def answer_call(request: bytes) -> bytes:
-    """Return the encoded answer to an encoded call.
+def call_function(call: Call, settings: bytes) -> CallValue | Failure:
+    """Return the value of a function.
 
     An error of the function, or a value that is not plain, is a result: a failure.
 
+    Args:
+        call: argument of the function.
+        settings: JSON of ``CallSettings``.
+
     Raises:
-        MalformedMessage: the bytes are no call.
+        MalformedMessage: no such settings.
         UnknownPlugin: no such function, or its module is not allowed here.
         ExperimentError: it is no function of one argument.
     """
-    start = time.perf_counter()
-    call = decode_call_request(request)
-    function = load_function(call.function, "function", 1)
-    value: bytes | Failed
     try:
-        value = pack_value(function(call.argument))
+        name = msgspec.json.decode(settings, type=CallSettings).function
+    except (ValueError, RecursionError) as error:
+        raise MalformedMessage(f"settings of a call: {error}") from None
+    function = load_function(name, "function", 1)
+    try:
+        value = function(call.argument)
+        check_plain(value)
     except ExperimentError as error:
-        value = Failed(f"{call.function}: its value {error}")
+        return Failure(f"{name}: its value {error}")
     # Also KeyboardInterrupt or SystemExit: no signal raises one in a worker.
     except BaseException as error:  # noqa: BLE001 - a user's function may raise anything
-        value = Failed(f"{call.function} raised {error_text(error)}")
-    return encode_call_answer(call, time.perf_counter() - start, value)
+        return Failure(f"{name} raised {error_text(error)}")
+    return CallValue(value)

@@ -1,21 +1,23 @@
-"""Requests of all kinds and their answers, as bytes."""
+"""The work of requests of all kinds."""
 
-import time
 from dataclasses import dataclass
 
-from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
-from schema.experiment.document import body_space
-from schema.experiment.settings import lasting
-from schema.robot.results import Evaluation
-from schema.robot.robot import check_types
-from schema.wire.codec import (
-    Answer,
-    decode_request,
-    encode_answer,
-    request_kind,
+from schema.errors import (
+    FitnessUndefined,
+    MalformedMessage,
+    SensorFailed,
+    SimulationDiverged,
 )
+from schema.experiment.document import body_space
+from schema.experiment.identity import Identity
+from schema.experiment.settings import lasting
+from schema.robot.brain import check_brain
+from schema.robot.results import Evaluation
+from schema.robot.robot import check_tree, check_types
+from schema.wire.arena import AdvanceShard
+from schema.wire.messages import Call, Evaluate, Failure, Request, Result
 from worker.robot.evaluation import evaluate
-from worker.serve.calls import answer_call
+from worker.serve.calls import call_function
 from worker.serve.checks import checked_evaluation
 from worker.serve.shards import Shards
 
@@ -26,44 +28,46 @@ class Jobs:
 
     shards: Shards
 
-    def answer(self, request: bytes) -> bytes:
-        """Return the encoded answer to an encoded request of any kind.
+    def answer(self, request: Request) -> Result:
+        """Return the result of a request of any kind.
 
         Raises:
-            RevolveError: see ``answer``, ``answer_call`` and ``Shards.answer``.
+            RevolveError: see ``answer_evaluation``, ``call_function`` and
+                ``Shards.answer``.
         """
-        match request_kind(request):
-            case "advance":
-                return self.shards.answer(request)
-            case "call":
-                return answer_call(request)
-            case "evaluation":
-                return answer(request)
+        match request.work:
+            case AdvanceShard():
+                return self.shards.answer(request, request.work)
+            case Call():
+                return call_function(request.work, request.settings)
+            case Evaluate():
+                return answer_evaluation(request, request.work)
+        raise MalformedMessage("a worker vets no bodies")
 
 
-def answer(request: bytes) -> bytes:
-    """Return the encoded answer to an encoded evaluation request.
+def answer_evaluation(request: Request, work: Evaluate) -> Evaluation | Failure:
+    """Return the outcome of an evaluation.
 
-    A function of the request but for ``wall_s``, which affects nothing. Diverged
-    physics, a failed sensor and an undefined fitness are results, answered with the
-    reason.
+    Diverged physics, a failed sensor and an undefined fitness are results: failures.
+
+    Args:
+        request: ``EvaluationSettings``, and the origin of the noise.
+        work: the robot.
 
     Raises:
-        MalformedMessage: the bytes are no request.
         ExperimentError: invalid settings, a plug-in that is unknown or breaks its
             contract, or a sensor that has no stimulus in the environment.
         InvalidRobot: a robot that breaks the rules of its body space.
     """
-    start = time.perf_counter()
-    job = decode_request(request, prepare=checked_evaluation)
-    settings = checked_evaluation(job.settings)
-    check_types(job.robot, body_space(settings.space))
-    if job.steps:
-        settings = lasting(settings, job.steps)
-    result: Evaluation | str
+    settings = checked_evaluation(request.settings)
+    robot = work.robot
+    check_tree(robot.parts)
+    check_brain(robot.brain, len(robot.parts))
+    check_types(robot, body_space(settings.space))
+    if work.steps:
+        settings = lasting(settings, work.steps)
     try:
-        result = evaluate(job.robot, settings, job.identity)
+        identity = Identity(request.origin, work.birth, work.trial)
+        return evaluate(robot, settings, identity)
     except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
-        result = str(error)
-    wall_s = time.perf_counter() - start
-    return encode_answer(Answer(job.epoch, job.number, wall_s, result))
+        return Failure(str(error))

@@ -10,23 +10,18 @@ from schema.agent.service import serve_as_process
 from schema.agent.supervision import ProcessSlot
 from schema.experiment.settings import read_evaluation_settings
 from schema.robot.results import Evaluation
-from schema.wire import revolve_pb2 as pb
-from schema.wire.codec import Answer, encode_answer
+from schema.wire.messages import Evaluate, Request
 
 TIMED_S = 0.04
 """Duration of an evaluation by ``timed_process`` [s]."""
 
 
-def answer(request: bytes) -> bytes:
-    """Return the encoded answer to an encoded evaluation request: fitness 0.
-
-    The robot is not decoded, as decoding is part of an evaluation.
-    """
-    job = pb.Request.FromString(request)
-    clock = read_evaluation_settings(job.settings).simulation
-    steps = job.steps or clock.evaluation_steps
-    nothing = Evaluation(0.0, 0.0, 0.0, steps * clock.timestep_s)
-    return encode_answer(Answer(job.epoch, job.number, 0.0, nothing))
+def answer(request: Request) -> Evaluation:
+    """Return fitness 0 for the robot of an evaluation."""
+    assert isinstance(request.work, Evaluate)
+    clock = read_evaluation_settings(request.settings).simulation
+    steps = request.work.steps or clock.evaluation_steps
+    return Evaluation(0.0, 0.0, 0.0, steps * clock.timestep_s)
 
 
 def process(agent: Agent, slot: ProcessSlot) -> None:
@@ -37,7 +32,7 @@ def process(agent: Agent, slot: ProcessSlot) -> None:
 def timed_process(agent: Agent, slot: ProcessSlot) -> None:
     """Run one process that answers after ``TIMED_S``; returns when asked to stop."""
 
-    def slow_answer(request: bytes) -> bytes:
+    def slow_answer(request: Request) -> Evaluation:
         until_s = time.monotonic() + TIMED_S
         answered = answer(request)
         time.sleep(max(0.0, until_s - time.monotonic()))

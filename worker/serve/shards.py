@@ -3,12 +3,8 @@
 A shard is long-lived state. A worker that holds the state that a request starts from
 continues from there. Otherwise it asks for a history, rebuilds the state, and compares
 the digest of each advance with the recorded one.
-
-A request may come twice: a coordinator sends it again if it waited in a queue for too
-long. The second one is answered from memory, and the state stays.
 """
 
-import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,23 +12,23 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol, Self
 
-from schema.errors import StateDiffers
+from msgspec.structs import replace
+
+from schema.errors import MalformedMessage, StateDiffers
 from schema.experiment.brains import types_of
 from schema.experiment.settings import ArenaSettings, read_arena_settings
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
-from schema.wire.arena import Advance, Changes
-from schema.wire.arena_codec import (
-    AdvanceAnswer,
-    AdvanceRequest,
+from schema.wire.arena import (
+    Advance,
+    AdvanceShard,
+    Changes,
     Live,
     PastAdvance,
     Rebuild,
-    decode_advance_request,
-    encode_advance_answer,
-    encode_live,
 )
-from schema.wire.decoding import fingerprint
+from schema.wire.codec import encode
+from schema.wire.messages import Request, StateMissing
 from worker.arena.changes import possible
 from worker.serve.checks import checked_arena
 
@@ -92,15 +88,11 @@ class _Held:
         world: the arena.
         settings: as in the request.
         digest: of its state; empty before the first advance.
-        request: fingerprint of the request for the latest advance.
-        answer: to that request.
     """
 
     world: World
     settings: bytes
     digest: bytes
-    request: bytes = b""
-    answer: bytes = b""
 
 
 class Shards:
@@ -130,58 +122,46 @@ class Shards:
         self._outlet, self._key_of = outlet, key_of
         self._held: OrderedDict[Key, _Held] = OrderedDict()
 
-    def answer(self, request: bytes) -> bytes:
-        """Return the encoded answer to an encoded request to advance a shard.
+    def answer(self, request: Request, work: AdvanceShard) -> Advance | StateMissing:
+        """Return the result of an advance.
 
-        A function of the request but for ``wall_s``, if the state that it starts from
-        is kept or comes with it, or if it is the request for the latest advance.
-        Otherwise the answer asks for the state.
+        A function of the request, if the state that it starts from is kept or comes
+        with it. Otherwise the answer asks for the state.
+
+        Args:
+            request: the run, and ``ArenaSettings``.
+            work: the advance.
 
         Raises:
-            MalformedMessage: the bytes are no such request.
+            MalformedMessage: an end before the start.
             ExperimentError: invalid settings, or a plug-in that is unknown or breaks
                 its contract.
             InvalidRobot: an insertion that breaks the rules of its body space.
             StateDiffers: the rebuilt state differs from the original one.
         """
-        start = time.perf_counter()
-        job = decode_advance_request(request, checked_arena)
-        key, asked = (job.run, job.shard), fingerprint(request)
-        if answer := self._answered(key, asked):
-            return answer
-        settings = checked_arena(job.settings)
-        _check_robots(job.changes, settings)
+        if work.until < work.from_step:
+            raise MalformedMessage(
+                f"until: must be >= from_step = {work.from_step}, got {work.until}"
+            )
+        settings, key = request.settings, (request.run, work.island)
+        _check_robots(work.changes, checked_arena(settings))
         # Not kept while it changes, so that an error below leaves no broken shard.
-        held, changes = self._taken(job), job.changes
-        if held is None and job.rebuild is not None:
-            held = _Held(self._rebuilt(job, job.rebuild), job.settings, job.from_digest)
-            if job.rebuild.living is not None:
+        held, changes = self._taken(key, settings, work), work.changes
+        if held is None and work.rebuild is not None:
+            world = self._rebuilt(settings, work, work.rebuild)
+            held = _Held(world, settings, work.from_digest)
+            if work.rebuild.living is not None:
                 changes = possible(changes, held.world.births)
         if held is None:
-            wall_s = time.perf_counter() - start
-            return encode_advance_answer(
-                AdvanceAnswer(job.epoch, job.number, wall_s, None)
-            )
+            return StateMissing()
         with _closed_on_error(held.world) as world:
             world.apply(changes)
-            advance = world.advance(job.until)
-            snapshot = world.snapshot() if job.wants_snapshot else b""
-            wall_s = time.perf_counter() - start
-            answer = encode_advance_answer(
-                AdvanceAnswer(job.epoch, job.number, wall_s, advance, snapshot)
-            )
-        held.digest, held.request, held.answer = advance.digest, asked, answer
+            advance = world.advance(work.until)
+            snapshot = world.snapshot() if work.wants_snapshot else b""
+        held.digest = advance.digest
         self._keep(key, held)
-        self._publish(Live(job.run, job.shard, advance))
-        return answer
-
-    def _answered(self, key: Key, asked: bytes) -> bytes:
-        """Return the answer to the latest request of a shard; b"" for another one."""
-        held = self._held.get(key)
-        if held is None or held.request != asked:
-            return b""
-        self._held.move_to_end(key)
-        return held.answer
+        self._publish(Live(request.run, work.island, advance))
+        return replace(advance, snapshot=snapshot)
 
     def _publish(self, live: Live) -> None:
         """Publish an advance; it is encoded only for viewers."""
@@ -189,15 +169,15 @@ class Shards:
             return
         key = self._key_of(live.shard)
         if self._outlet.has_listeners(key):
-            self._outlet.put(key, encode_live(live))
+            self._outlet.put(key, encode(live))
 
-    def _taken(self, job: AdvanceRequest) -> _Held | None:
-        """Remove and return the state that a request starts from, if it is kept."""
-        held = self._held.pop((job.run, job.shard), None)
+    def _taken(self, key: Key, settings: bytes, work: AdvanceShard) -> _Held | None:
+        """Remove and return the state that an advance starts from, if it is kept."""
+        held = self._held.pop(key, None)
         if held is None:
             return None
-        found = (held.world.step, held.digest, held.settings)
-        if found != (job.from_step, job.from_digest, job.settings):
+        kept = (held.world.step, held.digest, held.settings)
+        if kept != (work.from_step, work.from_digest, settings):
             held.world.close()
             return None
         return held
@@ -207,13 +187,13 @@ class Shards:
         if len(self._held) > self._most_held:
             self._held.popitem(last=False)[1].world.close()
 
-    def _rebuilt(self, job: AdvanceRequest, rebuild: Rebuild) -> World:
-        """Return the arena in the state that a request starts from.
+    def _rebuilt(self, data: bytes, work: AdvanceShard, rebuild: Rebuild) -> World:
+        """Return the arena in the state that an advance starts from.
 
         Raises:
             StateDiffers: a state on the way differs from the original one.
         """
-        settings = read_arena_settings(job.settings)
+        settings = read_arena_settings(data)
         if rebuild.snapshot:
             world = self._world.restore(settings, rebuild.snapshot, self._threads)
         else:
@@ -223,14 +203,14 @@ class Shards:
                 _repeat(world, rebuild.history)
             else:
                 _approximate(world, rebuild.history, rebuild.living)
-            if world.step != job.from_step:
+            if world.step != work.from_step:
                 raise StateDiffers(
-                    f"shard {job.shard}: rebuilt to step {world.step}, must be "
-                    f"{job.from_step}"
+                    f"shard {work.island}: rebuilt to step {world.step}, must be "
+                    f"{work.from_step}"
                 )
             is_only_snapshot = not rebuild.history and rebuild.living is None
-            if is_only_snapshot and job.from_digest:
-                _check_digest(world.step, world.digest(), job.from_digest)
+            if is_only_snapshot and work.from_digest:
+                _check_digest(world.step, world.digest(), work.from_digest)
         return world
 
 

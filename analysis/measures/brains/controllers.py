@@ -9,7 +9,7 @@ import pyarrow as pa
 from schema.robot.brain import Layer
 from schema.robot.genome import Genome, walk
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_genome, decode_robot
+from schema.wire.protobuf import decode_genome, decode_robot
 
 Name = tuple[int, int, Layer, str, int]
 """Name of a neuron.

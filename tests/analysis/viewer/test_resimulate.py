@@ -20,7 +20,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
-from schema.wire.codec import encode_robot
+from schema.wire.protobuf import encode_robot
 
 ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 BIRTH = BirthId(0, 16)

@@ -18,8 +18,7 @@ from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.wire.arena import Advance
-from schema.wire.arena_codec import Live
+from schema.wire.arena import Advance, Live
 from schema.wire.codec import encode_body
 from schema.wire.updates import Birth, Death, Migrant, Update, WorkerInfo
 from tests.coordinator.arena_world import poses

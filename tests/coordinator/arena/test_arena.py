@@ -9,11 +9,9 @@ import pytest
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
     Advanced,
-    AdvanceShard,
     ArenaEvent,
     Finish,
     Started,
-    Vet,
     Vetted,
     VettingFailed,
 )
@@ -22,7 +20,8 @@ from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
 from schema.tables.columns import ROWS
-from schema.wire.arena import Advance
+from schema.wire.arena import Advance, AdvanceShard
+from schema.wire.messages import Vet
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,

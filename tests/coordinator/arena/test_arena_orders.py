@@ -6,7 +6,6 @@ import pytest
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
-    AdvanceShard,
     ArenaCommand,
     Commanded,
     Insert,
@@ -20,7 +19,8 @@ from schema.errors import InvalidRobot, UnexpectedEvent
 from schema.robot.brain import Brain
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
-from schema.wire.codec import encode_genome
+from schema.wire.arena import AdvanceShard
+from schema.wire.protobuf import encode_genome
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
     Advanced,
-    AdvanceShard,
     Append,
     ArenaCommand,
     Commanded,
@@ -23,6 +22,7 @@ from coordinator.islands.events import (
 )
 from coordinator.storage.journal import decode_entry, encode_entry
 from schema.robot.ids import BirthId
+from schema.wire.arena import AdvanceShard
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,

@@ -10,7 +10,6 @@ from msgspec import structs
 from coordinator.arena.arena import Arena
 from coordinator.evolution.learners.brain_parameters import BrainParameters
 from coordinator.islands.events import (
-    AdvanceShard,
     Ask,
     Asked,
     Commanded,
@@ -18,7 +17,6 @@ from coordinator.islands.events import (
     Record,
     Remove,
     ReplaceBrain,
-    Vet,
 )
 from coordinator.run.learners import Learners
 from schema.errors import UnexpectedEvent
@@ -30,8 +28,9 @@ from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.tables.columns import ROWS
-from schema.wire.arena import BrainChange
-from schema.wire.codec import decode_robot
+from schema.wire.arena import AdvanceShard, BrainChange
+from schema.wire.messages import Vet
+from schema.wire.protobuf import decode_robot
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,

@@ -58,7 +58,7 @@ from coordinator.dispatch.pool import (
     longer_s,
 )
 from schema.errors import UnexpectedEvent
-from schema.wire.decoding import fingerprint
+from schema.wire.codec import fingerprint
 
 
 def job(number: int, kind: JobKind = "evaluate") -> Job:

@@ -22,7 +22,7 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.fleet import Fleet
 from coordinator.dispatch.pool import FIRST_S, LEAST_WAIT_S, LONGEST_WAIT_S, REPLY_S
 from schema.errors import MalformedMessage, RunFolderError
-from schema.wire.decoding import fingerprint
+from schema.wire.codec import fingerprint
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
 EMPTY = fingerprint(b"")

@@ -19,7 +19,7 @@ from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Part, Robot, check_robot
-from schema.wire.codec import decode_robot, encode_genome
+from schema.wire.protobuf import decode_robot, encode_genome
 
 Own = Callable[..., Experiment]
 THESIS = Experiment(name="test")

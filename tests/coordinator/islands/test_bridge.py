@@ -12,14 +12,12 @@ from msgspec.structs import replace
 
 from coordinator.islands.events import (
     Answered,
-    Evaluate,
     Evaluated,
     EvaluationFailed,
     Finish,
     IslandCommand,
     Record,
     Started,
-    Vet,
     Vetted,
 )
 from coordinator.islands.island import Island
@@ -34,6 +32,7 @@ from schema.experiment.document import (
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
+from schema.wire.messages import Evaluate, Vet
 from tests.coordinator.reports import VIABLE
 
 BRIDGE = Experiment(

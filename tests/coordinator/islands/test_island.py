@@ -11,14 +11,12 @@ from hypothesis import strategies as st
 
 from coordinator.islands.events import (
     Answered,
-    Evaluate,
     Evaluated,
     EvaluationFailed,
     Finish,
     IslandCommand,
     Record,
     Started,
-    Vet,
     Vetted,
     VettingFailed,
 )
@@ -30,7 +28,8 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.tables.columns import ROWS
-from schema.wire.codec import decode_genome
+from schema.wire.messages import Evaluate, Vet
+from schema.wire.protobuf import decode_genome
 from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
 
 BASELINES = ("no-selection", "no-reproduction")

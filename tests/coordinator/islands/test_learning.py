@@ -14,13 +14,11 @@ from coordinator.islands.events import (
     Answered,
     Ask,
     Asked,
-    Evaluate,
     Evaluated,
     EvaluationFailed,
     IslandCommand,
     Record,
     Started,
-    Vet,
     Vetted,
 )
 from coordinator.islands.island import Island
@@ -40,7 +38,8 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.columns import ROWS
-from schema.wire.codec import decode_genome, decode_robot
+from schema.wire.messages import Evaluate, Vet
+from schema.wire.protobuf import decode_genome, decode_robot
 from tests.coordinator.reports import PROVENANCE, VIABLE
 
 FIRST = BirthId(0, 0)

@@ -8,7 +8,6 @@ import pytest
 from coordinator.evolution.breeding import Individual
 from coordinator.islands.events import (
     Emigrate,
-    Evaluate,
     Finish,
     Immigrated,
     NeighbourClosed,
@@ -21,6 +20,7 @@ from schema.experiment.document import Experiment, Islands, Selection, Simulatio
 from schema.experiment.environment import Environment
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
+from schema.wire.messages import Evaluate
 from tests.coordinator.archipelago_run import ArchipelagoRun
 
 Names = list[tuple[int, int]]

@@ -4,14 +4,15 @@ from math import dist
 from typing import Any
 
 from coordinator.arena.arena import Arena
-from coordinator.islands.events import AdvanceShard, Evaluate
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Arena as Rules
 from schema.experiment.document import Experiment, Islands, Selection, Simulation
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
-from schema.wire.codec import decode_robot
+from schema.wire.arena import AdvanceShard
+from schema.wire.messages import Evaluate
+from schema.wire.protobuf import decode_robot
 from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import World
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coordinator.evolution.breeding import Individual
-from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed
+from coordinator.islands.events import Evaluated, EvaluationFailed
 from coordinator.islands.reevaluation import Reevaluations, with_durations
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import (
@@ -19,6 +19,7 @@ from schema.experiment.document import (
 from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
+from schema.wire.messages import Evaluate
 
 CORE = Node("Core", -1, 0, ())
 SPACE = body_space(Experiment(name="test").space)

@@ -40,7 +40,8 @@ from schema.agent.topics import Member
 from schema.errors import NetworkError
 from schema.limits import LONGEST_QUIET_S, OPERATOR_REQUEST_BYTES
 from schema.wire import revolve_pb2 as pb
-from schema.wire.codec import Answer, decode_answer
+from schema.wire.codec import decode_answer
+from schema.wire.messages import Answer
 
 pytestmark = pytest.mark.system
 

@@ -22,7 +22,7 @@ from coordinator.dispatch.events import (
     ShardDone,
 )
 from coordinator.dispatch.fleet import End, Fleet
-from coordinator.islands.events import Advanced, AdvanceShard
+from coordinator.islands.events import Advanced
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
 from schema.errors import MalformedMessage
@@ -31,7 +31,15 @@ from schema.robot.ids import BirthId
 from schema.tables.columns import POSES
 from schema.tables.received import read_columns
 from schema.wire import revolve_pb2 as pb
-from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement, Touch
+from schema.wire.arena import (
+    Advance,
+    AdvanceShard,
+    Casualty,
+    Changes,
+    Insertion,
+    Judgement,
+    Touch,
+)
 from schema.wire.arena_codec import (
     AdvanceAnswer,
     decode_advance_answer,

@@ -7,10 +7,8 @@ import pytest
 
 from coordinator.dispatch.events import Joined, Returned
 from coordinator.islands.events import (
-    Evaluate,
     Evaluated,
     EvaluationFailed,
-    Vet,
     Vetted,
     VettingFailed,
 )
@@ -19,7 +17,8 @@ from schema.errors import MalformedMessage
 from schema.limits import ANSWER_BYTES, LONGEST_REASON
 from schema.robot.results import Evaluation, Report
 from schema.wire import revolve_pb2 as pb
-from schema.wire.codec import Answer, encode_answer
+from schema.wire.codec import encode_answer
+from schema.wire.messages import Answer, Evaluate, Vet
 from tests.coordinator.sent_requests import (
     BIRTH,
     EPOCH,

@@ -36,7 +36,6 @@ from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
-from schema.wire.codec import encode_robot
 from schema.wire.operator import (
     InsertRobot,
     ListRobots,
@@ -48,6 +47,7 @@ from schema.wire.operator import (
     SaveSnapshot,
     SetBrain,
 )
+from schema.wire.protobuf import encode_robot
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.serve.shards import Shards

@@ -8,7 +8,6 @@ from msgspec.structs import replace
 from coordinator.islands.events import (
     QUARANTINED,
     Audited,
-    Evaluate,
     Evaluated,
     EvaluationFailed,
     VettingFailed,
@@ -19,6 +18,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import ROWS
+from schema.wire.messages import Evaluate
 
 ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
 BIRTH = BirthId(2, 7)

@@ -25,7 +25,6 @@ from schema.experiment.document import Experiment, Islands, Selection, Simulatio
 from schema.experiment.file import experiment_text
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
-from schema.wire.codec import encode_robot
 from schema.wire.operator import (
     ListRobots,
     OperatorAction,
@@ -37,6 +36,7 @@ from schema.wire.operator import (
     decode_operator_reply,
     encode_operator_request,
 )
+from schema.wire.protobuf import encode_robot
 from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import experiment
 

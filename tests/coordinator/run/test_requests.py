@@ -14,10 +14,8 @@ from coordinator.dispatch.events import (
 )
 from coordinator.islands.events import (
     QUARANTINED,
-    Evaluate,
     Evaluated,
     EvaluationFailed,
-    Vet,
     Vetted,
     VettingFailed,
 )
@@ -30,14 +28,14 @@ from schema.robot.results import Provenance
 from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import (
-    Answer,
     decode_body,
     decode_request,
     encode_answer,
     encode_body,
-    encode_robot,
+    fingerprint,
 )
-from schema.wire.decoding import fingerprint
+from schema.wire.messages import Answer, Evaluate, Vet
+from schema.wire.protobuf import encode_robot
 from tests.coordinator.sent_requests import (
     BIRTH,
     EPOCH,

@@ -30,7 +30,9 @@ from schema.experiment.file import experiment_text
 from schema.experiment.learning import Learning
 from schema.robot.results import Evaluation
 from schema.tables.files import read_table
-from schema.wire.codec import Answer, decode_request, encode_answer, encode_robot
+from schema.wire.codec import decode_request, encode_answer
+from schema.wire.messages import Answer
+from schema.wire.protobuf import encode_robot
 
 EXPERIMENT = Experiment(
     name="resume", births=40, selection=Selection(population=8, children=6)

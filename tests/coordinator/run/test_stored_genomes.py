@@ -16,7 +16,7 @@ from schema.experiment.learning import Learning
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_robot, encode_robot
+from schema.wire.protobuf import decode_robot, encode_robot
 
 CPPN = Experiment(name="test", encoding=Encoding(type="cppn"))
 SMALL = Space(max_parts=3)

@@ -2,9 +2,8 @@
 
 import pytest
 
-from coordinator.islands.events import AdvanceShard
 from coordinator.run.throttle import RealTimeThrottle
-from schema.wire.arena import Changes
+from schema.wire.arena import AdvanceShard, Changes
 
 
 def advance(shard: int = 0) -> AdvanceShard:

@@ -38,7 +38,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
-from schema.wire.codec import encode_genome
+from schema.wire.protobuf import encode_genome
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 REFUSED = Report(

@@ -17,7 +17,7 @@ from schema.limits import LONGEST_REASON, MOST_EPOCH
 from schema.plugins.permission import allow
 from schema.plugins.source import check_plugins, plugins_of
 from schema.wire import revolve_pb2 as pb
-from schema.wire.decoding import fingerprint
+from schema.wire.codec import fingerprint
 
 
 def request(number: int = 1, epoch: int = 1, plugins: str = "") -> bytes:

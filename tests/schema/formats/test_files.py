@@ -18,7 +18,7 @@ from schema.parts import BUILT_IN
 from schema.robot.brain import INPUT, Brain, Connection, Neuron
 from schema.robot.genome import Node, develop
 from schema.robot.robot import Part, Robot, check_robot
-from schema.wire.codec import encode_robot
+from schema.wire.protobuf import encode_robot
 
 NodeMaker = Callable[..., Node]
 

@@ -19,7 +19,7 @@ from schema.tables.columns import (
     TABLES,
     repeatable,
 )
-from schema.wire.codec import decode_genome, encode_genome, encode_robot
+from schema.wire.protobuf import decode_genome, encode_genome, encode_robot
 
 NodeMaker = Callable[..., Node]
 HIDDEN = NeuronGene("Simple", (0.0, 0.5))

@@ -21,13 +21,13 @@ from schema.wire.arena import (
     Changes,
     Insertion,
     Judgement,
+    PastAdvance,
+    Rebuild,
     Touch,
 )
 from schema.wire.arena_codec import (
     AdvanceAnswer,
     AdvanceRequest,
-    PastAdvance,
-    Rebuild,
     decode_advance_answer,
     decode_advance_request,
     encode_advance_answer,

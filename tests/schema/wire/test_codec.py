@@ -20,21 +20,21 @@ from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Robot, check_robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import (
-    Answer,
-    Request,
     decode_answer,
     decode_body,
-    decode_genome,
     decode_request,
-    decode_robot,
     encode_answer,
     encode_body,
     encode_brain,
-    encode_genome,
     encode_request,
+)
+from schema.wire.messages import Answer, Request, robot_to_message
+from schema.wire.protobuf import (
+    decode_genome,
+    decode_robot,
+    encode_genome,
     encode_robot,
 )
-from schema.wire.messages import robot_to_message
 
 NodeMaker = Callable[..., Node]
 DECODERS: list[Callable[[bytes], object]] = [

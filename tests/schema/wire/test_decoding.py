@@ -22,9 +22,10 @@ from schema.wire.arena_codec import (
     decode_advance_request,
     decode_live,
 )
-from schema.wire.codec import decode_answer, decode_genome, decode_request, decode_robot
+from schema.wire.codec import decode_answer, decode_request
 from schema.wire.decoding import parsed
 from schema.wire.operator import decode_operator_request
+from schema.wire.protobuf import decode_genome, decode_robot
 from schema.wire.updates import decode_update
 
 EMPTY_PART = b"\x0a\x00"

@@ -12,7 +12,6 @@ from schema.errors import MalformedMessage
 from schema.parts import BUILT_IN
 from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
-from schema.wire.codec import encode_robot
 from schema.wire.operator import (
     GetStatus,
     InsertRobot,
@@ -30,6 +29,7 @@ from schema.wire.operator import (
     encode_operator_reply,
     encode_operator_request,
 )
+from schema.wire.protobuf import encode_robot
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 CORE = encode_robot(develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN))

@@ -18,8 +18,7 @@ from schema.experiment.settings import (
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.arena import BrainChange, Changes, Insertion
-from schema.wire.arena_codec import PastAdvance, Rebuild
+from schema.wire.arena import BrainChange, Changes, Insertion, PastAdvance, Rebuild
 from tests.worker.arena_cases import crowd, settings_of
 from worker.arena.replay import Scene, alone, together
 from worker.arena.world import World

@@ -11,7 +11,7 @@ from schema.experiment.file import experiment_text
 from schema.robot.robot import Robot
 from schema.tables.columns import BIRTHS, EVALUATIONS, RUNS
 from schema.tables.segments import segment_path
-from schema.wire.codec import encode_robot
+from schema.wire.protobuf import encode_robot
 
 
 def write_run(

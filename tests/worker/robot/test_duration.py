@@ -11,12 +11,8 @@ from schema.experiment.document import Experiment, Simulation
 from schema.experiment.settings import evaluation_settings, evaluation_settings_of
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
-from schema.wire.codec import (
-    decode_answer,
-    decode_request,
-    encode_request,
-    encode_robot,
-)
+from schema.wire.codec import decode_answer, decode_request, encode_request
+from schema.wire.protobuf import encode_robot
 from worker.robot.evaluation import simulate
 from worker.serve.jobs import answer
 

@@ -22,7 +22,8 @@ from schema.experiment.document import Fitness, Simulation, Space
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.results import Track
 from schema.robot.robot import Part, Robot
-from schema.wire.codec import decode_answer, encode_request, encode_robot
+from schema.wire.codec import decode_answer, encode_request
+from schema.wire.protobuf import encode_robot
 from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
     FitnessFunction,

@@ -17,12 +17,8 @@ from schema.experiment.settings import arena_settings, vetting_settings
 from schema.limits import LONGEST_REASON, MOST_PARTS
 from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
-from schema.wire.arena import Advance, Changes, Insertion
-from schema.wire.arena_codec import (
-    AdvanceRequest,
-    Rebuild,
-    encode_advance_request,
-)
+from schema.wire.arena import Advance, Changes, Insertion, Rebuild
+from schema.wire.arena_codec import AdvanceRequest, encode_advance_request
 from schema.wire.codec import encode_body, encode_request
 from tests.coordinator.arena_world import experiment
 from tests.coordinator.sent_requests import ROBOT

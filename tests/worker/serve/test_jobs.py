@@ -7,7 +7,8 @@ from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment.document import Experiment, Simulation
 from schema.experiment.settings import evaluation_settings, read_evaluation_settings
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_answer, encode_request, encode_robot
+from schema.wire.codec import decode_answer, encode_request
+from schema.wire.protobuf import encode_robot
 from worker.robot.evaluation import evaluate
 from worker.serve.jobs import answer
 

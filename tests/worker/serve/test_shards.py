@@ -13,12 +13,10 @@ from schema.parts import BUILT_IN
 from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.wire.arena import Advance, Changes, Insertion
+from schema.wire.arena import Advance, Changes, Insertion, PastAdvance, Rebuild
 from schema.wire.arena_codec import (
     AdvanceAnswer,
     AdvanceRequest,
-    PastAdvance,
-    Rebuild,
     decode_advance_answer,
     decode_live,
     encode_advance_request,
