@@ -19,7 +19,7 @@ import msgspec
 from coordinator.dispatch.events import Deliver
 from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
-from coordinator.run.requests import failure_of, read_answer, read_evaluation
+from coordinator.run.requests import Expected, failure_of, read_answer, read_evaluation
 from revolve.arguments import in_order, naming_arguments, whole_number
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
@@ -40,8 +40,8 @@ from schema.plugins.permission import allow, allow_references, allowed
 from schema.plugins.source import forget_digests
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
-from schema.wire.calls import call_settings, check_plain
-from schema.wire.messages import Answer, Call, CallValue, Evaluate
+from schema.wire.calls import call_settings, pack_value, unpack_value
+from schema.wire.messages import Answer, Call, CallValue, Evaluate, Failure
 
 T = TypeVar("T")
 
@@ -251,12 +251,11 @@ class Fleet:
 
     def _call(self, settings: bytes, item: object, number: int) -> "Future[Any]":
         try:
-            check_plain(item)
+            call = Call(pack_value(item))
         except ExperimentError as error:
             raise ExperimentError(f"item {number}: {error}") from None
-        read = partial(read_answer, kind=CallValue, most=VALUE_BYTES + ANSWER_BYTES)
         settle = partial(_value, number=number)
-        return self._order(Order("call", Call(item), settings, read, settle))
+        return self._order(Order("call", call, settings, _read_value, settle))
 
     def _submit(
         self,
@@ -376,6 +375,21 @@ def _path_of(function: str | Callable[[Any], Any]) -> str:
     return f"{home}:{name}"
 
 
+def _read_value(data: bytes, *, expected: Expected) -> object:
+    """Return the value of a call, or its failure.
+
+    Args:
+        data: bytes of the answer.
+        expected: epoch and number of the job.
+
+    Raises:
+        MalformedMessage: not an answer, the answer to another request, or no value.
+    """
+    answer = read_answer(data, expected, CallValue, VALUE_BYTES + ANSWER_BYTES)
+    result = answer.result
+    return unpack_value(result.value) if isinstance(result, CallValue) else result
+
+
 def _value(end: Deliver, *, number: int) -> object:
     """Return the value that the end of a call gives.
 
@@ -385,11 +399,9 @@ def _value(end: Deliver, *, number: int) -> object:
     """
     if end.reason:
         raise refusal(end)
-    assert isinstance(end.answer, Answer)
-    outcome = end.answer.result
-    if isinstance(outcome, CallValue):
-        return outcome.value
-    raise RevolveError(f"item {number}: {failure_of(outcome)}")
+    if isinstance(end.answer, Failure):
+        raise RevolveError(f"item {number}: {failure_of(end.answer)}")
+    return end.answer
 
 
 def refusal(end: Deliver) -> JobRefused:

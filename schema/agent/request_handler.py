@@ -24,7 +24,12 @@ from schema.errors import (
     UnknownPlugin,
     error_text,
 )
-from schema.limits import ADVANCE_REQUEST_BYTES, LONGEST_REASON, printable
+from schema.limits import (
+    ADVANCE_REQUEST_BYTES,
+    LONGEST_REASON,
+    REQUEST_BYTES,
+    printable,
+)
 from schema.plugins.source import check_plugins
 from schema.wire.arena import AdvanceShard
 from schema.wire.codec import decode, encode, fingerprint
@@ -161,7 +166,9 @@ class Server:
     def reply(self, data: bytes) -> Reply:
         """Return the reply to any bytes."""
         try:
-            request = decode(Request, data, ADVANCE_REQUEST_BYTES)
+            is_analyzer = self.agent.role == "analyzer"
+            most = REQUEST_BYTES if is_analyzer else ADVANCE_REQUEST_BYTES
+            request = decode(Request, data, most)
             self._check(request)
             name = (request.run, request.epoch, request.number)
             task = Task(self.agent.name, *name, fingerprint(data))

@@ -2,14 +2,18 @@
 
 Arguments and values are plain: None, truth values, numbers, texts, bytes, lists and
 dicts of such. They travel as MessagePack; no object of another kind does, and no code.
+As bytes of bytes: lists and dicts of any value take some seventy times their bytes.
 """
+
+from types import UnionType
+from typing import Any, cast
 
 import msgspec
 
 from schema.errors import ExperimentError, one_line
 from schema.experiment.section import Section
 from schema.limits import MOST_SHOWN, VALUE_BYTES, printable
-from schema.wire.codec import encode
+from schema.wire.codec import decode, encode
 
 _PLAIN = "None, bool, int, float, str, bytes (of robots: Genome.to_bytes), list or dict"
 _LEAVES = (type(None), bool, int, float, str, bytes)
@@ -26,14 +30,14 @@ def call_settings(function: str) -> bytes:
     return msgspec.json.encode(CallSettings(function=function))
 
 
-def check_plain(value: object) -> None:
-    """Raise unless a value is plain; tuples count as lists.
+def pack_value(value: object) -> bytes:
+    """Return the bytes of a plain value; tuples become lists.
 
     Raises:
         ExperimentError: a value of another kind, or one that is too large.
     """
     try:
-        size = len(encode(value))
+        data = encode(value)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         why = printable(one_line(error), 2 * MOST_SHOWN)
         raise ExperimentError(
@@ -41,8 +45,18 @@ def check_plain(value: object) -> None:
         ) from None
     if strange := _strange_kinds(value):
         raise ExperimentError(f"must be {_PLAIN}, got {', '.join(strange)}")
-    if size > VALUE_BYTES:
-        raise ExperimentError(f"must have <= {VALUE_BYTES} bytes, got {size}")
+    if len(data) > VALUE_BYTES:
+        raise ExperimentError(f"must have <= {VALUE_BYTES} bytes, got {len(data)}")
+    return data
+
+
+def unpack_value(data: bytes) -> Any:  # noqa: ANN401 - any plain value
+    """Return the plain value of some bytes.
+
+    Raises:
+        MalformedMessage: not the bytes of a value, or too many.
+    """
+    return decode(cast("UnionType", Any), data, VALUE_BYTES)
 
 
 def _strange_kinds(value: object) -> list[str]:

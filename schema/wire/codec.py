@@ -2,7 +2,7 @@
 
 Messages travel between processes of one version, and the journal of a run holds some.
 Unknown or missing fields, numbers out of range or not finite, and lists that are too
-long are refused. A decoded message takes at most some thirty times its bytes.
+long are refused. A decoded message takes at most some fifty times its bytes.
 """
 
 from functools import cache
@@ -48,9 +48,11 @@ def decode(kind: type[T] | UnionType, data: bytes, most: int) -> T | Any:
         raise MalformedMessage(
             f"message: must be <= {most} bytes, got {len(data)}", "too large"
         )
+    decoder = _decoder(cast("Any", kind))
     try:
-        message: T = _decoder(cast("Any", kind)).decode(data)
-    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
+        message: T = decoder.decode(data)
+    # Also of bytes that are not UTF-8, and of a dict that is a key of a plain value.
+    except (ValueError, TypeError, RecursionError) as error:
         raise MalformedMessage(
             f"damaged, or of another version of Revolve Islands: {error}"
         ) from None

@@ -3,7 +3,7 @@
 The classes that the state machines handle are those that travel.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from msgspec import Meta
 
@@ -17,6 +17,7 @@ from schema.limits import (
     MOST_RUN_NAME,
     MOST_SHARDS,
     MOST_SLOTS,
+    VALUE_BYTES,
 )
 from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.results import Evaluation, Report, WallTime
@@ -25,6 +26,8 @@ from schema.wire.arena import Advance, AdvanceShard
 from schema.wire.codec import Message
 
 Epoch = Annotated[int, Meta(ge=0, le=MOST_EPOCH)]
+Packed = Annotated[bytes, Meta(max_length=VALUE_BYTES)]
+"""Plain value, by ``schema.wire.calls.pack_value``."""
 RunName = Annotated[str, Meta(min_length=1, max_length=MOST_RUN_NAME)]
 
 
@@ -64,10 +67,10 @@ class Call(Message, frozen=True, tag="call"):
     """Call a user's own function, which the settings name, on a worker.
 
     Attributes:
-        argument: None, a truth value, number, text, bytes, list or dict of such.
+        argument: of the function, packed.
     """
 
-    argument: Any
+    argument: Packed
 
 
 Work = Vet | Evaluate | AdvanceShard | Call
@@ -106,9 +109,9 @@ class StateMissing(Message, frozen=True, tag="state missing"):
 
 
 class CallValue(Message, frozen=True, tag="value"):
-    """Value of a call: plain, as its argument."""
+    """Value of a call, packed."""
 
-    value: Any
+    value: Packed
 
 
 Result = Report | Evaluation | Advance | CallValue | Failure | StateMissing
