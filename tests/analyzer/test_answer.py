@@ -1,4 +1,4 @@
-"""Encoded answers to encoded requests."""
+"""Answers to requests."""
 
 import pytest
 
@@ -7,9 +7,9 @@ from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.settings import vetting_settings
 from schema.robot.brain import Brain, Neuron
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.wire.codec import decode_answer, encode_request
-from schema.wire.protobuf import encode_robot
+from schema.wire.messages import Evaluate, Request, Vet
 
 GREY = (0.5, 0.5, 0.5)
 EXPERIMENT = Experiment(name="test")
@@ -22,26 +22,14 @@ ROBOT = Robot(
 )
 
 
-def request_for(
-    robot: Robot, settings: bytes = SETTINGS, *, epoch: int = 1, number: int = 1
-) -> bytes:
-    """Return the bytes of a request about a robot, its brain included."""
-    return encode_request(
-        run="run",
-        epoch=epoch,
-        number=number,
-        settings=settings,
-        robot=encode_robot(robot),
-    )
+def request_for(robot: Robot, settings: bytes = SETTINGS) -> Request:
+    """Return a request about a robot, its brain included."""
+    return Request("run", 1, 1, Vet(BirthId(0, 7), 0, robot), settings)
 
 
-def test_an_answer_holds_the_report_and_the_request_number() -> None:
-    request = request_for(ROBOT, epoch=3, number=17)
-    found = decode_answer(answer(request))
+def test_an_answer_is_the_report() -> None:
     space = body_space(EXPERIMENT.space)
-    assert (found.epoch, found.number) == (3, 17)
-    assert found.result == analyze(ROBOT, space, EXPERIMENT.vetting)
-    assert found.wall_s > 0
+    assert answer(request_for(ROBOT)) == analyze(ROBOT, space, EXPERIMENT.vetting)
 
 
 @pytest.mark.parametrize(
@@ -50,12 +38,12 @@ def test_an_answer_holds_the_report_and_the_request_number() -> None:
     ids=["none", "out of order", "of another body"],
 )
 def test_the_brain_of_a_request_is_ignored(brain: Brain) -> None:
-    found = decode_answer(answer(request_for(Robot(ROBOT.parts, brain))))
-    assert found.result == decode_answer(answer(request_for(ROBOT))).result
+    other = request_for(Robot(ROBOT.parts, brain))
+    assert answer(other) == answer(request_for(ROBOT))
 
 
-def test_a_brain_without_a_body_is_malformed() -> None:
-    with pytest.raises(MalformedMessage, match="at least the core"):
+def test_a_brain_without_a_body_is_rejected() -> None:
+    with pytest.raises(InvalidRobot, match="at least the core"):
         answer(request_for(Robot((), ROBOT.brain)))
 
 
@@ -79,6 +67,7 @@ def test_settings_of_another_kind_are_rejected() -> None:
         answer(request)
 
 
-def test_bytes_that_are_no_request_are_malformed() -> None:
-    with pytest.raises(MalformedMessage):
-        answer(b"\xff\xff\xff")
+def test_an_analyzer_does_no_other_work() -> None:
+    work = Evaluate(BirthId(0, 7), ROBOT)
+    with pytest.raises(MalformedMessage, match="vets bodies only"):
+        answer(Request("run", 1, 1, work, SETTINGS))

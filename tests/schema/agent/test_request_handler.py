@@ -3,80 +3,161 @@
 import os
 import signal
 import time
-from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
-from schema.agent.request_handler import LONG_S, Reply, Server
+from schema.agent.request_handler import LONG_S, Compute, Reply, Server
 from schema.agent.supervision import CurrentJob, Death, JobWatch, ProcessSlot, Task
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
-from schema.limits import LONGEST_REASON, MOST_EPOCH
+from schema.limits import (
+    ANSWER_BYTES,
+    INFO_BYTES,
+    LONGEST_REASON,
+    MOST_EPOCH,
+    REQUEST_BYTES,
+)
 from schema.plugins.permission import allow
 from schema.plugins.source import check_plugins, plugins_of
-from schema.wire import revolve_pb2 as pb
-from schema.wire.codec import fingerprint
+from schema.robot.ids import NOBODY
+from schema.robot.results import Evaluation
+from schema.robot.robot import Part, Robot
+from schema.wire.arena import AdvanceShard, Changes
+from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.messages import (
+    AgentInfo,
+    Answer,
+    Crash,
+    Evaluate,
+    Failure,
+    Request,
+    Result,
+    Work,
+)
+
+ROBOT = Robot((Part("Core", -1, -1, -1, 0, ()),))
+EVALUATE = Evaluate(NOBODY, ROBOT)
+ANSWER = Evaluation(0.25, 0.0, 0.0, 12.0)
 
 
-def request(number: int = 1, epoch: int = 1, plugins: str = "") -> bytes:
-    message = pb.Request(run="r", epoch=epoch, number=number, plugins=plugins)
-    return message.SerializeToString()
+def request(
+    number: int = 1,
+    epoch: int = 1,
+    plugins: str = "",
+    run: str = "r",
+    work: Work = EVALUATE,
+) -> bytes:
+    return encode(Request(run, epoch, number, work, b"{}", plugins))
 
 
-def server(compute: Callable[[bytes], bytes] = lambda _: b"answer") -> Server:
-    return Server(compute, Agent("worker", "w", "tcp/h:1", version="1"))
+def advance(number: int, island: int = 0, *, run: str = "r") -> bytes:
+    return request(number, run=run, work=AdvanceShard(island, 0, 9, Changes(), False))
+
+
+def server(compute: Compute = lambda _: ANSWER, shards: int = 1) -> Server:
+    agent = Agent("worker", "w", "tcp/h:1", shards=shards, version="1")
+    return Server(compute, agent)
+
+
+def result(reply: Reply) -> Result:
+    """Return the result in the answer of a reply."""
+    assert reply.reason == ""
+    return decode(Answer, reply.answer, ANSWER_BYTES).result
+
+
+def counting() -> tuple[Compute, list[int]]:
+    """Return what answers by the number of a request, and the numbers it was asked."""
+    asked: list[int] = []
+
+    def compute(wanted: Request) -> Result:
+        asked.append(wanted.number)
+        return Failure(f"{wanted.number}")
+
+    return compute, asked
 
 
 def test_request_gets_its_answer() -> None:
     made = server()
-    assert made.reply(request()) == Reply(b"answer")
+    answer = decode(Answer, made.reply(request(7, 3)).answer, ANSWER_BYTES)
+    assert (answer.epoch, answer.number, answer.result) == (3, 7, ANSWER)
+    assert 0.0 < answer.wall_s < 1.0
     assert (made.counts.answered, made.counts.refused) == (1, 0)
 
 
 def test_only_the_answer_to_a_long_job_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
-
-    def compute(data: bytes) -> bytes:
-        asked.append(pb.Request.FromString(data).number)
-        monkeypatch.setattr(time, "monotonic", lambda: 100.0 + LONG_S * len(asked))
-        return b"%d" % asked[-1]
-
-    monkeypatch.setattr(time, "monotonic", lambda: 100.0)
+    compute, asked = counting()
     made = server(compute)
-    assert [made.reply(request(n)).answer for n in (1, 2, 1, 2)] == [b"1", b"2"] * 2
+    with monkeypatch.context() as patch:
+        patch.setattr(time, "monotonic", lambda: 100.0 + LONG_S * len(asked))
+        replies = [made.reply(request(number)) for number in (1, 2, 1, 2)]
     assert asked == [1, 2]
-    monkeypatch.undo()
-    assert [made.reply(request(3)).answer for _ in range(2)] == [b"3", b"3"]
-    assert made.reply(request(1, epoch=2)).answer == b"1"
+    assert replies[:2] == replies[2:]
+    assert result(replies[0]) == Failure("1")
+    for _ in range(2):
+        made.reply(request(3))
+    made.reply(request(1, epoch=2))
     assert asked == [1, 2, 3, 3, 1]
+
+
+def test_the_last_advance_of_each_arena_is_answered_from_memory() -> None:
+    """The arena has moved on, so that it cannot be done again."""
+    compute, asked = counting()
+    made = server(compute, shards=2)
+    first = made.reply(advance(1))
+    for _ in range(3):
+        assert made.reply(advance(1)) == first
+    made.reply(advance(2, island=1))
+    made.reply(request(3))
+    assert made.reply(advance(1)) == first
+    assert asked == [1, 2, 3]
+    # Only the last answer is kept, and of as many arenas as the worker keeps.
+    made.reply(advance(4))
+    made.reply(advance(1))
+    assert asked == [1, 2, 3, 4, 1]
+    made.reply(advance(5, run="other"))
+    made.reply(advance(2, island=1))
+    assert asked == [1, 2, 3, 4, 1, 5, 2]
+
+
+@pytest.mark.parametrize(
+    "other", [{"epoch": 2}, {"number": 2}, {"run": "s"}, {"plugins": " "}]
+)
+def test_another_request_is_not_answered_from_memory(other: dict[str, Any]) -> None:
+    compute, asked = counting()
+    made = server(compute, shards=9)
+    work = AdvanceShard(0, 0, 9, Changes(), False)
+    made.reply(request(work=work))
+    made.reply(request(**{"work": work, **other}))
+    assert len(asked) == 2
 
 
 def test_an_older_epoch_is_fenced_once() -> None:
     """A coordinator that repeats the job has found its run folder unchanged."""
     made = server()
-    assert made.reply(request(epoch=2)) == Reply(b"answer")
+    assert result(made.reply(request(epoch=2))) == ANSWER
     assert made.reply(request(epoch=1)).reason.startswith(FENCED)
     for forged in (2, 3, MOST_EPOCH):
-        assert made.reply(request(epoch=1)) == Reply(b"answer")
-        assert made.reply(request(epoch=forged)) == Reply(b"answer")
+        assert result(made.reply(request(epoch=1))) == ANSWER
+        assert result(made.reply(request(epoch=forged))) == ANSWER
 
 
 def test_the_coordinator_that_replaced_another_is_not_fenced() -> None:
     made = server()
     for epoch in (1, 2):
-        assert made.reply(request(epoch=epoch)) == Reply(b"answer")
+        assert result(made.reply(request(epoch=epoch))) == ANSWER
     assert made.reply(request(epoch=1)).reason.startswith(FENCED)
-    assert made.reply(request(epoch=2)) == Reply(b"answer")
+    assert result(made.reply(request(epoch=2))) == ANSWER
 
 
 @pytest.mark.parametrize(
     ("data", "story"),
     [
-        (request(epoch=MOST_EPOCH + 1), "Request.epoch: must be <= 4294967296"),
-        (request(epoch=2**64 - 1), "Request.epoch: must be <= 4294967296"),
-        (pb.Request(run="r" * 10_000).SerializeToString(), "must be <= 5000, got"),
+        (request(epoch=MOST_EPOCH + 1), "<= 4294967296"),
+        (request(epoch=2**64 - 1), "<= 4294967296"),
+        (request(run="r" * 5001), "length <= 5000"),
     ],
 )
 def test_what_is_beyond_a_limit_is_malformed_and_not_remembered(
@@ -84,54 +165,60 @@ def test_what_is_beyond_a_limit_is_malformed_and_not_remembered(
 ) -> None:
     made = server()
     assert story in made.reply(data).reason
-    made.cancel(data)
-    assert (made.counts.malformed, made.counts.cancels) == (1, 1)
-    assert made.reply(request(epoch=1)) == Reply(b"answer")
+    assert made.counts.malformed == 1
+    assert made._epochs == {}
+
+
+def test_an_analyzer_takes_no_request_as_large_as_one_about_an_arena() -> None:
+    large = encode(Request("r", 1, 1, EVALUATE, bytes(REQUEST_BYTES)))
+    assert result(server().reply(large)) == ANSWER
+    made = Server(lambda _: ANSWER, Agent("analyzer", "a", "tcp/h:1", version="1"))
+    assert "must be <= 16777216 bytes" in made.reply(large).reason
 
 
 def test_number_of_remembered_runs_is_limited() -> None:
     made = server()
     for number in range(3000):
-        message = pb.Request(run=f"r{number}", epoch=5)
-        made.reply(message.SerializeToString())
+        made.reply(request(run=f"r{number}", epoch=5))
     assert len(made._epochs) == 1000
 
 
 def test_a_job_that_comes_again_is_done_however_often_it_is_cancelled() -> None:
     made = server()
-    made.cancel(request(7))
+    made.cancel(fingerprint(request(7)))
     assert made.reply(request(7)) == Reply(reason=CANCELLED)
     for _ in range(3):
-        made.cancel(request(7))
-        assert made.reply(request(7)) == Reply(b"answer")
+        made.cancel(fingerprint(request(7)))
+        assert result(made.reply(request(7))) == ANSWER
 
 
 def test_cancelled_job_is_skipped_once() -> None:
     made = server()
-    made.cancel(request(7))
-    made.cancel(b"\xff")
-    assert made.reply(request(6)) == Reply(b"answer")
+    made.cancel(fingerprint(request(7)))
+    made.cancel(b"\xff" * 7)
+    made.cancel(request(6))
+    assert result(made.reply(request(6))) == ANSWER
     assert made.reply(request(7)).reason == "the job was cancelled"
-    assert made.reply(request(7)) == Reply(b"answer")
-    assert (made.counts.skipped, made.counts.cancels) == (1, 1)
+    assert result(made.reply(request(7))) == ANSWER
+    assert (made.counts.skipped, made.counts.cancels) == (1, 2)
 
 
 def test_a_cancellation_needs_the_request_of_the_job() -> None:
     made = server()
-    made.cancel(request(7, plugins="x"))
-    assert made.reply(request(7)) == Reply(b"answer")
+    made.cancel(fingerprint(request(7, plugins="x")))
+    assert result(made.reply(request(7))) == ANSWER
 
 
 def test_number_of_cancelled_jobs_is_limited() -> None:
     made = server()
     for number in range(3000):
-        made.cancel(request(number))
+        made.cancel(fingerprint(request(number)))
     assert len(made._cancelled) == 1000
     assert made.reply(request(2999)).reason
 
 
-def raising(error: Exception) -> Callable[[bytes], bytes]:
-    def compute(_: bytes) -> bytes:
+def raising(error: Exception) -> Compute:
+    def compute(_: Request) -> Result:
         raise error
 
     return compute
@@ -160,15 +247,6 @@ def test_reasons_are_short_printable_lines(error: type[Exception]) -> None:
     assert reason.isprintable()
 
 
-def test_long_names_of_runs_are_refused_and_not_kept() -> None:
-    made = server()
-    data = pb.Request(run="x" * 5001, number=7).SerializeToString()
-    made.cancel(data)
-    assert "characters of Request.run" in made.reply(data).reason
-    assert (made.counts.malformed, made.counts.cancels) == (1, 1)
-    assert (made._cancelled, made._epochs) == ({}, {})
-
-
 def test_agent_without_a_plugin_is_unfit() -> None:
     reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
     assert reply.reason.startswith(f"{UNFIT}has no plug-in 'nowhere_to_be_found' among")
@@ -185,12 +263,9 @@ def test_any_bytes_get_a_reply(data: bytes) -> None:
 def test_agent_info_holds_the_deaths() -> None:
     death = Death(Task("v", "r", 3, 7, b"12345678"), "SIGSEGV")
     agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
-    info = pb.AgentInfo.FromString(
-        Server(bytes, agent, ProcessSlot(0, None, (death,))).info
-    )
-    (told,) = info.deaths
-    assert (told.agent, told.run, told.epoch, told.number) == ("v", "r", 3, 7)
-    assert (told.cause, told.request) == ("SIGSEGV", b"12345678")
+    made = Server(lambda _: ANSWER, agent, ProcessSlot(0, None, (death,)))
+    info = decode(AgentInfo, made.info, INFO_BYTES)
+    assert info.deaths == (Crash("v", "r", 3, 7, "SIGSEGV", b"12345678"),)
 
 
 @pytest.mark.parametrize(
@@ -216,19 +291,18 @@ def test_job_that_waits_too_long_loses_its_process(
     slot = ProcessSlot(0, CurrentJob())
     noted: list[Task | None] = []
 
-    def compute(_: bytes) -> bytes:
+    def compute(_: Request) -> Result:
         nonlocal now_s
         if is_cancelled:
-            made.cancel(request(1))
+            made.cancel(fingerprint(request(1)))
         for _second in range(waited_s):
             assert sent == []
             now_s += 1.0
             made.look()
         assert slot.note is not None
         noted.append(slot.note.read())
-        told = pb.AgentInfo.FromString(made.info)
-        assert told.quiet_s == waited_s
-        return b"answer"
+        assert decode(AgentInfo, made.info, INFO_BYTES).quiet_s == waited_s
+        return ANSWER
 
     agent = Agent(
         "worker", "w", "tcp/h:1", threads=3, shards=9, wait_limit_s=60.0, version="1"
@@ -243,8 +317,8 @@ def test_job_that_waits_too_long_loses_its_process(
     now_s += 1000.0
     made.look()
     assert sent == signals
-    told = pb.AgentInfo.FromString(made.info)
-    assert not told.HasField("quiet_s")
+    told = decode(AgentInfo, made.info, INFO_BYTES)
+    assert told.quiet_s is None
     assert (told.shards, told.cores) == (9, 3)
 
 
@@ -274,11 +348,10 @@ def test_plugins_are_identified_by_their_source(
         "it had when the run began"
     )
     assert reply.reason == differs
-    wants_two = pb.Request(run="lab:1a2b:/runs/a", epoch=1, plugins="plugged_two=0")
-    reply = server().reply(wants_two.SerializeToString())
+    reply = server().reply(request(run="lab:1a2b:/runs/a", plugins="plugged_two=0"))
     assert reply.reason.endswith(
         ", or start this process with the run's copy: "
         "--plugins plugged_two=/runs/a/plugins/plugged_two"
     )
-    assert server().reply(request(plugins=wanted)) == Reply(b"answer")
+    assert result(server().reply(request(plugins=wanted))) == ANSWER
     assert plugins_of(b'{"function":"worker.fitness:thesis"}') == ""

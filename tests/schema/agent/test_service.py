@@ -9,7 +9,12 @@ from schema.agent.network import Agent, hub_config
 from schema.agent.request_handler import ReplyCounts
 from schema.agent.service import Outlet, serve
 from schema.agent.topics import Member
+from schema.wire.messages import Failure, Request, Result
 from tests.system.workspace import wait_until
+
+
+def compute(_: Request) -> Result:
+    return Failure("nothing to do")
 
 
 class NotedOutlet(Outlet):
@@ -35,7 +40,7 @@ def test_totals_are_told_before_the_session_closes() -> None:
     address = new_socket()
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
         serve(
-            lambda request: request,
+            compute,
             Agent("worker", "w", address),
             stop,
             outlet=NotedOutlet(steps, stop),
@@ -57,7 +62,7 @@ def test_an_agent_says_that_a_coordinator_has_another_version() -> None:
     key = Member("default", "worker", "w").info
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))) as hub:
         thread = threading.Thread(
-            target=serve, args=(lambda job: job, agent, stop, lines.append)
+            target=serve, args=(compute, agent, stop, lines.append)
         )
         thread.start()
         try:

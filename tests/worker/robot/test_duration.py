@@ -9,37 +9,26 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Simulation
 from schema.experiment.settings import evaluation_settings, evaluation_settings_of
+from schema.robot.ids import NOBODY
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_answer, decode_request, encode_request
-from schema.wire.protobuf import encode_robot
+from schema.wire.messages import Evaluate, Request
 from worker.robot.evaluation import simulate
-from worker.serve.jobs import answer
+from worker.serve.jobs import answer_evaluation
 
 WORLD = Simulation(window_steps=400, pose_steps=40, warmup_steps=80)
 EXPERIMENT = Experiment(name="test", simulation=WORLD)
 
 
-def request(robot: Robot, steps: int = 0) -> bytes:
-    return encode_request(
-        run="run",
-        epoch=3,
-        number=17,
-        settings=evaluation_settings(EXPERIMENT),
-        robot=encode_robot(robot),
-        steps=steps,
-    )
-
-
 def evaluated(robot: Robot, steps: int = 0) -> Evaluation:
-    result = decode_answer(answer(request(robot, steps))).result
+    work = Evaluate(NOBODY, robot, steps=steps)
+    request = Request("run", 3, 17, work, evaluation_settings(EXPERIMENT))
+    result = answer_evaluation(request, work)
     assert isinstance(result, Evaluation)
     return result
 
 
 def test_zero_steps_use_the_warm_up_of_the_settings(turtle: Robot) -> None:
-    assert len(request(turtle, steps=1)) == len(request(turtle)) + 2
-    assert decode_request(request(turtle)).steps == 0
     assert evaluated(turtle).simulated_s == pytest.approx(2.4)
     assert evaluated(turtle) == evaluated(turtle, steps=480)
 
@@ -64,4 +53,4 @@ def test_duration_need_not_be_a_multiple_of_the_pose_interval(turtle: Robot) -> 
 
 def test_duration_shorter_than_the_window_is_rejected(turtle: Robot) -> None:
     with pytest.raises(ExperimentError, match="400 steps, got 399"):
-        answer(request(turtle, steps=399))
+        evaluated(turtle, steps=399)

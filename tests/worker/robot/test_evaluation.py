@@ -20,9 +20,10 @@ from schema.errors import (
 )
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.ids import NOBODY
 from schema.robot.results import Track
 from schema.robot.robot import Part, Robot
-from schema.wire.codec import decode_answer, encode_request
+from schema.wire.messages import Evaluate, Request
 from schema.wire.protobuf import encode_robot
 from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
@@ -34,7 +35,7 @@ from worker.fitness import (
 from worker.measures.functions import Functions
 from worker.robot import evaluation
 from worker.robot.evaluation import evaluate, simulate
-from worker.serve.jobs import answer
+from worker.serve.jobs import answer_evaluation
 
 RobotOf = Callable[[int], Robot]
 WORLD = Simulation()
@@ -241,14 +242,9 @@ def test_undefined_fitness_is_a_result(
     monkeypatch.setattr(evaluation, "functions_of", lambda _settings: named)
     with pytest.raises(FitnessUndefined, match=message):
         evaluate(turtle, SETTINGS)
-    request = encode_request(
-        run="run",
-        epoch=1,
-        number=2,
-        settings=msgspec.json.encode(SETTINGS),
-        robot=encode_robot(turtle),
-    )
-    assert message in str(decode_answer(answer(request)).result)
+    work = Evaluate(NOBODY, turtle)
+    request = Request("run", 1, 2, work, msgspec.json.encode(SETTINGS))
+    assert message in str(answer_evaluation(request, work))
 
 
 def test_track_has_the_positions_of_the_core(turtle: Robot) -> None:

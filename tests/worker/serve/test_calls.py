@@ -6,15 +6,10 @@ import pytest
 
 from schema.errors import MalformedMessage, RevolveError, UnknownPlugin
 from schema.plugins import permission
-from schema.wire.calls import (
-    Failed,
-    call_settings,
-    encode_call_request,
-    pack_value,
-    read_call_answer,
-)
+from schema.wire.calls import call_settings, pack_value, unpack_value
+from schema.wire.messages import Call, CallValue, Failure, Request
 from worker.arena.world import World
-from worker.serve.calls import answer_call
+from worker.serve.calls import call_function
 from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards
 
@@ -49,39 +44,38 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     del permission._allowed["lab_of_calls"]
 
 
-def request(function: str, argument: object) -> bytes:
-    return encode_call_request(
-        run="run",
-        epoch=3,
-        number=17,
-        settings=call_settings(function),
-        argument=pack_value(argument),
-        plugins="",
-    )
+def called(function: str, argument: object = 1) -> CallValue | Failure:
+    return call_function(Call(pack_value(argument)), call_settings(function))
 
 
 def value(function: str, argument: object) -> object:
-    return read_call_answer(answer_call(request(function, argument)), (3, 17))
+    result = called(function, argument)
+    assert isinstance(result, CallValue)
+    return unpack_value(result.value)
 
 
 def test_value_is_that_of_the_function() -> None:
     assert value("lab_of_calls:double", 21) == 42
-    assert value("lab_of_calls:double", [1]) == [1, 1]
-    answer = Jobs(Shards(World)).answer(request("lab_of_calls:double", 21))
-    assert read_call_answer(answer, (3, 17)) == 42
+    assert value("lab_of_calls:double", (1,)) == [1, 1]
+    call = Call(pack_value("ab"))
+    request = Request("run", 3, 17, call, call_settings("lab_of_calls:double"))
+    assert Jobs(Shards(World)).answer(request) == CallValue(pack_value("abab"))
 
 
-def test_error_of_the_function_is_a_failure() -> None:
-    failed = value("lab_of_calls:broken", 0)
-    expected = "lab_of_calls:broken raised ZeroDivisionError: division by zero"
-    assert failed == Failed(expected)
-    for name, error in (("interrupted", "KeyboardInterrupt"), ("ended", "SystemExit")):
-        failed = value(f"lab_of_calls:{name}", 0)
-        assert isinstance(failed, Failed)
-        assert failed.reason.startswith(f"lab_of_calls:{name} raised {error}")
-    odd = value("lab_of_calls:odd", 0)
-    assert isinstance(odd, Failed)
-    assert "its value must be None, bool" in odd.reason
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("broken", "raised ZeroDivisionError: division by zero"),
+        ("interrupted", "raised KeyboardInterrupt"),
+        ("ended", "raised SystemExit"),
+        ("odd", ": its value must be None, bool"),
+    ],
+)
+def test_error_of_the_function_is_a_failure(name: str, reason: str) -> None:
+    failed = called(f"lab_of_calls:{name}", 0)
+    assert isinstance(failed, Failure)
+    assert failed.reason.replace(" :", ":").startswith(f"lab_of_calls:{name}")
+    assert reason in failed.reason
 
 
 @pytest.mark.parametrize(
@@ -89,13 +83,15 @@ def test_error_of_the_function_is_a_failure() -> None:
 )
 def test_modules_that_are_not_allowed_are_not_called(function: str) -> None:
     with pytest.raises(UnknownPlugin, match="is not allowed"):
-        answer_call(request(function, "x"))
+        called(function)
 
 
 def test_unfit_functions_and_requests_are_refused() -> None:
     with pytest.raises(UnknownPlugin, match="did you mean 'lab_of_calls:double'"):
-        answer_call(request("lab_of_calls:duble", 1))
+        called("lab_of_calls:duble")
     with pytest.raises(RevolveError, match="must take 1 argument: "):
-        answer_call(request("lab_of_calls:two", 1))
+        called("lab_of_calls:two")
     with pytest.raises(MalformedMessage):
-        answer_call(b"nothing")
+        call_function(Call(pack_value(1)), b"nothing")
+    with pytest.raises(MalformedMessage):
+        call_function(Call(b"\xc1"), call_settings("lab_of_calls:double"))

@@ -1,58 +1,53 @@
 """Mutated requests to a worker and an analyzer: each one gets a reply."""
 
-from collections.abc import Callable
-
 import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject
+from msgspec.structs import replace
 
 import analyzer.report
 from schema.agent.network import Agent
-from schema.agent.request_handler import Server
+from schema.agent.request_handler import Compute, Server
 from schema.errors import UnexpectedEvent
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings, vetting_settings
 from schema.limits import LONGEST_REASON, MOST_PARTS
+from schema.parts import BUILT_IN
+from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
-from schema.wire import revolve_pb2 as pb
-from schema.wire.arena import Advance, Changes, Insertion, Rebuild
-from schema.wire.arena_codec import AdvanceRequest, encode_advance_request
-from schema.wire.codec import encode_body, encode_request
+from schema.robot.robot import Robot
+from schema.wire.arena import Advance, AdvanceShard, Changes, Insertion, Rebuild
+from schema.wire.codec import encode
+from schema.wire.messages import Request, Result, Vet
 from tests.coordinator.arena_world import experiment
-from tests.coordinator.sent_requests import ROBOT
 from tests.worker.fake_world import FakeWorld
+from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards
 
 EXPERIMENT = experiment(9)
 LAST = 10_000
-VETTING = encode_request(
-    run="r",
-    epoch=1,
-    number=2,
-    settings=vetting_settings(EXPERIMENT),
-    robot=encode_body(ROBOT),
-)
-CHANGES = Changes((), (Insertion(BirthId(0, 0), ROBOT, (0.0, 0.0)),))
-ADVANCE = encode_advance_request(
-    AdvanceRequest(
-        run="r",
-        epoch=1,
-        number=3,
-        settings=arena_settings(EXPERIMENT, Origin()),
-        shard=0,
-        from_step=0,
-        from_digest=b"",
-        changes=CHANGES,
-        until=1000,
+BIRTH = BirthId(0, 0)
+ROBOT = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
+VETTING = Request("r", 1, 2, Vet(BIRTH, 0, ROBOT), vetting_settings(EXPERIMENT))
+ADVANCE = Request(
+    "r",
+    1,
+    3,
+    AdvanceShard(
+        0,
+        0,
+        1000,
+        Changes((), (Insertion(BIRTH, ROBOT, (0.0, 0.0)),)),
         wants_snapshot=True,
-        rebuild=Rebuild(b"", (), (BirthId(0, 0),)),
-    )
+        rebuild=Rebuild(b"", (), (BIRTH,)),
+    ),
+    arena_settings(EXPERIMENT, Origin()),
 )
 
 
-def server(compute: Callable[[bytes], bytes]) -> Server:
+def server(compute: Compute) -> Server:
     return Server(compute, Agent("worker", "w", "tcp/h:1"))
 
 
@@ -65,19 +60,19 @@ class NearWorld(FakeWorld):
         return super().advance(until)
 
 
-def advancing(data: bytes) -> bytes:
-    return Shards(NearWorld).answer(data)
+def working(request: Request) -> Result:
+    return Jobs(Shards(NearWorld)).answer(request)
 
 
 @pytest.mark.parametrize(
     ("compute", "valid"),
-    [(analyzer.report.answer, VETTING), (advancing, ADVANCE)],
+    [(analyzer.report.answer, encode(VETTING)), (working, encode(ADVANCE))],
     ids=["vetting", "advance"],
 )
 @settings(deadline=None)
 @given(data=st.data())
 def test_mutated_requests_get_a_reply(
-    compute: Callable[[bytes], bytes], valid: bytes, data: DataObject
+    compute: Compute, valid: bytes, data: DataObject
 ) -> None:
     assert server(compute).reply(valid).answer
     mutated = bytearray(valid)
@@ -91,23 +86,18 @@ def test_mutated_requests_get_a_reply(
 
 
 def test_a_robot_of_too_many_parts_is_refused() -> None:
-    message = pb.Request.FromString(VETTING)
-    message.robot = b"\x0a\x00" * (MOST_PARTS + 1)
+    parts = ROBOT.parts * (MOST_PARTS + 1)
     made = server(analyzer.report.answer)
-    reply = made.reply(message.SerializeToString())
-    assert reply.reason == "Robot.parts: must be <= 1000, got 1001"
+    vetting = replace(VETTING, work=Vet(BIRTH, 0, Robot(parts)))
+    assert "length <= 1000 - at `$.work.robot" in made.reply(encode(vetting)).reason
     assert made.counts.malformed == 1
 
 
-def test_settings_of_the_wrong_type_are_refused() -> None:
-    message = pb.Request.FromString(VETTING)
-    message.settings = msgspec.json.encode({"space": "x" * 100_000})
-    reply = server(analyzer.report.answer).reply(message.SerializeToString())
-    assert "settings of a request" in reply.reason
-
-
-def test_settings_that_are_not_utf_8_are_refused() -> None:
-    message = pb.Request.FromString(VETTING)
-    message.settings = b'{"space": "\xff"}'
-    reply = server(analyzer.report.answer).reply(message.SerializeToString())
-    assert "settings of a request" in reply.reason
+@pytest.mark.parametrize(
+    "sent", [msgspec.json.encode({"space": "x" * 100_000}), b'{"space": "\xff"}']
+)
+def test_settings_that_are_none_are_refused(sent: bytes) -> None:
+    """Of the wrong type, and not UTF-8."""
+    for compute, request in ((analyzer.report.answer, VETTING), (working, ADVANCE)):
+        reply = server(compute).reply(encode(replace(request, settings=sent)))
+        assert "settings of a request" in reply.reason

@@ -1,4 +1,4 @@
-"""Evaluation requests and answers as bytes."""
+"""Evaluation requests and their results."""
 
 import pytest
 from msgspec.structs import replace
@@ -6,52 +6,48 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment.document import Experiment, Simulation
 from schema.experiment.settings import evaluation_settings, read_evaluation_settings
+from schema.robot.ids import NOBODY
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_answer, encode_request
-from schema.wire.protobuf import encode_robot
+from schema.wire.messages import Evaluate, Failure, Request, Result, Vet, Work
+from worker.arena.world import World
 from worker.robot.evaluation import evaluate
-from worker.serve.jobs import answer
+from worker.serve.jobs import Jobs
+from worker.serve.shards import Shards
 
 EXPERIMENT = Experiment(name="test", simulation=Simulation(window_steps=400))
 
 
-def request_for(robot: Robot, experiment: Experiment = EXPERIMENT) -> bytes:
-    """Return the bytes of a request with number 17 of incarnation 3."""
-    return encode_request(
-        run="run",
-        epoch=3,
-        number=17,
-        settings=evaluation_settings(experiment),
-        robot=encode_robot(robot),
-    )
+def result_of(
+    robot: Robot, experiment: Experiment = EXPERIMENT, work: Work | None = None
+) -> Result:
+    """Return the result of an evaluation, or of other work."""
+    settings = evaluation_settings(experiment)
+    request = Request("run", 3, 17, work or Evaluate(NOBODY, robot), settings)
+    return Jobs(Shards(World)).answer(request)
 
 
-def test_answer_has_the_evaluation_and_the_request_s_number(turtle: Robot) -> None:
+def test_result_is_the_evaluation(turtle: Robot) -> None:
     settings = read_evaluation_settings(evaluation_settings(EXPERIMENT))
-    found = decode_answer(answer(request_for(turtle)))
-    assert (found.epoch, found.number) == (3, 17)
-    assert found.result == evaluate(turtle, settings)
-    assert found.wall_s > 0
+    assert result_of(turtle) == evaluate(turtle, settings)
 
 
-def test_diverged_simulation_is_answered_with_the_reason(turtle: Robot) -> None:
+def test_diverged_simulation_is_a_failure_with_the_reason(turtle: Robot) -> None:
     wild = replace(
         EXPERIMENT.simulation, timestep_s=0.5, servo_armature=0.0, servo_stiffness=1e9
     )
-    request = request_for(turtle, replace(EXPERIMENT, simulation=wild))
-    found = decode_answer(answer(request))
-    assert isinstance(found.result, str)
-    assert found.result.startswith("physics diverged by ")
+    result = result_of(turtle, replace(EXPERIMENT, simulation=wild))
+    assert isinstance(result, Failure)
+    assert result.reason.startswith("physics diverged by ")
 
 
 def test_invalid_requests_are_rejected(turtle: Robot) -> None:
-    with pytest.raises(MalformedMessage):
-        answer(b"no request")
-    robot = Robot(turtle.parts)
     with pytest.raises(InvalidRobot):
-        answer(request_for(robot))
-    bad = encode_request(
-        run="run", epoch=1, number=1, settings=b"{}", robot=encode_robot(turtle)
-    )
+        result_of(Robot(turtle.parts))
+    with pytest.raises(InvalidRobot, match="at least the core"):
+        result_of(Robot((), turtle.brain))
     with pytest.raises(ExperimentError):
-        answer(bad)
+        Jobs(Shards(World)).answer(
+            Request("run", 1, 1, Evaluate(NOBODY, turtle), b"{}")
+        )
+    with pytest.raises(MalformedMessage, match="vets no bodies"):
+        result_of(turtle, work=Vet(NOBODY, 0, turtle))

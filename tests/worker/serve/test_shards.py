@@ -1,26 +1,30 @@
 """Arena shards of a worker, in a world without physics."""
 
-from dataclasses import replace
 from functools import partial
 
 import pytest
+from msgspec.structs import replace
 
 from schema.errors import InvalidRobot, MalformedMessage, StateDiffers
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings
+from schema.limits import LIVE_BYTES
 from schema.parts import BUILT_IN
 from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.wire.arena import Advance, Changes, Insertion, PastAdvance, Rebuild
-from schema.wire.arena_codec import (
-    AdvanceAnswer,
-    AdvanceRequest,
-    decode_advance_answer,
-    decode_live,
-    encode_advance_request,
+from schema.wire.arena import (
+    Advance,
+    AdvanceShard,
+    Changes,
+    Insertion,
+    Live,
+    PastAdvance,
+    Rebuild,
 )
+from schema.wire.codec import decode
+from schema.wire.messages import Request, StateMissing
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.serve.shards import Shards as AnyShards
 
@@ -44,24 +48,25 @@ class JobClient:
         self.history: list[PastAdvance] = []
         self.snapshot = b""
 
-    def request(
+    def work(
         self,
         steps: int,
         changes: Changes | None = None,
         rebuild: Rebuild | None = None,
         *,
         keep: bool = False,
-        number: int = 7,
-    ) -> bytes:
-        return encode_advance_request(
-            AdvanceRequest(
-                run=self.run, epoch=1, number=number, settings=SETTINGS,
-                shard=self.shard,
-                from_step=self.step, from_digest=self.digest,
-                changes=changes or Changes(), until=self.step + steps,
-                wants_snapshot=keep, rebuild=rebuild,
-            )
-        )  # fmt: skip
+    ) -> AdvanceShard:
+        """Return an advance from the newest state."""
+        return AdvanceShard(
+            self.shard,
+            0,
+            self.step + steps,
+            changes or Changes(),
+            wants_snapshot=keep,
+            from_step=self.step,
+            from_digest=self.digest,
+            rebuild=rebuild,
+        )
 
     def ask(
         self,
@@ -71,18 +76,21 @@ class JobClient:
         rebuild: Rebuild | None = None,
         *,
         keep: bool = False,
-    ) -> AdvanceAnswer:
-        """Request an advance and record it."""
-        request = self.request(steps, changes, rebuild, keep=keep)
-        answer = decode_advance_answer(shards.answer(request))
-        assert (answer.epoch, answer.number) == (1, 7)
-        if answer.advance is not None:
-            self.step, self.digest = answer.advance.step, answer.advance.digest
+    ) -> Advance | None:
+        """Request an advance and record it; return None without the state."""
+        advance = self.send(shards, self.work(steps, changes, rebuild, keep=keep))
+        if advance is not None:
+            self.step, self.digest = advance.step, advance.digest
             past = PastAdvance(changes or Changes(), self.step, self.digest)
             self.history.append(past)
             if keep:
-                self.snapshot, self.history = answer.snapshot, []
-        return answer
+                self.snapshot, self.history = advance.snapshot, []
+        return advance
+
+    def send(self, shards: AnyShards, work: AdvanceShard) -> Advance | None:
+        request = Request(self.run, 1, 7, work, SETTINGS)
+        result = shards.answer(request, work)
+        return None if isinstance(result, StateMissing) else result
 
     def whole(self) -> Rebuild:
         return Rebuild(self.snapshot, tuple(self.history))
@@ -97,10 +105,9 @@ def lived(shards: AnyShards) -> JobClient:
 
 
 def following(
-    requester: JobClient, shards: AnyShards, rebuild: Rebuild | None, number: int = 7
+    requester: JobClient, shards: AnyShards, rebuild: Rebuild | None
 ) -> Advance | None:
-    request = requester.request(50, insertion(2), rebuild, number=number)
-    return decode_advance_answer(shards.answer(request)).advance
+    return requester.send(shards, requester.work(50, insertion(2), rebuild))
 
 
 def test_advance_continues_from_the_kept_state() -> None:
@@ -143,35 +150,8 @@ def test_state_that_is_ahead_of_the_request_is_dropped() -> None:
     shards = Shards(FakeWorld)
     requester = lived(shards)
     first = following(requester, shards, None)
-    assert following(requester, shards, None, 8) is None
-    assert following(requester, shards, requester.whole(), 9) == first
-
-
-@pytest.mark.parametrize("is_whole", [False, True])
-def test_request_that_comes_again_is_answered_from_memory(is_whole: bool) -> None:  # noqa: FBT001 - a case
-    """A coordinator repeats a request that waited for too long in the queue."""
-    shards = Shards(FakeWorld)
-    requester = lived(Shards(FakeWorld) if is_whole else shards)
-    rebuild = requester.whole() if is_whole else None
-    request = requester.request(100, insertion(2), rebuild, keep=True)
-    FakeWorld.made = 0
-    answers = {shards.answer(request) for _ in range(3)}
-    assert len(answers) == 1
-    assert decode_advance_answer(answers.pop()).advance is not None
-    requester.ask(shards, 100, insertion(2), rebuild, keep=True)
-    # The state is kept: the next advance goes on from it.
-    assert requester.ask(shards).advance is not None
-    assert FakeWorld.made == is_whole
-    # Only the last answer is kept, and it goes with its state.
-    again = decode_advance_answer(shards.answer(request)).advance
-    assert (again is not None) == is_whole
-
-
-def test_request_of_the_next_coordinator_is_not_answered_from_memory() -> None:
-    shards = Shards(FakeWorld)
-    requester = lived(shards)
-    assert following(requester, shards, None) is not None
-    assert following(requester, shards, None, number=8) is None
+    assert following(requester, shards, None) is None
+    assert following(requester, shards, requester.whole()) == first
 
 
 def test_state_with_another_digest_is_not_used() -> None:
@@ -185,7 +165,7 @@ def test_rebuild_on_a_machine_with_different_results_is_rejected() -> None:
     requester = lived(Shards(FakeWorld))
     odd = Shards(OddWorld)
     with pytest.raises(StateDiffers, match=r"at step 100 .* results differ"):
-        odd.answer(requester.request(50, None, requester.whole()))
+        requester.send(odd, requester.work(50, None, requester.whole()))
     assert following(requester, odd, None) is None
 
 
@@ -195,14 +175,14 @@ def test_snapshot_with_another_digest_is_rejected() -> None:
     requester.ask(first, 300, keep=True)
     requester.snapshot = requester.snapshot.replace(b"[0, 1,", b"[0, 2,")
     with pytest.raises(StateDiffers, match="at step 500"):
-        Shards(FakeWorld).answer(requester.request(50, None, requester.whole()))
+        requester.send(Shards(FakeWorld), requester.work(50, None, requester.whole()))
 
 
 def test_history_that_ends_at_another_step_is_rejected() -> None:
     requester = lived(Shards(FakeWorld))
     rebuild = Rebuild(b"", tuple(requester.history[:1]))
     with pytest.raises(StateDiffers, match="rebuilt to step 100, must be 200"):
-        Shards(FakeWorld).answer(requester.request(50, None, rebuild))
+        requester.send(Shards(FakeWorld), requester.work(50, None, rebuild))
 
 
 def test_invalid_robot_leaves_the_shard_unchanged() -> None:
@@ -210,7 +190,7 @@ def test_invalid_robot_leaves_the_shard_unchanged() -> None:
     requester = lived(shards)
     strange = Robot((Part("Wheelbarrow", -1, -1, -1, 0, ()),))
     with pytest.raises(InvalidRobot, match="Wheelbarrow"):
-        shards.answer(requester.request(50, insertion(2, strange)))
+        requester.send(shards, requester.work(50, insertion(2, strange)))
     assert following(requester, shards, None) is not None
 
 
@@ -220,7 +200,7 @@ def test_shards_of_different_runs_are_independent() -> None:
     for requester in clients:
         requester.ask(shards, 100, insertion(0), EMPTY)
     for requester in clients:
-        assert requester.ask(shards).advance is not None
+        assert requester.ask(shards) is not None
 
 
 def test_least_recently_used_shard_is_dropped_first() -> None:
@@ -230,9 +210,9 @@ def test_least_recently_used_shard_is_dropped_first() -> None:
         requester.ask(shards, rebuild=EMPTY)
     clients[0].ask(shards)
     clients[-1].ask(shards, rebuild=EMPTY)
-    assert clients[0].ask(shards).advance is not None
-    assert clients[1].ask(shards).advance is None
-    assert clients[2].ask(shards).advance is not None
+    assert clients[0].ask(shards) is not None
+    assert clients[1].ask(shards) is None
+    assert clients[2].ask(shards) is not None
 
 
 KEYS = {0: "fleet/poses/0"}
@@ -259,7 +239,7 @@ def test_each_advance_is_published_to_viewers() -> None:
     outlet.are_there = True
     requester = lived(Shards(FakeWorld, outlet=outlet, key_of=KEYS.__getitem__))
     assert [key for key, _ in outlet.put_at] == [KEYS[0], KEYS[0]]
-    seen = [decode_live(data) for _, data in outlet.put_at]
+    seen = [decode(Live, data, LIVE_BYTES) for _, data in outlet.put_at]
     assert [(live.run, live.shard, live.advance.step) for live in seen] == [
         ("r", 0, 100),
         ("r", 0, 200),
@@ -267,9 +247,10 @@ def test_each_advance_is_published_to_viewers() -> None:
     assert seen[1].advance.digest == requester.digest
 
 
-def test_malformed_request_is_rejected() -> None:
-    with pytest.raises(MalformedMessage):
-        Shards(FakeWorld).answer(b"\xff\xff")
+def test_an_end_before_the_start_is_malformed() -> None:
+    requester = lived(Shards(FakeWorld))
+    with pytest.raises(MalformedMessage, match="until: must be >= from_step = 200"):
+        requester.ask(Shards(FakeWorld), -1)
 
 
 def test_history_of_another_platform_is_approximated() -> None:
@@ -282,7 +263,7 @@ def test_history_of_another_platform_is_approximated() -> None:
         requester.ask(Shards(FakeWorld), 10, None, requester.whole())
     rebuild = replace(requester.whole(), living=(BirthId(0, 0), BirthId(0, 7)))
     gone = Changes(removals=(BirthId(0, 7),))
-    advance = requester.ask(Shards(FakeWorld), 10, gone, rebuild).advance
+    advance = requester.ask(Shards(FakeWorld), 10, gone, rebuild)
     assert advance is not None
     births = {judgement.birth for judgement in advance.judgements}
     births |= {casualty.birth for casualty in advance.casualties}
