@@ -16,12 +16,16 @@ from google.protobuf.descriptor_pb2 import (
 )
 from msgspec import Struct
 
+import schema.wire.arena
+import schema.wire.messages
 import schema.wire.operator
 import schema.wire.status
 import schema.wire.updates
 from docs.struct_tables import attributes, introduction, rows
 from schema.agent import topics
 from schema.agent.topics import Member, Role
+from schema.experiment.identity import Origin
+from schema.robot.results import Evaluation, Report
 from schema.wire.codec import Message
 
 _TOP = Path(__file__).parents[1]
@@ -31,14 +35,29 @@ _HEAD = f"""# Messages and keys
 Written from the code by `python -m docs.reference_pages`.
 [Architecture](../architecture.md) shows the path of a birth through these messages.
 
-Processes exchange messages by Zenoh through a hub. Jobs, answers and poses are Protobuf
-messages ([{_PROTO}](../../{_PROTO})); requests of operators
-and updates for viewers are MessagePack. Journals and tables hold some of the same
-messages. Lengths are in metres, masses in kilograms, times in seconds and angles in
-radians unless stated otherwise.
+Processes exchange messages of MessagePack by Zenoh through a hub; they must be of one
+version. Robot files and tables hold robots and genomes as Protobuf
+([{_PROTO}](../../{_PROTO})), which later versions read. Lengths
+are in metres, masses in kilograms, times in seconds and angles in radians unless stated
+otherwise.
 
 """
-_MODULES = (schema.wire.operator, schema.wire.updates, schema.wire.status)
+_MODULES = (
+    schema.wire.messages,
+    schema.wire.arena,
+    schema.wire.operator,
+    schema.wire.status,
+    schema.wire.updates,
+)
+_OTHERS = (Report, Evaluation, Origin)
+"""Structs in messages that are also used elsewhere."""
+_CODING = """Maps with the names of the fields. A message that may stand where others
+may has a field `type` that names it. Fields with a default may be missing; other fields
+are refused. A `BirthId` is a list of two whole numbers from 0: the island of birth and
+the number there. A `Robot` is a list of its parts and its brain, a `Brain` a list of
+its neurons and its connections; a `Part`, a `Neuron` and a `Connection` are lists of
+the fields of the [Protobuf messages](#protobuf-messages) of that name, the layer as
+`input`, `output` or `hidden`."""
 _ROLES: tuple[Role, ...] = ("coordinator", "worker", "analyzer")
 _OF_ROLE: dict[str, tuple[Role, ...]] = {
     "jobs": ("worker", "analyzer"),
@@ -54,7 +73,7 @@ _OF_ROLE: dict[str, tuple[Role, ...]] = {
 
 def page() -> str:
     """Return the page."""
-    parts = (_keys(), _protobuf(), _messagepack())
+    parts = (_keys(), _messagepack(), _protobuf())
     return _HEAD + "\n".join(line for part in parts for line in part).rstrip() + "\n"
 
 
@@ -170,7 +189,7 @@ def _text(comment: str) -> str:
 
 def messagepack() -> dict[str, type[Struct]]:
     """Return the MessagePack messages by name."""
-    return {
+    messages: dict[str, type[Struct]] = {
         name: found
         for module in _MODULES
         for name, found in vars(module).items()
@@ -178,21 +197,26 @@ def messagepack() -> dict[str, type[Struct]]:
         and issubclass(found, Message)
         and found.__module__ == module.__name__
     }
+    return messages | {each.__name__: each for each in _OTHERS}
 
 
 def _messagepack() -> Iterator[str]:
     """Yield the tables of the MessagePack messages."""
     yield "## MessagePack messages\n"
-    yield (
-        "Maps with the names of the fields. Actions of operators have a field `type` "
-        "that names them. Fields with a default may be missing. A `BirthId` is a list "
-        "of two whole numbers from 0: the island of birth and the number there.\n"
-    )
-    for name, found in messagepack().items():
+    yield f"{_CODING}\n"
+    messages = messagepack()
+
+    def link(inner: type) -> str:
+        name = inner.__name__
+        return f"[`{name}`](#{name.lower()})" if name in messages else f"`{name}`"
+
+    for name, found in messages.items():
         yield f"### `{name}`\n"
         yield f"{introduction(found)}\n"
-        tag = found.__struct_config__.tag
-        if tag:
-            yield f"Its `type` is `{tag}`.\n"
+        config = found.__struct_config__
+        if config.tag:
+            yield f"Its `type` is `{config.tag}`.\n"
+        if config.array_like:
+            yield "A list of the fields, in this order.\n"
         if found.__struct_fields__:
-            yield from rows(found, lambda inner: f"`{inner.__name__}`")
+            yield from rows(found, link)

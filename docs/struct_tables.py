@@ -116,7 +116,8 @@ def _limits(kind: kinds.Type) -> str:
         for key, sign in _SIGNS.items()
         if (value := getattr(kind, key, None)) is not None and abs(value) not in _MOST
     ]
-    what = "characters" if isinstance(kind, kinds.StrType) else "items"
+    counted = {kinds.StrType: "characters", kinds.BytesType: "bytes"}
+    what = counted.get(type(kind), "items")
     lengths = [
         f", at {key} {value} {what}"
         for key, value in (
@@ -137,6 +138,8 @@ def _default(field: kinds.Field) -> str:
         return "required" if field.required else "not given"
     if value is None:
         return "not given"
+    if value == b"":
+        return "empty"
     if isinstance(value, Struct):
         return "its defaults"
     if isinstance(value, tuple) and value and isinstance(value[0], str):

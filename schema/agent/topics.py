@@ -31,8 +31,7 @@ class Member:
         fleet: name of the fleet.
         role: what the process is.
         name: its own, never used again.
-        jobs: key that takes one ``Request`` and gives one ``Answer``, or takes one
-            ``AdvanceRequest`` and gives one ``AdvanceAnswer`` (workers).
+        jobs: key that takes one ``Request`` and gives one ``Answer``.
         session: id of the process's Zenoh session, hexadecimal. A hub accepts one
             session of an id at a time, and a reply carries the id of the session that
             gave it. Only the process itself can thus reply in its name.
@@ -63,7 +62,7 @@ class Member:
 
     @property
     def cancelled(self) -> str:
-        """Key that takes the ``Request`` of a job that is no longer wanted."""
+        """Key that takes the fingerprint of a ``Request`` that is no longer wanted."""
         return f"{self._prefix}/cancelled"
 
     @property

@@ -53,7 +53,13 @@ class BrainChange(Message, frozen=True):
 
 
 class Changes(Message, frozen=True):
-    """Changes of an arena before an advance: removals, insertions, brains."""
+    """Changes of an arena before an advance.
+
+    Attributes:
+        removals: robots that leave, first of all.
+        insertions: robots that come.
+        brains: new brains of robots that live then.
+    """
 
     removals: Births = ()
     insertions: Annotated[tuple[Insertion, ...], Meta(max_length=MOST_LIVING)] = ()
@@ -61,7 +67,13 @@ class Changes(Message, frozen=True):
 
 
 class PastAdvance(Message, frozen=True):
-    """Past advance to repeat: its changes, last step, and digest of the result."""
+    """Past advance to repeat.
+
+    Attributes:
+        changes: before the advance.
+        until: step that it reached.
+        digest: of the state at that step.
+    """
 
     changes: Changes
     until: Count
@@ -133,7 +145,14 @@ class Judgement(Message, frozen=True, array_like=True):
 
 
 class Casualty(Message, frozen=True, array_like=True):
-    """Removal of a robot whose simulation diverged, with the reason."""
+    """Removal of a robot whose simulation diverged.
+
+    Attributes:
+        birth: id of the robot.
+        step: at which it was removed.
+        reason: what diverged.
+        place: of the core when it was removed, world frame [m].
+    """
 
     birth: BirthId
     step: Count
@@ -142,7 +161,12 @@ class Casualty(Message, frozen=True, array_like=True):
 
 
 class Touch(Message, frozen=True, array_like=True):
-    """Contact of two robots during an advance, and its total duration [s]."""
+    """Contact of two robots during an advance.
+
+    Attributes:
+        first, second: ids of the robots.
+        duration_s: total duration [s].
+    """
 
     first: BirthId
     second: BirthId

@@ -67,7 +67,7 @@ class Call(Message, frozen=True, tag="call"):
     """Call a user's own function, which the settings name, on a worker.
 
     Attributes:
-        argument: of the function, packed.
+        argument: of the function, in MessagePack of its own.
     """
 
     argument: Packed
@@ -99,7 +99,11 @@ class Request(Message, frozen=True):
 
 
 class Failure(Message, frozen=True, tag="failure"):
-    """Reason why a simulation or a call has no result."""
+    """A simulation or a call without a result.
+
+    Attributes:
+        reason: why there is none.
+    """
 
     reason: str
 
@@ -109,7 +113,11 @@ class StateMissing(Message, frozen=True, tag="state missing"):
 
 
 class CallValue(Message, frozen=True, tag="value"):
-    """Value of a call, packed."""
+    """Value of a call.
+
+    Attributes:
+        value: of the function, in MessagePack of its own.
+    """
 
     value: Packed
 

@@ -39,8 +39,10 @@ from schema.agent.network import Agent
 from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
 from schema.experiment.file import read_experiment
+from schema.limits import ANSWER_BYTES
 from schema.tables.arrow import skip_pandas
-from schema.wire.codec import decode_answer
+from schema.wire.codec import decode
+from schema.wire.messages import Answer
 
 # As the command does, before the first session is opened.
 prepare_process()
@@ -68,7 +70,7 @@ class TimedNetwork:
         events = self._network.receive(timeout_s, pause_s)
         for event in events:
             if isinstance(event, Returned) and event.agent.startswith("worker"):
-                self.busy_s += decode_answer(event.answer).wall_s
+                self.busy_s += decode(Answer, event.answer, ANSWER_BYTES).wall_s
         return events
 
 

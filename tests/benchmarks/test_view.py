@@ -21,10 +21,10 @@ from schema.experiment.document import Arena, Experiment
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
+from schema.limits import LIVE_BYTES
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Live
-from schema.wire.arena_codec import decode_live, encode_live
-from schema.wire.codec import encode_body
+from schema.wire.codec import decode, encode
 from schema.wire.updates import Birth, Update
 from worker.arena.replay import alone
 from worker.bench.spider import spider
@@ -61,9 +61,8 @@ def moving_spiders() -> tuple[Update, list[pa.Table]]:
     rng = np.random.default_rng(1)
     starts = rng.integers(0, motion.num_rows, ROBOTS)
     places = rng.uniform(-2.0, 2.0, (ROBOTS, 2)).astype(np.float32)
-    body = encode_body(robot)
     births = tuple(
-        Birth(BirthId(0, number), (), 1, number + 1, 0.0, body)
+        Birth(BirthId(0, number), (), 1, number + 1, 0.0, robot.parts)
         for number in range(ROBOTS)
     )
     update = Update("run", 1, 1, is_whole=True, experiment="watched", births=births)
@@ -94,7 +93,7 @@ def message(poses: pa.Table) -> bytes:
     with pa.ipc.new_stream(sink, poses.schema) as writer:
         writer.write_table(poses.combine_chunks())
     columns = bytes(sink.getvalue().to_pybytes())
-    return encode_live(Live("run", 0, Advance(1, bytes(32), (), (), (), columns)))
+    return encode(Live("run", 0, Advance(1, bytes(32), (), (), (), columns)))
 
 
 def test_viewer_of_an_arena_of_thirty_uses_at_most_a_fifth_of_a_core(
@@ -110,7 +109,7 @@ def test_viewer_of_an_arena_of_thirty_uses_at_most_a_fifth_of_a_core(
         view.tell([update])
         began = time.process_time()
         for data in messages:
-            view.tell([decode_live(data)])
+            view.tell([decode(Live, data, LIVE_BYTES)])
         recording.flush()
         used_s = time.process_time() - began
     share = used_s / (60.0 * MINUTES)

@@ -151,7 +151,8 @@ def test_every_field_of_every_protobuf_message_is_listed() -> None:
     messages = re.findall(
         r"^message (\w+) \{\n(.*?)^\}", source, re.MULTILINE | re.DOTALL
     )
-    assert len(messages) >= 30
+    assert len(messages) >= 8
+    page = page.partition("## Protobuf messages\n")[2]
     for name, body in messages:
         part = page.split(f"### `{name}`\n", 1)[1].split("\n###")[0]
         fields = re.findall(r"^\s*[^/\n]*?(\w+) = (\d+);", body, re.MULTILINE)
@@ -169,7 +170,7 @@ def test_every_key_and_messagepack_message_is_listed() -> None:
     ):
         assert f"| `revolve/FLEET/{key}` |" in page
     listed = messages_reference.messagepack()
-    assert {"OperatorRequest", "OperatorReply", "Update", "Status"} <= {*listed}
+    assert {"Request", "Advance", "OperatorReply", "Update", "Report"} <= {*listed}
     for name in listed:
         assert f"### `{name}`\n" in page
 

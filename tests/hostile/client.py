@@ -20,6 +20,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import zenoh
+from msgspec.structs import replace
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
 from schema.agent.platform_tag import wire_version
@@ -27,18 +28,26 @@ from schema.agent.service import session_config
 from schema.agent.supervisor import stop_on_signals
 from schema.agent.topics import Member, Role, agents_alive, member_of
 from schema.errors import MalformedMessage
-from schema.limits import MOST_EPOCH
+from schema.limits import ADVANCE_REQUEST_BYTES, MOST_EPOCH
 from schema.robot.ids import BirthId
-from schema.wire import revolve_pb2 as pb
+from schema.robot.results import Evaluation
+from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.messages import (
+    AgentInfo,
+    Answer,
+    Call,
+    Crash,
+    Failure,
+    Request,
+    StateMissing,
+)
 from schema.wire.operator import (
     GetStatus,
     ListRobots,
     OperatorRequest,
     PauseArena,
     RemoveRobot,
-    encode_operator_request,
 )
-from schema.wire.updates import encode_update
 from tests.hostile.decoders import update
 from tests.hostile.mutation import Mutator
 
@@ -259,22 +268,28 @@ class HostileClient:
         """Return a request of another coordinator, without what takes time to do."""
         draw = self._mutator.random
         try:
-            request = pb.Request.FromString(data)
-        except Exception:  # noqa: BLE001 - a sample that is no request
+            request = decode(Request, data, ADVANCE_REQUEST_BYTES)
+        except MalformedMessage:  # a sample that is no request
             return data
-        request.run = draw.choice((request.run, "", "x", "y" * 6000))
-        request.epoch = draw.choice((0, 1, 2, MOST_EPOCH, MOST_EPOCH + 1, 2**64 - 1))
-        request.number = draw.choice((request.number, _FAR))
-        request.settings = draw.choice((b"", b"{}", request.settings[:-1]))
-        request.plugins = draw.choice(("", "os:system=0", "x" * 20_000))
-        return request.SerializeToString()
+        # No type is checked when a message is made.
+        return encode(
+            replace(
+                request,
+                run=draw.choice((request.run, "", "x", "y" * 6000)),
+                epoch=draw.choice((0, 1, 2, MOST_EPOCH, MOST_EPOCH + 1, 2**64 - 1)),
+                number=draw.choice((request.number, _FAR)),
+                settings=draw.choice((b"", b"{}", request.settings[:-1])),
+                plugins=draw.choice(("", "os:system=0", "x" * 20_000)),
+            )
+        )
 
     def _cancel(self, member: Member) -> None:
         """Cancel a job that was heard, or none."""
         draw = self._mutator.random
         known = list(self._heard["evaluation"]) + list(self._heard["analysis"])
         valid = draw.random() < 0.2 and known
-        data = draw.choice(known) if valid else self._message("cancelled")
+        heard = fingerprint(draw.choice(known)) if valid else b""
+        data = heard or self._message("cancelled")
         self._put(member.cancelled, data, "cancellation")
 
     def _ask(self, member: Member) -> None:
@@ -286,7 +301,7 @@ class HostileClient:
 
     def _news(self, member: Member) -> None:
         draw = self._mutator.random
-        forged = encode_update(update())
+        forged = encode(update())
         data = forged if draw.random() < 0.1 else self._message("events")
         self._put(member.events, data, "news")
 
@@ -326,22 +341,20 @@ class HostileClient:
 
 def _info(liar: Member) -> bytes:
     """Return a valid description; its predecessors died of the jobs of others."""
-    info = pb.AgentInfo(
+    info = AgentInfo(
         agent=liar.name,
         kind=liar.role,
         slots=1,
         platform="liar",
         version=wire_version(),
-        shards=1,
-        cores=1,
+        deaths=(Crash("w", "run", 1, 1, "SIGSEGV", b""),),
         quiet_s=0.1,
     )
-    info.deaths.add(agent="w", run="run", epoch=1, number=1, cause="SIGSEGV")
-    return info.SerializeToString()
+    return encode(info)
 
 
 def _samples() -> list[bytes]:
-    return [pb.Request(run="run", epoch=1, number=_FAR).SerializeToString()]
+    return [encode(Request("run", 1, _FAR, Call(b"\xc0"), b"{}"))]
 
 
 def _answers(kind: str) -> list[bytes]:
@@ -349,16 +362,13 @@ def _answers(kind: str) -> list[bytes]:
     if kind == "info":
         return [_info(Member("default", "worker", "nobody"))]
     if kind in ("command", "state"):
-        return [encode_update(update())]
-    evaluation = pb.Evaluation(fitness=99.0, simulated_s=1.0)
-    judged = pb.Answer(epoch=MOST_EPOCH, number=_FAR, evaluation=evaluation)
-    failed = pb.Answer(epoch=MOST_EPOCH, number=_FAR, failure="diverged")
-    lost = pb.AdvanceAnswer(epoch=MOST_EPOCH, number=_FAR, needs_state=True)
-    return [each.SerializeToString() for each in (judged, failed, lost)]
+        return [encode(update())]
+    results = (Evaluation(99.0, 0.0, 0.0, 1.0), Failure("diverged"), StateMissing())
+    return [encode(Answer(MOST_EPOCH, _FAR, 0.0, result)) for result in results]
 
 
 _ORDERS = [
-    encode_operator_request(OperatorRequest("id", 0, action, _NOBODY))
+    encode(OperatorRequest("id", 0, action, _NOBODY))
     for action in (ListRobots(), GetStatus(), PauseArena(), RemoveRobot(BirthId(0, 1)))
 ]
 

@@ -8,6 +8,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+from msgspec.structs import replace
 
 import analyzer.report
 from coordinator.dispatch.faults import PeerFaults
@@ -17,6 +20,7 @@ from coordinator.islands.events import (
     Evaluated,
     EvaluationFailed,
     Insert,
+    JournalledEvent,
     Pause,
     Remove,
     Vetted,
@@ -25,12 +29,12 @@ from coordinator.network.membership import Membership
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
     check_advance,
-    check_answer,
     place_poses,
     read_poses,
 )
-from coordinator.run.requests import read_evaluation, read_vetting
-from coordinator.storage.journal import decode_entry, decode_record, encode_entry
+from coordinator.run.requests import read_answer, read_evaluation, read_vetting
+from coordinator.storage.journal import decode_record, encode_event
+from revolve.fleet import _read_value
 from schema.agent.network import Agent
 from schema.agent.request_handler import Server
 from schema.agent.topics import Member, member_of
@@ -46,7 +50,7 @@ from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
 )
-from schema.experiment.identity import Identity, Origin
+from schema.experiment.identity import Origin
 from schema.experiment.settings import (
     arena_settings,
     evaluation_settings,
@@ -60,44 +64,46 @@ from schema.formats.files import robot_from_yaml
 from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
 from schema.formats.yaml import robot_to_yaml
-from schema.limits import LIVE_BYTES, MOST_LIVE_ROWS
+from schema.limits import (
+    ADVANCE_BYTES,
+    ADVANCE_REQUEST_BYTES,
+    LIVE_BYTES,
+    MOST_LIVE_ROWS,
+    OPERATOR_REQUEST_BYTES,
+    UPDATE_BYTES,
+)
 from schema.parts import BUILT_IN, BodySpace
 from schema.plugins.source import check_plugins
+from schema.robot.brain import check_brain
 from schema.robot.inverse_development import genome_of
 from schema.robot.results import Provenance
-from schema.robot.robot import Robot, check_types
+from schema.robot.robot import Robot, check_tree, check_types
 from schema.tables.received import received_columns
-from schema.wire import revolve_pb2 as pb
-from schema.wire.arena import Advance, Changes, Insertion, Live, PastAdvance, Rebuild
-from schema.wire.arena_codec import (
-    AdvanceAnswer,
-    AdvanceRequest,
-    decode_advance_answer,
-    decode_advance_request,
-    decode_live,
-    encode_advance_answer,
-    encode_advance_request,
-    encode_live,
+from schema.wire.arena import (
+    Advance,
+    AdvanceShard,
+    Changes,
+    Insertion,
+    Live,
+    PastAdvance,
+    Rebuild,
 )
-from schema.wire.calls import (
+from schema.wire.calls import call_settings, pack_value, unpack_value
+from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.messages import (
+    AgentInfo,
+    Answer,
     Call,
-    call_settings,
-    decode_call_request,
-    encode_call_answer,
-    encode_call_request,
-    pack_value,
-    read_call_answer,
+    CallValue,
+    Crash,
+    Evaluate,
+    Failure,
+    Request,
+    Result,
+    StateMissing,
+    Vet,
+    Work,
 )
-from schema.wire.codec import (
-    decode_answer,
-    decode_body,
-    decode_request,
-    encode_answer,
-    encode_body,
-    encode_request,
-    request_kind,
-)
-from schema.wire.messages import Answer
 from schema.wire.operator import (
     GetStatus,
     InsertRobot,
@@ -107,9 +113,6 @@ from schema.wire.operator import (
     RemoveRobot,
     SetBrain,
     decode_operator_reply,
-    decode_operator_request,
-    encode_operator_reply,
-    encode_operator_request,
 )
 from schema.wire.protobuf import (
     decode_genome,
@@ -126,8 +129,6 @@ from schema.wire.updates import (
     Update,
     WorkerInfo,
     decode_page,
-    decode_update,
-    encode_update,
     pages_of,
 )
 from tests.coordinator.run.test_honest_worlds import advances, settings_of
@@ -137,7 +138,6 @@ from worker.arena.world import World
 
 JOB = (3, 5)
 _SIGNED = Provenance("worker", "platform", 0.5)
-_SECONDS = 12.0
 _VERSION = "1"
 _WORKER = Member("default", "worker", "w.00000001")
 
@@ -170,9 +170,8 @@ def targets() -> list[Target]:
     made = list(advances(rules, [200, 400]))
     return [
         *_robots(),
-        *_requests(rules, made[-1][1]),
+        *_requests(rules, made[-1][0].snapshot),
         *_answers(made),
-        *_calls(),
         *_viewers(made),
         *_operators(),
         *_agents(),
@@ -183,19 +182,7 @@ def targets() -> list[Target]:
 
 def _robots() -> Iterator[Target]:
     yield Target("decode_robot", decode_robot, (encode_robot(ROBOT),))
-    yield Target("decode_body", decode_body, (encode_body(ROBOT),))
     yield Target("decode_genome", decode_genome, (encode_genome(genome_of(ROBOT)),))
-
-
-def _request(settings: bytes, robot: bytes) -> bytes:
-    return encode_request(
-        run="run",
-        epoch=JOB[0],
-        number=JOB[1],
-        settings=settings,
-        robot=robot,
-        identity=Identity(Origin(1, 0), BIRTH, 0),
-    )
 
 
 def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
@@ -203,25 +190,25 @@ def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     changes = Changes((BIRTH,), (Insertion(BIRTH, ROBOT, (0.0, 0.0)),))
     past = PastAdvance(changes, 200, bytes(32))
     rebuild = Rebuild(snapshot, (past,), (BIRTH,))
-    advance = encode_advance_request(
-        AdvanceRequest(
-            "run", *JOB, settings, 0, 200, bytes(32), changes, 400, True, rebuild
-        )
-    )
-    single = _request(evaluation_settings(rules), encode_robot(ROBOT))
-    vetting = _request(vetting_settings(rules), encode_body(ROBOT))
-    both = (single, advance)
-    yield Target("decode_request", decode_request, (single,))
-    body = partial(decode_request, read=decode_body)
-    yield Target("decode_request, body", body, (vetting,))
-    yield Target("request_kind", request_kind, both)
-    yield Target("decode_advance_request", decode_advance_request, (advance,))
-    yield Target(
-        "analyzer's answer", analyzer.report.answer, (vetting,), (RevolveError,)
-    )
-    yield Target("worker's reading", _read_job, (single,), (RevolveError,))
-    yield Target("Server.reply", Server(_read_job, _agent()).reply, both, ())
-    yield Target("Server.cancel", Server(_read_job, _agent()).cancel, both, ())
+    kept = (200, bytes(32), rebuild)
+    advance = _request(AdvanceShard(0, 1, 400, changes, True, *kept), settings)
+    evaluation = _request(Evaluate(BIRTH, ROBOT, 1, 400, 0), evaluation_settings(rules))
+    vetting = _request(Vet(BIRTH, 0, ROBOT), vetting_settings(rules))
+    argument = Call(pack_value({"a": [1, 2.5, None, "é"]}))
+    call = _request(argument, call_settings("lab:score"))
+    requests = (advance, evaluation, vetting, call)
+    yield _of(Request, ADVANCE_REQUEST_BYTES, *requests)
+    for compute, samples in (
+        (analyzer.report.answer, (vetting,)),
+        (_read_job, (evaluation, vetting, call)),
+    ):
+        reply = Server(compute, _agent()).reply
+        # It refuses only what is no valid sample for it.
+        assert all(reply(sample).answer for sample in samples)
+        yield Target("Server.reply", reply, requests, (), share=20)
+    prints = tuple(map(fingerprint, requests))
+    yield Target("Server.cancel", Server(_read_job, _agent()).cancel, prints, ())
+    yield Target("unpack_value", unpack_value, (argument.argument,))
     for read, sample in (
         (read_vetting_settings, vetting_settings(rules)),
         (read_evaluation_settings, evaluation_settings(rules)),
@@ -244,65 +231,76 @@ def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     )
 
 
+def _request(work: Work, settings: bytes) -> bytes:
+    return encode(Request("run", *JOB, work, settings, "", Origin(1, 0)))
+
+
+def _of(kind: Any, most: int, *samples: bytes) -> Target:  # noqa: ANN401 - also unions
+    """Return the target of a type of messages, or of a union of types."""
+    name = getattr(kind, "__name__", "JournalledEvent")
+    return Target(name, partial(decode, kind, most=most), samples)
+
+
 def _agent() -> Agent:
     return Agent("worker", "w", "tcp/127.0.0.1:1")
 
 
-def _read_job(data: bytes) -> bytes:
+def _read_job(request: Request) -> Result:
     """Read an evaluation request as a worker does; nothing is simulated."""
-    job = decode_request(data)
-    settings = read_evaluation_settings(job.settings)
-    check_types(job.robot, body_space(settings.space))
-    lasting(settings, job.steps)
-    return data
+    work = request.work
+    if isinstance(work, Evaluate):
+        settings = read_evaluation_settings(request.settings)
+        check_tree(work.robot.parts)
+        check_brain(work.robot.brain, len(work.robot.parts))
+        check_types(work.robot, body_space(settings.space))
+        lasting(settings, work.steps)
+    return Failure("not simulated")
 
 
-def _answers(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Target]:
-    evaluated = encode_answer(Answer(*JOB, 0.5, JUDGED))
-    vetted = encode_answer(Answer(*JOB, 0.5, VIABLE))
-    failed = encode_answer(Answer(*JOB, 0.5, "diverged"))
-    space = BUILT_IN
-    yield Target("decode_answer", decode_answer, (evaluated, vetted, failed))
-    vetting = partial(read_vetting, expected=JOB, robot=ROBOT, space=space)
+def _answers(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
+    def answer(result: Result) -> bytes:
+        return encode(Answer(*JOB, 0.5, result))
+
+    failed, value = answer(Failure("diverged")), answer(CallValue(pack_value([1])))
+    evaluated, vetted = answer(JUDGED), answer(VIABLE)
+    yield _of(Answer, ADVANCE_BYTES, evaluated, vetted, failed, value)
+    vetting = partial(read_vetting, expected=JOB)
     yield Target("read_vetting", vetting, (vetted, failed))
-    evaluation = partial(read_evaluation, expected=JOB, simulated_s=_SECONDS)
+    evaluation = partial(read_evaluation, expected=JOB)
     yield Target("read_evaluation", evaluation, (evaluated, failed))
-    for number, (advance, snapshot, expected) in enumerate(made):
-        answer = AdvanceAnswer(*expected.job, 0.5, advance, snapshot)
-        without = AdvanceAnswer(*expected.job, 0.5, None)
-        samples = (encode_advance_answer(answer), encode_advance_answer(without))
+    yield Target("_read_value", partial(_read_value, expected=JOB), (value, failed))
+    for number, (advance, expected) in enumerate(made):
         read = partial(_read_advance, expected=expected)
-        yield Target(f"advance checks {number}", read, samples)
-        yield Target("decode_advance_answer", decode_advance_answer, samples)
-        poses = partial(read_poses, advance=advance, expected=expected)
+        samples = (answer(advance), answer(StateMissing()))
+        yield Target(f"advance checks {number}", read, samples, share=20)
+        poses = partial(read_poses, expected=expected)
         yield Target(f"pose checks {number}", poses, (advance.poses,))
 
 
 def _read_advance(data: bytes, expected: ExpectedAdvance) -> None:
     """Check an answer as ``coordinator.run.shard_requests`` does."""
-    answer = decode_advance_answer(data, expected.most_bytes)
-    check_answer(answer, expected)
-    if answer.advance is None:
-        return
-    check_advance(answer.advance, expected)
-    rows = read_poses(answer.advance.poses, answer.advance, expected)
-    place_poses(answer.advance.poses, rows, 0)
+    answer = read_answer(data, JOB, Advance | StateMissing, ADVANCE_BYTES)
+    advance = answer.result
+    if isinstance(advance, Advance):
+        check_advance(advance, expected)
+        rows = read_poses(advance.poses, expected)
+        place_poses(advance.poses, rows, 0)
 
 
-def _viewers(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Target]:
-    lives = tuple(encode_live(Live("run", 0, advance)) for advance, _, _ in made)
-    yield Target("decode_live", decode_live, lives)
+def _viewers(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
+    lives = [replace(advance, snapshot=b"") for advance, _ in made]
+    yield _of(Live, LIVE_BYTES, *(encode(Live("run", 0, each)) for each in lives))
     columns = partial(
         received_columns, "poses", most_bytes=LIVE_BYTES, most_rows=MOST_LIVE_ROWS
     )
-    yield Target("received_columns", columns, tuple(each[0].poses for each in made))
-    yield Target("decode_update", decode_update, (encode_update(update()),))
+    yield Target("received_columns", columns, tuple(each.poses for each in lives))
+    yield _of(Update, UPDATE_BYTES, encode(update()))
     yield Target("decode_page", decode_page, tuple(pages_of(update())))
 
 
 def update() -> Update:
     """Return a message to viewers that holds everything that one can."""
-    body = encode_body(ROBOT)
+    body = ROBOT.parts
     return Update(
         "run",
         JOB[0],
@@ -319,53 +317,34 @@ def update() -> Update:
 
 
 def _operators() -> Iterator[Target]:
-    robot = encode_robot(ROBOT)
     actions = (
         ListRobots(),
         GetStatus(),
-        InsertRobot(robot, (0.0, 1.0)),
+        InsertRobot(ROBOT, (0.0, 1.0)),
         RemoveRobot(BIRTH),
-        SetBrain(BIRTH, robot),
+        SetBrain(BIRTH, ROBOT),
     )
-    requests = tuple(
-        encode_operator_request(OperatorRequest("id", 0, action, "run"))
-        for action in actions
-    )
-    yield Target("decode_operator_request", decode_operator_request, requests)
+    requests = [encode(OperatorRequest("id", 0, action, "run")) for action in actions]
+    yield _of(OperatorRequest, OPERATOR_REQUEST_BYTES, *requests)
     run = RunStatus("run", "x", 0, "running", 1.0, (IslandStatus(1, 2, 0.5, 1),))
     status = Status((run,), 1, 1, 1.0, (PeerFault("late", "w", 3),))
-    reply = encode_operator_reply(OperatorReply("text", status=status))
+    reply = encode(OperatorReply("text", status=status))
     yield Target("decode_operator_reply", decode_operator_reply, (reply,))
 
 
-def _calls() -> Iterator[Target]:
-    value = pack_value({"a": [1, 2.5, None, "é"]})
-    request = encode_call_request(
-        run="run",
-        epoch=JOB[0],
-        number=JOB[1],
-        settings=call_settings("lab:score"),
-        argument=value,
-        plugins="",
-    )
-    answer = encode_call_answer(Call(*JOB, "lab:score", None), 0.1, value)
-    yield Target("decode_call_request", decode_call_request, (request,))
-    yield Target("read_call_answer", partial(read_call_answer, expected=JOB), (answer,))
-
-
 def _agents() -> Iterator[Target]:
-    info = pb.AgentInfo(
+    info = AgentInfo(
         agent=_WORKER.name,
         kind="worker",
         slots=1,
         platform="p",
         version=_VERSION,
+        deaths=(Crash("w.00000000", "run", 3, 4, "SIGSEGV", bytes(8)),),
         shards=4,
         cores=1,
         quiet_s=0.5,
     )
-    info.deaths.add(agent="w.00000000", run="run", epoch=3, number=4, cause="SIGSEGV")
-    data = (info.SerializeToString(),)
+    data = (encode(info),)
 
     def introduce(message: bytes) -> None:
         membership = Membership(_VERSION, PeerFaults())
@@ -381,7 +360,7 @@ def _agents() -> Iterator[Target]:
     yield Target("member_of", lambda found: member_of(found.decode("latin-1")), (key,))
 
 
-def _journal(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Target]:
+def _journal(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
     advance = made[0][0]
     events = (
         Evaluated(BIRTH, JUDGED, _SIGNED),
@@ -392,8 +371,8 @@ def _journal(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Tar
         Commanded(0, "id", 200, Remove(BIRTH)),
         Commanded(0, "id", 200, Pause()),
     )
-    entries = tuple(encode_entry(event) for event in events)
-    yield Target("decode_entry", decode_entry, entries)
+    entries = tuple(encode_event(event) for event in events)
+    yield _of(JournalledEvent, ADVANCE_BYTES, *entries)
     record = partial(decode_record, Path("journal.bin"))
     yield Target("decode_record", record, entries, (RunFolderError,))
 

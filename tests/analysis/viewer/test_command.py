@@ -36,7 +36,6 @@ from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
-from schema.wire.codec import encode_body
 from schema.wire.updates import Birth, Death, Level, Update
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
@@ -145,7 +144,7 @@ def test_ancestry_is_drawn_every_ten_births_with_living_robots_marked() -> None:
 def test_a_death_has_as_many_births_as_the_last_pose() -> None:
     recorded: Any = Recorded()
     show = Show(recorded, BUILT_IN)
-    first, second = (Birth(BirthId(0, n), (), 1, n + 1, 10.0 * n, encode_body(CORE))
+    first, second = (Birth(BirthId(0, n), (), 1, n + 1, 10.0 * n, CORE.parts)
                      for n in range(2))  # fmt: skip
     # At 10 s the second is born and the first dies: one birth, says the table.
     death = Death(0, first.birth, 1, 10.0, "cull")

@@ -12,12 +12,12 @@ from schema.agent.network import client_config, hub_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member
 from schema.robot.ids import BirthId
+from schema.wire.codec import encode
 from schema.wire.updates import (
     Birth,
     Page,
     Update,
     decode_page,
-    encode_update,
     pages_of,
 )
 
@@ -100,7 +100,7 @@ class Chief:
             # As a coordinator publishes: behind the pages.
             self._session.put(
                 self._member.events,
-                encode_update(news(8)),
+                encode(news(8)),
                 priority=zenoh.Priority.DATA_LOW,
             )
 

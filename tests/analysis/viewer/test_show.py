@@ -5,13 +5,12 @@ from unittest.mock import MagicMock
 from analysis.viewer.show import Show
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
-from schema.robot.robot import Part, Robot
+from schema.robot.robot import Part
 from schema.tables.received import read_columns
-from schema.wire.codec import encode_body
 from schema.wire.updates import Birth, Update
 from tests.coordinator.arena_world import poses
 
-BODY = encode_body(Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),)))
+BODY = (Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),)
 
 
 def news(sequence: int, *numbers: int) -> Update:

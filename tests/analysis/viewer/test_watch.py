@@ -17,9 +17,8 @@ from analysis.viewer.watch import LiveView, watch
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
-from schema.robot.robot import Part, Robot
+from schema.robot.robot import Part
 from schema.wire.arena import Advance, Live
-from schema.wire.codec import encode_body
 from schema.wire.updates import Birth, Death, Migrant, Update, WorkerInfo
 from tests.coordinator.arena_world import poses
 
@@ -149,11 +148,17 @@ def test_poses_that_fit_no_robot_are_dropped() -> None:
     assert view.dropped == 2
 
 
-BAD_BODY = encode_body(Robot((Part("Hinoe", -1, -1, -1, 0, ()),)))
+CORE = Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3))
+
+
+def with_body(*body: Part) -> Update:
+    return replace(news(3), births=(Birth(BirthId(0, 9), (), 1, 1, None, body),))
+
+
 FORGED: dict[str, Update] = {
-    "unknown part": replace(
-        news(3), births=(Birth(BirthId(0, 9), (), 1, 1, None, BAD_BODY),)
-    ),
+    "unknown part": with_body(Part("Hinoe", -1, -1, -1, 0, ())),
+    "two cores": with_body(CORE, CORE),
+    "no core": with_body(),
     "time beyond 64 bits": replace(
         news(3), births=(Birth(BirthId(0, 9), (), 1, 1, 1e308, None),)
     ),

@@ -45,7 +45,7 @@ def test_the_tag_names_system_cpu_and_libraries() -> None:
 def test_messages_that_look_the_same_may_mean_something_else(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    before = wire_version()
-    assert wire_version() == before
+    made = wire_version.__wrapped__
+    assert made() == wire_version()
     monkeypatch.setattr(tags, "MEANING", tags.MEANING + 1)
-    assert wire_version() != before
+    assert made() != wire_version()

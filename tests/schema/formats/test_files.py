@@ -3,13 +3,13 @@
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
+from msgspec.structs import replace
 
 from schema.errors import InvalidRobot, MalformedMessage, RevolveError
 from schema.formats.files import read_robot, robot_from_yaml, write_robot

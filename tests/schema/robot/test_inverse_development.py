@@ -1,9 +1,8 @@
 """Genomes of given robots."""
 
-from dataclasses import replace
-
 from hypothesis import given
 from hypothesis.strategies import SearchStrategy
+from msgspec.structs import replace
 
 from schema.parts import BUILT_IN
 from schema.robot.genome import develop

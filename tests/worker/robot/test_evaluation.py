@@ -116,7 +116,7 @@ def test_simulation_is_independent_of_threads(robot_of: RobotOf) -> None:
 
 ELSEWHERE = """
 import hashlib, sys
-from schema.wire.codec import decode_robot
+from schema.wire.protobuf import decode_robot
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings
 from worker.robot.evaluation import simulate
