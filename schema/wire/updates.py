@@ -247,7 +247,8 @@ def _level(
         births=births,
         size=len(rows),
         judged=len(fitness),
-        mean=fsum(fitness) / len(fitness) if fitness else 0.0,
+        # Their sum may be no finite number.
+        mean=fsum(each / len(fitness) for each in fitness),
         best=max(fitness, default=0.0),
         members=tuple(sorted(map(individual, rows))),
     )

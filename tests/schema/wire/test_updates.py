@@ -82,3 +82,6 @@ def test_level_counts_failed_robots_off_line_and_no_immature_ones_of_arenas() ->
     # It counts as the least fitness below 0.
     rows[0]["fitness"] = -0.5
     assert read_levels(rows, arenas={1})[0] == Level(0, 2, 2, 2, -0.5, -0.5, two)
+    # A user's function may give any finite number.
+    rows = [{**row, "fitness": 1.5e308} for row in rows[:2]]
+    assert read_levels(rows, arenas={1}) == [Level(0, 2, 2, 2, 1.5e308, 1.5e308, two)]
