@@ -180,8 +180,8 @@ def test_values_of_another_type_are_refused(tmp_path: Path) -> None:
     neuron = structs.replace(brain.neurons[0], part=1.5)
     part = structs.replace(robot.parts[0], parameters=(wrong,) * 3)
     for changed in (
-        replace(robot, brain=replace(brain, connections=(edge,))),
-        replace(robot, brain=replace(brain, neurons=(neuron, *brain.neurons[1:]))),
+        replace(robot, brain=rv.Brain(brain.neurons, (edge,))),
+        replace(robot, brain=rv.Brain((neuron, *brain.neurons[1:]), brain.connections)),
         replace(robot, parts=(part, *robot.parts[1:])),
         replace(robot, parts=cast("Any", None)),
         replace(robot, brain=cast("Any", object())),
@@ -205,7 +205,7 @@ def test_numbers_of_numpy_are_those_of_python() -> None:
         )
         for each in brain.connections
     ]
-    changed = replace(brain, neurons=tuple(neurons), connections=tuple(edges))
+    changed = rv.Brain(tuple(neurons), tuple(edges))
     assert rv.evaluate(replace(robot, brain=changed)) == rv.evaluate(robot)
 
 
