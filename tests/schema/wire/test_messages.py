@@ -208,6 +208,12 @@ def test_nested_lists_are_malformed(nest: bytes) -> None:
         for data in (nested, unknown):
             with pytest.raises(MalformedMessage):
                 decode(kind, data, MOST)
+    # Items behind the last one of a list are skipped.
+    part = encode(ROBOT.parts[0])
+    longer = bytes([part[0] + 1]) + part[1:] + nested
+    assert part in encode(EVALUATE)
+    with pytest.raises(MalformedMessage, match="recursion"):
+        decode(Request, encode(EVALUATE).replace(part, longer), MOST)
 
 
 def test_a_message_of_too_many_bytes_is_not_read() -> None:
