@@ -14,16 +14,15 @@ from schema.parts import Vector
 from schema.plugins.protocols import Bank
 from schema.robot.brain import Widths
 from schema.robot.results import Floats
-from worker.arena.guarded_bank import GuardedBank
 from worker.clusters.cluster import EngineView
 from worker.clusters.models import Indices
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Layout
 from worker.robot.brains import Controls
 from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
+from worker.robot.filters import Filter, filtered_outputs, filtered_readings
+from worker.robot.guarded_bank import broken_rows, guarded_bank
 from worker.robot.noise import Noise, NoiseSource
-
-_DIVERGED = "brain diverged: state not finite"
 
 
 class BatchedControllers:
@@ -54,7 +53,7 @@ class BatchedControllers:
 
     def gather(self, robots: Sequence[ArenaRobot]) -> None:
         """Rebuild the bank; each robot's states are moved to its row."""
-        self._bank, self._noise = self._rows_of(robots)
+        self._bank, self._filters = self._rows_of(robots)
         for robot, states in zip(robots, self._bank.states, strict=True):
             states[:] = robot.states
             robot.states = states
@@ -72,8 +71,8 @@ class BatchedControllers:
             (R, O) unclipped; may be a view that the next tick overwrites.
         """
         ages = (step - self._starts) // self._tick_steps
-        outputs = self._outputs(self._bank, self._noise, step, readings, ages)
-        self.broken = _broken(self._bank, outputs)
+        outputs = self._outputs(self._bank, self._filters, step, readings, ages)
+        self.broken = broken_rows(self._bank, outputs)
         return outputs
 
     def first_tick(self, step: int, robot: ArenaRobot) -> str:
@@ -86,48 +85,31 @@ class BatchedControllers:
         Returns:
             Why its brain broke; empty if it did not.
         """
-        bank, noise = self._rows_of([robot])
+        bank, filters = self._rows_of([robot])
         readings = robot.view.sensors.readings
-        outputs = self._outputs(bank, noise, step, readings, 0.0)
+        outputs = self._outputs(bank, filters, step, readings, 0.0)
         robot.view.servos.drive(outputs[0])
         robot.states = bank.states[0]
-        return _broken(bank, outputs).get(0, "")
+        return broken_rows(bank, outputs).get(0, "")
 
-    def _rows_of(self, robots: Sequence[ArenaRobot]) -> tuple[Bank, Noise | None]:
-        """Return a bank at rest and the noise of some robots."""
-        packed, controls = [robot.packed for robot in robots], self._controls
-        bank: Bank = (
-            GuardedBank(controls, packed)
-            if controls.is_checked
-            else controls.bank(packed)
-        )
+    def _rows_of(self, robots: Sequence[ArenaRobot]) -> tuple[Bank, tuple[Filter, ...]]:
+        """Return a bank at rest and the filters of some robots."""
+        bank = guarded_bank(self._controls, [robot.packed for robot in robots])
         if not self._is_noisy:
-            return bank, None
-        return bank, Noise(self._source, [robot.birth for robot in robots])
+            return bank, ()
+        return bank, (Noise(self._source, [robot.birth for robot in robots]),)
 
     def _outputs(
         self,
         bank: Bank,
-        noise: Noise | None,
+        filters: tuple[Filter, ...],
         step: int,
         readings: Floats,
         ages: Floats | float,
     ) -> Floats:
-        if noise is None:
-            return bank.step(readings, ages)
         tick = step // self._tick_steps
-        outputs = bank.step(noise.perturb_readings(tick, readings), ages)
-        return noise.perturb_outputs(tick, outputs)
-
-
-def _broken(bank: Bank, outputs: Floats) -> dict[int, str]:
-    """Return why brains failed, or are no longer finite, by row, ascending."""
-    if not isinstance(bank, GuardedBank):
-        return {}
-    is_finite = np.isfinite(bank.states).all(axis=1)
-    is_finite &= np.isfinite(outputs).all(axis=1)
-    diverged = dict.fromkeys(np.flatnonzero(~is_finite).tolist(), _DIVERGED)
-    return dict(sorted((diverged | bank.failed).items()))
+        received = filtered_readings(filters, tick, readings)
+        return filtered_outputs(filters, tick, bank.step(received, ages))
 
 
 class BatchedIO:

@@ -14,7 +14,6 @@ from functools import partial
 from typing import Self
 
 from schema.errors import SimulationDiverged, UnexpectedEvent
-from schema.experiment.document import body_space
 from schema.experiment.environment import gravity_vector
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
@@ -29,15 +28,14 @@ from schema.wire.arena import (
 )
 from worker.arena.batched_control import BatchedControllers, BatchedIO
 from worker.arena.changes import check_changes, diverged, newborn
-from worker.arena.light import read_lights
-from worker.arena.own_sensors import has_own_sensors, read_own_sensors
+from worker.arena.looking import look
 from worker.arena.records import Contacts, Poses, Samples
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Rollout, Schedule
-from worker.robot.evaluation import silence_engine
+from worker.robot.control_loop import silence_engine
 from worker.robot.noise import NoiseSource
 
 _FEW = 5
@@ -75,7 +73,6 @@ class World:
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = Poses(clock.timestep_s)
-        self._has_own_sensors = has_own_sensors(body_space(settings.space))
         self._samples = Samples(settings, self.population)
 
     def close(self) -> None:
@@ -222,11 +219,7 @@ class World:
         state = rollout.state
         self._io.settle(self.population.layout)
         self._io.read(state)
-        self._read_light(self.population.robots)
-        if self._has_own_sensors:
-            failed = read_own_sensors(
-                self.population, self.population.robots, self.step, self._settings
-            )
+        if failed := self._look(self.population.robots):
             self._remove(failed)
             self._io.settle(self.population.layout)
             state = rollout.state
@@ -236,9 +229,8 @@ class World:
         broken = self._controllers.broken.items()
         self._remove_broken([(robots[row], reason) for row, reason in broken])
 
-    def _read_light(self, robots: Sequence[ArenaRobot]) -> None:
-        if self._settings.light is not None:
-            read_lights(self._settings.light, self.population, robots)
+    def _look(self, robots: Sequence[ArenaRobot]) -> list[Casualty]:
+        return look(self.population, robots, self.step, self._settings)
 
     def _sample(self, state: Floats) -> None:
         layout = self.population.layout
@@ -256,14 +248,10 @@ class World:
             else:
                 robots.append(robot)
         self.population.add(robots)
-        self._read_light(robots)
-        if self._has_own_sensors:
-            failed = read_own_sensors(
-                self.population, robots, self.step, self._settings
-            )
-            self._casualties += failed
-            self.population.remove([each.birth for each in failed])
-            robots = [robot for robot in robots if robot.birth in self.population]
+        failed = self._look(robots)
+        self._casualties += failed
+        self.population.remove([casualty.birth for casualty in failed])
+        robots = [robot for robot in robots if robot.birth in self.population]
         first_tick = partial(self._controllers.first_tick, self.step)
         begun = [(robot, first_tick(robot)) for robot in robots]
         self._remove_broken([each for each in begun if each[1]])

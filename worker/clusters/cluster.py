@@ -81,7 +81,6 @@ class EngineView:
             width=settings.space.max_inputs,
             prefix=prefix,
             has_light=settings.light is not None,
-            counts_gap=settings.environment.counts_gap,
         )
         self.servos = Servos(member.robot, types, model, data, prefix=prefix)
         self.probe: Probe | None = None
@@ -93,7 +92,6 @@ class EngineView:
                 dofs=self.dofs,
                 geoms=self.geoms,
                 prefix=prefix,
-                counts_gap=settings.environment.counts_gap,
             )
         self.qpos: Floats = data.qpos[self.joints]
         self.qvel: Floats = data.qvel[self.dofs]
@@ -227,9 +225,7 @@ class Cluster:
         self.probes = [view.probe for view in self.views if view.probe is not None]
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
-        self._contacts = contact_reader(
-            model, self.data, counts_gap=settings.environment.counts_gap
-        )
+        self._contacts = contact_reader(model, self.data)
         self.history = StateHistory(self)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER

@@ -10,18 +10,19 @@ from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
+from schema.robot.results import Evaluation, Floats
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from schema.wire.arena import Casualty, Judgement
 from schema.wire.protobuf import encode_robot
 from worker.clusters.models import Body
-from worker.fitness import path_velocity, straight_velocity
-from worker.measures.functions import functions_of
+from worker.measures.functions import evaluation_of
 from worker.robot.brains import Controls
+from worker.robot.recording import Channels
 
 LEAST_SHARE = 0.25
 """Share of the window that a robot must have lived to have a fitness."""
+_NO_FITNESS = Evaluation(0.0, 0.0, 0.0, 0.0)
 
 
 class Window:
@@ -80,10 +81,15 @@ class Window:
         """Whether it covers enough of a window for a fitness."""
         return len(self.positions) - 1 >= max(1, LEAST_SHARE * self._intervals)
 
-    def track(self) -> Trace:
-        """Return the samples as a trace without channels; at least two."""
+    def trace(self, channels: Channels, robot: Robot) -> Trace:
+        """Return the trace of the samples, at least two.
+
+        Args:
+            channels: of the rows.
+            robot: with its present brain.
+        """
         interval_s = self._clock.pose_steps * self._clock.timestep_s
-        return Trace(interval_s, np.array(self.positions))
+        return channels.trace(robot, interval_s, np.array(self.positions), self.rows)
 
 
 class ArenaRobot:
@@ -154,28 +160,21 @@ class ArenaRobot:
         age_s = (step - self.window.born) * settings.simulation.timestep_s
         x, y, z = self.view.qpos[:3].tolist()
         place, is_mature = (x, y, z), self.window.is_mature
-        path = straight = fitness = 0.0
-        measures: tuple[float, ...] = ()
+        evaluation = _NO_FITNESS
         if self.window.has_fitness:
-            track = self.window.track()
-            trace = self.body.channels.trace(
-                self.robot, track.interval_s, track.core_position, self.window.rows
-            )
+            trace = self.window.trace(self.body.channels, self.robot)
             try:
-                functions = functions_of(settings)
-                fitness = functions.fitness.value(trace)
-                measures = tuple(each.value(trace) for each in functions.measures)
+                evaluation = evaluation_of(trace, settings, age_s)
             except FitnessUndefined as error:
                 reason = f"fitness undefined: {error}"
                 return Casualty(self.birth, step, reason, place)
-            path, straight = path_velocity(trace), straight_velocity(trace)
         return Judgement(
             self.birth,
             age_s,
-            path,
-            straight,
-            fitness,
+            evaluation.path_velocity,
+            evaluation.straight_velocity,
+            evaluation.fitness,
             is_mature=is_mature,
             place=place,
-            measures=measures,
+            measures=evaluation.measures,
         )

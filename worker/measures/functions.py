@@ -14,6 +14,7 @@ from schema.plugins.needs import channels_of
 from schema.plugins.parameters import parameters_type, read_parameters
 from schema.plugins.protocols import MeasureFunction
 from schema.plugins.simple_traces import check_function
+from schema.robot.results import Evaluation
 from schema.robot.trace import Trace
 from worker.fitness import (
     LoadedFitness,
@@ -143,3 +144,28 @@ def functions_of(settings: EvaluationSettings | ArenaSettings) -> Functions:
     fitness, measures = load_fitness(settings.fitness), measures_of(settings.measures)
     functions = [fitness.function, *(each.function for each in measures)]
     return Functions(fitness, measures, channels_of(functions))
+
+
+def evaluation_of(
+    trace: Trace, settings: EvaluationSettings | ArenaSettings, simulated_s: float
+) -> Evaluation:
+    """Return the evaluation of a trace.
+
+    Args:
+        trace: with all channels that the functions of the settings declare.
+        settings: fitness and measures.
+        simulated_s: simulated time, warm-up included [s].
+
+    Raises:
+        FitnessUndefined: the fitness function or a measure raised or gave no finite
+            number.
+        ExperimentError: an unknown fitness function or measure.
+    """
+    functions = functions_of(settings)
+    return Evaluation(
+        functions.fitness.value(trace),
+        path_velocity(trace),
+        straight_velocity(trace),
+        simulated_s,
+        tuple(measure.value(trace) for measure in functions.measures),
+    )

@@ -44,19 +44,16 @@ class Ablated:
         )
         self._motors = np.array(ablation.motors, np.intp)
 
-    def hold(self, inputs: Floats) -> None:
-        """Write the held values into what the brain receives at a tick, (1, I)."""
-        inputs[0, self._inputs] = self._values
+    def readings(self, _tick: int, values: Floats) -> Floats:
+        """Return readings (1, I) with the held values."""
+        received = values.copy()
+        received[0, self._inputs] = self._values
+        return received
 
-    def outputs(self, values: Floats) -> Floats:
-        """Return the outputs (O,) that reach the motors at a tick.
-
-        The array of the network stays as it is: its outputs are inputs of neurons.
-        """
-        if not len(self._motors):
-            return values
+    def outputs(self, _tick: int, values: Floats) -> Floats:
+        """Return outputs (1, O) in which those to dead motors are neutral."""
         reached = values.copy()
-        reached[self._motors] = NEUTRAL
+        reached[0, self._motors] = NEUTRAL
         return reached
 
 

@@ -55,23 +55,24 @@ class Calibrated:
         noise = _of(sensors, "noise"), _of(motors, "noise")
         self.noise = noise if any(map(np.any, noise)) else None
 
-    def readings(self, values: Floats) -> Floats:
-        """Return what the brain receives at a tick, without noise.
+    def readings(self, _tick: int, values: Floats) -> Floats:
+        """Return what the brain receives at a tick, without noise, (1, N).
 
         Args:
             values: (1, N) true readings; before the first tick they were the same.
         """
         return self._sensors.pass_on(values[0], values[0])[np.newaxis]
 
-    def outputs(self, values: Floats) -> Floats:
-        """Return the outputs that reach the motors at a tick, without noise.
+    def outputs(self, _tick: int, values: Floats) -> Floats:
+        """Return the outputs that reach the motors at a tick, without noise, (1, O).
 
         Args:
-            values: (O,) of the network, clipped here to [0, 1]; before the first tick
-                they were neutral.
+            values: (1, O) of the network, clipped here to [0, 1]; before the first
+                tick they were neutral.
         """
-        moved = np.clip(values, 0.0, 1.0) - NEUTRAL
-        return self._motors.pass_on(moved, np.zeros(len(values))) + NEUTRAL
+        moved = np.clip(values[0], 0.0, 1.0) - NEUTRAL
+        late = self._motors.pass_on(moved, np.zeros(len(moved))) + NEUTRAL
+        return late[np.newaxis]
 
 
 class _Channels:

@@ -1,8 +1,7 @@
 """Contacts of robots in the last step of a model.
 
 The engine also reports geoms that are farther apart than their ``margin`` but within
-the ``gap`` of scenery. They exert no force on each other, and do not touch, except in
-runs that were begun by versions in which they did.
+the ``gap`` of scenery. They exert no force on each other, and do not touch.
 """
 
 from collections.abc import Callable
@@ -15,15 +14,12 @@ ReadContacts = Callable[[], list[list[int]]]
 """Returns the pairs of geoms in contact in the last step, as plain numbers."""
 
 
-def contact_reader(
-    model: mujoco.MjModel, data: mujoco.MjData, *, counts_gap: bool = False
-) -> ReadContacts:
+def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:
     """Return a function that returns the contacts of the last step.
 
     Args:
         model: a compiled model.
         data: the model's state.
-        counts_gap: contacts within the gap of scenery count, too.
     """
     contacts = data.contact
 
@@ -35,5 +31,4 @@ def contact_reader(
         found: list[list[int]] = contacts.geom[contacts.exclude != _IN_GAP].tolist()
         return found
 
-    has_gap = bool(model.geom_gap.any())
-    return read_some if has_gap and not counts_gap else read_all
+    return read_some if model.geom_gap.any() else read_all

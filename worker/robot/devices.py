@@ -17,7 +17,8 @@ from schema.parts import BodySpace, Sensor
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.robot.contacts import contact_reader
-from worker.robot.own_sensors import OwnSensors
+from worker.robot.light import brightness
+from worker.robot.own_sensors import OwnSensors, Surroundings
 
 _Velocity = tuple[float, float, float]
 _Number = TypeVar("_Number", float, Floats)
@@ -41,7 +42,7 @@ class Sensors:
         lights: (geom, index in the readings) of each light sensor.
         pads: the same of each touch sensor.
         core_imu: index in the readings of the imu at the core's centre, or -1.
-        own: sensors of plug-ins, which the caller reads; None if there are none.
+        own: sensors of plug-ins; None if there are none.
     """
 
     def __init__(
@@ -54,7 +55,6 @@ class Sensors:
         width: int,
         prefix: str = "",
         has_light: bool = False,
-        counts_gap: bool = False,
     ) -> None:
         """Find the sensors.
 
@@ -65,14 +65,13 @@ class Sensors:
             data: the model's state.
             width: number I of readings, at least the robot's inputs.
             prefix: of the robot's names in the model.
-            has_light: the caller writes the readings of light sensors.
-            counts_gap: touch sensors respond within the gap of scenery.
+            has_light: the world has a light.
 
         Raises:
             ExperimentError: a light sensor in a world without light.
         """
         self._model, self._data = model, data
-        self._contacts = contact_reader(model, data, counts_gap=counts_gap)
+        self._contacts = contact_reader(model, data)
         self.velocities: list[_Velocity] = []
         self.pads: list[tuple[int, int]] = []
         self.core_imu = -1
@@ -140,7 +139,7 @@ class Sensors:
         return self.read(1.0)
 
     def read(self, interval_s: float) -> Floats:
-        """Read all sensors but light sensors and own ones.
+        """Read all sensors but those that ``look`` reads.
 
         Args:
             interval_s: since the last reading [s].
@@ -158,6 +157,27 @@ class Sensors:
             for geom, place in self.pads:
                 self._cells[place] = float(geom in touching)
         return self.readings
+
+    @property
+    def looks(self) -> bool:
+        """Whether a sensor needs ``look``."""
+        return bool(self.lights) or self.own is not None
+
+    def look(self, around: Surroundings) -> None:
+        """Read light sensors and own ones.
+
+        Args:
+            around: what they see; frames of all bodies must be those of the state.
+
+        Raises:
+            SensorFailed: as of ``OwnSensors.read``.
+        """
+        for geom, place in self.lights:
+            assert around.light is not None
+            state = self._model, self._data
+            self._cells[place] = brightness(around.light, state, geom, around.states)
+        if self.own is not None:
+            self.own.read(self._row, around)
 
     def touching(self) -> set[int]:
         """Return the geoms in contact in the last step."""

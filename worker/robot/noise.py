@@ -66,35 +66,35 @@ class Noise:
         self._block = -1
         self._drawn: list[tuple[Floats, Floats]] = []
 
-    def perturb_readings(self, tick: int, readings: Floats) -> Floats:
+    def readings(self, tick: int, values: Floats) -> Floats:
         """Return readings with sensor noise.
 
         Args:
             tick: its number, from the start of the evaluation or arena.
-            readings: (R, N), the first N <= I; not modified.
+            values: (R, N), the first N <= I; not modified.
 
         Returns:
             (R, N); the readings themselves if sensors have no noise.
         """
         if not np.any(self._on_readings):
-            return readings
+            return values
         added, _ = self._added(tick)
-        return readings + added[:, : readings.shape[1]]
+        return values + added[:, : values.shape[1]]
 
-    def perturb_outputs(self, tick: int, outputs: Floats) -> Floats:
+    def outputs(self, tick: int, values: Floats) -> Floats:
         """Return network outputs with actuator noise.
 
         Args:
             tick: its number, from the start of the evaluation or arena.
-            outputs: (R, O), unclipped; not modified.
+            values: (R, O), unclipped; not modified.
 
         Returns:
             (R, O), unclipped; the outputs themselves if motors have no noise.
         """
         if not np.any(self._on_outputs):
-            return outputs
+            return values
         _, added = self._added(tick)
-        return outputs + added
+        return values + added
 
     def _added(self, tick: int) -> tuple[Floats, Floats]:
         """Return the noise of a tick: on readings (R, I), on outputs (R, O)."""

@@ -11,13 +11,12 @@ from schema.parts import OwnSensor, Vector
 from schema.plugins.protocols import SensorView
 from schema.plugins.sensor_checks import ray_problem, values_of
 from schema.robot.results import Floats
-
-State = tuple[mujoco.MjModel, mujoco.MjData]
+from worker.robot.light import State
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What a robot's own sensors see beside the robot.
+    """What a robot's light sensors and own sensors see beside the robot.
 
     Attributes:
         age_s: simulated time since the robot's birth [s].

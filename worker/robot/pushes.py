@@ -8,6 +8,7 @@ import mujoco
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import Identity
+from schema.robot.results import Floats
 from worker.robot.random_streams import Purpose, stream
 
 
@@ -48,13 +49,19 @@ class Pushes:
         row = data.xfrc_applied[model.body("root").id]
         self._applied = cast("memoryview[float]", row.data)
 
-    def apply(self, tick: int) -> None:
-        """Set the force on the robot until the next tick.
+    def readings(self, _tick: int, values: Floats) -> Floats:
+        """Return the readings, which pushes do not change."""
+        return values
+
+    def outputs(self, tick: int, values: Floats) -> Floats:
+        """Set the force on the robot until the next tick; return the outputs.
 
         Args:
             tick: its number, from the start of the evaluation.
+            values: of the brain.
         """
         number, since = divmod(tick, self._every)
         is_push = number > 0 and since == 0
         fx, fy = self._forces[number - 1] if is_push else (0.0, 0.0)
         self._applied[0], self._applied[1] = fx, fy
+        return values

@@ -84,7 +84,6 @@ class Channels:
             self.width += sizes[name]
         self.has_probe = bool(probed_channels(settings))
         self.has_work = "energy" in wanted
-        self.counts_gap = settings.environment.counts_gap
         self._constants: dict[str, Any] = {
             "light": settings.light,
             "mass": float(model.body_subtreemass[model.jnt_bodyid[free]]),
@@ -182,7 +181,6 @@ class Probe:
         dofs: slice,
         geoms: tuple[int, int],
         prefix: str = "",
-        counts_gap: bool = False,
     ) -> None:
         """Find a robot in a model.
 
@@ -193,9 +191,8 @@ class Probe:
             dofs: its slice of the model's velocities.
             geoms: first and last + 1 of its geoms.
             prefix: of its names in the model.
-            counts_gap: contacts within the gap of scenery count.
         """
-        self._contacts = contact_reader(model, data, counts_gap=counts_gap)
+        self._contacts = contact_reader(model, data)
         self._velocities = data.qvel
         self._timestep_s = float(model.opt.timestep)
         first = dofs.start + _FREE_DOFS
@@ -278,14 +275,7 @@ class Recorder:
             first = int(model.body_geomadr[root])
             own = int((model.body_rootid[model.geom_bodyid] == root).sum())
             geoms, dofs = (first, first + own), slice(0, channels.dofs)
-            self._probe = Probe(
-                model,
-                data,
-                robot,
-                dofs=dofs,
-                geoms=geoms,
-                counts_gap=channels.counts_gap,
-            )
+            self._probe = Probe(model, data, robot, dofs=dofs, geoms=geoms)
         self._working = [self._probe] if self._probe and channels.has_work else []
 
     def step(self, steps: int) -> None:

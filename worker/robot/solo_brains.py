@@ -1,19 +1,14 @@
 """Brains of robots that live alone, updated from birth on."""
 
+from typing import Any
+
 import numpy as np
 
 from schema.errors import SimulationDiverged
-from schema.plugins.protocols import Bank
 from schema.robot.brain import Brain, Widths
 from schema.robot.results import Floats
-from worker.robot.brains import (
-    HIGHEST,
-    LOWEST,
-    Controls,
-    Network,
-    outputs_of,
-    story_of,
-)
+from worker.robot.brains import HIGHEST, LOWEST, Controls, Network
+from worker.robot.guarded_bank import broken_rows, guarded_bank
 
 
 class SoloNetwork:
@@ -107,9 +102,15 @@ class SoloBank:
         readings: (1, I) sensor readings, which the caller writes before each tick.
     """
 
-    def __init__(self, bank: Bank, width: Widths, tick_s: float) -> None:
-        self.readings: Floats = np.zeros((1, width.inputs))
-        self._bank, self._outputs, self._tick_s = bank, width.outputs, tick_s
+    def __init__(self, controls: Controls, packed: Any) -> None:  # noqa: ANN401
+        """Start at rest.
+
+        Args:
+            controls: of the experiment.
+            packed: a brain in the form of its brain type.
+        """
+        self.readings: Floats = np.zeros((1, controls.width.inputs))
+        self._bank, self._tick_s = guarded_bank(controls, [packed]), controls.tick_s
 
     def step(self, tick: int) -> Floats:
         """Update the brain and return its outputs, (O,), not clipped.
@@ -118,17 +119,11 @@ class SoloBank:
             SimulationDiverged: code of a user that raised or gave no such array, or a
                 state or output that is not finite.
         """
-        try:
-            found = self._bank.step(self.readings, float(tick))
-            outputs = outputs_of(found, 1, self._outputs)
-        except Exception as error:
-            raise SimulationDiverged(
-                f"brain failed by {tick * self._tick_s:.3f} s: {story_of(error)}"
-            ) from error
-        if not (np.isfinite(self._bank.states).all() and np.isfinite(outputs).all()):
-            raise SimulationDiverged(
-                f"brain diverged by {tick * self._tick_s:.3f} s: state not finite"
-            )
+        outputs = self._bank.step(self.readings, float(tick))
+        for reason in broken_rows(self._bank, outputs).values():
+            what, _, why = reason.partition(": ")
+            time_s = tick * self._tick_s
+            raise SimulationDiverged(f"{what} by {time_s:.3f} s: {why}")
         first: Floats = outputs[0]
         return first
 
@@ -150,4 +145,4 @@ def solo_brain(controls: Controls, brain: Brain, ticks: int) -> Solo:
     packed = controls.pack(brain)
     if isinstance(packed, Network) and not packed.own:
         return SoloNetwork(packed, controls.width, controls.tick_s, ticks)
-    return SoloBank(controls.bank([packed]), controls.width, controls.tick_s)
+    return SoloBank(controls, packed)

@@ -142,8 +142,8 @@ def test_robot_alone_in_an_arena_has_the_off_line_track(robot_of: Robots) -> Non
         settings.simulation, drop_m=settings.arena.drop_m, window_steps=800
     )
     track = simulate(robot, alone(simulation, WILD))
-    own = world.population.find(A).window.track()
-    positions = np.asarray(own.core_position)[-len(track.core_position) :]
+    own = np.array(world.population.find(A).window.positions)
+    positions = own[-len(track.core_position) :]
     assert positions.tobytes() == track.core_position.tobytes()
 
 

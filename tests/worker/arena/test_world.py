@@ -74,9 +74,8 @@ def test_robot_alone_has_the_track_of_an_off_line_simulation(turtle: Robot) -> N
         space=SETTINGS.space, simulation=simulation, fitness=SETTINGS.fitness
     )
     track = simulate(turtle, settings)
-    own = world.population.find(A).window.track()
-    assert np.array_equal(own.core_position, track.core_position)
-    assert own.interval_s == track.interval_s
+    own = np.array(world.population.find(A).window.positions)
+    assert np.array_equal(own, track.core_position)
     assert advance.judgements[0].is_mature
 
 
@@ -193,7 +192,7 @@ def test_exchanged_brain_moves_a_robot_as_two_brains_by_hand(
         both = (solo_brain(controls, each, ticks) for each in (brain, learnt))
         return Switching(*both)
 
-    monkeypatch.setattr("worker.robot.evaluation.solo_brain", solo)
+    monkeypatch.setattr("worker.robot.control_loop.solo_brain", solo)
     by_hand = simulate(robot, off_line).core_position
     assert not np.array_equal(by_hand, plain)
 

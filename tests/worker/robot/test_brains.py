@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -13,7 +14,7 @@ from schema.experiment.document import Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.robot.brains import Bank, Network, pack
+from worker.robot.brains import Bank, Controls, Network, pack
 from worker.robot.own_neurons import STATE_LIMIT
 from worker.robot.solo_brains import SoloBank
 
@@ -158,7 +159,10 @@ def test_complex_outputs_of_a_brain_type_are_a_failed_result() -> None:
             outputs = np.full((1, WIDTH.outputs), 0.5)
             return cast("Floats", outputs + 1j) if age_ticks else outputs
 
-    solo = SoloBank(Complex(), WIDTH, TICK_S)
+    controls = SimpleNamespace(
+        width=WIDTH, tick_s=TICK_S, is_checked=True, bank=lambda _: Complex()
+    )
+    solo = SoloBank(cast("Controls", controls), ())
     assert solo.step(0)[0] == 0.5
     with pytest.raises(SimulationDiverged, match=r"by 0\.125 s: .*complex128"):
         solo.step(1)

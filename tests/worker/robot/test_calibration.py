@@ -37,11 +37,11 @@ def calibrated(*entries: Calibration, robot: Robot | None = None) -> Calibrated:
 
 def course(found: Calibrated, *values: float) -> list[float]:
     """Return the first output that arrives at each tick."""
-    outputs = np.zeros(10)
+    outputs = np.zeros((1, 10))
     arrived = []
-    for value in values:
-        outputs[0] = value
-        arrived.append(float(found.outputs(outputs)[0]))
+    for tick, value in enumerate(values):
+        outputs[0, 0] = value
+        arrived.append(float(found.outputs(tick, outputs)[0, 0]))
     return arrived
 
 
@@ -60,15 +60,15 @@ def test_sensor_by_hand() -> None:
     first, second = np.arange(10.0)[None], np.full((1, 10), 10.0)
     # Before the first tick the readings were those of the first tick.
     wanted = [-1.0, 1.0, 3.0, 5.0, 7.0, 9.0]
-    assert found.readings(first).tolist() == [[*wanted, 6.0, 7.0, 8.0, 9.0]]
-    assert found.readings(second).tolist() == [[*wanted, *[10.0] * 4]]
-    assert found.readings(first).tolist() == [[*[19.0] * 6, 6.0, 7.0, 8.0, 9.0]]
+    assert found.readings(0, first).tolist() == [[*wanted, 6.0, 7.0, 8.0, 9.0]]
+    assert found.readings(1, second).tolist() == [[*wanted, *[10.0] * 4]]
+    assert found.readings(0, first).tolist() == [[*[19.0] * 6, 6.0, 7.0, 8.0, 9.0]]
 
 
 def test_other_part_types_are_ideal() -> None:
     found = calibrated(Calibration(part="ParametricBarJoint"))
     readings = np.arange(10.0)[None]
-    assert found.readings(readings).tolist() == readings.tolist()
+    assert found.readings(0, readings).tolist() == readings.tolist()
     assert course(found, 0.3, 0.9) == [0.3, 0.9]
     assert found.noise is None
 

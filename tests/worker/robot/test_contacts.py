@@ -1,7 +1,4 @@
-"""Contacts of the last step, near scenery that has a gap.
-
-Runs that were begun by versions in which such contacts counted keep them.
-"""
+"""Contacts of the last step, near scenery that has a gap."""
 
 import mujoco
 import pytest
@@ -28,32 +25,23 @@ WITH_PADS = Robot(
 
 
 @pytest.mark.parametrize(
-    ("x", "gap_m", "counts", "touches"),
-    [
-        (0.0, 0.0, False, 0.0),
-        (0.0, 0.03, False, 0.0),
-        (0.0, 0.0, True, 0.0),
-        (0.0, 0.03, True, 1.0),
-        (-0.01, 0.0, False, 1.0),
-        (-0.01, 0.03, False, 1.0),
-        (-0.01, 0.03, True, 1.0),
-    ],
+    ("x", "gap_m", "touches"),
+    [(0.0, 0.0, 0.0), (0.0, 0.03, 0.0), (-0.01, 0.0, 1.0), (-0.01, 0.03, 1.0)],
 )
-def test_contacts_within_a_gap_count_only_in_old_runs(
-    x: float, gap_m: float, *, counts: bool, touches: float
+def test_contacts_within_a_gap_do_not_count(
+    x: float, gap_m: float, touches: float
 ) -> None:
     """The pads end 9.5 mm from a wall, or 0.5 mm in it."""
     geom = f'<geom type="box" size="0.05 2 0.3" pos="-0.115 0 0.3" gap="{gap_m}"/>'
     scenery = f"<mujoco><worldbody>{geom}</worldbody></mujoco>"
-    environment = Environment(scenery=scenery, gap_contacts=counts)
-    assert environment.counts_gap is counts
+    environment = Environment(scenery=scenery)
     model = solo_spec(WITH_PADS, BUILT_IN, Simulation(), environment).compile()
     data = mujoco.MjData(model)
     data.qpos[0] = x
-    sensors = Sensors(WITH_PADS, BUILT_IN, model, data, width=8, counts_gap=counts)
+    sensors = Sensors(WITH_PADS, BUILT_IN, model, data, width=8)
     assert sensors.start()[0, 6:].tolist() == [touches, touches]
     geoms, dofs = (2, model.ngeom), slice(0, 6)
-    probe = Probe(model, data, WITH_PADS, dofs=dofs, geoms=geoms, counts_gap=counts)
+    probe = Probe(model, data, WITH_PADS, dofs=dofs, geoms=geoms)
     probe.read()
     assert probe.numbers[-1] == touches
     settings = replace(settings_of(drop_m=0.0), environment=environment)

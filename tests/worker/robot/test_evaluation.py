@@ -32,8 +32,8 @@ from worker.fitness import (
     path_velocity,
     straight_velocity,
 )
+from worker.measures import functions
 from worker.measures.functions import Functions
-from worker.robot import evaluation
 from worker.robot.evaluation import evaluate, simulate
 from worker.serve.jobs import answer_evaluation
 
@@ -239,7 +239,7 @@ def test_undefined_fitness_is_a_result(
     message: str,
 ) -> None:
     named = Functions(LoadedFitness("own:function", function, None), (), ())
-    monkeypatch.setattr(evaluation, "functions_of", lambda _settings: named)
+    monkeypatch.setattr(functions, "functions_of", lambda _settings: named)
     with pytest.raises(FitnessUndefined, match=message):
         evaluate(turtle, SETTINGS)
     work = Evaluate(NOBODY, turtle)

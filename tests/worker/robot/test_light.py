@@ -18,7 +18,7 @@ from schema.wire.arena import Insertion
 from tests.worker.arena_cases import populated, settings_of
 from worker.robot.devices import Sensors
 from worker.robot.evaluation import simulate
-from worker.robot.light import read_light
+from worker.robot.own_sensors import Surroundings
 
 GREY = (0.5, 0.5, 0.5)
 SPACE = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
@@ -59,7 +59,7 @@ def reading(light: Vector, scenery: str = "") -> float:
     data = mujoco.MjData(model)
     sensors = Sensors(LAMP, space, model, data, width=7, has_light=True)
     mujoco.mj_kinematics(model, data)
-    read_light(light, sensors, (model, data), [(model, data)])
+    sensors.look(Surroundings(0.0, (), light=light))
     return float(sensors.readings[0, 6])
 
 

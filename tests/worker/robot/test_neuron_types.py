@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -157,11 +159,21 @@ def test_all_states_are_clipped() -> None:
     assert outputs[0, 0] == bank.states[0, 0] == bank.states[0, 20] == STATE_LIMIT
 
 
+def solo_bank(control: NetworkControl, brain: Brain) -> SoloBank:
+    """Return a brain of a user's neurons that lives alone."""
+    controls = SimpleNamespace(
+        width=WIDTH,
+        tick_s=TICK_S,
+        is_checked=True,
+        bank=lambda packed: control.bank(packed, WIDTH, TICK_S),
+    )
+    return SoloBank(cast("Controls", controls), control.pack(brain, WIDTH))
+
+
 def test_off_line_a_state_that_is_not_finite_is_a_failed_result() -> None:
     control = NetworkControl(NoParameters(), (Growing(np.nan),))
     brain = Brain((Neuron("output", "Growing", 0),))
-    bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
-    solo = SoloBank(bank, WIDTH, TICK_S)
+    solo = solo_bank(control, brain)
     for tick in range(9):
         solo.step(tick)
     with pytest.raises(SimulationDiverged, match=r"brain diverged by 1\.125 s"):
@@ -188,8 +200,7 @@ def test_off_line_a_type_that_raises_is_a_failed_result_in_one_line() -> None:
     control = NetworkControl(NoParameters(), (Picky(),))
     neurons = (Neuron("input", INPUT, 0), Neuron("output", "Picky", 0))
     brain = Brain(neurons, (Connection(0, 1, 1.0),))
-    bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
-    solo = SoloBank(bank, WIDTH, TICK_S)
+    solo = solo_bank(control, brain)
     assert solo.step(0)[0] == 0.5
     solo.readings[0, 0] = 2.0
     with pytest.raises(SimulationDiverged) as caught:
@@ -231,8 +242,7 @@ def test_states_of_another_form_are_a_failed_result(
 ) -> None:
     control = NetworkControl(NoParameters(), (Turning(form),))
     brain = Brain((Neuron("output", "Turning", 0),))
-    bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
-    solo = SoloBank(bank, WIDTH, TICK_S)
+    solo = solo_bank(control, brain)
     assert solo.step(0)[0] == 0.25
     with pytest.raises(SimulationDiverged) as caught:
         solo.step(1)

@@ -61,8 +61,8 @@ def drawn(identity: Identity, ticks: int = 200) -> Floats:
         [
             np.hstack(
                 [
-                    noise.perturb_readings(tick, zeros[0])[0],
-                    noise.perturb_outputs(tick, zeros[1])[0],
+                    noise.readings(tick, zeros[0])[0],
+                    noise.outputs(tick, zeros[1])[0],
                 ]
             )
             for tick in range(ticks)
@@ -96,13 +96,13 @@ def test_noise_is_independent_of_other_robots_and_order_of_ticks() -> None:
     population, own = noise_of(*births), [noise_of(birth) for birth in births]
     ticks = [0, BLOCK_TICKS - 1, BLOCK_TICKS, 5 * BLOCK_TICKS + 3, 1, 0]
     for tick in ticks:
-        whole = population.perturb_readings(tick, readings)
+        whole = population.readings(tick, readings)
         for row, noise in enumerate(own):
-            single = noise.perturb_readings(tick, readings[row : row + 1])
+            single = noise.readings(tick, readings[row : row + 1])
             assert np.array_equal(whole[row : row + 1], single)
     assert not np.array_equal(
-        population.perturb_readings(0, readings),
-        population.perturb_readings(64, readings),
+        population.readings(0, readings),
+        population.readings(64, readings),
     )
 
 
@@ -111,14 +111,10 @@ def test_sensor_and_actuator_noise_are_independent() -> None:
     both = noise_of(A)
     sensors = noise_of(A, simulation=replace(LOUD, actuator_noise=0.0))
     actuators = noise_of(A, simulation=replace(LOUD, sensor_noise=0.0))
-    assert np.array_equal(
-        sensors.perturb_readings(3, rows), both.perturb_readings(3, rows)
-    )
-    assert np.array_equal(
-        actuators.perturb_outputs(3, rows), both.perturb_outputs(3, rows)
-    )
-    assert sensors.perturb_outputs(3, rows) is rows
-    assert actuators.perturb_readings(3, rows) is rows
+    assert np.array_equal(sensors.readings(3, rows), both.readings(3, rows))
+    assert np.array_equal(actuators.outputs(3, rows), both.outputs(3, rows))
+    assert sensors.outputs(3, rows) is rows
+    assert actuators.readings(3, rows) is rows
 
 
 # --- off-line ---------------------------------------------------------------------
@@ -234,12 +230,10 @@ def test_noise_of_a_robot_alone_equals_that_off_line(robot_of: Robots) -> None:
         simulation = replace(NOISY.simulation, drop_m=NOISY.arena.drop_m)
         identity = Identity(ORIGIN, A, 0)
         track = simulate(robot_of(seed), with_simulation(simulation), identity=identity)
-        own = world.population.find(A).window.track()
-        assert np.array_equal(own.core_position, track.core_position)
+        own = np.array(world.population.find(A).window.positions)
+        assert np.array_equal(own, track.core_position)
         calm = simulate(robot_of(seed), with_simulation(SETTINGS.simulation))
-        assert not np.array_equal(
-            own.core_position, calm.core_position[: len(own.core_position)]
-        )
+        assert not np.array_equal(own, calm.core_position[: len(own)])
 
 
 def test_distant_births_and_deaths_do_not_change_the_noise(robot_of: Robots) -> None:

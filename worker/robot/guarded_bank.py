@@ -9,8 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from schema.plugins.protocols import Bank
 from schema.robot.results import Floats
 from worker.robot.brains import Controls, outputs_of, story_of
+
+_DIVERGED = "brain diverged: state not finite"
 
 
 class GuardedBank:
@@ -64,3 +67,25 @@ class GuardedBank:
                 self.failed[row] = f"brain failed: {story_of(error)}"
             self.states[one] = bank.states
         return outputs
+
+
+def guarded_bank(controls: Controls, packed: Sequence[Any]) -> Bank:
+    """Return brains at rest that are updated together; guarded if code is a user's."""
+    if controls.is_checked:
+        return GuardedBank(controls, packed)
+    return controls.bank(packed)
+
+
+def broken_rows(bank: Bank, outputs: Floats) -> dict[int, str]:
+    """Return why brains failed, or are no longer finite, by row, ascending.
+
+    Args:
+        bank: the brains after a tick.
+        outputs: (R, O) of that tick.
+    """
+    if not isinstance(bank, GuardedBank):
+        return {}
+    is_finite = np.isfinite(bank.states).all(axis=1)
+    is_finite &= np.isfinite(outputs).all(axis=1)
+    diverged = dict.fromkeys(np.flatnonzero(~is_finite).tolist(), _DIVERGED)
+    return dict(sorted((diverged | bank.failed).items()))

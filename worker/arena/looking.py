@@ -1,4 +1,4 @@
-"""Own sensors in an arena: sensors of plug-ins, which see the other robots, too."""
+"""Light sensors and own sensors in an arena, which see the other robots, too."""
 
 from collections.abc import Sequence
 
@@ -6,29 +6,19 @@ import numpy as np
 
 from schema.errors import SensorFailed
 from schema.experiment.settings import ArenaSettings
-from schema.parts import BodySpace, Sensor
 from schema.wire.arena import Casualty
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.robot.own_sensors import Surroundings
 
 
-def has_own_sensors(space: BodySpace) -> bool:
-    """Return whether a part type has a sensor of a plug-in."""
-    return any(
-        not isinstance(sensor, Sensor)
-        for kind in space.values()
-        for sensor in kind.sensors
-    )
-
-
-def read_own_sensors(
+def look(
     population: ArenaPopulation,
     robots: Sequence[ArenaRobot],
     step: int,
     settings: ArenaSettings,
 ) -> list[Casualty]:
-    """Write the readings of some robots' own sensors.
+    """Write the readings of some robots' light sensors and own sensors.
 
     Args:
         population: all robots of the arena; sensors see all of them.
@@ -39,14 +29,14 @@ def read_own_sensors(
     Returns:
         The robots with a sensor that failed.
     """
-    reading = [robot for robot in robots if robot.view.sensors.own is not None]
-    if not reading:
+    looking = [robot for robot in robots if robot.view.sensors.looks]
+    if not looking:
         return []
     population.kinematics()
     places = np.array([robot.view.qpos[:3] for robot in population.robots])
     rows = population.robot_rows.rows
     failed = []
-    for robot in reading:
+    for robot in looking:
         sensors = robot.view.sensors
         cluster = population.cluster_of[robot.birth]
         is_newborn = step == robot.window.born
@@ -58,9 +48,8 @@ def read_own_sensors(
             np.delete(places, rows[robot.birth], axis=0),
             settings.light,
         )
-        assert sensors.own is not None
         try:
-            sensors.own.read(sensors.readings[0], around)
+            sensors.look(around)
         except SensorFailed as error:
             x, y, z = robot.view.qpos[:3].tolist()
             failed.append(Casualty(robot.birth, step, str(error), (x, y, z)))

@@ -1,0 +1,262 @@
+"""Control loop of one robot, alone in its environment, one brain tick at a time.
+
+All clocks are integers of physics steps; the wall clock is never read.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from schema.errors import SimulationDiverged, one_line
+from schema.experiment.brains import with_room
+from schema.experiment.document import body_space
+from schema.experiment.identity import NO_IDENTITY, Identity
+from schema.experiment.settings import EvaluationSettings
+from schema.mjcf.model import solo_spec
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+from schema.robot.trace import Trace
+from worker.measures.functions import functions_of
+from worker.robot.brains import controls_of
+from worker.robot.devices import Sensors, Servos
+from worker.robot.filters import filtered_outputs, filtered_readings, filters_of
+from worker.robot.own_sensors import Surroundings
+from worker.robot.recording import Channels, Recorder
+from worker.robot.solo_brains import solo_brain
+
+Watch = Callable[[mujoco.MjData], None]
+
+
+class ControlLoop:
+    """Simulation of one robot that starts at the origin: sensors, brain, motors.
+
+    Sensors, brain and commands are updated every ``brain_steps`` from step 0 on. The
+    position of the core's centre is sampled every ``pose_steps`` of the window, both
+    ends included, and so are the channels that fitness and measures declare.
+
+    Attributes:
+        model: of the robot in its environment.
+        data: the engine's state.
+        now: physics steps since the start.
+        watch: called with the state at each tick, after the commands; may be None.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        settings: EvaluationSettings,
+        identity: Identity = NO_IDENTITY,
+        means: Sequence[float] = (),
+    ) -> None:
+        """Build the model and start.
+
+        Args:
+            robot: a checked robot; it may have more neurons than ``[space]`` allows in
+                a search.
+            settings: body space, simulation and environment; of fitness and measures
+                the channels that they declare.
+            identity: of the evaluation; noise and pushes depend on it.
+            means: of the inputs, for those that ``settings.ablation`` holds there.
+
+        Raises:
+            SimulationDiverged: the engine cannot build the robot.
+            ExperimentError: a sensor that has no stimulus in this environment, or an
+                unknown fitness function or measure.
+            InvalidRobot: neurons of other types, or an ablation of another robot.
+        """
+        silence_engine()
+        self._settings = settings = with_room(settings, robot.brain)
+        self._robot, self._identity, self._means = robot, identity, means
+        self._clock, self._light = settings.simulation, settings.environment.light
+        self._end = self._clock.evaluation_steps
+        self.watch: Watch | None = None
+        space = body_space(settings.space)
+        try:
+            spec = solo_spec(robot, space, self._clock, settings.environment)
+            self.model: mujoco.MjModel = spec.compile()
+        except ValueError as error:
+            raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
+        self.reset()
+
+    def reset(self) -> None:
+        """Start again, equal to the last bit."""
+        robot, settings, model = self._robot, self._settings, self.model
+        types, controls = body_space(settings.space), controls_of(settings)
+        self.data = data = mujoco.MjData(model)
+        self._core, self._velocities = data.qpos[:3].data, data.qvel.data
+        self._sensors = Sensors(
+            robot,
+            types,
+            model,
+            data,
+            width=controls.width.inputs,
+            has_light=self._light is not None,
+        )
+        self._servos = Servos(robot, types, model, data)
+        ticks = self._end // self._clock.brain_steps + 1
+        self._brain = solo_brain(controls, robot.brain, ticks)
+        self._sensors.write_to(self._brain.readings)
+        self._inputs = self._brain.readings[:, : robot.brain.count("input")]
+        state = model, data
+        self._filters = filters_of(robot, settings, self._identity, state, self._means)
+        self._channels = Channels(robot, model, settings)
+        self._recorder: Recorder | None = None
+        if self._channels.names:
+            self._recorder = Recorder(self._channels, robot, model, data)
+        self._positions: list[float] = []
+        self.now, self._next_sample = 0, self._clock.warmup_steps
+        self._observed = -1
+
+    @property
+    def done(self) -> bool:
+        """Whether the window is over."""
+        return self.now >= self._end
+
+    def observe(self) -> Floats:
+        """Return what the brain receives at the present tick, (1, I).
+
+        At the end of a window that is no tick, that of the last tick.
+
+        Raises:
+            SimulationDiverged: the state is not finite, or the engine failed.
+            SensorFailed: a sensor of a plug-in raised or gave wrong values.
+        """
+        tick, since = divmod(self.now, self._clock.brain_steps)
+        if self._observed < self.now and not since:
+            self._observed = self.now
+            try:
+                self._read_sensors()
+            except mujoco.FatalError as error:
+                raise self._failure(error) from None
+            if self._recorder is not None:
+                self._recorder.readings = self._inputs.copy()
+            if self._filters:
+                self._inputs[:] = filtered_readings(self._filters, tick, self._inputs)
+        return self._inputs
+
+    def step(self, action: Floats | None = None) -> None:
+        """Command the motors, and step the physics to the next tick or the end.
+
+        Args:
+            action: (M,) of the motors, -1 to 1 over their ranges; None is the robot's
+                own brain. Filters act on both.
+
+        Raises:
+            SimulationDiverged: the state is not finite, the engine warned or failed,
+                or the brain of a plug-in failed.
+            SensorFailed: as of ``observe``.
+        """
+        tick = self.now // self._clock.brain_steps
+        self.observe()
+        outputs = self._brain.step(tick) if action is None else 0.5 + 0.5 * action
+        if self._filters:
+            outputs = filtered_outputs(self._filters, tick, outputs[np.newaxis])[0]
+        self._servos.drive(outputs)
+        if self.watch is not None:
+            self.watch(self.data)
+        try:
+            self._step_to(min((tick + 1) * self._clock.brain_steps, self._end))
+        except mujoco.FatalError as error:
+            raise self._failure(error) from None
+        if self.done:
+            self._finish()
+
+    def trace(self) -> Trace:
+        """Return the samples of the window, once it is over."""
+        recorder = self._recorder
+        return self._channels.trace(
+            self._robot,
+            self._clock.pose_steps * self._clock.timestep_s,
+            np.array(self._positions).reshape(-1, 3),
+            recorder.rows if recorder is not None else (),
+        )
+
+    @property
+    def fitness(self) -> float:
+        """Fitness, once the window is over.
+
+        Raises:
+            FitnessUndefined: the fitness function raised or gave no finite number.
+        """
+        return functions_of(self._settings).fitness.value(self.trace())
+
+    def _step_to(self, until: int) -> None:
+        """Step the physics with constant commands; sample on the way."""
+        model, data, recorder = self.model, self.data, self._recorder
+        while self.now < until:
+            if self.now == self._next_sample:
+                # After the tick, as in an arena: a sample has the readings of its step.
+                self._sample()
+            stop = min(until, self._next_sample)
+            if recorder is None:
+                mujoco.mj_step(model, data, stop - self.now)
+            else:
+                recorder.step(stop - self.now)
+            self.now = stop
+
+    def _sample(self) -> None:
+        self._positions += self._core.tolist()
+        self._next_sample += self._clock.pose_steps
+        if self._recorder is not None:
+            self._recorder.sample()
+
+    def _finish(self) -> None:
+        """Add the last sample; its readings are those of the last tick, as in an arena.
+
+        That may be the end, where the brain does not tick.
+        """
+        if self._recorder is not None:
+            self.observe()
+        self._sample()
+        data = self.data
+        if data.warning.number.any() or not math.isfinite(
+            data.qvel.sum() + data.qpos.sum()
+        ):
+            self._raise_diverged()
+
+    def _read_sensors(self) -> None:
+        if self.now:
+            # A sum is finite only if all its terms are. No plausible state overflows
+            # it, and one velocity that is not a number spreads to all of a robot's.
+            if not math.isfinite(sum(self._velocities.tolist())):
+                self._raise_diverged()
+            self._sensors.read(self._clock.tick_s)
+        else:
+            self._sensors.start()
+        if self._sensors.looks:
+            # Frames are those of the state before the last step.
+            mujoco.mj_kinematics(self.model, self.data)
+            age_s, touched = self.now * self._clock.timestep_s, self._sensors.touching()
+            self._sensors.look(Surroundings(age_s, touched, light=self._light))
+
+    def _failure(self, error: mujoco.FatalError) -> SimulationDiverged:
+        """Return why the engine cannot continue, such as contacts beyond its memory."""
+        return SimulationDiverged(
+            f"physics diverged by {self.data.time:.3f} s: {one_line(error)}"
+        )
+
+    def _raise_diverged(self) -> None:
+        time_s = self.now * self._clock.timestep_s
+        reason = warning_names(self.data.warning.number) or "state not finite"
+        raise SimulationDiverged(f"physics diverged by {time_s:.3f} s: {reason}")
+
+
+def warning_names(counts: npt.NDArray[np.integer]) -> str:
+    """Return the names of the engine's warnings whose counts are not 0."""
+    return ", ".join(
+        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
+        for index in counts.nonzero()[0].tolist()
+    )
+
+
+@lru_cache(maxsize=1)
+def silence_engine() -> None:
+    """Keep the engine's warnings out of stderr and of its log file.
+
+    The engine still counts them in ``MjData.warning``.
+    """
+    mujoco.set_mju_user_warning(lambda _message: None)

@@ -1,0 +1,85 @@
+"""Filters between the sensors, brains and motors of robots: noise, faults, pushes."""
+
+from collections.abc import Iterable, Sequence
+from typing import Protocol
+
+from schema.experiment.brains import widths
+from schema.experiment.document import body_space
+from schema.experiment.identity import Identity
+from schema.experiment.settings import EvaluationSettings
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+from worker.robot.ablation import Ablated
+from worker.robot.calibration import Calibrated
+from worker.robot.light import State
+from worker.robot.noise import Noise, NoiseSource
+from worker.robot.pushes import Pushes
+
+
+class Filter(Protocol):
+    """Change of what R brains receive, and of what reaches the motors, at a tick.
+
+    Arrays that a filter gets stay as they are.
+    """
+
+    def readings(self, tick: int, values: Floats) -> Floats:
+        """Return the readings (R, N) after the filter."""
+
+    def outputs(self, tick: int, values: Floats) -> Floats:
+        """Return the outputs of the brains (R, O), unclipped, after the filter."""
+
+
+def filtered_readings(filters: Iterable[Filter], tick: int, values: Floats) -> Floats:
+    """Return readings (R, N) after all filters, in their order."""
+    for each in filters:
+        values = each.readings(tick, values)
+    return values
+
+
+def filtered_outputs(filters: Iterable[Filter], tick: int, values: Floats) -> Floats:
+    """Return outputs (R, O) after all filters, in their order."""
+    for each in filters:
+        values = each.outputs(tick, values)
+    return values
+
+
+def filters_of(
+    robot: Robot,
+    settings: EvaluationSettings,
+    identity: Identity,
+    state: State,
+    means: Sequence[float] = (),
+) -> tuple[Filter, ...]:
+    """Return the filters of an evaluation, in the order in which they act.
+
+    Args:
+        robot: the robot.
+        settings: of the evaluation.
+        identity: of the evaluation; noise and pushes depend on it.
+        state: model and data of the robot, to which forces are written.
+        means: of the inputs, for those that are held at their mean; as ``mean_inputs``.
+
+    Raises:
+        InvalidRobot: an ablation of another robot.
+    """
+    clock, environment = settings.simulation, settings.environment
+    width, found = widths(settings.space), list[Filter]()
+    further: tuple[Floats, Floats] | None = None
+    if settings.calibration:
+        calibrated = Calibrated(
+            robot,
+            body_space(settings.space),
+            settings.calibration,
+            tick_s=clock.tick_s,
+            width=width,
+        )
+        found.append(calibrated)
+        further = calibrated.noise
+    if clock.sensor_noise or clock.actuator_noise or further:
+        source = NoiseSource(clock, width, identity.origin, further)
+        found.append(Noise(source, (identity.birth,), identity.trial))
+    if settings.ablation is not None:
+        found.append(Ablated(settings.ablation, robot, means))
+    if environment.push_impulse:
+        found.append(Pushes(environment, clock, identity, *state))
+    return tuple(found)
