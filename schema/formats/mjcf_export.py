@@ -77,8 +77,8 @@ def exact_xml(spec: mujoco.MjSpec) -> str:
         engine._mjPRIVATE__set_xml_precision(usual)  # noqa: SLF001
 
 
-def portable(root: ET.Element) -> str:
-    """Return the text of MJCF whose servos are ``velocity`` elements, for all readers.
+def portable(root: ET.Element) -> ET.Element:
+    """Return MJCF whose servos are ``velocity`` elements, for all readers.
 
     MuJoCo 4 writes them as ``general`` elements with an attribute ``input``, which
     MuJoCo 3.3 and earlier do not know. Both give the same model.
@@ -92,8 +92,8 @@ def portable(root: ET.Element) -> str:
         for name in ("input", "biastype", "biasprm"):
             del servo.attrib[name]
     for numbers in root.iterfind("custom/numeric"):
-        del numbers.attrib["size"]  # of the data; refused, as it reserves memory
-    return ET.tostring(root, encoding="unicode") + "\n"
+        del numbers.attrib["size"]  # of the data
+    return root
 
 
 def _rename(spec: mujoco.MjSpec) -> None:

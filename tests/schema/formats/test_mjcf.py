@@ -86,18 +86,6 @@ def test_mjcf_holds_objects_that_move() -> None:
     assert model.body("scenery_1").mass.item() == pytest.approx(8.0)
 
 
-def test_edited_body_is_refused() -> None:
-    text = robot_to_mjcf(ARM, SETTINGS)
-    heavier = text.replace('mass="0.0102"', 'mass="0.0104"')
-    assert heavier != text
-    with pytest.raises(InvalidRobot, match=r"^it: its body differs .*body_mass.*YAML"):
-        robot_from_mjcf(heavier, "it")
-    fewer = re.sub(r'<geom name="2_body".*?/>', "", text)
-    assert fewer != text
-    with pytest.raises(InvalidRobot, match=r"^it: its body differs .*\(ngeom\)"):
-        robot_from_mjcf(fewer, "it")
-
-
 WALKER = Robot(
     (
         Part("Core", -1, -1, -1, 0, GREY),
@@ -114,106 +102,31 @@ WALKER = Robot(
 
 
 @pytest.mark.parametrize(
-    ("written", "edited", "name"),
+    ("written", "edited"),
     [
-        ('name="body1" pos=".*?"', 'name="body1" pos="0.5 0.5 0.5"', "body_pos"),
-        ('name="body1"', 'name="body1" quat="0 1 0 0"', "body_quat"),
-        ('name="root" pos="0 0', 'name="root" pos="0.1 0', "body_pos"),
-        ('(?=<geom name="1_servo")',
-         '<inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/>', "body_ipos"),
-        ('name="joint1"', 'name="joint1" pos="0 0 0.1"', "jnt_pos"),
-        ('(name="joint1" .*?)axis=".*?"', r'\1axis="1 0 0"', "jnt_axis"),
-        ('name="joint1"', 'name="joint1" damping="0.1"', "dof_damping"),
-        ('armature="0.005"', 'armature="0.01"', "dof_armature"),
-        ('forcerange=".*?"', 'forcerange="-9 9"', "actuator_forcerange"),
-        ('kv="1"', 'kv="77"', "actuator_gainprm"),
-        ('name="joint1"', 'name="joint1" frictionloss="0.1"', "dof_frictionloss"),
-        ('name="joint1"', 'name="joint1" stiffness="0.1"', "jnt_stiffness"),
-        ('name="joint1"', 'name="joint1" ref="0.1"', "qpos0"),
-        ('name="joint1"', 'name="joint1" damping="0.000101"', "dof_damping"),
-        ('range="-0.785.*? 0', 'type="ball" range="0 0', "nq"),
-        ('name="body1"', 'name="body1" gravcomp="1"', "body_gravcomp"),
-        ('name="1_servo"', 'name="1_servo" shellinertia="true"', "body_inertia"),
-        ('name="2_left"', 'name="2_left" rgba="1 0 0 1"', "geom_rgba"),
-        ("<velocity ", '<velocity gear="2" ', "actuator_gear"),
-        ('joint="joint1"', 'joint="free"', "actuator_trnid"),
-        ("<gyro ", '<gyro noise="1" ', "sensor_noise"),
-        ('ctrlrange="-5.236 5.236"', 'ctrlrange="-9 9"', "actuator_ctrlrange"),
-        ('(?<="motor_gain" )data=".*?"', 'data="5"', "numeric_data"),
-        ("(?=<numeric)", '<numeric name="n" data="1 2"/>', "nnumeric"),
+        ('mass="0.09"', 'mass="0.0901"'),
+        ('name="body1" pos=".*?"', 'name="body1" pos="0.5 0.5 0.5"'),
+        ('name="joint1"', 'name="joint1" damping="0.1"'),
+        ('kv="1"', 'kv="77"'),
+        ('name="2_left"', 'name="2_left" rgba="1 0 0 1"'),
+        ("<gyro .*?/>", ""),
+        ('<geom name="2_left".*?/>', ""),
+        ('(?<="motor_gain" )data=".*?"', 'data="5"'),
+        ('friction="1 0 0"', 'friction="0.1 0 0"'),
+        ("<option ", '<option gravity="0 0 -1.62" '),
+        ("<flag ", '<flag contact="disable" '),
+        ("<worldbody>", "<worldbody><geom size='1'/>"),
+        ("<worldbody>", "<include file='other.xml'/><worldbody>"),
+        (r'(name="revolve_settings" data=".*?)..(?=")', r"\1AA"),
     ],
-)  # fmt: skip
-def test_each_edit_of_a_body_is_refused(written: str, edited: str, name: str) -> None:
+)
+def test_each_edit_is_refused(written: str, edited: str) -> None:
+    """What MuJoCo's viewer would obey has no effect here: it is no silent loss."""
     text = robot_to_mjcf(WALKER, SETTINGS)
     changed = re.sub(written, edited, text, count=1)
     assert changed != text
-    mujoco.MjModel.from_xml_string(changed)
-    with pytest.raises(InvalidRobot, match=rf"^it: its body differs .*\b{name}\b"):
+    with pytest.raises(InvalidRobot, match=r"^it: "):
         robot_from_mjcf(changed, "it")
-
-
-@pytest.mark.parametrize(
-    ("written", "edited", "name"),
-    [
-        ('friction="1 0 0"', 'friction="0.1 0 0"', "geom_friction"),
-        ('solref="0.01"', 'solref="0.02"', "geom_solref"),
-        ('name="ground"', 'name="ground" condim="6"', "geom_condim"),
-        ('name="0_body"', 'name="0_body" contype="0"', "geom_contype"),
-        ('timestep="0.005"', 'timestep="0.001"', "opt.timestep"),
-        ("<option ", '<option gravity="0 0 -1.62" ', "opt.gravity"),
-        ("<option ", '<option density="1000" ', "opt.density"),
-        ("<option ", '<option solver="CG" ', "opt.solver"),
-        ('cone="elliptic"', 'cone="pyramidal"', "opt.cone"),
-        ("<flag ", '<flag contact="disable" ', "opt.disableflags"),
-        ("<flag ", '<flag override="enable" ', "opt.enableflags"),
-    ],
-)
-def test_each_edit_of_a_world_is_refused(written: str, edited: str, name: str) -> None:
-    """What MuJoCo's viewer would obey has no effect here: it is no silent loss."""
-    text = robot_to_mjcf(WALKER, SETTINGS)
-    changed = text.replace(written, edited, 1)
-    assert changed != text
-    mujoco.MjModel.from_xml_string(changed)
-    message = rf"^it: its world differs from the settings .*\({name}\): .*--experiment$"
-    with pytest.raises(InvalidRobot, match=message):
-        robot_from_mjcf(changed, "it")
-
-
-@pytest.mark.parametrize("number", ["nan", "NaN", "-inf", "1e999"])
-def test_numbers_that_are_not_finite_are_refused(
-    number: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """MuJoCo would warn on the screen and in a file of the current folder."""
-    monkeypatch.chdir(tmp_path)
-    text = robot_to_mjcf(WALKER, SETTINGS)
-    changed = text.replace('mass="0.09"', f'mass="{number}"')
-    assert changed != text
-    with pytest.raises(InvalidRobot, match=f"^it: <geom mass='{number}'> must be fin"):
-        robot_from_mjcf(changed, "it")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.filterwarnings("default")
-def test_edit_that_mujoco_warns_of_is_refused_in_one_line(
-    recwarn: pytest.WarningsRecorder,
-) -> None:
-    text = robot_to_mjcf(WALKER, SETTINGS)
-    changed = text.replace('armature="0"', 'armature="-10"', 1)
-    with pytest.warns(UserWarning, match="close to singular"):
-        mujoco.MjSpec.from_string(changed).compile()
-    recwarn.clear()
-    with pytest.raises(InvalidRobot, match=r"^it: its body differs .*\(dof_armature\)"):
-        robot_from_mjcf(changed, "it")
-    assert not recwarn.list
-
-
-def test_long_names_of_elements_are_cut() -> None:
-    text = robot_to_mjcf(WALKER, SETTINGS)
-    for edited in ("<{0}/><worldbody>", "<light {0}='nan'/><worldbody>"):
-        changed = text.replace("<worldbody>", edited.format("x" * 5000), 1)
-        with pytest.raises(InvalidRobot) as error:
-            robot_from_mjcf(changed, "it")
-        assert len(str(error.value)) < 1000
 
 
 def test_what_does_not_move_a_robot_may_be_edited() -> None:
@@ -221,19 +134,12 @@ def test_what_does_not_move_a_robot_may_be_edited() -> None:
     for written, edited in (
         ('name="ground"', 'name="floor" rgba="0 1 0 1"'),
         ('memory="1M"', 'memory="2M"'),
+        ("<compiler", "<visual><headlight ambient='1 1 1'/></visual><compiler"),
         ("<worldbody>", "<worldbody><light pos='0 0 3'/>"),
     ):
         changed = text.replace(written, edited, 1)
         assert changed != text
         assert robot_from_mjcf(changed, "it") == (WALKER, SETTINGS)
-
-
-def test_robot_may_stand_at_another_height() -> None:
-    """Earlier versions placed robots in other ways on rough ground and scenery."""
-    text = robot_to_mjcf(WALKER, SETTINGS)
-    lifted = text.replace('name="root" pos="0 0 0.0225"', 'name="root" pos="0 0 0.03"')
-    assert lifted != text
-    assert robot_from_mjcf(lifted, "it") == (WALKER, SETTINGS)
 
 
 @pytest.mark.parametrize(
@@ -376,33 +282,11 @@ def test_motors_have_their_limits_in_plain_mujoco() -> None:
     assert model.numeric("motor_gain").data.tolist() == [0.9]
 
 
-def test_files_with_six_digits_and_without_limits_are_read() -> None:
-    """As written before: no range of the velocity, no gain."""
-    spec = solo_spec(TILTED, BUILT_IN, SETTINGS.simulation, SETTINGS.environment)
-    add_sensors(spec, TILTED, BUILT_IN)
-    spec.compile()
-    texts = "".join(re.findall("<text .*?/>", robot_to_mjcf(TILTED, SETTINGS)))
-    old = spec.to_xml().replace("</mujoco>", f"<custom>{texts}</custom></mujoco>")
-    assert "ctrlrange" not in old
+def test_files_without_a_digest_are_read() -> None:
+    """As versions before 0.3 wrote them, and whatever was edited in them."""
+    texts = re.findall("<text .*?/>", robot_to_mjcf(TILTED, SETTINGS))
+    old = f"<mujoco><custom>{''.join(texts[:2])}</custom></mujoco>"
     assert robot_from_mjcf(old, "it") == (TILTED, SETTINGS)
-
-
-def test_files_without_sensors_are_read() -> None:
-    """As written before: names with a slash, general servos, no sensors."""
-    spec = solo_spec(ARM, BUILT_IN, SETTINGS.simulation, SETTINGS.environment)
-    spec.compile()
-    texts = "".join(re.findall("<text .*?/>", robot_to_mjcf(ARM, SETTINGS)))
-    old = spec.to_xml().replace("</mujoco>", f"<custom>{texts}</custom></mujoco>")
-    assert 'name="2/body"' in old
-    assert robot_from_mjcf(old, "it") == (ARM, SETTINGS)
-
-
-def test_a_file_without_one_sensor_is_refused() -> None:
-    text = robot_to_mjcf(ARM, SETTINGS)
-    fewer = re.sub("<gyro .*?/>", "", text)
-    assert fewer != text
-    with pytest.raises(InvalidRobot, match=r"its body differs .*\(nsensor\)"):
-        robot_from_mjcf(fewer, "it")
 
 
 def test_a_body_that_the_engine_cannot_build_is_refused() -> None:
