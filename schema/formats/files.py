@@ -13,11 +13,11 @@ from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.contents import read_data, read_text
+from schema.formats.document import compose
 from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
 from schema.formats.yaml import robot_to_yaml
 from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
-from schema.formats.yaml_node import compose
 from schema.formats.yaml_reader import Reader
 from schema.limits import MOST_MJCF_BYTES, MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace

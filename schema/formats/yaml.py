@@ -32,7 +32,7 @@ from typing import Any
 import yaml
 
 from schema.errors import InvalidRobot
-from schema.formats.yaml_node import compose
+from schema.formats.document import compose
 from schema.parts import BodySpace, Parameter
 from schema.robot.brain import NeuronKinds, neuron_names
 from schema.robot.cpg import BUILT_IN_KINDS

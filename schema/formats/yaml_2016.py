@@ -11,7 +11,7 @@ pyrevolve/revolve_bot in ci-group/revolve), and its examples.
 """
 
 from schema.errors import shown
-from schema.formats.yaml_node import Table
+from schema.formats.document import Table
 from schema.formats.yaml_reader import FULL_TURN, OTHER_TYPES, Reader
 from schema.robot.brain import INPUT, LAYERS, NEURON_TYPES, Brain, Layer, Neuron
 
@@ -43,10 +43,8 @@ class RevolveReader(Reader):
 
     def kind(self, table: Table) -> str:
         """Return the type of a part by its name in Revolve."""
-        kind = _KINDS.get(table.text("type"), table.text("type"))
-        if kind not in self.space:
-            table.refuse_type(self.space, OTHER_TYPES)
-        return kind
+        kind = _KINDS.get(table.text("type"))
+        return kind or table.word("type", self.space, OTHER_TYPES)
 
     def orientation(self, table: Table) -> int:
         """Return the orientation of a part; Revolve also writes 90.0 and -90."""
@@ -163,8 +161,8 @@ def _neuron(
     typed = next((each for each in tables if each.has("type")), None)
     kind = INPUT if layer == "input" else "Simple"
     types = {INPUT: ()} if layer == "input" else NEURON_TYPES
-    if typed is not None and (kind := typed.text("type")) not in types:
-        typed.refuse_type(types)
+    if typed is not None:
+        kind = typed.word("type", types)
     values = []
     allowed = [*_ABOUT]
     for parameter in types[kind]:

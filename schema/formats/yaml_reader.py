@@ -6,9 +6,9 @@ Messages name the ids of the file, its name and line.
 import re
 
 from schema.errors import InvalidRobot, shown
+from schema.formats.document import Table
 from schema.formats.ids import link_name, with_ids
 from schema.formats.yaml import VERSION
-from schema.formats.yaml_node import Table
 from schema.parts import BodySpace, Parameter, PartType
 from schema.robot.brain import (
     INPUT,
@@ -134,10 +134,7 @@ class Reader:
 
     def kind(self, table: Table) -> str:
         """Return the type of a part."""
-        kind = table.text("type")
-        if kind not in self.space:
-            table.refuse_type(self.space, OTHER_TYPES)
-        return kind
+        return table.word("type", self.space, OTHER_TYPES)
 
     def own_slot(self, table: Table) -> int:
         """Return the slot by which a part is attached to its parent; 0 by default."""
@@ -197,9 +194,7 @@ class Reader:
         layer: Layer = (
             "output" if table.word("layer", _WRITTEN) == "output" else "hidden"
         )
-        kind = table.text("type")
-        if kind not in self._kinds:
-            table.refuse_type(self._kinds)
+        kind = table.word("type", self._kinds)
         part = self.part_index[table.word("part", self.part_index)]
         values = _values(table, self._kinds[kind])
         return Neuron(layer, kind, part, values), table

@@ -94,7 +94,7 @@ def test_a_file_of_a_run_has_the_settings_that_the_command_takes(
 def test_a_named_experiment_comes_first_with_its_island_0(
     best: Path, tmp_path: Path
 ) -> None:
-    with pytest.raises(rv.InvalidRobot, match="'Paddle' is not supported"):
+    with pytest.raises(rv.InvalidRobot, match="got 'Paddle'"):
         rv.Robot.read(best, "scenario1")
     text = 'name = "a"\n[[islands]]\n[islands.simulation]\nfriction = 0.25\n'
     (tmp_path / "a.toml").write_text(text)

@@ -131,10 +131,10 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "deep.json": (lambda: "[" * 900_000, "not valid JSON"),
     "list.json": (
         lambda: '{"body": {"part": [' + "[]," * 300_000 + "[]]}}",
-        "must be an object",
+        "<= 100000 values",
     ),
     "size.json": (lambda: "[]," * 10_000_000, "<= 1000000 bytes"),
-    "digits.json": (lambda: '{"body": ' + "9" * 900_000 + "}", "not valid JSON"),
+    "digits.json": (lambda: '{"body": ' + "9" * 900_000 + "}", "must be a mapping"),
     "float.json": (
         lambda: (
             '{"body": {"part": [{"id": "a", "type": "CoreComponent", '
@@ -142,7 +142,7 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
             + "0" * 4000
             + "}]}]}}"
         ),
-        "takes 0 numbers",
+        "paramValue: must be a finite number",
     ),
     "deep.txt": (
         lambda: (

@@ -214,6 +214,6 @@ def test_plug_in_of_another_user_is_not_imported(
 
 def test_unknown_part_type_elsewhere_asks_for_the_experiment(paddle: Path) -> None:
     moved = paddle.rename(paddle.parents[1] / "moved.yaml")
-    message = r"'Paddle' is not supported: must be .*\(name the experiment with its"
+    message = r"must be one of .*, got 'Paddle' .*\(name the experiment with its"
     with pytest.raises(InvalidRobot, match=message):
         main(["robot", "show", str(moved)])

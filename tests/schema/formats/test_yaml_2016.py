@@ -95,7 +95,7 @@ def test_default_outputs_and_hidden_neurons_by_name() -> None:
         ("gain: 0.25", "phase: 0.25", r"its\.yaml:4: neuron 'late': phase: no"),
         ("src: late", "src: later", r"its\.yaml:12: .*'late'"),
         ("layer: hidden", "layer: input", r":4: neuron 'late': layer: part 'h' has"),
-        ("type: Core", "type: Cor", r"its\.yaml:1: part 'c': type 'Cor' is"),
+        ("type: Core", "type: Cor", r"its\.yaml:1: part 'c': type: must be"),
         ("id: h,", "id: h, orientation: 0.5,", r"its\.yaml:1: .*orientation: must"),
         ("part_id: h, gain", "part_id: x, gain", r"its\.yaml:4: .*part_id"),
     ],
