@@ -7,9 +7,9 @@ import re
 
 from schema.errors import InvalidRobot, shown
 from schema.formats.document import Table
-from schema.formats.ids import link_name, with_ids
+from schema.formats.ids import with_ids
 from schema.formats.yaml import VERSION
-from schema.parts import BodySpace, Parameter, PartType
+from schema.parts import BodySpace, Parameter
 from schema.robot.brain import (
     INPUT,
     LAYERS,
@@ -108,10 +108,6 @@ class Reader:
             table.rename(f"part {shown(name)}")
         table.refuse_others(*own, *self.part_keys)
         kind = self.space[self.kind(table)]
-        if kind.is_root != (parent < 0):
-            table.refuse(
-                "type", f"exactly the first part must be a core, got {kind.name}"
-            )
         if name in self.part_index:
             table.refuse("id", f"duplicate part name {shown(name)}")
         self.part_index[name] = index
@@ -129,7 +125,6 @@ class Reader:
         if not table.is_null("children"):
             children = table.table("children")
             for slot in sorted(map(children.key_as_slot, children.keys)):
-                _check_slot(children, slot, kind, part)
                 self._read_part(children.table(str(slot)), index, slot)
 
     def kind(self, table: Table) -> str:
@@ -205,34 +200,14 @@ class Reader:
         """Return the connections, given all neurons by name."""
         index = {name: number for number, name in enumerate(neurons)}
         self._neurons = list(neurons)
-        edges: dict[tuple[str, str], Connection] = {}
+        edges: list[Connection] = []
         for number, table in enumerate(tables):
             table.refuse_others(*self.edge_keys, "weight")
             self._lines |= table.lines(f"brain.connections[{number}]")
             source, target = (table.word(end, index) for end in self.edge_keys)
-            if (source, target) in edges:
-                table.refuse(
-                    self.edge_keys[0],
-                    f"second {link_name(source, target)}, at most one is allowed",
-                )
-            if neurons[target].layer == "input":
-                table.refuse(
-                    self.edge_keys[1], f"must not be an input, got {shown(target)}"
-                )
-            weight = self.weight(table)
-            edges[source, target] = Connection(index[source], index[target], weight)
-        self._edges = list(edges)
-        return tuple(edges.values())
-
-
-def _check_slot(children: Table, slot: int, kind: PartType, part: Part) -> None:
-    """Raise unless a part has a slot for a child, other than the one to its parent."""
-    if slot >= kind.arity:
-        children.refuse(
-            str(slot), f"{kind.name} has slots 0..{kind.arity - 1}, got {slot}"
-        )
-    if slot == part.slot:
-        children.refuse(str(slot), f"slot {slot} holds the part to its parent")
+            self._edges.append((source, target))
+            edges.append(Connection(index[source], index[target], self.weight(table)))
+        return tuple(edges)
 
 
 def _lines(table: Table, name: str) -> dict[str, int]:

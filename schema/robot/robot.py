@@ -79,8 +79,8 @@ def check_tree(parts: Sequence[Part]) -> None:
         for end in ((part.parent, part.parent_slot), (index, part.slot)):
             if end in taken:
                 raise InvalidRobot(
-                    f"body.parts[{index}]: slot {shown(end[1])} of part "
-                    f"{end[0]} is taken"
+                    f"body.parts[{index}]: slot {shown(end[1])} of "
+                    f"body.parts[{end[0]}] is taken"
                 )
             taken.add(end)
     _check_order(parts)

@@ -115,7 +115,7 @@ def test_a_part_is_attached_by_its_slot_0_unless_it_names_another() -> None:
         ("{red: 1}", "7", 11, "params: must be a mapping, got '7'"),
         ("orientation: 90", "orientation: 91", 10, "orientation: must be one of"),
         ("orientation: 90", "orientation: x", 10, "must be a whole number, got 'x'"),
-        ("    2:", "    4:", 6, "'trunk': children.4: Core has slots 0..3, got 4"),
+        ("    2:", "    4:", 7, "'leg': parent_slot: Core has slots 0..3, got 4"),
         ("    2:", "    0:", 17, "key '0' is given twice"),
         ("    2:", "    two:", 6, "must be a slot number"),
         ("    2:", "    007:", 6, "must be a slot number"),

@@ -249,14 +249,14 @@ def test_json_and_text_give_the_same_robot() -> None:
 @pytest.mark.parametrize(
     ("path", "value", "message"),
     [
-        (("body", "part", 1, "id"), "C", r"it:1: body.part\[1\].id: duplicate part 'C'"),
+        (("body", "part", 1, "id"), "C", r"it:1: .*part\[1\].id: duplicate part 'C'"),
         (("body", "part", 1, "type"), 3, "part 'H': type '3' is not supported"),
         (("body", "part", 0, "root"), False, "exactly one must be the root, got 0"),
         (("body", "connection"), [], "it: body.part: 'H' is not attached"),
-        (("body", "connection", 0, "src"), "X", r"\[0\].src: must be one of C, H, got 'X'"),
+        (("body", "connection", 0, "src"), "X", r"\[0\].src: must be one of C, H"),
         (("body", "connection", 0, "src"), "H", "slot 0 is taken"),
         (("body", "connection", 0, "srcSlot"), 4, "part 'H': 'C' has no slot 4"),
-        (("brain", "connection", 0, "dest"), "X", r"\[0\].dest: must be one of C-0, H-0"),
+        (("brain", "connection", 0, "dest"), "X", r"\[0\].dest: must be one of C-0"),
         (("brain", "neuron", 1, "type"), "x", "it:1: type: must be one of"),
         (("brain", "neuron", 1, "layer"), "x", r"neuron\[1\].layer: must be one of in"),
         (("brain", "neuron", 1, "bodyPartId"), "X", "no neuron 0 on part 'X'"),
