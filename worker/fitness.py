@@ -25,42 +25,22 @@ FitnessFunction = Callable[[Trace, Any], float]
 """Function that ``fitness.function`` names: fitness of a trace; finite, maximised."""
 
 
-def finite_value(name: str, function: Callable[..., Any], *arguments: object) -> float:
-    """Return the value of a fitness function or a measure.
-
-    Args:
-        name: for messages.
-        function: of a user, or built-in.
-        arguments: of the call.
-
-    Raises:
-        FitnessUndefined: the function raised or gave no finite number.
-    """
-    try:
-        value = float(function(*arguments))
-    except Exception as error:
-        raise FitnessUndefined(f"{name} raised {error_text(error)}") from error
-    if not math.isfinite(value):
-        raise FitnessUndefined(f"{name} must return a finite number, got {value}")
-    return value
-
-
 @dataclass(frozen=True, slots=True)
-class LoadedFitness:
-    """Fitness function of an experiment with its parameters.
+class TraceFunction:
+    """Fitness function or measure of an experiment, with its parameters.
 
     Attributes:
-        name: as in ``fitness.function``.
-        function: that computes it.
-        argument: its second argument.
+        name: for messages.
+        function: of a trace and the arguments.
+        arguments: of the function after the trace.
     """
 
     name: str
-    function: FitnessFunction
-    argument: Any
+    function: Callable[..., float]
+    arguments: tuple[Any, ...] = ()
 
     def value(self, trace: Trace) -> float:
-        """Return the fitness of a trace.
+        """Return the value of a trace.
 
         Args:
             trace: of T samples with all channels that the function declares; T >= 2.
@@ -68,10 +48,19 @@ class LoadedFitness:
         Raises:
             FitnessUndefined: the function raised or gave no finite number.
         """
-        return finite_value(self.name, self.function, trace, self.argument)
+        try:
+            value = float(self.function(trace, *self.arguments))
+        except Exception as error:
+            story = f"{self.name} raised {error_text(error)}"
+            raise FitnessUndefined(story) from error
+        if not math.isfinite(value):
+            raise FitnessUndefined(
+                f"{self.name} must return a finite number, got {value}"
+            )
+        return value
 
 
-def load_fitness(fitness: Fitness) -> LoadedFitness:
+def load_fitness(fitness: Fitness) -> TraceFunction:
     """Return the fitness function that an experiment names.
 
     Raises:
@@ -79,7 +68,7 @@ def load_fitness(fitness: Fitness) -> LoadedFitness:
     """
     function = fitness_function(fitness)
     argument = fitness_argument(function, fitness)
-    return LoadedFitness(fitness.function, function, argument)
+    return TraceFunction(fitness.function, function, (argument,))
 
 
 @lru_cache(maxsize=1)  # both the fitness and the record of a robot need it

@@ -7,8 +7,9 @@ import worker.fitness
 from schema.experiment.document import Experiment, Fitness, Measures
 from schema.experiment.kinds import Kind, Use
 from schema.experiment.settings import FITNESS, fitness_function
+from schema.plugins.simple_traces import check_function
 from worker.fitness import check_fitness
-from worker.measures.functions import BUILT_IN, check_measure, measures_of
+from worker.measures.functions import BUILT_IN, measures_of
 
 
 def fitness_use(fitness: Fitness) -> Use:
@@ -33,7 +34,9 @@ def measure_use(measures: Measures) -> Use:
         "measures.names",
         measures.names[0],
         lambda: measures_of(measures)[0].function,
-        lambda _: check_measure(measures_of(measures)[0]),
+        lambda function: check_function(
+            function, measures_of(measures)[0].arguments, "measures.names"
+        ),
     )
 
 

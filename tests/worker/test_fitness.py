@@ -13,8 +13,8 @@ from schema.robot.results import Track
 from schema.robot.trace import Trace
 from worker.fitness import (
     FitnessFunction,
+    TraceFunction,
     check_fitness,
-    finite_value,
     path_velocity,
     straight_velocity,
     thesis,
@@ -155,7 +155,7 @@ def test_the_reason_of_a_failure_is_one_line() -> None:
 
     message = "^own raised ValueError: two lines$"
     with pytest.raises(FitnessUndefined, match=message):
-        finite_value("own", raises, None)
+        TraceFunction("own", raises).value(Trace(1.0, np.zeros((2, 3))))
 
 
 def test_function_may_raise_for_some_traces() -> None:

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import msgspec
-
 from schema.errors import ExperimentError
 from schema.experiment.document import Measures
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
@@ -13,12 +11,10 @@ from schema.plugins.load import load_function, load_object
 from schema.plugins.needs import channels_of
 from schema.plugins.parameters import parameters_type, read_parameters
 from schema.plugins.protocols import MeasureFunction
-from schema.plugins.simple_traces import check_function
 from schema.robot.results import Evaluation
 from schema.robot.trace import Trace
 from worker.fitness import (
-    LoadedFitness,
-    finite_value,
+    TraceFunction,
     load_fitness,
     path_velocity,
     straight_velocity,
@@ -50,32 +46,8 @@ BUILT_IN: dict[str, MeasureFunction] = {
 """Measures by short name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measure:
-    """Measure of an experiment.
-
-    Attributes:
-        name: as in ``measures.names``.
-        function: that computes it.
-        arguments: its parameters, if it has any.
-    """
-
-    name: str
-    function: MeasureFunction
-    arguments: tuple[msgspec.Struct, ...] = ()
-
-    def value(self, trace: Trace) -> float:
-        """Return its value for a trace.
-
-        Raises:
-            FitnessUndefined: the function raised or gave no finite number.
-        """
-        name = f"measure {self.name}"
-        return finite_value(name, self.function, trace, *self.arguments)
-
-
 @lru_cache(maxsize=64)
-def measures_of(measures: Measures) -> tuple[Measure, ...]:
+def measures_of(measures: Measures) -> tuple[TraceFunction, ...]:
     """Return the measures that an experiment names, in its order.
 
     Raises:
@@ -89,7 +61,7 @@ def measures_of(measures: Measures) -> tuple[Measure, ...]:
     )
 
 
-def _measure(name: str, table: dict[str, Any] | None, where: str) -> Measure:
+def _measure(name: str, table: dict[str, Any] | None, where: str) -> TraceFunction:
     where_named = "measures.names"
     found = load_object(name, where_named, BUILT_IN)
     if not callable(found):
@@ -106,17 +78,9 @@ def _measure(name: str, table: dict[str, Any] | None, where: str) -> Measure:
             raise ExperimentError(
                 f"{where}: {name} has no parameters of its own; {then}"
             )
-        return Measure(name, found)
-    return Measure(name, found, (read_parameters(table or {}, kind, where),))
-
-
-def check_measure(measure: Measure) -> None:
-    """Raise unless a measure keeps its contract on simple traces.
-
-    Raises:
-        ExperimentError: as of ``schema.plugins.simple_traces.check_function``.
-    """
-    check_function(measure.function, measure.arguments, "measures.names")
+        return TraceFunction(f"measure {name}", found)
+    parameters = read_parameters(table or {}, kind, where)
+    return TraceFunction(f"measure {name}", found, (parameters,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +93,8 @@ class Functions:
         channels: that these functions declare.
     """
 
-    fitness: LoadedFitness
-    measures: tuple[Measure, ...]
+    fitness: TraceFunction
+    measures: tuple[TraceFunction, ...]
     channels: tuple[str, ...]
 
 

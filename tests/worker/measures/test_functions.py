@@ -6,17 +6,14 @@ import pytest
 
 from schema.errors import ExperimentError, FitnessUndefined, UnknownPlugin
 from schema.experiment.document import Fitness, Measures, Simulation, Space
+from schema.experiment.kinds import check_use
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
-from schema.plugins.simple_traces import simple_traces
+from schema.plugins.simple_traces import check_function, simple_traces
 from schema.robot.trace import Trace
-from worker.measures.functions import (
-    BUILT_IN,
-    Measure,
-    check_measure,
-    functions_of,
-    measures_of,
-)
+from worker.fitness import TraceFunction
+from worker.kinds import measure_use
+from worker.measures.functions import BUILT_IN, functions_of, measures_of
 
 OWN = """
 from msgspec import Struct
@@ -50,8 +47,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_measures_keep_the_contract(name: str) -> None:
-    (measure,) = measures_of(Measures(names=(name,)))
-    check_measure(measure)
+    check_use(measure_use(Measures(names=(name,))))
 
 
 def test_own_measures_have_parameters(own: str) -> None:
@@ -93,11 +89,11 @@ def test_wrong_measures_are_refused(
 def test_undefined_measures_are_failed_results() -> None:
     trace = simple_traces(lambda _trace: 0.0)["still"]
     with pytest.raises(FitnessUndefined, match="measure x raised ZeroDivisionError"):
-        Measure("x", lambda _trace: 1 / 0).value(trace)
+        TraceFunction("measure x", lambda _trace: 1 / 0).value(trace)
     with pytest.raises(FitnessUndefined, match="measure x must return a finite number"):
-        Measure("x", lambda _trace: float("nan")).value(trace)
+        TraceFunction("measure x", lambda _trace: float("nan")).value(trace)
 
 
 def test_measure_that_is_not_finite_is_refused_before_a_run() -> None:
     with pytest.raises(ExperimentError, match=r"test_functions.py:\d+: must return a"):
-        check_measure(Measure("x", lambda _trace: float("nan")))
+        check_function(lambda _trace: float("nan"), (), "measures.names")

@@ -28,7 +28,7 @@ from schema.wire.protobuf import encode_robot
 from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
     FitnessFunction,
-    LoadedFitness,
+    TraceFunction,
     path_velocity,
     straight_velocity,
 )
@@ -238,7 +238,7 @@ def test_undefined_fitness_is_a_result(
     function: FitnessFunction,
     message: str,
 ) -> None:
-    named = Functions(LoadedFitness("own:function", function, None), (), ())
+    named = Functions(TraceFunction("own:function", function, (None,)), (), ())
     monkeypatch.setattr(functions, "functions_of", lambda _settings: named)
     with pytest.raises(FitnessUndefined, match=message):
         evaluate(turtle, SETTINGS)
