@@ -89,8 +89,8 @@ def under_changes(robot: Robot, rules: Experiment) -> dict[str, float]:
     changes = [each for each in all_changes(settings) if each.name in CHANGES]
     assert {each.name for each in changes} == set(CHANGES)
     found = {ALONE: evaluate(robot, settings).fitness}
-    for judged in rejudge(robot, changes):
-        found[judged.change.name] = judged.fitness or 0.0
+    for change, fitness in rejudge(robot, changes):
+        found[change.name] = fitness or 0.0
     return found
 
 

@@ -13,7 +13,7 @@ from schema.plugins.permission import allow
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
-from worker.robot.robustness import Judged, rejudge, small_changes, summary
+from worker.robot.robustness import rejudge, small_changes, summary
 
 
 def main(arguments: list[str]) -> int:
@@ -75,11 +75,11 @@ def _show_robustness(
         settings = replace(settings, robust=None)
         fitness = _evaluate(robot, settings).fitness
         print(f"{'undisturbed:':26}{rounded(fitness)}")
-    judged: list[Judged] = []
-    for one in rejudge(robot, small_changes(settings), _evaluate):
-        print(f"{one.change.name + ':':26}{_share(one.fitness, fitness)}", flush=True)
-        judged.append(one)
-    print(summary(fitness, judged))
+    kept: list[float | None] = []
+    for change, changed in rejudge(robot, small_changes(settings), _evaluate):
+        print(f"{change.name + ':':26}{_share(changed, fitness)}", flush=True)
+        kept.append(changed)
+    print(summary(fitness, kept))
 
 
 def _share(found: float | None, fitness: float) -> str:

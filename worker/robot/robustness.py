@@ -41,20 +41,20 @@ SLOPE_DEG = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
-    """Changed settings, their name for people, and what is changed."""
+class ChangedSettings:
+    """Settings of an evaluation with one change.
+
+    Attributes:
+        name: of the change, for people.
+        settings: with the change.
+        group: what is changed.
+        is_small: by less than any two machines of the real world differ.
+    """
 
     name: str
     settings: EvaluationSettings
     group: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """Fitness of a robot under a change; None if the evaluation failed."""
-
-    change: Change
-    fitness: float | None
+    is_small: bool = False
 
 
 def finer(simulation: Simulation, factor: int = 5) -> Simulation:
@@ -69,24 +69,18 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
     )
 
 
-def small_changes(settings: EvaluationSettings) -> tuple[Change, ...]:
+def small_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
     """Return settings with finer time steps, less friction, and raised starts.
 
     Args:
-        settings: to change.
+        settings: to change, without ``robust``.
 
     Source: own definition.
     """
-    world = settings.simulation
-    changed = [
-        *_finer_steps(world),
-        _with_friction(world, FRICTION),
-        *_raised_starts(world),
-    ]
-    return _as_changes(settings, changed)
+    return tuple(change for change in all_changes(settings) if change.is_small)
 
 
-def all_changes(settings: EvaluationSettings) -> tuple[Change, ...]:
+def all_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
     """Return settings with another time step, friction, start, noise, ground and robot.
 
     Time steps are finer. Friction, masses and torques differ by up to 10 %. Starts are
@@ -98,40 +92,26 @@ def all_changes(settings: EvaluationSettings) -> tuple[Change, ...]:
 
     Source: own definition.
     """
-    world, ground = settings.simulation, settings.environment
-    changed = [*_finer_steps(world)]
-    changed += [_with_friction(world, factor) for factor in FRICTIONS]
-    changed += _raised_starts(world)
-    roll, pitch, yaw = world.start_deg
-    for roll_deg, pitch_deg in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        tilt = roll + TILT_DEG * roll_deg, pitch + TILT_DEG * pitch_deg, yaw
-        axis, sign = ("x", roll_deg) if roll_deg else ("y", pitch_deg)
-        name = f"start tilted {sign * TILT_DEG:+g} degree about {axis}"
-        changed.append((name, "start", replace(world, start_deg=tilt)))
-    for key in ("mass_factor", "torque_factor"):
-        what = key.removesuffix("_factor")
-        for factor in FACTORS:
-            other = replace(world, **{key: factor * getattr(world, key)})
-            changed.append((f"{what} x {factor:g}", what, other))
-    found = list(_as_changes(settings, changed))
+    ground = settings.environment
+    changed = [
+        ChangedSettings(name, replace(settings, simulation=world), group, is_small)
+        for name, group, world, is_small in _simulations(settings.simulation)
+    ]
     for key, level in NOISES.items():
         noise = replace(_NO_DISTURBANCE, **{key: (level, level)})
         name = f"{key.replace('_', ' ')} {level:g}"
-        found.append(Change(name, replace(settings, robust=noise), "noise"))
+        changed.append(ChangedSettings(name, replace(settings, robust=noise), "noise"))
     steeper = replace(ground, slope_deg=ground.slope_deg + SLOPE_DEG)
     if ground.roughness_m:
         bumps = "other bumps", replace(ground, ground_seed=ground.ground_seed + 1)
     else:
         name = f"ground with bumps of {1000 * BUMP_M:g} mm"
         bumps = name, replace(ground, roughness_m=BUMP_M)
-    for name, other_ground in (bumps, (f"slope {SLOPE_DEG:+g} degree", steeper)):
-        other_settings = replace(settings, environment=other_ground)
-        found.append(Change(name, other_settings, "ground"))
-    return tuple(found)
+    for name, other in (bumps, (f"slope {SLOPE_DEG:+g} degree", steeper)):
+        elsewhere = replace(settings, environment=other)
+        changed.append(ChangedSettings(name, elsewhere, "ground"))
+    return tuple(changed)
 
-
-_Changed = tuple[str, str, Simulation]
-"""Name, group and simulation of a change."""
 
 _NO_DISTURBANCE = Robust(
     draws=NOISY_TRIALS,
@@ -145,41 +125,44 @@ _NO_DISTURBANCE = Robust(
 )
 
 
-def _finer_steps(world: Simulation) -> Iterator[_Changed]:
+def _simulations(world: Simulation) -> Iterator[tuple[str, str, Simulation, bool]]:
+    """Yield name, group, simulation and smallness of each change of the simulation."""
     for factor in FINER:
         fine = finer(world, factor)
-        yield f"time step {fine.timestep_s:g} s", "time step", fine
-
-
-def _with_friction(world: Simulation, factor: float) -> _Changed:
-    friction = factor * world.friction
-    changed = replace(world, friction=friction)
-    return f"friction {friction:g}", "friction", changed
-
-
-def _raised_starts(world: Simulation) -> Iterator[_Changed]:
-    """Yield starts at heights that are drawn uniformly from 0 to ``2 LIFT_M``."""
+        yield f"time step {fine.timestep_s:g} s", "time step", fine, True
+    for share in FRICTIONS:
+        friction = share * world.friction
+        slippery = replace(world, friction=friction)
+        yield f"friction {friction:g}", "friction", slippery, share == FRICTION
+    # Drawn uniformly from 0 to twice the mean.
     heights = np.random.default_rng(_SEED).uniform(0.0, 2 * LIFT_M, STARTS)
     for lift_m in heights.tolist():
         higher = replace(world, drop_m=world.drop_m + lift_m)
-        yield f"start {1000 * lift_m:.4f} mm higher", "start", higher
-
-
-def _as_changes(
-    settings: EvaluationSettings, changed: Iterable[_Changed]
-) -> tuple[Change, ...]:
-    return tuple(
-        Change(name, replace(settings, simulation=simulation), group)
-        for name, group, simulation in changed
-    )
+        yield f"start {1000 * lift_m:.4f} mm higher", "start", higher, True
+    for number, axis in enumerate("xy"):
+        for tilt_deg in (TILT_DEG, -TILT_DEG):
+            start = [*world.start_deg]
+            start[number] += tilt_deg
+            tilted = replace(world, start_deg=tuple(start))
+            yield (
+                f"start tilted {tilt_deg:+g} degree about {axis}",
+                "start",
+                tilted,
+                False,
+            )
+    for key in ("mass_factor", "torque_factor"):
+        what = key.removesuffix("_factor")
+        for factor in FACTORS:
+            other = replace(world, **{key: factor * getattr(world, key)})
+            yield f"{what} x {factor:g}", what, other, False
 
 
 def rejudge(
     robot: Robot,
-    changes: Sequence[Change],
+    changes: Iterable[ChangedSettings],
     evaluator: Callable[[Robot, EvaluationSettings], Evaluation] = evaluate,
-) -> Iterator[Judged]:
-    """Evaluate a robot under each change, in their order.
+) -> Iterator[tuple[ChangedSettings, float | None]]:
+    """Yield each change and the fitness under it; None if the evaluation failed.
 
     Args:
         robot: a checked robot.
@@ -188,25 +171,23 @@ def rejudge(
     """
     for change in changes:
         try:
-            fitness = evaluator(robot, change.settings).fitness
+            yield change, evaluator(robot, change.settings).fitness
         except (SimulationDiverged, SensorFailed, FitnessUndefined):
-            yield Judged(change, None)
-        else:
-            yield Judged(change, fitness)
+            yield change, None
 
 
-def summary(fitness: float, judged: Sequence[Judged]) -> str:
+def summary(fitness: float, found: Sequence[float | None]) -> str:
     """Return one line that says how much of its fitness a robot keeps.
 
     Args:
         fitness: without changes.
-        judged: under changes; at least one.
+        found: under changes, at least one; None of an evaluation that failed.
     """
-    known = [one.fitness for one in judged if one.fitness is not None]
-    under = f"under {len(judged)} small changes of time step, friction and start"
+    known = [each for each in found if each is not None]
+    under = f"under {len(found)} small changes of time step, friction and start"
     if not known:
         return f"has no fitness {under}, {fitness:.3g} without"
-    failed = len(judged) - len(known)
+    failed = len(found) - len(known)
     least, most = min(known), max(known)
     if fitness > 0:
         shares = f"{100 * least / fitness:.0f} to {100 * most / fitness:.0f} %"

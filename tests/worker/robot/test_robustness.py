@@ -20,8 +20,7 @@ from schema.robot.robot import Robot
 from worker.robot.disturbances import disturbances
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import (
-    Change,
-    Judged,
+    ChangedSettings,
     all_changes,
     rejudge,
     small_changes,
@@ -33,11 +32,7 @@ SETTINGS = EvaluationSettings(
     simulation=Simulation(window_steps=400, drop_m=0.01),
     fitness=Fitness(),
 )
-CHANGE = Change("none", SETTINGS)
-
-
-def judged(*fitness: float | None) -> list[Judged]:
-    return [Judged(CHANGE, one) for one in fitness]
+CHANGE = ChangedSettings("none", SETTINGS)
 
 
 def test_each_change_changes_one_thing_and_no_duration() -> None:
@@ -116,8 +111,8 @@ def test_fitness_is_that_of_an_evaluation_with_the_changed_settings(
     turtle: Robot,
 ) -> None:
     slow = replace(SETTINGS, fitness=Fitness(path_weight=0.5))
-    found = list(rejudge(turtle, [CHANGE, Change("half the weight", slow)]))
-    assert [one.fitness for one in found] == [
+    changes = [CHANGE, ChangedSettings("half the weight", slow)]
+    assert [fitness for _, fitness in rejudge(turtle, changes)] == [
         evaluate(turtle, SETTINGS).fitness,
         evaluate(turtle, slow).fitness,
     ]
@@ -135,7 +130,7 @@ def test_failed_evaluations_have_no_fitness(
         return Evaluation(0.5, 0.0, 0.0, 12.0)
 
     judgements = rejudge(turtle, small_changes(SETTINGS), fake)
-    found = [one.fitness for one in judgements]
+    found = [fitness for _, fitness in judgements]
     assert found == [0.5, 0.5, None, *[0.5] * 8]
 
 
@@ -153,4 +148,4 @@ def test_failed_evaluations_have_no_fitness(
     ],
 )
 def test_summary(fitness: float, found: tuple[float | None, ...], line: str) -> None:
-    assert line in summary(fitness, judged(*found))
+    assert line in summary(fitness, found)
