@@ -27,7 +27,7 @@ _NULL = ("", "~", "null", "Null", "NULL")
 _MOST_WORDS = 40
 
 
-class Node(NamedTuple):
+class DocumentNode(NamedTuple):
     """Value in a document, and its line from 1.
 
     Smaller than the nodes of PyYAML, which keep a mark of two positions each.
@@ -38,7 +38,7 @@ class Node(NamedTuple):
         line: on which it begins.
     """
 
-    value: "str | list[Node] | dict[str, tuple[Node, int]]"
+    value: "str | list[DocumentNode] | dict[str, tuple[DocumentNode, int]]"
     line: int
 
 
@@ -49,14 +49,14 @@ class _Composer:
         self._events = events
         self._count = 0
 
-    def document(self) -> Node | None:
+    def document(self) -> DocumentNode | None:
         """Return the root node; None if the document is empty.
 
         Raises:
             yaml.YAMLError: not YAML, several documents, an alias, a key that is no
                 scalar or given twice, too many values or levels.
         """
-        root: Node | None = None
+        root: DocumentNode | None = None
         documents = 0
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
@@ -66,7 +66,7 @@ class _Composer:
                 root = self._node(next(self._events), 1)
         return root
 
-    def _node(self, event: yaml.Event, depth: int) -> Node:
+    def _node(self, event: yaml.Event, depth: int) -> DocumentNode:
         """Return the node that begins with an event."""
         self._count += 1
         if self._count > MOST_NODES:
@@ -77,10 +77,12 @@ class _Composer:
             raise _refusal("aliases are not allowed", event)
         line = _mark(event).line + 1
         if isinstance(event, yaml.ScalarEvent):
-            return Node(event.value, line)
+            return DocumentNode(event.value, line)
         if isinstance(event, yaml.SequenceStartEvent):
-            return Node([self._node(item, depth + 1) for item in self._items()], line)
-        values: dict[str, tuple[Node, int]] = {}
+            return DocumentNode(
+                [self._node(item, depth + 1) for item in self._items()], line
+            )
+        values: dict[str, tuple[DocumentNode, int]] = {}
         for first in self._items():
             key, key_line = self._node(first, depth + 1)
             if not isinstance(key, str):
@@ -88,7 +90,7 @@ class _Composer:
             if key in values:
                 raise _refusal(f"key {shown(key)} is given twice", first)
             values[key] = self._node(next(self._events), depth + 1), key_line
-        return Node(values, line)
+        return DocumentNode(values, line)
 
     def _items(self) -> Iterator[yaml.Event]:
         """Yield the first event of each item of a list or mapping."""
@@ -112,7 +114,7 @@ class Table:
         line: number of its first line, from 1.
     """
 
-    def __init__(self, node: Node | None, path: str, file: str) -> None:
+    def __init__(self, node: DocumentNode | None, path: str, file: str) -> None:
         """Read a node.
 
         Raises:
@@ -274,7 +276,7 @@ class Table:
     def _at(self, key: str) -> str:
         return f"{self._stem}{printable(key)}"
 
-    def _node(self, key: str) -> Node:
+    def _node(self, key: str) -> DocumentNode:
         if not self.has(key):
             self._fail(self._at(key), "is missing", self.line)
         return self._values[key][0]
@@ -313,7 +315,7 @@ def compose(text: str, file: str, language: str = "YAML") -> Table:
     return Table(node, "", file)
 
 
-def _shown(node: Node | None) -> str:
+def _shown(node: DocumentNode | None) -> str:
     """Return a short description of a node for a message."""
     value = node.value if node is not None else ""
     if isinstance(value, str):

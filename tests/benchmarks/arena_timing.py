@@ -14,7 +14,7 @@ import numpy as np
 from schema.experiment.settings import ArenaSettings
 from schema.robot.results import Floats
 from schema.wire.arena import Changes, Insertion
-from worker.arena.threads import Pool
+from worker.arena.threads import ThreadTeam
 from worker.arena.world import World
 from worker.bench.arena_timing import Place
 from worker.clusters.cluster import Cluster
@@ -238,7 +238,7 @@ def time_arena(
     changing.wrap(population, "regroup", "split", "remove", "catch_up")
     changing.wrap(world, "apply")
     merges, splits = population.merges, population.splits
-    unborn, pool = list(spares), Pool(threads)
+    unborn, pool = list(spares), ThreadTeam(threads)
     for number in range(seconds // advance_s):
         changes = Changes()
         if unborn and world.births:
@@ -271,7 +271,7 @@ def time_arena(
     )
 
 
-def solo_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
+def solo_time(world: World, pool: ThreadTeam, steps: int, clock: Clock) -> float:
     """Return the time of the steps of a world's robots, each simulated alone.
 
     Control signals are constant. The world does not change.

@@ -14,7 +14,7 @@ from schema.robot.robot import Robot, check_robot
 from schema.wire.arena import Casualty, Changes, Insertion
 from worker.clusters.cluster import Cluster
 from worker.clusters.population import ArenaPopulation
-from worker.clusters.robot import ArenaRobot, Window
+from worker.clusters.robot import ArenaRobot, FitnessWindow
 from worker.clusters.states import PLAUSIBLE, Rollout
 from worker.robot.control_loop import warning_names
 
@@ -122,7 +122,7 @@ def newborn(
     except mujoco.FatalError as error:
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
-    window = Window(cache.settings.simulation, step)
+    window = FitnessWindow(cache.settings.simulation, step)
     try:
         return ArenaRobot(insertion.birth, body, cache.controls, window, place)
     except SimulationDiverged as error:

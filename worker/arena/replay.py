@@ -29,7 +29,7 @@ from worker.robot.evaluation import evaluate, simulate
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class ReplayedAdvance:
     """One advance of a replayed arena.
 
     Attributes:
@@ -85,7 +85,7 @@ def alone(
 
 def together(
     settings: bytes, past: Rebuild, births: frozenset[BirthId], threads: int = 1
-) -> Iterator[Scene]:
+) -> Iterator[ReplayedAdvance]:
     """Replay an arena, advance by advance.
 
     Args:
@@ -117,7 +117,7 @@ def together(
             samples = read_columns("poses", world.advance(advance.until).poses)
             if is_shown:
                 motion.append(_motion(world, births))
-            yield Scene(
+            yield ReplayedAdvance(
                 world.step,
                 world.digest() == advance.digest,
                 samples,

@@ -26,7 +26,7 @@ from schema.robot.robot import Robot, check_types
 from schema.wire.arena import Casualty
 from schema.wire.protobuf import decode_robot
 from worker.clusters.population import ArenaPopulation
-from worker.clusters.robot import ArenaRobot, Window
+from worker.clusters.robot import ArenaRobot, FitnessWindow
 from worker.measures.functions import functions_of
 
 FORMAT = 2
@@ -186,7 +186,7 @@ def _robot_state(robot: ArenaRobot) -> _RobotState:
 def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
     cache = population.model_cache
     body = cache.body(state.birth, _robot(state.robot, cache.settings))
-    window = Window(cache.settings.simulation, state.born)
+    window = FitnessWindow(cache.settings.simulation, state.born)
     for x, y, z in _unpack(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
     try:

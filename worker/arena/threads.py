@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 Job = Callable[[], None]
 
 
-class Pool:
+class ThreadTeam:
     """Threads that share jobs; one submission per thread is cheaper than one per job.
 
     Attributes:

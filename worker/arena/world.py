@@ -31,7 +31,7 @@ from worker.arena.changes import check_changes, diverged, newborn
 from worker.arena.looking import look
 from worker.arena.records import Contacts, Poses, Samples
 from worker.arena.snapshot import read_snapshot, write_snapshot
-from worker.arena.threads import Pool
+from worker.arena.threads import ThreadTeam
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Rollout, Schedule
@@ -64,7 +64,7 @@ class World:
         self.population = ArenaPopulation(settings)
         self._settings = settings
         self._schedule = Schedule(settings)
-        self._pool = Pool(threads)
+        self._pool = ThreadTeam(threads)
         controls = self.population.model_cache.controls
         noise = NoiseSource(clock, controls.width, settings.origin)
         self._controllers = BatchedControllers(noise, controls)

@@ -27,7 +27,7 @@ NEVER = 1 << 62
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
+class SharedRobot:
     """A robot in a shared model.
 
     Attributes:
@@ -56,7 +56,7 @@ class EngineView:
 
     def __init__(
         self,
-        member: Member,
+        member: SharedRobot,
         model: mujoco.MjModel,
         data: mujoco.MjData,
         settings: ArenaSettings,
@@ -202,7 +202,7 @@ class Cluster:
     def __init__(
         self,
         births: tuple[BirthId, ...],
-        members: Sequence[Member],
+        members: Sequence[SharedRobot],
         model: mujoco.MjModel,
         settings: ArenaSettings,
     ) -> None:

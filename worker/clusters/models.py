@@ -31,7 +31,7 @@ from schema.mjcf.model import (
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.clusters.cluster import Cluster, Member
+from worker.clusters.cluster import Cluster, SharedRobot
 from worker.robot.brains import controls_of
 from worker.robot.recording import Channels
 
@@ -126,7 +126,7 @@ class ModelCache:
             self.settings.environment,
             furnish=self._furnish,
         ).compile()
-        solo = Cluster((birth,), [Member("", robot, model)], model, self.settings)
+        solo = Cluster((birth,), [SharedRobot("", robot, model)], model, self.settings)
         channels = Channels(robot, model, self.settings)
         return Body(robot, bounding_spheres(model), solo, channels)
 
@@ -177,7 +177,7 @@ class ModelCache:
         for birth, body in zip(births, bodies, strict=True):
             prefix = f"{birth.island}.{birth.number}/"
             specs.append((prefix, self._spec(birth, body.robot)))
-            members.append(Member(prefix, body.robot, body.solo.model))
+            members.append(SharedRobot(prefix, body.robot, body.solo.model))
         model = shared_model(
             specs, self._simulation, self.settings.environment, furnish=self._furnish
         )

@@ -15,7 +15,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.models import ModelCache
-from worker.clusters.proximity import Proximity, Scene
+from worker.clusters.proximity import Proximity, RobotBounds
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import (
     Layout,
@@ -122,8 +122,8 @@ class ArenaPopulation:
     def merge(self) -> None:
         """Merge the clusters of robots that may touch before the next check."""
         if self.rollout is None:
-            scene = Scene(self.layout, self.layout.read()[np.newaxis])
-            pairs = self._proximity.pairs_to_merge(scene)[0]
+            bounds = RobotBounds(self.layout, self.layout.read()[np.newaxis])
+            pairs = self._proximity.pairs_to_merge(bounds)[0]
         else:
             pairs = self._merge_pairs(self.rollout)
         if pairs:
@@ -152,8 +152,8 @@ class ArenaPopulation:
                 for b in other
             )
         if pairs:
-            scene = Scene(self.layout, state[np.newaxis])
-            near = self._proximity.pairs_to_keep(scene, pairs)
+            bounds = RobotBounds(self.layout, state[np.newaxis])
+            near = self._proximity.pairs_to_keep(bounds, pairs)
             self.regroup(connected_components(groups, self._links(near)))
 
     def regroup(self, groups: Iterable[Group]) -> None:
@@ -227,8 +227,10 @@ class ArenaPopulation:
         if rollout.moment not in rollout.merge_pairs:
             ahead = rollout.merges_ahead()
             span = slice(ahead.start, ahead.stop)
-            scene = Scene(self.layout, rollout.states[span], rollout.velocities[span])
-            found = self._proximity.pairs_to_merge(scene)
+            bounds = RobotBounds(
+                self.layout, rollout.states[span], rollout.velocities[span]
+            )
+            found = self._proximity.pairs_to_merge(bounds)
             rollout.merge_pairs = dict(zip(ahead, found, strict=True))
         return rollout.merge_pairs[rollout.moment]
 

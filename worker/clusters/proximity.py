@@ -25,7 +25,7 @@ _ROUNDING_M = 1e-9
 Mask = npt.NDArray[np.bool_]
 
 
-class Scene:
+class RobotBounds:
     """Bounds of R robots at L moments.
 
     Attributes:
@@ -168,31 +168,31 @@ class Proximity:
         # Frames of bodies are one step old.
         self._ahead_s = (arena.proximity_steps + 1) * clock.timestep_s
 
-    def pairs_to_merge(self, scene: Scene) -> list[Pairs]:
-        """Return, for each moment of a scene, the pairs whose clusters must merge.
+    def pairs_to_merge(self, bounds: RobotBounds) -> list[Pairs]:
+        """Return, for each moment of the bounds, the pairs whose clusters must merge.
 
         Valid as long as no robot changes its cluster.
         """
-        margins = self._margins(scene)
+        margins = self._margins(bounds)
         most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
-        pairs = list(zip(*scene.neighbours(most), strict=True))
-        is_near = scene.are_near(pairs, margins, self._merge_m)
+        pairs = list(zip(*bounds.neighbours(most), strict=True))
+        is_near = bounds.are_near(pairs, margins, self._merge_m)
         return [list(compress(pairs, row)) for row in is_near.tolist()]
 
-    def pairs_to_keep(self, scene: Scene, pairs: Pairs) -> Pairs:
+    def pairs_to_keep(self, bounds: RobotBounds, pairs: Pairs) -> Pairs:
         """Return which pairs of one cluster must stay in one cluster.
 
         Args:
-            scene: at one moment.
+            bounds: at one moment.
             pairs: at least one.
         """
-        margins = self._margins(scene)
+        margins = self._margins(bounds)
         most = margins[0] + (0.5 * self._split_m + _ROUNDING_M)
-        overlaps = scene.overlaps(most)[*zip(*pairs, strict=True)]
+        overlaps = bounds.overlaps(most)[*zip(*pairs, strict=True)]
         pairs = list(compress(pairs, overlaps.tolist()))
-        is_near = scene.are_near(pairs, margins, self._split_m)[0]
+        is_near = bounds.are_near(pairs, margins, self._split_m)[0]
         return list(compress(pairs, is_near.tolist()))
 
-    def _margins(self, scene: Scene) -> Floats:
+    def _margins(self, bounds: RobotBounds) -> Floats:
         """Return how far each robot may move until the next check, (L, R) [m]."""
-        return np.asarray(np.minimum(scene.speeds, FASTEST) * self._ahead_s)
+        return np.asarray(np.minimum(bounds.speeds, FASTEST) * self._ahead_s)

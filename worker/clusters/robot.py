@@ -25,7 +25,7 @@ LEAST_SHARE = 0.25
 _NO_FITNESS = Evaluation(0.0, 0.0, 0.0, 0.0)
 
 
-class Window:
+class FitnessWindow:
     """The latest positions of one robot: the window of its fitness.
 
     The first sample is taken after the warm-up, so that neither the fall nor the
@@ -113,7 +113,7 @@ class ArenaRobot:
         birth: BirthId,
         body: Body,
         controls: Controls,
-        window: Window,
+        window: FitnessWindow,
         place: Vector,
     ) -> None:
         """Initialise in its own cluster, with a brain that starts at its birth.

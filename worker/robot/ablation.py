@@ -61,7 +61,7 @@ _AXES = ("acceleration", "rotation")
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class AblationCase:
     """Ablation of one robot, and what it concerns.
 
     Attributes:
@@ -87,7 +87,7 @@ class Change:
 HELD, MEAN, DEAD = "input at 0", "input at its mean", "motor dead"
 
 
-def all_ablations(robot: Robot, space: BodySpace) -> tuple[Change, ...]:
+def all_ablations(robot: Robot, space: BodySpace) -> tuple[AblationCase, ...]:
     """Return the ablations of a robot: one by one, by kind, and all together.
 
     Args:
@@ -119,17 +119,19 @@ def _changes(
     what: str,
     channels: Sequence[_Channel],
     ablation: Callable[[Sequence[int]], Ablation],
-) -> Iterator[Change]:
+) -> Iterator[AblationCase]:
     for number, (kind, part, name) in enumerate(channels):
-        yield Change(group, "one", kind, part, number, name, ablation([number]))
+        yield AblationCase(group, "one", kind, part, number, name, ablation([number]))
     numbers: dict[str, list[int]] = {}
     for number, (kind, _, _) in enumerate(channels):
         numbers.setdefault(kind, []).append(number)
     for kind, own in numbers.items():
-        yield Change(group, "kind", kind, None, None, f"all {kind}", ablation(own))
+        yield AblationCase(
+            group, "kind", kind, None, None, f"all {kind}", ablation(own)
+        )
     if channels:
         every = range(len(channels))
-        yield Change(group, "all", "", None, None, f"all {what}", ablation(every))
+        yield AblationCase(group, "all", "", None, None, f"all {what}", ablation(every))
 
 
 def _inputs(robot: Robot, space: BodySpace) -> list[_Channel]:

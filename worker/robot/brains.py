@@ -20,8 +20,7 @@ from schema.experiment.brains import NoParameters, brain_half, kinds_of, widths
 from schema.experiment.document import BrainSection, Space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.plugins.origin import where_defined
-from schema.plugins.protocols import Bank as BankProtocol
-from schema.plugins.protocols import BrainControl, NeuronType
+from schema.plugins.protocols import Bank, BrainControl, NeuronType
 from schema.robot.brain import (
     Brain,
     Neuron,
@@ -44,7 +43,7 @@ _NUMBER_LIMIT = 1e100
 
 
 @dataclass(frozen=True, slots=True)
-class Network:
+class PackedNetwork:
     """Brain as arrays: S states (outputs, then hidden), I inputs.
 
     The next state of a neuron of the thesis's types is
@@ -66,7 +65,7 @@ class Network:
     own: tuple[OwnNeuron, ...] = ()
 
 
-class Bank:
+class NetworkBank:
     """R networks that are updated together; row r belongs to robot r.
 
     Attributes:
@@ -77,7 +76,7 @@ class Bank:
 
     def __init__(
         self,
-        networks: Sequence[Network],
+        networks: Sequence[PackedNetwork],
         width: Widths,
         tick_s: float,
         values: int = 1,
@@ -161,13 +160,15 @@ class NetworkControl:
         self._types = {kind.name: kind for kind in types}
         self._values = max(kind.states for kind in types)
 
-    def pack(self, brain: Brain, width: Widths) -> Network:
+    def pack(self, brain: Brain, width: Widths) -> PackedNetwork:
         """Return a brain as arrays."""
         return pack(brain, width, self._types)
 
-    def bank(self, packed: Sequence[Network], width: Widths, tick_s: float) -> Bank:
+    def bank(
+        self, packed: Sequence[PackedNetwork], width: Widths, tick_s: float
+    ) -> NetworkBank:
         """Return networks that are updated together."""
-        return Bank(packed, width, tick_s, self._values)
+        return NetworkBank(packed, width, tick_s, self._values)
 
 
 BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainControl]] = {
@@ -263,7 +264,7 @@ class Controls:
             raise SimulationDiverged(f"brain failed: {story_of(error)}") from error
         return packed
 
-    def bank(self, packed: Sequence[Any]) -> BankProtocol:
+    def bank(self, packed: Sequence[Any]) -> Bank:
         """Return brains at rest that are updated together."""
         return self._control.bank(packed, self.width, self.tick_s)
 
@@ -288,7 +289,7 @@ def pack(
     brain: Brain,
     width: Widths,
     types: Mapping[str, NeuronType] = BUILT_IN_NEURONS,
-) -> Network:
+) -> PackedNetwork:
     """Return a brain as arrays of fixed width.
 
     Args:
@@ -317,7 +318,7 @@ def pack(
             _set_neuron(neuron, row, (weights, numbers, kinds))
         else:
             own.append(OwnNeuron(kind, row, tuple(map(_bounded, neuron.parameters))))
-    return Network(weights, numbers, kinds, tuple(own))
+    return PackedNetwork(weights, numbers, kinds, tuple(own))
 
 
 def _set_neuron(neuron: Neuron, row: int, arrays: tuple[Floats, Floats, Mask]) -> None:

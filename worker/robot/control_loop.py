@@ -25,7 +25,7 @@ from worker.robot.brains import controls_of
 from worker.robot.devices import Sensors, Servos
 from worker.robot.filters import filtered_outputs, filtered_readings, filters_of
 from worker.robot.own_sensors import Surroundings
-from worker.robot.recording import Channels, Recorder
+from worker.robot.recording import Channels, SampleRecorder
 from worker.robot.solo_brains import solo_brain
 
 Watch = Callable[[mujoco.MjData], None]
@@ -104,9 +104,9 @@ class ControlLoop:
         state = model, data
         self._filters = filters_of(robot, settings, self._identity, state, self._means)
         self._channels = Channels(robot, model, settings)
-        self._recorder: Recorder | None = None
+        self._recorder: SampleRecorder | None = None
         if self._channels.names:
-            self._recorder = Recorder(self._channels, robot, model, data)
+            self._recorder = SampleRecorder(self._channels, robot, model, data)
         self._positions: list[float] = []
         self.now, self._next_sample = 0, self._clock.warmup_steps
         self._observed = -1

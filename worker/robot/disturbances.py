@@ -15,7 +15,7 @@ from schema.experiment.identity import Identity
 from schema.experiment.robust import RANGES, Robust
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
-from worker.robot.random_streams import Purpose, stream
+from worker.robot.random_streams import DrawPurpose, stream
 
 
 def disturbances(
@@ -31,7 +31,7 @@ def disturbances(
     """
     for number in range(rules.draws):
         rng = stream(
-            Purpose.DISTURBANCES,
+            DrawPurpose.DISTURBANCES,
             identity.origin,
             identity.birth,
             identity.trial,

@@ -16,7 +16,7 @@ from schema.experiment.identity import Origin
 from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from worker.robot.random_streams import Purpose, stream
+from worker.robot.random_streams import DrawPurpose, stream
 
 BLOCK_TICKS = 64
 """Ticks that are drawn at once, because starting a generator costs more than a draw."""
@@ -108,7 +108,7 @@ class Noise:
         inputs, outputs = source.width.inputs, source.width.outputs
         numbers = np.empty((BLOCK_TICKS, len(self._births), inputs + outputs))
         for row, birth in enumerate(self._births):
-            rng = stream(Purpose.NOISE, source.origin, birth, self._trial, block)
+            rng = stream(DrawPurpose.NOISE, source.origin, birth, self._trial, block)
             numbers[:, row] = rng.standard_normal((BLOCK_TICKS, inputs + outputs))
         on_readings = numbers[:, :, :inputs] * self._on_readings
         on_outputs = numbers[:, :, inputs:] * self._on_outputs

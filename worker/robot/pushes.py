@@ -9,7 +9,7 @@ from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import Identity
 from schema.robot.results import Floats
-from worker.robot.random_streams import Purpose, stream
+from worker.robot.random_streams import DrawPurpose, stream
 
 
 class Pushes:
@@ -42,7 +42,9 @@ class Pushes:
         self._every = max(1, round(environment.push_interval_s / tick_s))
         steps = simulation.evaluation_steps
         count = steps // simulation.brain_steps // self._every + 1
-        rng = stream(Purpose.PUSHES, identity.origin, identity.birth, identity.trial)
+        rng = stream(
+            DrawPurpose.PUSHES, identity.origin, identity.birth, identity.trial
+        )
         angles = rng.uniform(0.0, 2.0 * pi, count).tolist()
         force = environment.push_impulse / tick_s
         self._forces = [(force * cos(each), force * sin(each)) for each in angles]

@@ -13,7 +13,7 @@ from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 
 
-class Purpose(IntEnum):
+class DrawPurpose(IntEnum):
     """Purposes; they differ from those of ``coordinator.evolution.random_streams``."""
 
     NOISE = 11
@@ -22,7 +22,7 @@ class Purpose(IntEnum):
 
 
 def stream(
-    purpose: Purpose, origin: Origin, birth: BirthId, trial: int, block: int = 0
+    purpose: DrawPurpose, origin: Origin, birth: BirthId, trial: int, block: int = 0
 ) -> np.random.Generator:
     """Return the stream of a block of one robot's draws for a purpose.
 
@@ -39,7 +39,7 @@ def stream(
 
 
 @lru_cache(maxsize=64)
-def _key(purpose: Purpose, origin: Origin) -> int:
+def _key(purpose: DrawPurpose, origin: Origin) -> int:
     """Return the key of a purpose and an origin, of 128 bits."""
     name = (origin.run, origin.island, 0, 0, int(purpose))
     words = np.random.SeedSequence(origin.seed, spawn_key=name)

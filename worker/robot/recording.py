@@ -243,7 +243,7 @@ class Probe:
         return np.where(is_limited, self._forces, torques)
 
 
-class Recorder:
+class SampleRecorder:
     """Rows of one robot that is alone in its model.
 
     Attributes:

@@ -152,9 +152,9 @@ def _simulations(world: Simulation) -> Iterator[tuple[str, str, Simulation, bool
             )
     for key in ("mass_factor", "torque_factor"):
         what = key.removesuffix("_factor")
-        for factor in FACTORS:
-            other = replace(world, **{key: factor * getattr(world, key)})
-            yield f"{what} x {factor:g}", what, other, False
+        for share in FACTORS:
+            other = replace(world, **{key: share * getattr(world, key)})
+            yield f"{what} x {share:g}", what, other, False
 
 
 def rejudge(

@@ -7,14 +7,14 @@ import numpy as np
 from schema.errors import SimulationDiverged
 from schema.robot.brain import Brain, Widths
 from schema.robot.results import Floats
-from worker.robot.brains import HIGHEST, LOWEST, Controls, Network
+from worker.robot.brains import HIGHEST, LOWEST, Controls, PackedNetwork
 from worker.robot.guarded_bank import broken_rows, guarded_bank
 
 
 class SoloNetwork:
     """One network of the thesis's neuron types, with a known maximum of ticks.
 
-    The same arithmetic as ``Bank``, equal to the last bit
+    The same arithmetic as ``NetworkBank``, equal to the last bit
     (tests/worker/robot/test_solo_brains.py), at less than half of the cost of a
     bank of one. An oscillator's state depends only on its age; all its states are
     computed before the first tick. Kinds of neurons that the network lacks cost
@@ -27,7 +27,7 @@ class SoloNetwork:
     """
 
     def __init__(
-        self, network: Network, width: Widths, tick_s: float, ticks: int
+        self, network: PackedNetwork, width: Widths, tick_s: float, ticks: int
     ) -> None:
         """Start at state 0.
 
@@ -143,6 +143,6 @@ def solo_brain(controls: Controls, brain: Brain, ticks: int) -> Solo:
         InvalidRobot, SimulationDiverged: as of ``Controls.pack``.
     """
     packed = controls.pack(brain)
-    if isinstance(packed, Network) and not packed.own:
+    if isinstance(packed, PackedNetwork) and not packed.own:
         return SoloNetwork(packed, controls.width, controls.tick_s, ticks)
     return SoloBank(controls, packed)

@@ -20,7 +20,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes, Insertion, PastAdvance, Rebuild
 from tests.worker.arena_cases import crowd, settings_of
-from worker.arena.replay import Scene, alone, together
+from worker.arena.replay import ReplayedAdvance, alone, together
 from worker.arena.world import World
 
 Robots = Callable[[int], Robot]
@@ -44,7 +44,7 @@ def lived(
 
 def scenes(
     history: Sequence[PastAdvance], birth: BirthId, settings: bytes = SETTINGS
-) -> list[Scene]:
+) -> list[ReplayedAdvance]:
     past = Rebuild(b"", tuple(history))
     found = list(together(settings, past, frozenset({birth})))
     assert [scene.step for scene in found] == [past.until for past in history]

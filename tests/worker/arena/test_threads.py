@@ -4,13 +4,13 @@ import threading
 
 import pytest
 
-from worker.arena.threads import Pool
+from worker.arena.threads import ThreadTeam
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
 @pytest.mark.parametrize("count", [0, 1, 3, 200])
 def test_every_job_runs_once(threads: int, count: int) -> None:
-    pool, done = Pool(threads), [0] * count
+    pool, done = ThreadTeam(threads), [0] * count
 
     def job(number: int) -> None:
         done[number] += 1
@@ -23,7 +23,7 @@ def test_every_job_runs_once(threads: int, count: int) -> None:
 
 def test_threads_run_concurrently() -> None:
     """Three jobs that wait for each other need three threads."""
-    pool, gate = Pool(3), threading.Barrier(3)
+    pool, gate = ThreadTeam(3), threading.Barrier(3)
 
     def job() -> None:
         gate.wait(timeout=30)
@@ -33,7 +33,7 @@ def test_threads_run_concurrently() -> None:
 
 
 def test_error_of_a_job_is_raised_and_the_pool_stays_usable() -> None:
-    pool, done = Pool(2), []
+    pool, done = ThreadTeam(2), []
 
     def bad() -> None:
         raise RuntimeError("engine")
@@ -47,12 +47,12 @@ def test_error_of_a_job_is_raised_and_the_pool_stays_usable() -> None:
 
 def test_pool_without_threads_is_rejected() -> None:
     with pytest.raises(ValueError, match="got 0"):
-        Pool(0)
+        ThreadTeam(0)
 
 
 def test_close_stops_the_threads() -> None:
     before, gate = threading.enumerate(), threading.Barrier(3)
-    pool = Pool(3)
+    pool = ThreadTeam(3)
 
     def job() -> None:
         gate.wait(timeout=30)

@@ -9,7 +9,7 @@ import pytest
 from schema.robot.robot import Robot
 from tests.worker.arena_cases import crowd, populated, seconds, settings_of
 from worker.arena.world import World
-from worker.clusters.proximity import FASTEST, Proximity, Scene
+from worker.clusters.proximity import FASTEST, Proximity, RobotBounds
 from worker.clusters.states import Pairs
 
 Robots = Callable[[int], Robot]
@@ -22,10 +22,10 @@ def pairs_of_clusters(world: World) -> Pairs:
     return [pair for pair in pairs if clusters[pair[0]] is not clusters[pair[1]]]
 
 
-def measured(world: World, scene: Scene, pairs: Pairs, gap_m: float) -> Pairs:
+def measured(world: World, bounds: RobotBounds, pairs: Pairs, gap_m: float) -> Pairs:
     """Return the pairs that are near, from the distances of all of them."""
     steps = world.population.model_cache.settings.arena.proximity_steps + 1
-    moves = np.minimum(scene.speeds[0], FASTEST) * steps * 0.005
+    moves = np.minimum(bounds.speeds[0], FASTEST) * steps * 0.005
     return [
         (first, second)
         for first, second in pairs
@@ -57,10 +57,10 @@ def test_pairs_to_merge_and_to_keep_equal_those_of_all_measurements(
     for _ in range(12):
         seconds(world, 0.125)
         layout = world.population.layout
-        scene = Scene(layout, layout.read()[np.newaxis])
-        found = proximity.pairs_to_merge(scene)[0]
+        bounds = RobotBounds(layout, layout.read()[np.newaxis])
+        found = proximity.pairs_to_merge(bounds)[0]
         pairs_apart = pairs_of_clusters(world)
-        assert found == measured(world, scene, pairs_apart, gap_m)
-        assert not pairs_apart or proximity.pairs_to_keep(scene, pairs_apart) == found
+        assert found == measured(world, bounds, pairs_apart, gap_m)
+        assert not pairs_apart or proximity.pairs_to_keep(bounds, pairs_apart) == found
         pairs += len(found)
     assert pairs > 0 or gap_m < 0.1

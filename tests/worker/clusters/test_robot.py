@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from schema.experiment.document import Simulation
 from schema.robot.trace import Trace
 from tests.worker.arena_cases import SETTINGS
-from worker.clusters.robot import Window
+from worker.clusters.robot import FitnessWindow
 from worker.fitness import load_fitness, path_velocity, straight_velocity
 
 CLOCK = Simulation(
@@ -16,12 +16,12 @@ CLOCK = Simulation(
 """Samples every 0.1 s, a window of 0.8 s, a warm-up of 0.2 s."""
 
 
-def track(window: Window) -> Trace:
+def track(window: FitnessWindow) -> Trace:
     return Trace(0.1, np.array(window.positions))
 
 
 def test_window_excludes_fall_and_warm_up() -> None:
-    window = Window(CLOCK, born=100)
+    window = FitnessWindow(CLOCK, born=100)
     window.add(110, (9.0, 9.0, 9.0))
     assert not window.positions
     window.add(120, (0.0, 0.0, 0.0))
@@ -36,7 +36,7 @@ def test_window_excludes_fall_and_warm_up() -> None:
 
 def test_window_is_mature_after_warm_up_and_window() -> None:
     """200 + 800 ms: from the sample at age 1 s on."""
-    window = Window(CLOCK, born=50)
+    window = FitnessWindow(CLOCK, born=50)
     mature = []
     for step in range(50, 200, 10):
         window.add(step, (0.0, 0.0, 0.0))
@@ -46,7 +46,7 @@ def test_window_is_mature_after_warm_up_and_window() -> None:
 
 def test_window_drops_old_samples() -> None:
     """East at 1 m/s for 0.8 s, then back west: after 0.4 s of that s is 0."""
-    window = Window(CLOCK, born=0)
+    window = FitnessWindow(CLOCK, born=0)
     places = [0.1 * min(n, 16 - n) for n in range(17)]
     straight, path = [], []
     for number, x in enumerate(places):
@@ -60,7 +60,7 @@ def test_window_drops_old_samples() -> None:
 
 
 def test_fitness_of_the_window_uses_the_experiment_s_weights() -> None:
-    window = Window(CLOCK, born=0)
+    window = FitnessWindow(CLOCK, born=0)
     for number in range(9):
         window.add(20 + 10 * number, (0.01 * number, 0.0, 0.0))
     fitness = replace(SETTINGS.fitness, path_weight=1.0, straight_weight=5.0)

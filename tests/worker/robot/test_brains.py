@@ -14,7 +14,7 @@ from schema.experiment.document import Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.robot.brains import Bank, Controls, Network, pack
+from worker.robot.brains import Controls, NetworkBank, PackedNetwork, pack
 from worker.robot.own_neurons import STATE_LIMIT
 from worker.robot.solo_brains import SoloBank
 
@@ -24,7 +24,7 @@ TICK_S = 0.125
 
 def outputs_of(brain: Brain, readings: list[float], ticks: int) -> list[float]:
     """Return the first output after each of some ticks of constant readings."""
-    bank = Bank([pack(brain, WIDTH)], WIDTH, TICK_S)
+    bank = NetworkBank([pack(brain, WIDTH)], WIDTH, TICK_S)
     row = np.zeros((1, WIDTH.inputs))
     row[0, : len(readings)] = readings
     return [float(bank.step(row, float(tick))[0, 0]) for tick in range(ticks)]
@@ -109,13 +109,13 @@ def test_more_neurons_than_the_limit_are_rejected() -> None:
 
 
 @pytest.fixture(scope="module")
-def networks(robot_of: Callable[[int], Robot]) -> list[Network]:
+def networks(robot_of: Callable[[int], Robot]) -> list[PackedNetwork]:
     return [pack(robot_of(seed).brain, WIDTH) for seed in range(100)]
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 30, 100])
 def test_outputs_are_independent_of_the_batch(
-    networks: list[Network], count: int
+    networks: list[PackedNetwork], count: int
 ) -> None:
     """Outputs are equal to the last bit: alone, and in any row of any batch."""
     rng = np.random.default_rng(count)
@@ -123,8 +123,8 @@ def test_outputs_are_independent_of_the_batch(
     readings = rng.normal(0.0, 5.0, (ticks, 100, WIDTH.inputs))
     ages = rng.integers(0, 100_000, (100, 1)).astype(float)
     chosen = rng.permutation(100)[:count]
-    batch = Bank([networks[i] for i in chosen], WIDTH, TICK_S)
-    alone = [Bank([networks[i]], WIDTH, TICK_S) for i in chosen]
+    batch = NetworkBank([networks[i] for i in chosen], WIDTH, TICK_S)
+    alone = [NetworkBank([networks[i]], WIDTH, TICK_S) for i in chosen]
     for tick in range(ticks):
         together = batch.step(readings[tick, chosen], ages[chosen] + tick)
         for row, i in enumerate(chosen):
@@ -135,15 +135,15 @@ def test_outputs_are_independent_of_the_batch(
             assert alone[row].states.tobytes() == batch.states[row].tobytes()
 
 
-def test_states_can_be_moved_to_another_batch(networks: list[Network]) -> None:
+def test_states_can_be_moved_to_another_batch(networks: list[PackedNetwork]) -> None:
     rng = np.random.default_rng(1)
     readings = rng.normal(0.0, 5.0, (20, 3, WIDTH.inputs))
-    whole = Bank(networks[:3], WIDTH, TICK_S)
+    whole = NetworkBank(networks[:3], WIDTH, TICK_S)
     expected = [whole.step(readings[t], float(t)).copy() for t in range(20)]
-    first = Bank(networks[:3], WIDTH, TICK_S)
+    first = NetworkBank(networks[:3], WIDTH, TICK_S)
     for t in range(10):
         first.step(readings[t], float(t))
-    second = Bank(networks[:3][::-1], WIDTH, TICK_S)
+    second = NetworkBank(networks[:3][::-1], WIDTH, TICK_S)
     second.states[...] = first.states[::-1]
     for t in range(10, 20):
         found = second.step(readings[t, ::-1], float(t))

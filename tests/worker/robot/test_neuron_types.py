@@ -15,7 +15,7 @@ from schema.parts import Parameter
 from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
 from schema.robot.neurons import BUILT_IN_NEURONS, Tick
 from schema.robot.results import Floats
-from worker.robot.brains import Bank, Controls, NetworkControl, pack
+from worker.robot.brains import Controls, NetworkBank, NetworkControl, pack
 from worker.robot.own_neurons import STATE_LIMIT
 from worker.robot.solo_brains import SoloBank, solo_brain
 
@@ -55,7 +55,7 @@ def test_built_in_types_compute_what_networks_compute(kind: str) -> None:
     """The objects are the oracle of the batched arithmetic, up to rounding."""
     count = len(NEURON_TYPES[kind])
     brain = random_brain(3, {kind: count})
-    bank = Bank([pack(brain, WIDTH)], WIDTH, TICK_S)
+    bank = NetworkBank([pack(brain, WIDTH)], WIDTH, TICK_S)
     weights = np.zeros((20, 30))
     for edge in brain.connections:
         weights[edge.target - 10, edge.source] = edge.weight

@@ -9,7 +9,7 @@ from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.robot import Robot
-from worker.robot.brains import Bank, pack
+from worker.robot.brains import NetworkBank, pack
 from worker.robot.own_neurons import STATE_LIMIT
 from worker.robot.solo_brains import SoloNetwork
 
@@ -24,7 +24,7 @@ def agree(brain: Brain, ticks: int, seed: int) -> np.ndarray[tuple[int], np.dtyp
     """Compare all states after each tick and return the last ones."""
     network = pack(brain, WIDTH)
     solo = SoloNetwork(network, WIDTH, TICK_S, ticks)
-    bank = Bank([network], WIDTH, TICK_S)
+    bank = NetworkBank([network], WIDTH, TICK_S)
     rng = np.random.default_rng(seed)
     for tick in range(ticks):
         readings = rng.normal(0.0, 5.0, (1, WIDTH.inputs))
