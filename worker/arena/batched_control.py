@@ -14,12 +14,12 @@ from schema.parts import Vector
 from schema.plugins.protocols import Bank
 from schema.robot.brain import Widths
 from schema.robot.results import Floats
-from worker.clusters.cluster import EngineView
 from worker.clusters.models import Indices
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Layout
 from worker.robot.brains import Controls
 from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
+from worker.robot.engine_view import EngineView
 from worker.robot.filters import Filter, filtered_outputs, filtered_readings
 from worker.robot.guarded_bank import broken_rows, guarded_bank
 from worker.robot.noise import Noise, NoiseSource

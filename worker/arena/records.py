@@ -46,18 +46,10 @@ class Samples:
         """
         row: Floats | None = None
         if self._is_recorded:
-            probe = robot.view.probe
-            if probe is not None:
-                probe.read()
             places = [one.place for one in self._population.robots]
             number = self._population.robot_rows.rows[robot.birth]
-            row = robot.body.channels.row(
-                robot.view.qpos,
-                robot.view.qvel,
-                probe=None if probe is None else probe.numbers,
-                readings=robot.view.sensors.readings,
-                neighbours=self._neighbours(places)[number],
-            )
+            neighbours = self._neighbours(places)[number]
+            row = robot.view.row(robot.body.channels, neighbours)
         robot.window.add(step, robot.place, row)
 
     def add(self, step: int, state: Floats) -> None:

@@ -5,117 +5,23 @@ that is compiled when they meet. Clusters do not interact, so each is stepped th
 an interval independently and keeps its states at the interval's moments.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from itertools import chain
 
 import mujoco
 import numpy as np
 
 from schema.errors import RevolveError, one_line
-from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.robot.contacts import contact_reader
-from worker.robot.devices import Sensors, Servos
-from worker.robot.recording import Probe, probed_channels, step_with
+from worker.robot.engine_view import EngineView
+from worker.robot.recording import probed_channels, step_with
 
 NEVER = 1 << 62
 """A moment later than all others."""
-
-
-@dataclass(frozen=True, slots=True)
-class SharedRobot:
-    """A robot in a shared model.
-
-    Attributes:
-        prefix: of its names in the model.
-        robot: the robot.
-        solo: the model in which it is alone, which has its sizes.
-    """
-
-    prefix: str
-    robot: Robot
-    solo: mujoco.MjModel
-
-
-class EngineView:
-    """A robot's slice of a cluster's model and state, its sensors and motors.
-
-    Attributes:
-        model, data: of the cluster.
-        joints, dofs: its slices of the cluster's qpos and qvel.
-        qpos, qvel, ctrl: its part of the state, live.
-        offsets: where its numbers start in each part of ``Cluster.live``.
-        geoms: first and last + 1 of its geoms.
-        sensors, servos: of the robot.
-        probe: of its work, torques and contacts; None if nothing needs them.
-    """
-
-    def __init__(
-        self,
-        member: SharedRobot,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        settings: ArenaSettings,
-    ) -> None:
-        """Find a robot in a cluster by the prefix of its names."""
-        self.model, self.data = model, data
-        prefix, solo, types = member.prefix, member.solo, body_space(settings.space)
-        free = model.joint(f"{prefix}free").id
-        body = model.body(f"{prefix}root").id
-        start, dof = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
-        self.joints = slice(start, start + solo.nq)
-        self.dofs = slice(dof, dof + solo.nv)
-        self.offsets = (start, dof, 3 * body, 9 * body)
-        geom = int(model.body_geomadr[body])
-        own_geoms = solo.ngeom - int(solo.body_geomadr[solo.jnt_bodyid[0]])
-        self.geoms = (geom, geom + own_geoms)
-        self.sensors = Sensors(
-            member.robot,
-            types,
-            model,
-            data,
-            width=settings.space.max_inputs,
-            prefix=prefix,
-            has_light=settings.light is not None,
-        )
-        self.servos = Servos(member.robot, types, model, data, prefix=prefix)
-        self.probe: Probe | None = None
-        if probed_channels(settings):
-            self.probe = Probe(
-                model,
-                data,
-                member.robot,
-                dofs=self.dofs,
-                geoms=self.geoms,
-                prefix=prefix,
-            )
-        self.qpos: Floats = data.qpos[self.joints]
-        self.qvel: Floats = data.qvel[self.dofs]
-        self.ctrl: Floats = data.ctrl[self.servos.actuators]
-
-    def copy_from(self, other: "EngineView") -> None:
-        """Copy the robot's whole state from its view of another cluster."""
-        self.qpos[:], self.qvel[:] = other.qpos, other.qvel
-        self.ctrl[:] = other.ctrl
-        self.sensors.readings[:] = other.sensors.readings
-        self.sensors.velocities = list(other.sensors.velocities)
-        if self.probe is not None and other.probe is not None:
-            self.probe.numbers[:] = other.probe.numbers
-
-    def touched_of(self, other: "EngineView", touched: Iterable[int]) -> set[int]:
-        """Return which of the robot's geoms are in contact in another cluster.
-
-        Args:
-            other: its view of that cluster.
-            touched: geoms in contact there.
-        """
-        first, end = other.geoms
-        shift = self.geoms[0] - first
-        return {geom + shift for geom in touched if first <= geom < end}
 
 
 class StateHistory:
@@ -202,7 +108,7 @@ class Cluster:
     def __init__(
         self,
         births: tuple[BirthId, ...],
-        members: Sequence[SharedRobot],
+        robots: Mapping[str, Robot],
         model: mujoco.MjModel,
         settings: ArenaSettings,
     ) -> None:
@@ -210,13 +116,16 @@ class Cluster:
 
         Args:
             births: of the members, ascending.
-            members: robots of the model.
+            robots: of the members, by the prefixes of their names in the model.
             model: that holds them.
             settings: of the arena.
         """
         self.members = births
         self.model, self.data = model, mujoco.MjData(model)
-        self.views = tuple(EngineView(m, model, self.data, settings) for m in members)
+        self.views = tuple(
+            EngineView(robot, model, self.data, settings, prefix)
+            for prefix, robot in robots.items()
+        )
         self._owners = [-1] * model.ngeom
         for number, view in enumerate(self.views):
             first, end = view.geoms

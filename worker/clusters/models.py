@@ -31,7 +31,7 @@ from schema.mjcf.model import (
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.clusters.cluster import Cluster, SharedRobot
+from worker.clusters.cluster import Cluster
 from worker.robot.brains import controls_of
 from worker.robot.recording import Channels
 
@@ -126,7 +126,7 @@ class ModelCache:
             self.settings.environment,
             furnish=self._furnish,
         ).compile()
-        solo = Cluster((birth,), [SharedRobot("", robot, model)], model, self.settings)
+        solo = Cluster((birth,), {"": robot}, model, self.settings)
         channels = Channels(robot, model, self.settings)
         return Body(robot, bounding_spheres(model), solo, channels)
 
@@ -173,15 +173,16 @@ class ModelCache:
             del self._clusters[members]
 
     def _shared(self, births: tuple[BirthId, ...], bodies: Sequence[Body]) -> Cluster:
-        specs, members = [], []
+        specs: list[tuple[str, mujoco.MjSpec]] = []
+        robots: dict[str, Robot] = {}
         for birth, body in zip(births, bodies, strict=True):
             prefix = f"{birth.island}.{birth.number}/"
             specs.append((prefix, self._spec(birth, body.robot)))
-            members.append(SharedRobot(prefix, body.robot, body.solo.model))
+            robots[prefix] = body.robot
         model = shared_model(
             specs, self._simulation, self.settings.environment, furnish=self._furnish
         )
-        return Cluster(births, members, model, self.settings)
+        return Cluster(births, robots, model, self.settings)
 
     def _spec(self, birth: BirthId, robot: Robot) -> mujoco.MjSpec:
         if birth not in self._specs:

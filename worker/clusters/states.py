@@ -15,9 +15,8 @@ from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.models import Indices
 from worker.clusters.robot import ArenaRobot
+from worker.robot.placed import FREE, FREE_DOFS
 
-_FREE, _FREE_DOFS = 7, 6
-"""Numbers of a free joint's position and orientation, and of its velocity."""
 _PARTS = 4
 """Parts of a cluster's state that are read."""
 _SPARE = 2
@@ -59,8 +58,8 @@ class RobotRows:
         hulls = np.concatenate([np.zeros((0, 4)), *(each.hulls for each in bounds)])
         self.hulls = np.ascontiguousarray(hulls.T)
         degrees = [len(each.weights) for each in bounds]
-        self.sizes = np.array(degrees, dtype=np.intp) + (_FREE - _FREE_DOFS)
-        self.joint_counts = (self.sizes - _FREE).astype(np.int32)
+        self.sizes = np.array(degrees, dtype=np.intp) + (FREE - FREE_DOFS)
+        self.joint_counts = (self.sizes - FREE).astype(np.int32)
         bodies = [len(each.hulls) for each in bounds]
         self.body_counts = np.array(bodies, dtype=np.intp)
         self.first_bodies = np.cumsum(self.body_counts) - self.body_counts
@@ -177,7 +176,11 @@ class Layout:
         rows = [
             robot_rows.rows[birth] for cluster in clusters for birth in cluster.members
         ]
-        own = [view.offsets for cluster in clusters for view in cluster.views]
+        own = [
+            (view.joints.start, view.dofs.start, 3 * view.root, 9 * view.root)
+            for cluster in clusters
+            for view in cluster.views
+        ]
         self._columns = columns.place(clusters)
         self.states = columns.states
         counts = [len(cluster.members) for cluster in clusters]
@@ -189,10 +192,10 @@ class Layout:
         order = np.argsort(np.array(rows, dtype=np.intp))
         self.starts, dofs, first_places, first_rotations = offsets[order].T
         self.cluster_indices: Indices = np.repeat(np.arange(len(counts)), counts)[order]
-        self.roots = self.starts[:, None] + np.arange(_FREE)
-        self.motions = dofs[:, None] + np.arange(_FREE_DOFS)
-        self.joints = runs(self.starts + _FREE, robot_rows.sizes - _FREE)
-        degrees = robot_rows.sizes - (_FREE - _FREE_DOFS)
+        self.roots = self.starts[:, None] + np.arange(FREE)
+        self.motions = dofs[:, None] + np.arange(FREE_DOFS)
+        self.joints = runs(self.starts + FREE, robot_rows.sizes - FREE)
+        degrees = robot_rows.sizes - (FREE - FREE_DOFS)
         self._velocities = runs(dofs, degrees)
         self._first_velocities = np.cumsum(degrees) - degrees
         self._places = runs(first_places, robot_rows.body_counts, 3)

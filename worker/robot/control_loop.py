@@ -22,10 +22,10 @@ from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from worker.measures.functions import functions_of
 from worker.robot.brains import controls_of
-from worker.robot.devices import Sensors, Servos
+from worker.robot.engine_view import EngineView
 from worker.robot.filters import filtered_outputs, filtered_readings, filters_of
 from worker.robot.own_sensors import Surroundings
-from worker.robot.recording import Channels, SampleRecorder
+from worker.robot.recording import Channels, probed_channels, step_with
 from worker.robot.solo_brains import solo_brain
 
 Watch = Callable[[mujoco.MjData], None]
@@ -85,29 +85,23 @@ class ControlLoop:
     def reset(self) -> None:
         """Start again, equal to the last bit."""
         robot, settings, model = self._robot, self._settings, self.model
-        types, controls = body_space(settings.space), controls_of(settings)
         self.data = data = mujoco.MjData(model)
         self._core, self._velocities = data.qpos[:3].data, data.qvel.data
-        self._sensors = Sensors(
-            robot,
-            types,
-            model,
-            data,
-            width=controls.width.inputs,
-            has_light=self._light is not None,
-        )
-        self._servos = Servos(robot, types, model, data)
+        self._view = EngineView(robot, model, data, settings)
+        self._sensors = self._view.sensors
+        probe = self._view.probe
+        is_working = probe and "energy" in probed_channels(settings)
+        self._working = [probe] if probe and is_working else []
         ticks = self._end // self._clock.brain_steps + 1
-        self._brain = solo_brain(controls, robot.brain, ticks)
+        self._brain = solo_brain(controls_of(settings), robot.brain, ticks)
         self._sensors.write_to(self._brain.readings)
         self._inputs = self._brain.readings[:, : robot.brain.count("input")]
         state = model, data
         self._filters = filters_of(robot, settings, self._identity, state, self._means)
         self._channels = Channels(robot, model, settings)
-        self._recorder: SampleRecorder | None = None
-        if self._channels.names:
-            self._recorder = SampleRecorder(self._channels, robot, model, data)
         self._positions: list[float] = []
+        self._rows: list[Floats] = []
+        self._undisturbed: Floats = self._inputs
         self.now, self._next_sample = 0, self._clock.warmup_steps
         self._observed = -1
 
@@ -132,9 +126,8 @@ class ControlLoop:
                 self._read_sensors()
             except mujoco.FatalError as error:
                 raise self._failure(error) from None
-            if self._recorder is not None:
-                self._recorder.readings = self._inputs.copy()
             if self._filters:
+                self._undisturbed = self._inputs.copy()
                 self._inputs[:] = filtered_readings(self._filters, tick, self._inputs)
         return self._inputs
 
@@ -155,7 +148,7 @@ class ControlLoop:
         outputs = self._brain.step(tick) if action is None else 0.5 + 0.5 * action
         if self._filters:
             outputs = filtered_outputs(self._filters, tick, outputs[np.newaxis])[0]
-        self._servos.drive(outputs)
+        self._view.servos.drive(outputs)
         if self.watch is not None:
             self.watch(self.data)
         try:
@@ -167,12 +160,11 @@ class ControlLoop:
 
     def trace(self) -> Trace:
         """Return the samples of the window, once it is over."""
-        recorder = self._recorder
         return self._channels.trace(
             self._robot,
             self._clock.pose_steps * self._clock.timestep_s,
             np.array(self._positions).reshape(-1, 3),
-            recorder.rows if recorder is not None else (),
+            self._rows,
         )
 
     @property
@@ -186,30 +178,28 @@ class ControlLoop:
 
     def _step_to(self, until: int) -> None:
         """Step the physics with constant commands; sample on the way."""
-        model, data, recorder = self.model, self.data, self._recorder
+        model, data, working = self.model, self.data, self._working
         while self.now < until:
             if self.now == self._next_sample:
                 # After the tick, as in an arena: a sample has the readings of its step.
                 self._sample()
             stop = min(until, self._next_sample)
-            if recorder is None:
-                mujoco.mj_step(model, data, stop - self.now)
-            else:
-                recorder.step(stop - self.now)
+            step_with(working, model, data, stop - self.now)
             self.now = stop
 
     def _sample(self) -> None:
         self._positions += self._core.tolist()
         self._next_sample += self._clock.pose_steps
-        if self._recorder is not None:
-            self._recorder.sample()
+        if self._channels.names:
+            row = self._view.row(self._channels, 0, self._undisturbed)
+            self._rows.append(row)
 
     def _finish(self) -> None:
         """Add the last sample; its readings are those of the last tick, as in an arena.
 
         That may be the end, where the brain does not tick.
         """
-        if self._recorder is not None:
+        if self._channels.names:
             self.observe()
         self._sample()
         data = self.data

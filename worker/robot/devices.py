@@ -13,12 +13,12 @@ import mujoco
 import numpy as np
 
 from schema.errors import ExperimentError
-from schema.parts import BodySpace, Sensor
+from schema.parts import Sensor
 from schema.robot.results import Floats
-from schema.robot.robot import Robot
 from worker.robot.contacts import contact_reader
 from worker.robot.light import brightness
 from worker.robot.own_sensors import OwnSensors, Surroundings
+from worker.robot.placed import PlacedRobot
 
 _Velocity = tuple[float, float, float]
 _Number = TypeVar("_Number", float, Floats)
@@ -47,29 +47,22 @@ class Sensors:
 
     def __init__(
         self,
-        robot: Robot,
-        space: BodySpace,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
+        placed: PlacedRobot,
         *,
         width: int,
-        prefix: str = "",
         has_light: bool = False,
     ) -> None:
         """Find the sensors.
 
         Args:
-            robot: the robot.
-            space: its part types.
-            model: a compiled model that holds it.
-            data: the model's state.
+            placed: the robot in a model.
             width: number I of readings, at least the robot's inputs.
-            prefix: of the robot's names in the model.
             has_light: the world has a light.
 
         Raises:
             ExperimentError: a light sensor in a world without light.
         """
+        model, data, prefix = placed.model, placed.data, placed.prefix
         self._model, self._data = model, data
         self._contacts = contact_reader(model, data)
         self.velocities: list[_Velocity] = []
@@ -77,15 +70,14 @@ class Sensors:
         self.core_imu = -1
         self._imus: list[tuple[int, int]] = []
         self.lights: list[tuple[int, int]] = []
-        start = model.joint(f"{prefix}free").id
-        qpos, qvel = int(model.jnt_qposadr[start]), int(model.jnt_dofadr[start])
+        qpos, qvel = placed.joints.start, placed.dofs.start
         self._orientation = _cells(data.qpos[qpos + 3 : qpos + 7])
         self._motion = _cells(data.qvel[qvel : qvel + 6])
         gx, gy, gz = model.opt.gravity.tolist()
         self._gravity = (gx, gy, gz)
         place, own = 0, []
-        for index, part in enumerate(robot.parts):
-            for sensor in space[part.kind].sensors:
+        for index, part in enumerate(placed.robot.parts):
+            for sensor in placed.space[part.kind].sensors:
                 if not isinstance(sensor, Sensor):
                     own.append((index, part.kind, sensor, place))
                     place += sensor.inputs
@@ -96,13 +88,13 @@ class Sensors:
                     )
                 if sensor.kind == "imu":
                     site = model.site(f"{prefix}{index}/imu").id
-                    self._add_imu(site, int(model.jnt_bodyid[start]), place)
+                    self._add_imu(site, placed.root, place)
                 else:
                     geom = model.geom(f"{prefix}{index}/{sensor.box}").id
                     kind = self.lights if sensor.kind == "light" else self.pads
                     kind.append((geom, place))
                 place += sensor.inputs
-        self.own = OwnSensors(own, (model, data), prefix) if own else None
+        self.own = OwnSensors(own, placed) if own else None
         self.readings: Floats = np.zeros((1, width))
         self.write_to(self.readings)
 
@@ -236,32 +228,17 @@ class Servos:
         free: indices in ``motors`` of those that control the velocity.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        space: BodySpace,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        *,
-        prefix: str = "",
-    ) -> None:
-        """Find the actuators.
-
-        Args:
-            robot: the robot.
-            space: its part types.
-            model: a compiled model that holds it.
-            data: the model's state.
-            prefix: of the robot's names in the model.
-        """
+    def __init__(self, placed: PlacedRobot) -> None:
+        """Find the actuators of a robot in a model."""
+        model, data = placed.model, placed.data
         self.motors: list[tuple[int, float, float, float, float]] = []
         self.free: list[int] = []
         found: list[int] = []
-        for index, part in enumerate(robot.parts):
-            motor = space[part.kind].motor
+        for index, part in enumerate(placed.robot.parts):
+            motor = placed.space[part.kind].motor
             if motor is None:
                 continue
-            name = f"{prefix}joint{index}"
+            name = f"{placed.prefix}joint{index}"
             found.append(model.actuator(name).id)
             joint = model.joint(name).id
             low, high = model.jnt_range[joint].tolist()

@@ -12,6 +12,7 @@ from schema.plugins.protocols import SensorView
 from schema.plugins.sensor_checks import ray_problem, values_of
 from schema.robot.results import Floats
 from worker.robot.light import State
+from worker.robot.placed import PlacedRobot
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,26 +41,20 @@ class PartView:
         around: what is around it at the present tick.
     """
 
-    def __init__(self, state: State, index: int, prefix: str) -> None:
-        """Find a part.
-
-        Args:
-            state: model and data that hold its robot.
-            index: of the part.
-            prefix: of the robot's names in the model.
-        """
-        model, self._data = state
-        self._state = state
+    def __init__(self, placed: PlacedRobot, index: int) -> None:
+        """Find a part of a robot in a model, by its index."""
+        model, self._data = placed.model, placed.data
+        self._state = model, self._data
         self.around = Surroundings(0.0, ())
-        start = f"{prefix}{index}/"
-        names = [(number, model.geom(number).name) for number in range(model.ngeom)]
+        start = f"{placed.prefix}{index}/"
+        names = {number: model.geom(number).name for number in range(*placed.geoms)}
         self._geoms = {
             name.removeprefix(start): number
-            for number, name in names
+            for number, name in names.items()
             if name.startswith(start)
         }
         kind = mujoco.mjtObj.mjOBJ_JOINT
-        joint = mujoco.mj_name2id(model, kind, f"{prefix}joint{index}")
+        joint = mujoco.mj_name2id(model, kind, f"{placed.prefix}joint{index}")
         self._joint = joint if joint >= 0 else None
 
     @property
@@ -136,21 +131,19 @@ class OwnSensors:
     def __init__(
         self,
         sensors: Sequence[tuple[int, str, OwnSensor, int]],
-        state: State,
-        prefix: str,
+        placed: PlacedRobot,
     ) -> None:
         """Find their parts.
 
         Args:
             sensors: of each, index and type of its part, the sensor, and its first
                 index in the readings.
-            state: model and data that hold the robot.
-            prefix: of the robot's names in the model.
+            placed: the robot in a model.
         """
         # Its code may change the number of inputs of a sensor; the brain has these.
         self._sensors = [
             (
-                PartView(state, index, prefix),
+                PartView(placed, index),
                 sensor,
                 slice(place, place + sensor.inputs),
                 f"part {index} ({kind})",

@@ -19,12 +19,9 @@ from schema.robot.robot import Robot
 from schema.robot.trace import RECORDED, Trace
 from worker.measures.functions import functions_of
 from worker.robot.contacts import contact_reader
+from worker.robot.placed import FREE, FREE_DOFS, PlacedRobot
 
 Indices = npt.NDArray[np.intp]
-_FREE, _FREE_DOFS = 7, 6
-"""Numbers of a free joint's position and orientation, and of its velocity."""
-
-
 PROBED = ("joint_torque", "energy", "contact")
 """Channels that are not functions of positions and velocities."""
 
@@ -41,9 +38,6 @@ class Channels:
     Attributes:
         names: of the recorded channels, in the order of ``RECORDED``.
         width: numbers of a row.
-        has_probe: some of them need a probe.
-        has_work: the probe must see every step.
-        dofs: number of the robot's velocities.
     """
 
     def __init__(
@@ -76,14 +70,11 @@ class Channels:
         }
         self.names = tuple(name for name in RECORDED if name in wanted)
         self._joints, self._inputs = joints, inputs
-        self.dofs = _FREE_DOFS + joints
         self._spans: dict[str, slice] = {}
         self.width = 0
         for name in self.names:
             self._spans[name] = slice(self.width, self.width + sizes[name])
             self.width += sizes[name]
-        self.has_probe = bool(probed_channels(settings))
-        self.has_work = "energy" in wanted
         self._constants: dict[str, Any] = {
             "light": settings.light,
             "mass": float(model.body_subtreemass[model.jnt_bodyid[free]]),
@@ -111,29 +102,21 @@ class Channels:
             readings: (1, I') of its sensors, I' >= I.
             neighbours: number of robots near it.
         """
+        values: dict[str, Floats | int] = {
+            "core_attitude": qpos[3:FREE],
+            "joint_angle": qpos[FREE : FREE + self._joints],
+            "joint_velocity": qvel[FREE_DOFS : FREE_DOFS + self._joints],
+            "readings": readings[0, : self._inputs],
+            "neighbours": neighbours,
+        }
+        if probe is not None:
+            first = 1 + self._joints
+            values["energy"], values["joint_torque"] = probe[:1], probe[1:first]
+            values["contact"] = probe[first:]
         row = np.empty(self.width)
         for name, span in self._spans.items():
-            if name == "core_attitude":
-                row[span] = qpos[3:_FREE]
-            elif name == "joint_angle":
-                row[span] = qpos[_FREE : _FREE + self._joints]
-            elif name == "joint_velocity":
-                row[span] = qvel[_FREE_DOFS : _FREE_DOFS + self._joints]
-            elif name == "readings":
-                row[span] = readings[0, : self._inputs]
-            elif name == "neighbours":
-                row[span] = neighbours
-            else:
-                assert probe is not None
-                row[span] = probe[self._probed(name)]
+            row[span] = values[name]
         return row
-
-    def _probed(self, name: str) -> slice:
-        """Return where the numbers of a probe hold a channel."""
-        if name == "energy":
-            return slice(0, 1)
-        first = 1 + self._joints
-        return slice(1, first) if name == "joint_torque" else slice(first, None)
 
     def trace(
         self,
@@ -172,30 +155,13 @@ class Probe:
             [N m or N], whether each part touches anything but the robot.
     """
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        robot: Robot,
-        *,
-        dofs: slice,
-        geoms: tuple[int, int],
-        prefix: str = "",
-    ) -> None:
-        """Find a robot in a model.
-
-        Args:
-            model: a compiled model that holds it.
-            data: the model's state.
-            robot: the robot.
-            dofs: its slice of the model's velocities.
-            geoms: first and last + 1 of its geoms.
-            prefix: of its names in the model.
-        """
+    def __init__(self, placed: PlacedRobot) -> None:
+        """Start without work."""
+        model, data, dofs = placed.model, placed.data, placed.dofs
         self._contacts = contact_reader(model, data)
         self._velocities = data.qvel
         self._timestep_s = float(model.opt.timestep)
-        first = dofs.start + _FREE_DOFS
+        first = dofs.start + FREE_DOFS
         driven = model.jnt_dofadr[model.actuator_trnid[:, 0]]
         own = ((driven >= first) & (driven < dofs.stop)).nonzero()[0]
         motors = slice(int(own[0]), int(own[-1]) + 1) if len(own) else slice(0, 0)
@@ -204,13 +170,14 @@ class Probe:
         self._before: Floats = data.actuator_velocity[motors]
         self._slopes: Floats = model.actuator_biasprm[motors, 2].copy()
         self._limits: Floats = model.actuator_forcerange[motors, 1].copy()
+        prefix = placed.prefix
         self._part_of = {
             geom: int(model.geom(geom).name.removeprefix(prefix).partition("/")[0])
-            for geom in range(*geoms)
+            for geom in range(*placed.geoms)
         }
         self._driven = 1 + self._dofs - first
         self._parts = 1 + dofs.stop - first
-        self.numbers: Floats = np.zeros(self._parts + len(robot.parts))
+        self.numbers: Floats = np.zeros(self._parts + len(placed.robot.parts))
 
     def add_work(self) -> None:
         """Add the work of the step that was just made."""
@@ -241,59 +208,6 @@ class Probe:
         torques = self._forces + self._slopes * (now - self._before)
         is_limited = np.abs(self._forces) >= self._limits
         return np.where(is_limited, self._forces, torques)
-
-
-class SampleRecorder:
-    """Rows of one robot that is alone in its model.
-
-    Attributes:
-        rows: of the samples.
-        readings: (1, I) of its sensors, without noise.
-    """
-
-    def __init__(
-        self,
-        channels: Channels,
-        robot: Robot,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-    ) -> None:
-        """Initialise without samples.
-
-        Args:
-            channels: to record.
-            robot: the robot.
-            model: the model in which it is alone.
-            data: the model's state.
-        """
-        self._model, self._data, self._channels = model, data, channels
-        self.rows: list[Floats] = []
-        self.readings: Floats = np.zeros((1, 0))
-        self._probe: Probe | None = None
-        if channels.has_probe:
-            root = int(model.jnt_bodyid[model.joint("free").id])
-            first = int(model.body_geomadr[root])
-            own = int((model.body_rootid[model.geom_bodyid] == root).sum())
-            geoms, dofs = (first, first + own), slice(0, channels.dofs)
-            self._probe = Probe(model, data, robot, dofs=dofs, geoms=geoms)
-        self._working = [self._probe] if self._probe and channels.has_work else []
-
-    def step(self, steps: int) -> None:
-        """Step the physics."""
-        step_with(self._working, self._model, self._data, steps)
-
-    def sample(self) -> None:
-        """Add a sample of the present state."""
-        if self._probe is not None:
-            self._probe.read()
-        row = self._channels.row(
-            self._data.qpos,
-            self._data.qvel,
-            probe=self._probe.numbers if self._probe else None,
-            readings=self.readings,
-            neighbours=0,
-        )
-        self.rows.append(row)
 
 
 def step_with(

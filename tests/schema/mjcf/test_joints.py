@@ -25,6 +25,7 @@ from schema.parts import (
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
 from schema.robot.robot import Part, Robot
 from worker.robot.devices import Servos
+from worker.robot.placed import PlacedRobot
 
 GREY = (0.5, 0.5, 0.5)
 CORE = Part("Core", -1, -1, -1, 0, GREY)
@@ -126,7 +127,7 @@ def test_a_slider_reaches_its_target_and_stays_within_its_limit() -> None:
     for kind, output, end in (("Slide", 0.75, 0.0075), ("FastSlide", 1.0, 0.015)):
         robot = Robot((CORE, Part(kind, 0, 2, 0, 0, GREY)))
         model, data = alone(robot)
-        servos = Servos(robot, SPACE, model, data)
+        servos = Servos(PlacedRobot(robot, SPACE, model, data))
         for _ in range(40):
             servos.drive(np.array([output]))
             mujoco.mj_step(model, data, nstep=25)
@@ -136,7 +137,7 @@ def test_a_slider_reaches_its_target_and_stays_within_its_limit() -> None:
 def test_velocity_control_commands_velocities_from_least_to_greatest() -> None:
     robot = Robot((CORE, Part("FastSlide", 0, 2, 0, 0, GREY)))
     model, data = alone(robot)
-    servos = Servos(robot, SPACE, model, data)
+    servos = Servos(PlacedRobot(robot, SPACE, model, data))
     data.joint("joint1").qpos = 0.01
     for output, velocity in ((0.5, 0.0), (0.75, 0.05), (7.0, 0.1), (-7.0, -0.1)):
         servos.drive(np.array([output]))
@@ -147,7 +148,7 @@ def test_a_free_joint_turns_without_limit_at_its_velocity() -> None:
     """10 s at 5.236 rad/s: more than eight turns."""
     robot = Robot((CORE, Part("ActiveWheel", 0, 2, 0, 0, (60.0, *GREY))))
     model, data = alone(robot)
-    servos = Servos(robot, SPACE, model, data)
+    servos = Servos(PlacedRobot(robot, SPACE, model, data))
     servos.drive(np.array([1.0]))
     mujoco.mj_step(model, data, nstep=2000)
     assert float(data.joint("joint1").qpos[0]) == pytest.approx(52.36, rel=0.01)
@@ -167,7 +168,7 @@ def test_wheels_lift_the_core_and_roll_it() -> None:
     model, data = alone(robot, WORLD)
     assert model.qpos0[2] == pytest.approx(radius, abs=1e-12)
     assert robot_spec(robot, SPACE, WORLD).height == pytest.approx(radius, abs=1e-12)
-    servos = Servos(robot, SPACE, model, data)
+    servos = Servos(PlacedRobot(robot, SPACE, model, data))
     for _ in range(40):
         servos.drive(np.array([0.75, 0.25]))
         mujoco.mj_step(model, data, nstep=25)

@@ -24,6 +24,7 @@ from worker.arena.world import World
 from worker.robot.devices import Sensors
 from worker.robot.evaluation import evaluate, simulate
 from worker.robot.own_sensors import Surroundings
+from worker.robot.placed import PlacedRobot
 
 GREY = (0.5, 0.5, 0.5)
 A, B, C = BirthId(0, 1), BirthId(0, 2), BirthId(0, 3)
@@ -138,7 +139,7 @@ def test_rays_pass_through_their_own_segment_and_end_at_the_ground() -> None:
     robot, types = crawler(), body_space(settings.space)
     model = solo_spec(robot, types, settings.simulation, settings.environment).compile()
     data = mujoco.MjData(model)
-    sensors = Sensors(robot, types, model, data, width=WIDTH)
+    sensors = Sensors(PlacedRobot(robot, types, model, data), width=WIDTH)
     sensors.start()
     assert sensors.own is not None
     view = sensors.own._sensors[0][0]
@@ -193,7 +194,7 @@ def test_readings_alone_equal_those_in_an_arena_for_the_same_state() -> None:
     clock = settings.simulation
     model = solo_spec(robot, types, clock, settings.environment).compile()
     data = mujoco.MjData(model)
-    sensors = Sensors(robot, types, model, data, width=WIDTH)
+    sensors = Sensors(PlacedRobot(robot, types, model, data), width=WIDTH)
     for _ in range(24):
         # Up to the tick, whose readings belong to the state just reached.
         seconds(world, 0.125)

@@ -91,7 +91,7 @@ def _check_spheres(population: ArenaPopulation) -> None:
     expected = []
     for robot in population.robots:
         bounds, view = robot.body.bounds, robot.view
-        root = view.offsets[2] // 3
+        root = view.root
         for body, centre in zip(bounds.bodies, bounds.centres[:, :3], strict=True):
             frame = view.data.xmat[root + body].reshape(3, 3)
             expected.append(view.data.xpos[root + body] + frame @ centre)

@@ -14,6 +14,7 @@ from schema.robot.robot import Part, Robot
 from schema.wire.arena import Insertion
 from tests.worker.arena_cases import populated, settings_of
 from worker.robot.devices import Sensors
+from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Probe
 
 GREY = (0.5, 0.5, 0.5)
@@ -38,10 +39,9 @@ def test_contacts_within_a_gap_do_not_count(
     model = solo_spec(WITH_PADS, BUILT_IN, Simulation(), environment).compile()
     data = mujoco.MjData(model)
     data.qpos[0] = x
-    sensors = Sensors(WITH_PADS, BUILT_IN, model, data, width=8)
+    sensors = Sensors(PlacedRobot(WITH_PADS, BUILT_IN, model, data), width=8)
     assert sensors.start()[0, 6:].tolist() == [touches, touches]
-    geoms, dofs = (2, model.ngeom), slice(0, 6)
-    probe = Probe(model, data, WITH_PADS, dofs=dofs, geoms=geoms)
+    probe = Probe(PlacedRobot(WITH_PADS, BUILT_IN, model, data))
     probe.read()
     assert probe.numbers[-1] == touches
     settings = replace(settings_of(drop_m=0.0), environment=environment)

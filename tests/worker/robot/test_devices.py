@@ -14,6 +14,7 @@ from schema.mjcf.model import add_ground, robot_spec, set_options, solo_spec
 from schema.parts import BUILT_IN, CORE, BodySpace, PartType, Sensor
 from schema.robot.robot import Part, Robot
 from worker.robot.devices import Sensors, Servos
+from worker.robot.placed import PlacedRobot
 
 GREY = (0.5, 0.5, 0.5)
 WORLD = Simulation()
@@ -66,7 +67,7 @@ def ticks(
 
 def test_accelerometer_at_rest_reads_gravity_upward(turtle: Robot) -> None:
     model, data = alone(turtle)
-    sensors = Sensors(turtle, BUILT_IN, model, data, width=10)
+    sensors = Sensors(PlacedRobot(turtle, BUILT_IN, model, data), width=10)
     assert sensors.start()[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0])
     for _ in ticks(model, data, [sensors], 16):
         pass
@@ -76,8 +77,8 @@ def test_accelerometer_at_rest_reads_gravity_upward(turtle: Robot) -> None:
 def test_two_robots_of_one_model_read_gravity_upward(turtle: Robot) -> None:
     model, data = two((turtle, HINGED))
     sensors = [
-        Sensors(turtle, BUILT_IN, model, data, width=10, prefix="1:"),
-        Sensors(HINGED, BUILT_IN, model, data, width=10, prefix="2:"),
+        Sensors(PlacedRobot(turtle, BUILT_IN, model, data, "1:"), width=10),
+        Sensors(PlacedRobot(HINGED, BUILT_IN, model, data, "2:"), width=10),
     ]
     for _ in ticks(model, data, sensors, 16):
         pass
@@ -89,13 +90,13 @@ def test_gravity_is_read_in_the_frame_of_the_core() -> None:
     """Turned a quarter about +x, the core's +y points up."""
     model, data = alone(HINGED, replace(WORLD, drop_m=1.0))
     data.qpos[3:7] = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
-    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    sensors = Sensors(PlacedRobot(HINGED, BUILT_IN, model, data), width=10)
     assert sensors.start()[0, :3] == pytest.approx([0, 9.81, 0], abs=1e-9)
 
 
 def test_accelerometer_of_a_falling_robot_reads_zero() -> None:
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0))
-    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    sensors = Sensors(PlacedRobot(HINGED, BUILT_IN, model, data), width=10)
     for _ in ticks(model, data, [sensors], 3):
         assert sensors.readings[0, :3] == pytest.approx([0, 0, 0], abs=1e-9)
 
@@ -104,7 +105,7 @@ def test_acceleration_is_the_mean_over_the_interval() -> None:
     """Accelerated along +x by 2 m/s2 after half a turn: -2 in its own frame."""
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0, gravity=0.0))
     data.qpos[3:7] = (0.0, 0.0, 0.0, 1.0)
-    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    sensors = Sensors(PlacedRobot(HINGED, BUILT_IN, model, data), width=10)
     sensors.start()
     data.qvel[0] = 2.0 * TICK_S
     assert sensors.read(TICK_S)[0, :3] == pytest.approx([-2.0, 0.0, 0.0])
@@ -114,7 +115,7 @@ def test_gyroscope_reads_in_the_frame_of_the_core() -> None:
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0, gravity=0.0))
     data.qpos[3:7] = (math.cos(0.4), math.sin(0.4), 0.0, 0.0)
     data.qvel[3:6] = (0.1, -0.2, 0.3)
-    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    sensors = Sensors(PlacedRobot(HINGED, BUILT_IN, model, data), width=10)
     sensors.start()
     assert sensors.readings[0, 3:6] == pytest.approx([0.1, -0.2, 0.3], abs=1e-12)
 
@@ -146,7 +147,7 @@ def test_imu_in_a_limb_agrees_with_the_engine_s_sensors() -> None:
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qvel[:] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
-    sensors = Sensors(HINGED, space, model, data, width=6)
+    sensors = Sensors(PlacedRobot(HINGED, space, model, data), width=6)
     sensors.start()
     before = data.sensor("v").data.copy()
     data.ctrl[0] = 1.0
@@ -168,7 +169,7 @@ def test_touch_sensor_reads_contact_with_the_ground() -> None:
         )
     )
     model, data = alone(robot)
-    sensors = Sensors(robot, BUILT_IN, model, data, width=10)
+    sensors = Sensors(PlacedRobot(robot, BUILT_IN, model, data), width=10)
     assert sensors.start()[0, 6:8].tolist() == [0.0, 0.0]
     # Nose down: a quarter turn about +y sends +x to -z.
     data.qpos[2] = 0.045 + 0.0105 - 1e-4
@@ -187,7 +188,7 @@ def test_touch_sensor_reads_contact_with_the_ground() -> None:
 
 def test_unused_readings_stay_zero(turtle: Robot) -> None:
     model, data = alone(turtle)
-    sensors = Sensors(turtle, BUILT_IN, model, data, width=12)
+    sensors = Sensors(PlacedRobot(turtle, BUILT_IN, model, data), width=12)
     for _ in ticks(model, data, [sensors], 4):
         assert sensors.readings[0, 8:].tolist() == [0.0] * 4
 
@@ -199,7 +200,7 @@ def test_commanded_velocity_is_proportional_to_the_error(
     robots = (robot_of(1), robot_of(2))
     model, data = two(robots)
     servos = [
-        Servos(robot, BUILT_IN, model, data, prefix=f"{number}:")
+        Servos(PlacedRobot(robot, BUILT_IN, model, data, f"{number}:"))
         for number, robot in enumerate(robots, start=1)
     ]
     rng = np.random.default_rng(5)
@@ -237,7 +238,7 @@ def test_commanded_velocity_is_reached_and_held(turn: int) -> None:
 def test_joint_approaches_its_target_in_about_a_second() -> None:
     """Time constant 1 / 0.9 = 1.11 s, with ticks of 0.125 s."""
     model, data = alone(HINGED)
-    servos = Servos(HINGED, BUILT_IN, model, data)
+    servos = Servos(PlacedRobot(HINGED, BUILT_IN, model, data))
     start, target = 0.0, math.pi / 4 * 0.99998
     angles = []
     for _ in range(80):

@@ -19,6 +19,7 @@ from tests.worker.arena_cases import populated, settings_of
 from worker.robot.devices import Sensors
 from worker.robot.evaluation import simulate
 from worker.robot.own_sensors import Surroundings
+from worker.robot.placed import PlacedRobot
 
 GREY = (0.5, 0.5, 0.5)
 SPACE = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
@@ -57,7 +58,7 @@ def reading(light: Vector, scenery: str = "") -> float:
     space, clock = body_space(SPACE), Simulation()
     model = solo_spec(LAMP, space, clock, Environment(scenery=scenery)).compile()
     data = mujoco.MjData(model)
-    sensors = Sensors(LAMP, space, model, data, width=7, has_light=True)
+    sensors = Sensors(PlacedRobot(LAMP, space, model, data), width=7, has_light=True)
     mujoco.mj_kinematics(model, data)
     sensors.look(Surroundings(0.0, (), light=light))
     return float(sensors.readings[0, 6])

@@ -12,11 +12,13 @@ from schema.experiment.environment import Environment
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
+from schema.parts import BUILT_IN
 from schema.plugins.needs import needs
 from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
 from worker.measures import functions
 from worker.robot.evaluation import evaluate, simulate
+from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Probe
 
 PLAIN = evaluation_settings_of(read_experiment("scenario1"))
@@ -143,7 +145,7 @@ def test_work_and_torque_follow_from_the_motion_of_a_flywheel(
     model = wheel(kv, limit)
     data = mujoco.MjData(model)
     data.ctrl[0] = 4.0
-    probe = Probe(model, data, turtle, dofs=slice(0, 7), geoms=(0, 2))
+    probe = Probe(PlacedRobot(turtle, BUILT_IN, model, data))
     work, speed, angle, torques = 0.0, 0.0, 0.0, []
     for _ in range(20):
         mujoco.mj_step(model, data)

@@ -1,0 +1,94 @@
+"""A robot in a model: its slices of the engine's state, its sensors and motors."""
+
+from collections.abc import Iterable
+
+import mujoco
+
+from schema.experiment.document import body_space
+from schema.experiment.settings import ArenaSettings, EvaluationSettings
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+from worker.robot.devices import Sensors, Servos
+from worker.robot.placed import PlacedRobot
+from worker.robot.recording import Channels, Probe, probed_channels
+
+
+class EngineView:
+    """A robot's slice of a model and its state, with its sensors and motors.
+
+    Attributes:
+        model, data: that hold the robot.
+        joints, dofs: its slices of qpos and qvel.
+        qpos, qvel, ctrl: its part of the state, live.
+        root: its first body.
+        geoms: first and last + 1 of its geoms.
+        sensors, servos: of the robot.
+        probe: of its work, torques and contacts; None if nothing needs them.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        settings: EvaluationSettings | ArenaSettings,
+        prefix: str = "",
+    ) -> None:
+        """Find a robot in a model by the prefix of its names."""
+        self.model, self.data = model, data
+        space = body_space(settings.space)
+        placed = PlacedRobot(robot, space, model, data, prefix)
+        self.joints, self.dofs = placed.joints, placed.dofs
+        self.root, self.geoms = placed.root, placed.geoms
+        self.sensors = Sensors(
+            placed,
+            width=settings.space.max_inputs,
+            has_light=settings.light is not None,
+        )
+        self.servos = Servos(placed)
+        self.probe: Probe | None = None
+        if probed_channels(settings):
+            self.probe = Probe(placed)
+        self.qpos: Floats = data.qpos[self.joints]
+        self.qvel: Floats = data.qvel[self.dofs]
+        self.ctrl: Floats = data.ctrl[self.servos.actuators]
+
+    def row(
+        self, channels: Channels, neighbours: int, readings: Floats | None = None
+    ) -> Floats:
+        """Return a sample of the present state as a row.
+
+        Args:
+            channels: of the robot.
+            neighbours: number of robots near it.
+            readings: (1, I') of its sensors, I' >= I; None are the latest.
+        """
+        if self.probe is not None:
+            self.probe.read()
+        return channels.row(
+            self.qpos,
+            self.qvel,
+            probe=None if self.probe is None else self.probe.numbers,
+            readings=self.sensors.readings if readings is None else readings,
+            neighbours=neighbours,
+        )
+
+    def copy_from(self, other: "EngineView") -> None:
+        """Copy the robot's whole state from its view of another model."""
+        self.qpos[:], self.qvel[:] = other.qpos, other.qvel
+        self.ctrl[:] = other.ctrl
+        self.sensors.readings[:] = other.sensors.readings
+        self.sensors.velocities = list(other.sensors.velocities)
+        if self.probe is not None and other.probe is not None:
+            self.probe.numbers[:] = other.probe.numbers
+
+    def touched_of(self, other: "EngineView", touched: Iterable[int]) -> set[int]:
+        """Return which of the robot's geoms are in contact in another model.
+
+        Args:
+            other: its view of that model.
+            touched: geoms in contact there.
+        """
+        first, end = other.geoms
+        shift = self.geoms[0] - first
+        return {geom + shift for geom in touched if first <= geom < end}

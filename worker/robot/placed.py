@@ -1,0 +1,45 @@
+"""Places of a robot's elements in a model, which other robots may share."""
+
+import mujoco
+
+from schema.parts import BodySpace
+from schema.robot.robot import Robot
+
+FREE, FREE_DOFS = 7, 6
+"""Numbers of a free joint's position and orientation, and of its velocity."""
+
+
+class PlacedRobot:
+    """A robot in a model, which is found there by the prefix of its names.
+
+    Attributes:
+        robot: its parts and its brain.
+        space: its part types.
+        model, data: a compiled model that holds it, and the model's state.
+        prefix: of its names in the model.
+        root: its first body.
+        joints, dofs: its slices of the model's positions and velocities.
+        geoms: first and last + 1 of its geoms.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        space: BodySpace,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        prefix: str = "",
+    ) -> None:
+        """Find a robot in a model."""
+        self.robot, self.space, self.prefix = robot, space, prefix
+        self.model, self.data = model, data
+        free = model.joint(f"{prefix}free").id
+        self.root = int(model.jnt_bodyid[free])
+        bodies = (model.body_rootid == self.root).nonzero()[0]
+        # One of a number each, besides the free joint.
+        joints = int(model.body_jntnum[bodies].sum()) - 1
+        start, dof = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
+        self.joints = slice(start, start + FREE + joints)
+        self.dofs = slice(dof, dof + FREE_DOFS + joints)
+        geom = int(model.body_geomadr[self.root])
+        self.geoms = (geom, geom + int(model.body_geomnum[bodies].sum()))
