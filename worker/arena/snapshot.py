@@ -13,7 +13,7 @@ from functools import lru_cache
 import msgspec
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import asdict
+from msgspec.structs import astuple
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
@@ -50,6 +50,13 @@ class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     place: Vector
 
 
+class _Recording(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """Recorded channels of one robot: rows of its window, numbers of its probe."""
+
+    rows: bytes
+    probe: bytes
+
+
 class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """State of an arena between two advances.
 
@@ -59,6 +66,8 @@ class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
         clusters: members of each, as indices into the robots.
         casualties: birth, step, reason and place of robots that diverged and are not
             yet reported by an advance.
+        recordings: of the robots, by birth; only of an arena whose fitness or measures
+            need recorded channels.
     """
 
     format: int
@@ -67,23 +76,7 @@ class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     robots: list[_RobotState]
     clusters: list[list[int]]
     casualties: list[tuple[BirthId, int, str, Vector]]
-
-
-class _Recording(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Recorded channels of one robot: rows of its window, numbers of its probe."""
-
-    rows: bytes
-    probe: bytes
-
-
-class _RecordingState(_ArenaState, frozen=True, array_like=True):
-    """State of an arena whose fitness or measures need recorded channels.
-
-    Attributes:
-        recordings: of the robots, by birth.
-    """
-
-    recordings: list[_Recording]
+    recordings: list[_Recording] = []
 
 
 def write_snapshot(
@@ -108,11 +101,10 @@ def write_snapshot(
         robots=[_robot_state(robot) for robot in population.robots],
         clusters=[[rows[b] for b in c.members] for c in population.clusters],
         casualties=[(c.birth, c.step, c.reason, c.place) for c in casualties],
+        recordings=[_recording(robot) for robot in population.robots],
     )
-    if functions_of(settings).channels:
-        recordings = [_recording(robot) for robot in population.robots]
-        state = _RecordingState(**asdict(state), recordings=recordings)
-    return msgspec.msgpack.encode(state)
+    fields = astuple(state)
+    return msgspec.msgpack.encode(fields if _is_recorded(settings) else fields[:-1])
 
 
 def read_snapshot(
@@ -132,11 +124,8 @@ def read_snapshot(
         MalformedMessage: not a snapshot's bytes, another format, of an arena with
             other settings, or a robot that breaks their rules.
     """
-    is_recorded = bool(functions_of(settings).channels)
     try:
-        state: _ArenaState = msgspec.msgpack.decode(
-            data, type=_RecordingState if is_recorded else _ArenaState
-        )
+        state = msgspec.msgpack.decode(data, type=_ArenaState)
     except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise MalformedMessage(f"snapshot: {error}") from None
     if state.format != FORMAT:
@@ -147,16 +136,19 @@ def read_snapshot(
     if members != list(range(len(state.robots))):
         raise MalformedMessage("snapshot: every robot must be in one cluster")
     robots = [_restored(robot, population) for robot in state.robots]
-    if isinstance(state, _RecordingState):
-        if len(state.recordings) != len(robots):
-            raise MalformedMessage("snapshot: every robot must have a recording")
-        for robot, recording in zip(robots, state.recordings, strict=True):
-            _restore_recording(robot, recording)
+    if len(state.recordings) != len(robots) * _is_recorded(settings):
+        raise MalformedMessage("snapshot: every robot must have a recording")
+    for robot, recording in zip(robots, state.recordings, strict=False):
+        _restore_recording(robot, recording)
     population.add(robots)
     births = [robot.birth for robot in population.robots]
     population.regroup([tuple(births[row] for row in g) for g in state.clusters])
     population.merges = population.splits = 0
     return state.step, [Casualty(*fields) for fields in state.casualties]
+
+
+def _is_recorded(settings: ArenaSettings) -> bool:
+    return bool(functions_of(settings).channels)
 
 
 @lru_cache(maxsize=8)

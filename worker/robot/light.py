@@ -44,16 +44,21 @@ def brightness(
     if distance == 0.0:
         return 1.0
     slope = float(ray @ outward) / distance
-    if slope <= 0.0 or _is_hidden((state, *others), start, ray):
+    ends = (ray_share(world, start, ray) for world in (state, *others))
+    if slope <= 0.0 or any(share < 1.0 for share in ends):
         return 0.0
     return slope * min(1.0, (FULL_WITHIN_M / distance) ** 2)
 
 
-def _is_hidden(states: Sequence[State], start: Floats, ray: Floats) -> bool:
-    """Return whether a geom lies between a sensor's face and the end of its ray."""
+def ray_share(state: State, start: Floats, ray: Floats, but: int = -1) -> float:
+    """Return where a ray meets the first geom, in its lengths; infinite if it does not.
+
+    Args:
+        state: model and data; frames are those of the state.
+        start: (3,) of the ray, world frame [m].
+        ray: (3,) its direction and length.
+        but: body whose geoms it passes; -1 is none.
+    """
     hit = np.zeros(1, dtype=np.int32)
-    for model, data in states:
-        share = mujoco.mj_ray(model, data, start, ray, None, 1, -1, hit)
-        if 0.0 <= share < 1.0:
-            return True
-    return False
+    share = mujoco.mj_ray(*state, start, ray, None, 1, but, hit)
+    return share if hit[0] >= 0 else np.inf

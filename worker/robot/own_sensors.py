@@ -11,7 +11,7 @@ from schema.parts import OwnSensor, Vector
 from schema.plugins.protocols import SensorView
 from schema.plugins.sensor_checks import ray_problem, values_of
 from schema.robot.results import Floats
-from worker.robot.light import State
+from worker.robot.light import State, ray_share
 from worker.robot.placed import PlacedRobot
 
 
@@ -112,17 +112,10 @@ class PartView:
         place = self.position(box) + rotation @ start
         way = rotation @ direction
         own = int(self._state[0].geom_bodyid[self._geoms[box]])
-        nearest = _ray(self._state, place, way, own)
+        nearest = ray_share(self._state, place, way, own)
         for state in self.around.states:
-            nearest = min(nearest, _ray(state, place, way, -1))
+            nearest = min(nearest, ray_share(state, place, way))
         return min(nearest, reach)
-
-
-def _ray(state: State, place: Floats, way: Floats, but: int) -> float:
-    """Return the distance of the first geom on a ray, infinite if there is none."""
-    hit = np.zeros(1, dtype=np.int32)
-    found = mujoco.mj_ray(*state, place, way, None, 1, but, hit)
-    return found if hit[0] >= 0 else np.inf
 
 
 class OwnSensors:
