@@ -24,9 +24,10 @@ from worker.measures.functions import functions_of
 from worker.robot.brains import controls_of
 from worker.robot.engine_view import EngineView
 from worker.robot.filters import filtered_outputs, filtered_readings, filters_of
+from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_sensors import Surroundings
 from worker.robot.recording import Channels, probed_channels, step_with
-from worker.robot.solo_brains import solo_brain
+from worker.robot.solo_brains import SoloNetwork, solo_brain
 
 Watch = Callable[[mujoco.MjData], None]
 
@@ -73,6 +74,7 @@ class ControlLoop:
         self._robot, self._identity, self._means = robot, identity, means
         self._clock, self._light = settings.simulation, settings.environment.light
         self._end = self._clock.evaluation_steps
+        self._tick_steps = self._clock.brain_steps
         self.watch: Watch | None = None
         space = body_space(settings.space)
         try:
@@ -92,10 +94,13 @@ class ControlLoop:
         probe = self._view.probe
         is_working = probe and "energy" in probed_channels(settings)
         self._working = [probe] if probe and is_working else []
-        ticks = self._end // self._clock.brain_steps + 1
+        ticks = self._end // self._tick_steps + 1
         self._brain = solo_brain(controls_of(settings), robot.brain, ticks)
-        self._sensors.write_to(self._brain.readings)
-        self._inputs = self._brain.readings[:, : robot.brain.count("input")]
+        if isinstance(self._brain, SoloNetwork):
+            self._sensors.write_to(self._brain.readings)
+        self._is_guarded = isinstance(self._brain, GuardedBank)
+        self._readings = self._sensors.readings
+        self._inputs = self._readings[:, : robot.brain.count("input")]
         state = model, data
         self._filters = filters_of(robot, settings, self._identity, state, self._means)
         self._channels = Channels(robot, model, settings)
@@ -103,7 +108,7 @@ class ControlLoop:
         self._rows: list[Floats] = []
         self._undisturbed: Floats = self._inputs
         self.now, self._next_sample = 0, self._clock.warmup_steps
-        self._observed = -1
+        self._tick, self._is_unread = 0, True
 
     @property
     def done(self) -> bool:
@@ -119,16 +124,17 @@ class ControlLoop:
             SimulationDiverged: the state is not finite, or the engine failed.
             SensorFailed: a sensor of a plug-in raised or gave wrong values.
         """
-        tick, since = divmod(self.now, self._clock.brain_steps)
-        if self._observed < self.now and not since:
-            self._observed = self.now
+        if self._is_unread:
+            self._is_unread = False
             try:
                 self._read_sensors()
             except mujoco.FatalError as error:
                 raise self._failure(error) from None
             if self._filters:
                 self._undisturbed = self._inputs.copy()
-                self._inputs[:] = filtered_readings(self._filters, tick, self._inputs)
+                self._inputs[:] = filtered_readings(
+                    self._filters, self._tick, self._inputs
+                )
         return self._inputs
 
     def step(self, action: Floats | None = None) -> None:
@@ -143,19 +149,21 @@ class ControlLoop:
                 or the brain of a plug-in failed.
             SensorFailed: as of ``observe``.
         """
-        tick = self.now // self._clock.brain_steps
         self.observe()
-        outputs = self._brain.step(tick) if action is None else 0.5 + 0.5 * action
+        outputs = self._think() if action is None else 0.5 + 0.5 * action[np.newaxis]
         if self._filters:
-            outputs = filtered_outputs(self._filters, tick, outputs[np.newaxis])[0]
-        self._view.servos.drive(outputs)
+            outputs = filtered_outputs(self._filters, self._tick, outputs)
+        self._view.servos.drive(outputs[0])
         if self.watch is not None:
             self.watch(self.data)
+        self._tick += 1
+        next_tick = self._tick * self._tick_steps
         try:
-            self._step_to(min((tick + 1) * self._clock.brain_steps, self._end))
+            self._step_to(min(next_tick, self._end))
         except mujoco.FatalError as error:
             raise self._failure(error) from None
-        if self.done:
+        self._is_unread = self.now == next_tick
+        if self.now == self._end:
             self._finish()
 
     def trace(self) -> Trace:
@@ -175,6 +183,17 @@ class ControlLoop:
             FitnessUndefined: the fitness function raised or gave no finite number.
         """
         return functions_of(self._settings).fitness.value(self.trace())
+
+    def _think(self) -> Floats:
+        """Return the outputs of the robot's own brain, (1, O)."""
+        outputs = self._brain.step(self._readings, float(self._tick))
+        if not self._is_guarded:
+            return outputs
+        for reason in broken_rows(self._brain, outputs).values():
+            what, _, why = reason.partition(": ")
+            time_s = self.now * self._clock.timestep_s
+            raise SimulationDiverged(f"{what} by {time_s:.3f} s: {why}")
+        return outputs
 
     def _step_to(self, until: int) -> None:
         """Step the physics with constant commands; sample on the way."""

@@ -1,14 +1,12 @@
 """Brains of robots that live alone, updated from birth on."""
 
-from typing import Any
-
 import numpy as np
 
-from schema.errors import SimulationDiverged
+from schema.plugins.protocols import Bank
 from schema.robot.brain import Brain, Widths
 from schema.robot.results import Floats
 from worker.robot.brains import HIGHEST, LOWEST, Controls, PackedNetwork
-from worker.robot.guarded_bank import broken_rows, guarded_bank
+from worker.robot.guarded_bank import guarded_bank
 
 
 class SoloNetwork:
@@ -21,9 +19,8 @@ class SoloNetwork:
     nothing.
 
     Attributes:
-        readings: (1, I) sensor readings, which the caller writes before each tick;
-            finite, unused inputs 0.
-        states: (S,) outputs and hidden states after the last tick.
+        readings: (1, I) those of the last tick; to write here saves a copy.
+        states: (1, S) outputs and hidden states after the last tick.
     """
 
     def __init__(
@@ -47,8 +44,9 @@ class SoloNetwork:
         # Inputs and previous states side by side, as the weights expect them.
         self._sources = np.zeros(width.inputs + width.states)
         self.readings: Floats = self._sources[np.newaxis, : width.inputs]
-        self.states: Floats = self._sources[width.inputs :]
-        self._outputs = self.states[: width.outputs]
+        self.states: Floats = self._sources[np.newaxis, width.inputs :]
+        self._states = self.states[0]
+        self._outputs = self.states[:, : width.outputs]
         self._next = np.empty(width.states)
         self._other = np.empty(width.states)
         ages = np.arange(ticks, dtype=np.float64)[:, np.newaxis] * tick_s
@@ -58,26 +56,28 @@ class SoloNetwork:
         offsets[:, is_oscillator] = np.clip(waves, LOWEST, HIGHEST)
         self._offsets = list(offsets)
 
-    def step(self, tick: int) -> Floats:
-        """Update the network with the present readings and return the outputs.
+    def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
+        """Update the network once; see ``NetworkBank.step``.
 
         Args:
-            tick: number of the tick, 0 at birth.
+            readings: (1, I) sensor readings, finite; unused inputs 0.
+            age_ticks: number of the tick, 0 at birth.
 
         Returns:
-            (O,) output states, a view that the next tick overwrites; finite, not
-            yet clipped to [0, 1].
+            (1, O) output states, a view that the next tick overwrites.
         """
-        offset = self._offsets[tick]
+        if readings is not self.readings:
+            self.readings[:] = readings
+        offset = self._offsets[int(age_ticks)]
         if self._has_sigmoids or self._has_linears:
             self._update(offset)
         else:
-            self.states[:] = offset
+            self._states[:] = offset
         return self._outputs
 
     def _update(self, offset: Floats) -> None:
         # ``out`` by position, not by name, saves a fifth of each call.
-        new, states = self._next, self.states
+        new, states = self._next, self._states
         self._weights.dot(self._sources, new)
         np.subtract(new, self._shift, new)
         if not self._has_linears:
@@ -95,44 +95,8 @@ class SoloNetwork:
         np.minimum(new, HIGHEST, out=states)
 
 
-class SoloBank:
-    """A bank of one brain, of any type.
-
-    Attributes:
-        readings: (1, I) sensor readings, which the caller writes before each tick.
-    """
-
-    def __init__(self, controls: Controls, packed: Any) -> None:  # noqa: ANN401
-        """Start at rest.
-
-        Args:
-            controls: of the experiment.
-            packed: a brain in the form of its brain type.
-        """
-        self.readings: Floats = np.zeros((1, controls.width.inputs))
-        self._bank, self._tick_s = guarded_bank(controls, [packed]), controls.tick_s
-
-    def step(self, tick: int) -> Floats:
-        """Update the brain and return its outputs, (O,), not clipped.
-
-        Raises:
-            SimulationDiverged: code of a user that raised or gave no such array, or a
-                state or output that is not finite.
-        """
-        outputs = self._bank.step(self.readings, float(tick))
-        for reason in broken_rows(self._bank, outputs).values():
-            what, _, why = reason.partition(": ")
-            time_s = tick * self._tick_s
-            raise SimulationDiverged(f"{what} by {time_s:.3f} s: {why}")
-        first: Floats = outputs[0]
-        return first
-
-
-Solo = SoloNetwork | SoloBank
-
-
-def solo_brain(controls: Controls, brain: Brain, ticks: int) -> Solo:
-    """Return the brain of a robot that lives alone.
+def solo_brain(controls: Controls, brain: Brain, ticks: int) -> Bank:
+    """Return the brain of a robot that lives alone, as a bank of one.
 
     Args:
         controls: of its experiment.
@@ -145,4 +109,4 @@ def solo_brain(controls: Controls, brain: Brain, ticks: int) -> Solo:
     packed = controls.pack(brain)
     if isinstance(packed, PackedNetwork) and not packed.own:
         return SoloNetwork(packed, controls.width, controls.tick_s, ticks)
-    return SoloBank(controls, packed)
+    return guarded_bank(controls, [packed])

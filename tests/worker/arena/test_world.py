@@ -11,6 +11,7 @@ from schema.errors import UnexpectedEvent
 from schema.experiment.document import Fitness, Space
 from schema.experiment.settings import EvaluationSettings
 from schema.parts import LIGHT_SENSOR
+from schema.plugins.protocols import Bank
 from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -30,7 +31,7 @@ from tests.worker.arena_cases import (
 from worker.arena.world import World
 from worker.robot.brains import Controls
 from worker.robot.evaluation import simulate
-from worker.robot.solo_brains import Solo, solo_brain
+from worker.robot.solo_brains import solo_brain
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)
@@ -158,16 +159,14 @@ def test_replaced_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None
 class Switching:
     """Brain that is exchanged by hand: the first one, then another one at rest."""
 
-    def __init__(self, *solos: Solo) -> None:
+    def __init__(self, *solos: Bank) -> None:
         self.solos = solos
-        self.readings = solos[0].readings
 
-    def step(self, tick: int) -> Floats:
+    def step(self, readings: Floats, age_ticks: float) -> Floats:
         first, second = self.solos
-        if tick <= EXCHANGE // TICK:
-            return first.step(tick)
-        second.readings[:] = self.readings
-        return second.step(tick - EXCHANGE // TICK - 1)
+        if age_ticks <= EXCHANGE // TICK:
+            return first.step(readings, age_ticks)
+        return second.step(readings, age_ticks - EXCHANGE // TICK - 1)
 
 
 def test_exchanged_brain_moves_a_robot_as_two_brains_by_hand(

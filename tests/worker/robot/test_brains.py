@@ -8,15 +8,15 @@ from typing import cast
 import numpy as np
 import pytest
 
-from schema.errors import InvalidRobot, SimulationDiverged
+from schema.errors import InvalidRobot
 from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.robot.brains import Controls, NetworkBank, PackedNetwork, pack
+from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_neurons import STATE_LIMIT
-from worker.robot.solo_brains import SoloBank
 
 WIDTH = widths(Space())
 TICK_S = 0.125
@@ -162,7 +162,8 @@ def test_complex_outputs_of_a_brain_type_are_a_failed_result() -> None:
     controls = SimpleNamespace(
         width=WIDTH, tick_s=TICK_S, is_checked=True, bank=lambda _: Complex()
     )
-    solo = SoloBank(cast("Controls", controls), ())
-    assert solo.step(0)[0] == 0.5
-    with pytest.raises(SimulationDiverged, match=r"by 0\.125 s: .*complex128"):
-        solo.step(1)
+    bank = GuardedBank(cast("Controls", controls), [()])
+    readings = np.zeros((1, WIDTH.inputs))
+    assert not broken_rows(bank, bank.step(readings, 0.0))
+    outputs = bank.step(readings, 1.0)
+    assert "complex128" in broken_rows(bank, outputs)[0]

@@ -32,8 +32,8 @@ def pair(first: Neuron, second: Neuron, weight: float) -> Brain:
 def test_free_oscillator_has_its_frequency_offset_amplitude_and_centre() -> None:
     brain = Brain((Neuron("input", INPUT, 0), oscillator(0.7, 0.2, 0.6, 0.4)))
     solo = solo_brain(controls_of(), brain, 100)
-    solo.readings[:] = 9.0
-    found = [float(solo.step(tick)[0]) for tick in range(100)]
+    nines = np.full((1, 10), 9.0)
+    found = [float(solo.step(nines, float(tick))[0, 0]) for tick in range(100)]
     expected = [
         0.4 + 0.3 * sin(2.0 * pi * (0.7 * TICK_S * tick + 0.2)) for tick in range(100)
     ]
@@ -95,7 +95,8 @@ def test_brains_are_independent_of_the_batch_and_can_be_restored() -> None:
 def test_numbers_of_files_beyond_all_ranges_stay_finite() -> None:
     huge = Neuron("output", PHASE_OSCILLATOR, 0, (1e308, -1e308, 1e308, 1e308))
     solo = solo_brain(controls_of(), pair(huge, huge, -1e308), 50)
-    assert all(np.isfinite(solo.step(tick)).all() for tick in range(50))
+    zeros = np.zeros((1, 10))
+    assert all(np.isfinite(solo.step(zeros, float(t))).all() for t in range(50))
 
 
 def test_an_empty_range_of_frequencies_is_refused() -> None:

@@ -29,9 +29,8 @@ def agree(brain: Brain, ticks: int, seed: int) -> np.ndarray[tuple[int], np.dtyp
     for tick in range(ticks):
         readings = rng.normal(0.0, 5.0, (1, WIDTH.inputs))
         expected = bank.step(readings, float(tick))
-        solo.readings[:] = readings
-        assert solo.step(tick).tobytes() == expected[0].tobytes()
-        assert solo.states.tobytes() == bank.states[0].tobytes()
+        assert solo.step(readings, float(tick)).tobytes() == expected.tobytes()
+        assert solo.states.tobytes() == bank.states.tobytes()
     return solo.states
 
 
