@@ -38,25 +38,23 @@ class ThreadTeam:
             jobs: most expensive first, for an even load.
 
         Raises:
-            BaseException: the first error that a job raised; all other jobs have run.
+            BaseException: an error that a job raised; no job runs any more.
         """
         left = iter(jobs)
-        errors: list[BaseException] = []
 
         def work() -> None:
             # The iterator's step is atomic, so each job goes to one thread.
             for job in left:
-                try:
-                    job()
-                except BaseException as error:  # noqa: BLE001 - raised below
-                    errors.append(error)
+                job()
 
         others = min(self.threads, len(jobs)) - 1
         working = [self._others.submit(work) for _ in range(others)]
-        work()
-        wait(working)
-        if errors:
-            raise errors[0]
+        try:
+            work()
+        finally:
+            wait(working)
+        for each in working:
+            each.result()
 
     def close(self) -> None:
         """Stop the threads; the pool cannot run any more jobs."""

@@ -14,7 +14,6 @@ from functools import partial
 from typing import Self
 
 from schema.errors import SimulationDiverged, UnexpectedEvent
-from schema.experiment.environment import gravity_vector
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -26,7 +25,7 @@ from schema.wire.arena import (
     Insertion,
     Judgement,
 )
-from worker.arena.batched_control import BatchedControllers, BatchedIO
+from worker.arena.batched_control import BatchedControllers
 from worker.arena.changes import check_changes, diverged, newborn
 from worker.arena.looking import look
 from worker.arena.records import Contacts, Poses, Samples
@@ -36,7 +35,6 @@ from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Rollout, Schedule
 from worker.robot.control_loop import silence_engine
-from worker.robot.noise import NoiseSource
 
 _FEW = 5
 """Fewer clusters than this are stepped faster by one thread than by several."""
@@ -66,10 +64,7 @@ class World:
         self._schedule = Schedule(settings)
         self._pool = ThreadTeam(threads)
         controls = self.population.model_cache.controls
-        noise = NoiseSource(clock, controls.width, settings.origin)
-        self._controllers = BatchedControllers(noise, controls)
-        gravity = gravity_vector(settings.environment, clock.gravity)
-        self._io = BatchedIO(controls.width, clock, gravity)
+        self._controllers = BatchedControllers(settings, controls)
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = Poses(clock.timestep_s)
@@ -207,7 +202,7 @@ class World:
             diverged(self.population, rollout, step, reads_warnings=reads_warnings)
         )
         if is_tick:
-            self._tick(rollout)
+            self._tick()
         if is_sample:
             self._sample(rollout.state)
         if is_merge:
@@ -215,17 +210,23 @@ class World:
                 self._contacts.count(self.population.clusters, rollout.moment)
             self.population.merge()
 
-    def _tick(self, rollout: Rollout) -> None:
-        state = rollout.state
-        self._io.settle(self.population.layout)
-        self._io.read(state)
-        if failed := self._look(self.population.robots):
-            self._remove(failed)
-            self._io.settle(self.population.layout)
-            state = rollout.state
-        outputs = self._controllers.tick(self.step, self._io.readings)
-        self._io.drive(state, outputs)
+    def _tick(self) -> None:
+        """Read sensors, update brains and command motors.
+
+        A tick is the last moment of its interval, so the engine's states are those of
+        the moment.
+        """
+        tick_s, cluster_of = (
+            self._settings.simulation.tick_s,
+            self.population.cluster_of,
+        )
+        for robot in self.population.robots:
+            robot.view.sensors.read(tick_s, cluster_of[robot.birth].touched)
+        self._remove(self._look(self.population.robots))
         robots = self.population.robots
+        outputs = self._controllers.tick(self.step, robots)
+        for robot, row in zip(robots, outputs, strict=True):
+            robot.view.servos.drive(row)
         broken = self._controllers.broken.items()
         self._remove_broken([(robots[row], reason) for row, reason in broken])
 

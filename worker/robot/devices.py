@@ -6,22 +6,21 @@ the outputs of a brain into commanded joint velocities. A robot is found in a mo
 the prefix of its names, so that several can share a model.
 """
 
+from collections.abc import Container
 from itertools import chain
-from typing import TypeVar, cast
+from typing import cast
 
 import mujoco
 import numpy as np
 
 from schema.errors import ExperimentError
-from schema.parts import Sensor
+from schema.parts import Sensor, Vector
 from schema.robot.results import Floats
 from worker.robot.contacts import contact_reader
 from worker.robot.light import brightness
 from worker.robot.own_sensors import OwnSensors, Surroundings
 from worker.robot.placed import PlacedRobot
 
-_Velocity = tuple[float, float, float]
-_Number = TypeVar("_Number", float, Floats)
 LOWEST_OUTPUT = 1e-5
 HIGHEST_OUTPUT = 0.99999
 """Outputs are clipped to these before they become target angles."""
@@ -65,7 +64,7 @@ class Sensors:
         model, data, prefix = placed.model, placed.data, placed.prefix
         self._model, self._data = model, data
         self._contacts = contact_reader(model, data)
-        self.velocities: list[_Velocity] = []
+        self.velocities: list[Vector] = []
         self.pads: list[tuple[int, int]] = []
         self.core_imu = -1
         self._imus: list[tuple[int, int]] = []
@@ -110,11 +109,6 @@ class Sensors:
         else:
             self._imus.append((site, place))
 
-    @property
-    def is_simple(self) -> bool:
-        """Whether the free joint's state and contacts determine all readings."""
-        return self.core_imu >= 0 and not self._imus
-
     def write_to(self, readings: Floats) -> None:
         """Move the readings to another array, (1, I), and write there from now on."""
         readings[:] = self.readings
@@ -130,11 +124,12 @@ class Sensors:
         ]
         return self.read(1.0)
 
-    def read(self, interval_s: float) -> Floats:
+    def read(self, interval_s: float, touched: Container[int] | None = None) -> Floats:
         """Read all sensors but those that ``look`` reads.
 
         Args:
             interval_s: since the last reading [s].
+            touched: geoms in contact in the last step, if they are known.
 
         Returns:
             ``readings``, new values.
@@ -145,7 +140,7 @@ class Sensors:
             self._read_sites(interval_s)
         if self.pads:
             # No ravel: a copy of rows that lie apart costs more than the chain.
-            touching = self.touching()
+            touching = self.touching() if touched is None else touched
             for geom, place in self.pads:
                 self._cells[place] = float(geom in touching)
         return self.readings
@@ -287,15 +282,13 @@ class Servos:
 
 
 def into_frame(
-    orientation: tuple[_Number, _Number, _Number, _Number],
-    vector: tuple[_Number, _Number, _Number],
-) -> tuple[_Number, _Number, _Number]:
-    """Return vectors of the world in the frames of rotated bodies.
+    orientation: tuple[float, float, float, float], vector: Vector
+) -> Vector:
+    """Return a vector of the world in the frame of a rotated body.
 
     Args:
-        orientation: w, x, y, z of unit quaternions, body to world; each a number or
-            (N,).
-        vector: world frame, likewise.
+        orientation: w, x, y, z of a unit quaternion, body to world.
+        vector: world frame.
     """
     w, x, y, z = orientation
     ax, ay, az = vector
@@ -313,8 +306,8 @@ def into_frame(
     )
 
 
-def _velocity_of(vector: Floats) -> _Velocity:
-    return cast("_Velocity", tuple(vector.tolist()))
+def _velocity_of(vector: Floats) -> Vector:
+    return cast("Vector", tuple(vector.tolist()))
 
 
 def _cells(array: Floats) -> "memoryview[float]":

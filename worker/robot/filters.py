@@ -12,7 +12,7 @@ from schema.robot.robot import Robot
 from worker.robot.ablation import Ablated
 from worker.robot.calibration import Calibrated
 from worker.robot.light import State
-from worker.robot.noise import Noise, NoiseSource
+from worker.robot.noise import Noise
 from worker.robot.pushes import Pushes
 
 
@@ -76,8 +76,12 @@ def filters_of(
         found.append(calibrated)
         further = calibrated.noise
     if clock.sensor_noise or clock.actuator_noise or further:
-        source = NoiseSource(clock, width, identity.origin, further)
-        found.append(Noise(source, (identity.birth,), identity.trial))
+        births = (identity.birth,)
+        found.append(
+            Noise(
+                clock, width, identity.origin, births, identity.trial, further=further
+            )
+        )
     if settings.ablation is not None:
         found.append(Ablated(settings.ablation, robot, means))
     if environment.push_impulse:

@@ -7,7 +7,6 @@ no state of the generator.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,45 +21,37 @@ BLOCK_TICKS = 64
 """Ticks that are drawn at once, because starting a generator costs more than a draw."""
 
 
-@dataclass(frozen=True, slots=True)
-class NoiseSource:
-    """Parameters that all noise of one evaluation or arena shares.
-
-    Attributes:
-        simulation: holds the standard deviations.
-        width: of every network.
-        origin: run and island of the evaluation or arena.
-        further: standard deviations of further noise on each reading, (I,), and on
-            each output, (O,); None is none.
-    """
-
-    simulation: Simulation
-    width: Widths
-    origin: Origin
-    further: tuple[Floats, Floats] | None = None
-
-
 class Noise:
     """Additive Gaussian noise on the readings and outputs of R robots."""
 
     def __init__(
-        self, source: NoiseSource, births: Sequence[BirthId], trial: int = 0
+        self,
+        simulation: Simulation,
+        width: Widths,
+        origin: Origin,
+        births: Sequence[BirthId],
+        trial: int = 0,
+        *,
+        further: tuple[Floats, Floats] | None = None,
     ) -> None:
         """Initialise the streams.
 
         Args:
-            source: shared parameters.
+            simulation: holds the standard deviations.
+            width: of every network.
+            origin: run and island of the evaluation or arena.
             births: of the robots, one per row.
             trial: number of each robot's evaluation, from 0.
+            further: standard deviations of further noise on each reading, (I,), and
+                on each output, (O,); None is none.
         """
-        self._source = source
-        clock = source.simulation
-        self._on_readings: float | Floats = clock.sensor_noise
-        self._on_outputs: float | Floats = clock.actuator_noise
-        if source.further is not None:
+        self._width, self._origin = width, origin
+        self._on_readings: float | Floats = simulation.sensor_noise
+        self._on_outputs: float | Floats = simulation.actuator_noise
+        if further is not None:
             # Standard deviations of sums of two independent noises.
-            self._on_readings = np.hypot(clock.sensor_noise, source.further[0])
-            self._on_outputs = np.hypot(clock.actuator_noise, source.further[1])
+            self._on_readings = np.hypot(simulation.sensor_noise, further[0])
+            self._on_outputs = np.hypot(simulation.actuator_noise, further[1])
         self._births = births
         self._trial = trial
         self._block = -1
@@ -104,11 +95,10 @@ class Noise:
         return self._drawn[place]
 
     def _draw(self, block: int) -> None:
-        source = self._source
-        inputs, outputs = source.width.inputs, source.width.outputs
+        inputs, outputs = self._width.inputs, self._width.outputs
         numbers = np.empty((BLOCK_TICKS, len(self._births), inputs + outputs))
         for row, birth in enumerate(self._births):
-            rng = stream(DrawPurpose.NOISE, source.origin, birth, self._trial, block)
+            rng = stream(DrawPurpose.NOISE, self._origin, birth, self._trial, block)
             numbers[:, row] = rng.standard_normal((BLOCK_TICKS, inputs + outputs))
         on_readings = numbers[:, :, :inputs] * self._on_readings
         on_outputs = numbers[:, :, inputs:] * self._on_outputs

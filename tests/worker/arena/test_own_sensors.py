@@ -213,26 +213,6 @@ def test_readings_alone_equal_those_in_an_arena_for_the_same_state() -> None:
     assert expected[1] != 0.0
 
 
-def test_batched_commands_of_wheels_and_sliders_equal_single_ones() -> None:
-    newborns = [
-        Insertion(BirthId(0, n), crawler(), (0.4 * n, 0.3 * (n % 2))) for n in range(4)
-    ]
-    world = populated(arena(), newborns)
-    seconds(world, 1.0)
-    layout = world.population.layout
-    outputs = np.random.default_rng(4).uniform(-0.2, 1.2, (4, 10))
-    world._io.settle(layout)
-    world._io.drive(layout.read(), outputs)
-    batched = [one.view.ctrl.tolist() for one in world.population.robots]
-    for one, row, expected in zip(
-        world.population.robots, outputs, batched, strict=True
-    ):
-        one.view.servos.drive(row)
-        assert one.view.ctrl.tolist() == expected
-        share = min(max(row[0], 1e-5), 0.99999)
-        assert expected[0] == pytest.approx(5.236 * (2.0 * share - 1.0))
-
-
 def test_readings_do_not_depend_on_clusters_or_threads(turtle: Robot) -> None:
     """Robots near each other; one thread or two; alone or after a restore."""
     newborns = [

@@ -30,7 +30,7 @@ from worker.arena.replay import alone
 from worker.arena.world import World
 from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT
 from worker.robot.evaluation import evaluate, simulate
-from worker.robot.noise import BLOCK_TICKS, Noise, NoiseSource
+from worker.robot.noise import BLOCK_TICKS, Noise
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)
@@ -48,9 +48,7 @@ WIDTH = widths(Space())
 def noise_of(
     *births: BirthId, simulation: Simulation = LOUD, identity: Identity = IDENTITY
 ) -> Noise:
-    return Noise(
-        NoiseSource(simulation, WIDTH, identity.origin), births, identity.trial
-    )
+    return Noise(simulation, WIDTH, identity.origin, births, identity.trial)
 
 
 def drawn(identity: Identity, ticks: int = 200) -> Floats:
