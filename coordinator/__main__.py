@@ -197,11 +197,9 @@ def _deployment(
     import analyzer.service
     import worker.serve.service
     from worker.arena.world import World
-    from worker.clusters.cluster import check_layout
     from worker.serve.jobs import Jobs
     from worker.serve.shards import Shards
 
-    check_layout()
     if options.speed is not None and not any(map(_has_arena, experiments)):
         names = ", ".join(experiment.name for experiment in experiments)
         raise ExperimentError(f"--speed: limits arenas, and there is none in {names}")

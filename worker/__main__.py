@@ -17,10 +17,8 @@ def main(arguments: list[str]) -> int:
     if arguments[0] == "bench":
         return _bench(arguments)
     from schema.agent.command import run_pool
-    from worker.clusters.cluster import check_layout
     from worker.serve.service import process
 
-    check_layout()
     return run_pool("worker", process, arguments[1:], processes=cores())
 
 

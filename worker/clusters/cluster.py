@@ -6,12 +6,12 @@ an interval independently and keeps its states at the interval's moments.
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
+from itertools import accumulate, chain
 
 import mujoco
 import numpy as np
 
-from schema.errors import RevolveError, one_line
+from schema.errors import one_line
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -30,7 +30,7 @@ class StateHistory:
     The states are columns of an array of all clusters, which need not be gathered.
 
     Attributes:
-        state: (K, W) all of ``Cluster.live``.
+        state: (K, W) all of ``Cluster.live``, one array after another.
         warnings: (K, N) the engine's counts of each of its warnings.
         touching: pairs of members in contact, if they are recorded.
         probed: numbers of the members' probes, if there are any.
@@ -41,11 +41,11 @@ class StateHistory:
         warnings = cluster.data.warning.number
         # Copies between memory views are faster than between arrays, and one view of
         # all rows is faster than one of each, as few of them stay in the caches.
-        self._live, self._warnings = cluster.live.data, warnings.data
-        first, velocity, *_ = cluster.parts
-        self._positions = slice(first, first + cluster.model.nq)
-        self._velocities = slice(velocity, velocity + cluster.model.nv)
-        self.state = np.zeros((0, len(cluster.live)))
+        self._live = [array.data for array in cluster.live]
+        self._warnings = warnings.data
+        self._positions = slice(0, cluster.model.nq)
+        self._velocities = slice(cluster.model.nq, cluster.parts[2])
+        self.state = np.zeros((0, cluster.size))
         self.warnings = np.zeros((0, len(warnings)), dtype=warnings.dtype)
         self.touching: list[list[tuple[int, int]]] = []
         self.probed: list[list[Floats]] = []
@@ -68,7 +68,7 @@ class StateHistory:
             start: first column of the cluster.
         """
         count, self._width = states.shape
-        state = states[:, start : start + len(self._live)]
+        state = states[:, start : start + self.state.shape[1]]
         if new := count - len(self.state):
             added = np.zeros((new, self.warnings.shape[1]), self.warnings.dtype)
             self.warnings = np.concatenate((self.warnings, added))
@@ -81,8 +81,9 @@ class StateHistory:
 
     def keep(self, moment: int) -> None:
         """Copy the present state and warnings to the rows of a moment."""
-        at = moment * self._width + self._start
-        self._cells[at : at + len(self._live)] = self._live
+        at, cells = moment * self._width + self._start, self._cells
+        for array in self._live:
+            cells[at : (at := at + len(array))] = array
         at = moment * len(self._warnings)
         self._counts[at : at + len(self._warnings)] = self._warnings
 
@@ -93,9 +94,10 @@ class Cluster:
     Attributes:
         members: births of its robots, ascending.
         views: of the members, in that order.
-        live: (W,) live view of the state, as of the last step: positions, velocities,
-            positions of all bodies and their rotations, and what lies between them.
-        parts: where these four start.
+        live: the state as of the last step, live: positions, velocities, positions of
+            all bodies and their rotations, each as one row of numbers.
+        parts: where these four start in a row of all.
+        size: W, numbers of the row.
         history: states at the moments of the last interval.
         cost: of a step, in arbitrary units; orders clusters for threads.
         failure: the engine's error; empty if there was none.
@@ -130,7 +132,11 @@ class Cluster:
         for number, view in enumerate(self.views):
             first, end = view.geoms
             self._owners[first:end] = [number] * (end - first)
-        self.live, self.parts = _live(self.data)
+        data = self.data
+        arrays = (data.qpos, data.qvel, data.xpos, data.xmat)
+        self.live: tuple[Floats, ...] = tuple(each.reshape(-1) for each in arrays)
+        *starts, self.size = accumulate(map(len, self.live), initial=0)
+        self.parts = tuple(starts)
         self.probes = [view.probe for view in self.views if view.probe is not None]
         has_work = "energy" in probed_channels(settings)
         self._working = self.probes if has_work else []
@@ -209,33 +215,3 @@ class Cluster:
         """Reset the state to the model's initial one."""
         mujoco.mj_resetData(self.model, self.data)
         self.failure, self.failed_at = "", NEVER
-
-
-def check_layout() -> None:
-    """Raise ``RevolveError`` if the engine's arrays have another order than needed."""
-    bodies = "<worldbody><body><freejoint/><geom size='1'/></body></worldbody>"
-    model = mujoco.MjModel.from_xml_string(f"<mujoco>{bodies}</mujoco>")
-    _live(mujoco.MjData(model))
-
-
-def _live(data: mujoco.MjData) -> tuple[Floats, tuple[int, int, int, int]]:
-    """Return ``live`` and ``parts`` of a cluster.
-
-    The engine keeps all its arrays in one block of memory, in an order that minor
-    versions may change. To copy everything from the first to the last that is wanted is
-    twice as fast as to copy four arrays, although half of it is not wanted.
-    """
-    wanted = data.qpos, data.qvel, data.xpos, data.xmat
-    start = data.qpos.ctypes.data
-    first, second, third, last = (
-        (array.ctypes.data - start) // array.itemsize for array in wanted
-    )
-    end = last + data.xmat.size
-    is_known = 0 == first < second < third < last
-    if not is_known or end * data.qpos.itemsize > data.nbuffer:
-        raise RevolveError(
-            f"MuJoCo {mujoco.__version__} orders the arrays of a state in another way "
-            "than arenas need: install mujoco-core 4.0"
-        )
-    live = np.lib.stride_tricks.as_strided(data.qpos, (end,), writeable=False)
-    return live, (first, second, third, last)

@@ -136,13 +136,13 @@ class StateColumns:
         for cluster in new:
             cluster.history.move(self.states, self._end)
             self._starts[cluster] = self._end
-            self._end += len(cluster.live)
+            self._end += cluster.size
         self._starts = {cluster: self._starts[cluster] for cluster in clusters}
         return list(self._starts.values())
 
 
 def _size(clusters: Iterable[Cluster]) -> int:
-    return sum(len(cluster.live) for cluster in clusters)
+    return sum(cluster.size for cluster in clusters)
 
 
 class Layout:
@@ -208,7 +208,7 @@ class Layout:
         """Return a copy of the present state, (W,)."""
         found = np.zeros(self.states.shape[1])
         for cluster, start in zip(self.clusters, self._columns, strict=True):
-            found[start : start + len(cluster.live)] = cluster.live
+            found[start : start + cluster.size] = np.concatenate(cluster.live)
         return found
 
     def velocities(self, states: Floats) -> Floats:

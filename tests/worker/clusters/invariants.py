@@ -68,7 +68,7 @@ def _check_columns(population: ArenaPopulation) -> None:
         assert angles[: size - 7].tobytes() == view.qpos[7:].tobytes()
         angles = angles[size - 7 :]
     assert not len(angles)
-    taken = sorted((_first_column(population, c), len(c.live)) for c in layout.clusters)
+    taken = sorted((_first_column(population, c), c.size) for c in layout.clusters)
     ends = [start + width for start, width in taken]
     assert all(end <= start for end, (start, _) in zip(ends, taken[1:], strict=False))
     assert not ends or ends[-1] <= layout.states.shape[1]

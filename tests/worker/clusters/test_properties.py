@@ -166,12 +166,12 @@ def test_columns_keep_what_is_theirs(moments: int, data: DataObject) -> None:
         alive = [*stay, *new]
         firsts = columns.place(alive)  # type: ignore[arg-type]
         cells = [
-            set(range(first, first + len(each.live)))
+            set(range(first, first + each.size))
             for first, each in zip(firsts, alive, strict=True)
         ]
         assert len(set().union(*cells)) == sum(map(len, cells))
         for first, cluster in zip(firsts, alive, strict=True):
-            own = columns.states[:, first : first + len(cluster.live)]
+            own = columns.states[:, first : first + cluster.size]
             assert np.shares_memory(own, cluster.history.rows)
             assert (own == cluster.mark).all()
             cluster.mark = float(data.draw(st.integers(1, 10**6)) + number)
@@ -182,7 +182,7 @@ class FakeCluster:
     """Cluster and history of some numbers, all of which are ``mark``."""
 
     def __init__(self, width: int) -> None:
-        self.live, self.mark = np.zeros(width), 0.0
+        self.size, self.mark = width, 0.0
         self.rows = np.zeros((0, width))
         self.history = self
 
