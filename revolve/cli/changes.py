@@ -15,7 +15,7 @@ from revolve.cli.winners import Chosen, chosen_robots
 from revolve.robot import plain
 from schema.experiment.document import REVOLVE_ANGLE, body_space
 from schema.robot.ids import BirthId
-from worker.robot.ablation import all_ablations
+from worker.filters.ablation import all_ablations
 from worker.robot.robustness import all_changes
 
 

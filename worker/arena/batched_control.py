@@ -12,10 +12,10 @@ from schema.experiment.settings import ArenaSettings
 from schema.plugins.protocols import Bank
 from schema.robot.results import Floats
 from worker.clusters.robot import ArenaRobot
+from worker.filters.filters import Filter, filtered_outputs, filtered_readings
+from worker.filters.noise import Noise
 from worker.robot.brains import Controls
-from worker.robot.filters import Filter, filtered_outputs, filtered_readings
 from worker.robot.guarded_bank import broken_rows, guarded_bank
-from worker.robot.noise import Noise
 
 
 class BatchedControllers:

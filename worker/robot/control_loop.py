@@ -20,10 +20,10 @@ from schema.mjcf.model import solo_spec
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
+from worker.filters.filters import filtered_outputs, filtered_readings, filters_of
 from worker.measures.functions import functions_of
 from worker.robot.brains import controls_of
 from worker.robot.engine_view import EngineView
-from worker.robot.filters import filtered_outputs, filtered_readings, filters_of
 from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_sensors import Surroundings
 from worker.robot.recording import Channels, probed_channels, step_with

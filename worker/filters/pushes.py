@@ -9,7 +9,7 @@ from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import Identity
 from schema.robot.results import Floats
-from worker.robot.random_streams import DrawPurpose, stream
+from worker.filters.random_streams import DrawPurpose, stream
 
 
 class Pushes:

@@ -15,7 +15,7 @@ from schema.experiment.identity import Origin
 from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from worker.robot.random_streams import DrawPurpose, stream
+from worker.filters.random_streams import DrawPurpose, stream
 
 BLOCK_TICKS = 64
 """Ticks that are drawn at once, because starting a generator costs more than a draw."""

@@ -28,9 +28,9 @@ from tests.worker.arena_cases import (
 from tests.worker.evaluations import IDENTITY, ORIGIN, OTHERS, bits, with_simulation
 from worker.arena.replay import alone
 from worker.arena.world import World
+from worker.filters.noise import BLOCK_TICKS, Noise
 from worker.robot.devices import HIGHEST_OUTPUT, LOWEST_OUTPUT
 from worker.robot.evaluation import evaluate, simulate
-from worker.robot.noise import BLOCK_TICKS, Noise
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)

@@ -16,7 +16,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from tests.documents import parse_experiment
 from worker.bench.spider import spider
-from worker.robot.calibration import Calibrated
+from worker.filters.calibration import Calibrated
 from worker.robot.evaluation import evaluate
 
 TICK_S = 0.125

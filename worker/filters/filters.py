@@ -3,17 +3,18 @@
 from collections.abc import Iterable, Sequence
 from typing import Protocol
 
+import mujoco
+
 from schema.experiment.brains import widths
 from schema.experiment.document import body_space
 from schema.experiment.identity import Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.robot.ablation import Ablated
-from worker.robot.calibration import Calibrated
-from worker.robot.light import State
-from worker.robot.noise import Noise
-from worker.robot.pushes import Pushes
+from worker.filters.ablation import Ablated
+from worker.filters.calibration import Calibrated
+from worker.filters.noise import Noise
+from worker.filters.pushes import Pushes
 
 
 class Filter(Protocol):
@@ -47,7 +48,7 @@ def filters_of(
     robot: Robot,
     settings: EvaluationSettings,
     identity: Identity,
-    state: State,
+    state: tuple[mujoco.MjModel, mujoco.MjData],
     means: Sequence[float] = (),
 ) -> tuple[Filter, ...]:
     """Return the filters of an evaluation, in the order in which they act.

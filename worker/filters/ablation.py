@@ -11,7 +11,7 @@ from schema.experiment.settings import Ablation, ablation_problems
 from schema.parts import BodySpace, Sensor
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.robot.calibration import NEUTRAL
+from worker.filters.calibration import NEUTRAL
 
 
 class Ablated:

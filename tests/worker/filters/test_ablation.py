@@ -20,7 +20,7 @@ from schema.robot.brain import INPUT, Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
-from worker.robot.ablation import all_ablations
+from worker.filters.ablation import all_ablations
 from worker.robot.evaluation import evaluate, mean_inputs, simulate
 
 GREY = (0.5, 0.5, 0.5)

@@ -1,0 +1,1 @@
+"""Filters between sensors, brains and motors: noise, calibration, ablation, pushes."""
