@@ -219,15 +219,13 @@ class Servos:
         actuators: indices of its actuators in the model, contiguous.
         motors: of each, the address of its joint's angle in the model, lowest target,
             range of the targets, gain and greatest velocity. Of a motor that controls
-            the velocity, targets are velocities, and the gain is 0.
-        free: indices in ``motors`` of those that control the velocity.
+            the velocity, targets are velocities, and the address is -1.
     """
 
     def __init__(self, placed: PlacedRobot) -> None:
         """Find the actuators of a robot in a model."""
         model, data = placed.model, placed.data
         self.motors: list[tuple[int, float, float, float, float]] = []
-        self.free: list[int] = []
         found: list[int] = []
         for index, part in enumerate(placed.robot.parts):
             motor = placed.space[part.kind].motor
@@ -241,8 +239,7 @@ class Servos:
             limits = (low, high - low, motor.gain, motor.max_velocity)
             if motor.control == "velocity":
                 fastest = motor.max_velocity
-                limits = (-fastest, 2.0 * fastest, 0.0, fastest)
-                self.free.append(len(self.motors))
+                address, limits = -1, (-fastest, 2.0 * fastest, 1.0, fastest)
             self.motors.append((address, *limits))
         first = found[0] if found else 0
         self.actuators = slice(first, first + len(found))
@@ -269,16 +266,14 @@ class Servos:
                 share = LOWEST_OUTPUT
             elif share > HIGHEST_OUTPUT:
                 share = HIGHEST_OUTPUT
-            command = gain * (low + share * span - angles[address])
+            command = low + share * span
+            if address >= 0:
+                command = gain * (command - angles[address])
             if command < -fastest:
                 command = -fastest
             elif command > fastest:
                 command = fastest
             commands[index] = command
-        for index in self.free:
-            share = min(max(float(outputs[index]), LOWEST_OUTPUT), HIGHEST_OUTPUT)
-            _, low, span, _, _ = self.motors[index]
-            commands[index] = low + share * span
 
 
 def into_frame(
