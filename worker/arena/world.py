@@ -34,7 +34,7 @@ from worker.arena.threads import ThreadTeam
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Rollout, Schedule
-from worker.robot.control_loop import silence_engine
+from worker.robot.engine_warnings import silence_engine
 
 _FEW = 5
 """Fewer clusters than this are stepped faster by one thread than by several."""

@@ -5,11 +5,9 @@ All clocks are integers of physics steps; the wall clock is never read.
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from schema.errors import SimulationDiverged, one_line
 from schema.experiment.brains import with_room
@@ -24,6 +22,7 @@ from worker.filters.filters import filtered_outputs, filtered_readings, filters_
 from worker.measures.functions import functions_of
 from worker.robot.brains import controls_of
 from worker.robot.engine_view import EngineView
+from worker.robot.engine_warnings import silence_engine, warning_names
 from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_sensors import Surroundings
 from worker.robot.recording import Channels, probed_channels, step_with
@@ -252,20 +251,3 @@ class ControlLoop:
         time_s = self.now * self._clock.timestep_s
         reason = warning_names(self.data.warning.number) or "state not finite"
         raise SimulationDiverged(f"physics diverged by {time_s:.3f} s: {reason}")
-
-
-def warning_names(counts: npt.NDArray[np.integer]) -> str:
-    """Return the names of the engine's warnings whose counts are not 0."""
-    return ", ".join(
-        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
-        for index in counts.nonzero()[0].tolist()
-    )
-
-
-@lru_cache(maxsize=1)
-def silence_engine() -> None:
-    """Keep the engine's warnings out of stderr and of its log file.
-
-    The engine still counts them in ``MjData.warning``.
-    """
-    mujoco.set_mju_user_warning(lambda _message: None)
