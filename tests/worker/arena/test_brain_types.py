@@ -46,6 +46,14 @@ OSCILLATING: dict[str, tuple[ArenaSettings, Callable[[int], Neuron]]] = {
 }
 
 
+def off_line(settings: ArenaSettings, **clock: int) -> EvaluationSettings:
+    """Return settings in which a robot alone lives as in an arena."""
+    world = replace(settings.simulation, drop_m=settings.arena.drop_m, **clock)
+    return EvaluationSettings(
+        settings.space, world, settings.fitness, brain=settings.brain
+    )
+
+
 def robots(turtle: Robot, make: Callable[[int], Neuron]) -> list[Robot]:
     """Return two robots with neurons of a type, coupled in different ways."""
     inputs = tuple(n for n in turtle.brain.neurons if n.layer == "input")
@@ -79,18 +87,10 @@ def test_restored_arena_continues_equal_to_the_last_bit(
 def test_robot_in_an_arena_ticks_as_off_line(name: str, turtle: Robot) -> None:
     settings, make = OSCILLATING[name]
     robot = robots(turtle, make)[0]
-    off_line = EvaluationSettings(
-        space=settings.space,
-        simulation=replace(
-            settings.simulation, drop_m=settings.arena.drop_m, window_steps=400
-        ),
-        fitness=settings.fitness,
-        brain=settings.brain,
-    )
     birth = BirthId(0, 0)
     world = populated(settings, [Insertion(birth, robot, (0.0, 0.0), 0.0)])
     seconds(world, 5.0)
-    track = simulate(robot, off_line)
+    track = simulate(robot, off_line(settings, window_steps=400))
     found = np.array(world.population.find(birth).window.positions)
     assert np.array_equal(found, track.core_position)
 
@@ -227,14 +227,8 @@ def test_robot_whose_brain_cannot_be_made_is_a_casualty(
     found = seconds(world, 1.0).casualties
     reason = "brain failed: KeyError: 'gone'"
     assert [(one.birth, one.reason) for one in found] == [(c, reason), (b, reason)]
-    off_line = EvaluationSettings(
-        space=settings.space,
-        simulation=settings.simulation,
-        fitness=settings.fitness,
-        brain=settings.brain,
-    )
     with pytest.raises(SimulationDiverged, match=f"^{reason}$"):
-        simulate(second, off_line)
+        simulate(second, off_line(settings))
 
 
 @pytest.mark.usefixtures("_own_brains")
@@ -250,14 +244,8 @@ def test_outputs_of_a_wrong_shape_are_a_failure(
     outputs = world.population.model_cache.controls.width.outputs
     story = f"ValueError: step must return (R, O) = (1, {outputs}), got (1, 2)"
     assert casualty.reason == f"brain failed: {story}"
-    off_line = EvaluationSettings(
-        space=settings.space,
-        simulation=settings.simulation,
-        fitness=settings.fitness,
-        brain=settings.brain,
-    )
     with pytest.raises(SimulationDiverged) as caught:
-        simulate(robot, off_line)
+        simulate(robot, off_line(settings))
     assert str(caught.value) == f"brain failed by 0.000 s: {story}"
 
 
