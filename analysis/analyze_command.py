@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-from analysis.comparison.comparison import Outcomes, comparison
-from analysis.comparison.findings import WithBenchmark, findings
+from analysis.comparison.comparison import comparison, outcomes_of
+from analysis.comparison.findings import findings, with_benchmark
 from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
@@ -35,7 +35,9 @@ from schema.tables.description import check_folder, make_folder
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
 _ALWAYS = ("populations", "robots", "extremities")
 """Measures that are read in any case; empty if they could not be measured."""
-_LIBRARIES = ("revolve-islands", "mujoco-core", "numpy", "pyarrow", "plotnine")
+_LIBRARIES = (
+    "revolve-islands", "mujoco-core", "numpy", "pyarrow", "scipy", "plotnine",
+)  # fmt: skip
 
 
 def analyze(
@@ -104,10 +106,10 @@ def _measured(
     empty = {name: schema(name).empty_table() for name in _ALWAYS}
     tables = {**empty, **concatenated(measured)}
     tables["progression"] = progression(tables["populations"])
-    outcomes = Outcomes(measured)
+    outcomes = outcomes_of(measured)
     tables["outcomes"] = outcomes.table()
     tables["comparison"] = comparison(outcomes)
-    tables["findings"] = findings(WithBenchmark(outcomes, benchmark))
+    tables["findings"] = findings(with_benchmark(outcomes, benchmark))
     bar.remove_task(comparing)
     return tables, [one for run in measured for one in run.left_out]
 

@@ -8,9 +8,10 @@ their founders; treating them as independent, as is done here, is conservative.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from itertools import combinations
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -27,62 +28,58 @@ OF_FITNESS = frozenset({
 """Measures whose values depend on the scale of the fitness function."""
 
 
-class RunOutcomes(Protocol):
-    """Outcomes of the finished runs of experiments."""
+class RunOutcomes(NamedTuple):
+    """Outcomes of one finished run.
 
-    @property
-    def experiments(self) -> list[str]:
-        """Experiments with finished runs, by name."""
+    Attributes:
+        folder: path of the run folder.
+        fitness: fitness function as ``fitness_text``.
+        births: numbers of births at which it has outcomes.
+        at: returns the outcomes at one of these, by measure.
+    """
 
-    def births(self, *experiments: str) -> int:
-        """Return the most births that all runs of some experiments reach."""
-
-    def values(self, experiment: str, measure: str, births: int) -> Numbers:
-        """Return the runs' values of a measure; runs without a value are skipped."""
-
-    def fitness_functions(self, *experiments: str) -> list[str]:
-        """Return the fitness functions of experiments, each once."""
-
-
-class Compared(RunOutcomes, Protocol):
-    """Outcomes of experiments that may name measures of their own."""
-
-    def own_measures(self, births: int, *experiments: str) -> list[str]:
-        """Return the outcomes that are measures named by experiments, by name."""
+    folder: str
+    fitness: str
+    births: Collection[int]
+    at: Callable[[int], Mapping[str, float]]
 
 
 class Outcomes:
-    """Outcomes of finished runs, at any number of births; other runs are ignored."""
+    """Outcomes of the finished runs of experiments.
 
-    def __init__(self, measured: Sequence[MeasuredRun]) -> None:
-        self._runs: dict[str, list[MeasuredRun]] = {}
-        for one in measured:
-            if one.run.is_finished and reach(one):
-                self._runs.setdefault(one.run.experiment, []).append(one)
-        self._known: dict[tuple[str, int], list[dict[str, float]]] = {}
+    Args:
+        runs: runs by experiment, at least one of each.
+    """
+
+    def __init__(self, runs: Mapping[str, Sequence[RunOutcomes]]) -> None:
+        self.runs = runs
+        self._known: dict[tuple[str, int], list[Mapping[str, float]]] = {}
 
     @property
     def experiments(self) -> list[str]:
         """Experiments with finished runs, by name."""
-        return sorted(self._runs)
+        return sorted(self.runs)
 
     def births(self, *experiments: str) -> int:
-        """Return the most births that all runs of some experiments reach."""
-        return min(reach(one) for name in experiments for one in self._runs[name])
+        """Return the most births at which all runs of some experiments have outcomes.
 
-    def at(self, experiment: str, births: int) -> list[dict[str, float]]:
+        0 if there are none.
+        """
+        each = [set(run.births) for name in experiments for run in self.runs[name]]
+        return max(set.intersection(*each), default=0)
+
+    def at(self, experiment: str, births: int) -> list[Mapping[str, float]]:
         """Return each run's outcomes at a number of births, in the runs' order."""
-        key, runs = (experiment, births), self._runs[experiment]
+        key = (experiment, births)
         if key not in self._known:
-            self._known[key] = [
-                outcome(one.tables, births, one.run.islands) for one in runs
-            ]
+            runs = self.runs[experiment]
+            self._known[key] = [run.at(births) for run in runs if births in run.births]
         return self._known[key]
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
         """Return the runs' values of a measure; runs without a value are skipped."""
         runs = self.at(experiment, births)
-        found = np.array([run.get(measure, math.nan) for run in runs])
+        found = np.array([run.get(measure, math.nan) for run in runs], np.float64)
         values: Numbers = found[~np.isnan(found)]
         return values
 
@@ -93,7 +90,7 @@ class Outcomes:
 
     def fitness_functions(self, *experiments: str) -> list[str]:
         """Return the fitness functions of experiments, each once."""
-        runs = (one.run for name in experiments for one in self._runs[name])
+        runs = (run for name in experiments for run in self.runs[name])
         return list(dict.fromkeys(run.fitness for run in runs))
 
     def table(self) -> pa.Table:
@@ -101,14 +98,26 @@ class Outcomes:
         rows: list[Row] = []
         for name in self.experiments:
             births = self.births(name)
-            for one, found in zip(self._runs[name], self.at(name, births), strict=True):
+            each = zip(self.runs[name], self.at(name, births), strict=True)
+            for run, found in each:
                 numbers: Row = {key: known(value) for key, value in found.items()}
-                names = {"experiment": name, "folder": str(one.run.folder)}
-                rows.append(numbers | names | {"births": births})
+                names = {"experiment": name, "folder": run.folder, "births": births}
+                rows.append(numbers | names)
         return pa.Table.from_pylist(rows, schema("outcomes"))
 
 
-def comparison(outcomes: Compared) -> pa.Table:
+def outcomes_of(measured: Sequence[MeasuredRun]) -> Outcomes:
+    """Return the outcomes of measured runs; those of unfinished runs are ignored."""
+    runs: dict[str, list[RunOutcomes]] = {}
+    for one in measured:
+        if one.run.is_finished and (end := reach(one)):
+            at = partial(outcome, one.tables, settings=one.run.islands)
+            made = RunOutcomes(str(one.run.folder), one.run.fitness, range(end + 1), at)
+            runs.setdefault(one.run.experiment, []).append(made)
+    return Outcomes(runs)
+
+
+def comparison(outcomes: Outcomes) -> pa.Table:
     """Return the comparison of every pair of experiments by every measure.
 
     Args:

@@ -7,17 +7,15 @@ one-sided tests procedure and the power approach*, J. Pharmacokin. Biopharm. 15,
 
 import math
 from functools import lru_cache
-from statistics import NormalDist
 
 import numpy as np
+from scipy import stats
 
 from analysis.comparison.statistics import (
     mean,
     rank_sum_ways,
     score_variance,
     standard_error,
-    t_quantile,
-    t_tail,
 )
 from analysis.measures.population_table import Numbers
 
@@ -38,7 +36,7 @@ def alike_p(delta: float, first: int, second: int, margin: float) -> float:
     """
     end = (margin + 1) / 2
     error = math.sqrt(score_variance(end, first, second))
-    return NormalDist().cdf((abs(delta) - margin) / 2 / error)
+    return float(stats.norm.cdf((abs(delta) - margin) / 2 / error))
 
 
 @lru_cache
@@ -54,7 +52,7 @@ def alike_power(first: int, second: int, margin: float, alpha: float = ALPHA) ->
         alpha: less than 5 % if p is corrected for many tests.
     """
     error = math.sqrt(score_variance((margin + 1) / 2, first, second))
-    most = margin - 2 * NormalDist().inv_cdf(1 - alpha) * error
+    most = margin - 2 * stats.norm.ppf(1 - alpha) * error
     ways = rank_sum_ways(2 * np.arange(1, first + second + 1), first)
     # A doubled rank sum s is delta = (s - first (first + 1)) / (first second) - 1.
     delta = (np.arange(len(ways)) - first * (first + 1)) / (first * second) - 1
@@ -77,7 +75,7 @@ def mean_alike_p(values: Numbers, reference: float, margin: float) -> float:
         return 1.0
     if error == 0:
         return 0.0 if room > 0 else 1.0
-    return t_tail(room / error, len(values) - 1)
+    return float(stats.t.sf(room / error, len(values) - 1))
 
 
 def mean_alike_power(values: Numbers, margin: float) -> float:
@@ -94,5 +92,5 @@ def mean_alike_power(values: Numbers, margin: float) -> float:
         return 0.0
     if error == 0:
         return 1.0
-    room = margin / error - t_quantile(freedom, 1 - 2 * ALPHA)
-    return max(0.0, 1 - 2 * t_tail(room, freedom))
+    room = margin / error - stats.t.ppf(1 - ALPHA, freedom)
+    return max(0.0, 1 - 2 * float(stats.t.sf(room, freedom)))

@@ -1,13 +1,13 @@
 """Tests of the findings of the thesis."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.claims import ARENA, CLAIMS, Claim
-from analysis.comparison.comparison import OF_FITNESS, RunOutcomes
+from analysis.comparison.comparison import OF_FITNESS, Outcomes, RunOutcomes
 from analysis.comparison.equivalence import (
     alike_p,
     alike_power,
@@ -23,44 +23,26 @@ ARENA_ROBOTS = 30
 """Robots of the arena whose speed is tested."""
 
 
-class WithBenchmark:
-    """Outcomes of runs, and the speed of an arena as an experiment of its own.
+def with_benchmark(outcomes: Outcomes, benchmark: pa.Table) -> Outcomes:
+    """Return outcomes with the speed of an arena as an experiment of its own.
 
     Args:
         outcomes: outcomes of runs.
         benchmark: rows of ``revolve bench arena --out``; each repetition is a run.
     """
-
-    def __init__(self, outcomes: RunOutcomes, benchmark: pa.Table) -> None:
-        self._outcomes = outcomes
-        is_of = (pc.field("benchmark") == "arena") & (
-            pc.field("population") == ARENA_ROBOTS
-        )
-        factors = benchmark.filter(is_of)["factor"]
-        self._factors: Numbers = np.asarray(factors, np.float64)
-
-    @property
-    def experiments(self) -> list[str]:
-        """Experiments with finished runs, by name."""
-        return [*self._outcomes.experiments, *([ARENA] if len(self._factors) else [])]
-
-    def births(self, *experiments: str) -> int:
-        """Return the most births that all runs reach; 0 for the benchmark."""
-        return 0 if ARENA in experiments else self._outcomes.births(*experiments)
-
-    def values(self, experiment: str, measure: str, births: int) -> Numbers:
-        """Return the runs' values of a measure; runs without a value are skipped."""
-        if experiment != ARENA:
-            return self._outcomes.values(experiment, measure, births)
-        return self._factors if measure == "real_time_factor" else np.empty(0)
-
-    def fitness_functions(self, *experiments: str) -> list[str]:
-        """Return the fitness functions of experiments, each once; none of ``ARENA``."""
-        names = [name for name in experiments if name != ARENA]
-        return self._outcomes.fitness_functions(*names)
+    is_of = (pc.field("benchmark") == "arena") & (
+        pc.field("population") == ARENA_ROBOTS
+    )
+    factors = benchmark.filter(is_of)["factor"].to_pylist()
+    speeds = [RunOutcomes("", "", (0,), _speed(factor)) for factor in factors]
+    return Outcomes({**outcomes.runs, **({ARENA: speeds} if speeds else {})})
 
 
-def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
+def _speed(factor: float) -> Callable[[int], dict[str, float]]:
+    return lambda _: {"real_time_factor": factor}
+
+
+def findings(outcomes: Outcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     """Return the test of each finding of the thesis.
 
     Args:
@@ -91,7 +73,7 @@ def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Tabl
     return pa.Table.from_pylist(rows, schema("findings"))
 
 
-def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
+def _tested(outcomes: Outcomes, claim: Claim) -> Row:
     """Return the numbers of a claim, or the reason why it cannot be tested."""
     names = [name for name in (claim.a, claim.b) if name is not None]
     for name in names:

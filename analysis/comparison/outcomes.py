@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from scipy import stats
 
-from analysis.comparison.statistics import ranks
 from analysis.measures.load import IslandSettings, island_settings
-from analysis.measures.outputs import OWN, POPULATION
+from analysis.measures.outputs import OWN, POPULATION, schema
 from analysis.measures.population_table import Numbers
 from analysis.measures.populations import RETENTION_BIRTHS
 
@@ -47,28 +47,23 @@ def outcome(
     for name in each[0] if each else ():
         found[name] = _mean(np.array([one[name] for one in each]))
     going_on = np.unique(islands[counts > births]).tolist()
-    if "robots" in tables:
-        found |= _of_robots(tables["robots"], found, births)
-        judged_again = [
-            island
-            for island in going_on
-            if (own := island_settings(island, settings)).is_online or own.reevaluation
-        ]
-        judged = _without(tables["robots"], judged_again)
-        found |= _correlations(judged.filter(pc.field("birth") < births))
-    found |= _own_measures(tables, births)
-    whole = {
-        name: _without(tables[name], going_on)
-        for name in ("families", "interactions", "variability")
-        if name in tables
-    }
-    found |= _of_families(whole) | _of_contacts(whole)
-    return found | _of_arena({**tables, **whole}, births)
+    judged_again = [
+        island
+        for island in going_on
+        if (own := island_settings(island, settings)).is_online or own.reevaluation
+    ]
+    found |= _of_robots(tables, found, births, judged_again)
+    return found | _own_measures(tables, births) | _of_lives(tables, births, going_on)
 
 
-def _without(table: pa.Table, islands: Sequence[int]) -> pa.Table:
-    """Return the rows of other islands than these."""
-    return table.filter(~pc.field("island").isin(islands))
+def _table(
+    tables: Mapping[str, pa.Table], name: str, without: Sequence[int] = ()
+) -> pa.Table:
+    """Return a table, which may be missing, without the rows of some islands."""
+    rows = tables.get(name)
+    if rows is None:
+        return schema(name).empty_table()
+    return rows.filter(~pc.field("island").isin(without)) if without else rows
 
 
 def _of_island(
@@ -134,30 +129,29 @@ def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) ->
 
 
 def _of_robots(
-    robots: pa.Table, last: dict[str, float], births: int
+    tables: Mapping[str, pa.Table],
+    last: Mapping[str, float],
+    births: int,
+    judged_again: Sequence[int],
 ) -> dict[str, float]:
-    is_random = pc.field("ancestors") == 0
-    random = robots.filter((pc.field("birth") < births) & is_random)
-    found = {}
-    for name in ("parts", "touch_sensors", "hidden"):
-        change = last.get(name, math.nan) - _mean(_column(random, name))
-        found[f"{name}_change"] = change
-    return found
-
-
-def _correlations(robots: pa.Table) -> dict[str, float]:
-    fitness = _column(robots, "fitness")
+    """Return changes from random robots, and correlations with fitness."""
+    is_born = pc.field("birth") < births
+    born = _table(tables, "robots").filter(is_born)
+    random = born.filter(pc.field("ancestors") == 0)
+    judged = _table(tables, "robots", judged_again).filter(is_born)
+    fitness = _column(judged, "fitness")
     return {
-        f"{name}_fitness": _correlation(_column(robots, name), fitness)
+        f"{name}_change": last.get(name, math.nan) - _mean(_column(random, name))
+        for name in ("parts", "touch_sensors", "hidden")
+    } | {
+        f"{name}_fitness": _correlation(_column(judged, name), fitness)
         for name in ("parts", "extremities", "extremities_per_part")
     }
 
 
 def _own_measures(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
-    if "named_measures" not in tables:
-        return {}
     last: dict[tuple[str, int], float] = {}
-    rows = tables["named_measures"].filter(pc.field("births") <= births)
+    rows = _table(tables, "named_measures").filter(pc.field("births") <= births)
     for row in rows.sort_by("births").to_pylist():
         last[row["measure"], row["island"]] = row["mean"]
     each: dict[str, list[float]] = {}
@@ -166,41 +160,32 @@ def _own_measures(tables: Mapping[str, pa.Table], births: int) -> dict[str, floa
     return {name: _mean(np.array(means)) for name, means in each.items()}
 
 
-def _of_families(tables: Mapping[str, pa.Table]) -> dict[str, float]:
-    found = dict.fromkeys(("family_distance", "family_founders"), math.nan)
-    if "families" in tables:
-        families = tables["families"]
-        distance, apart = (
-            _column(families, name) for name in ("distance", "founder_distance")
-        )
-        unknown = np.full(len(apart), np.nan)
-        ratio = np.divide(distance, apart, out=unknown, where=apart > 0)
-        found["family_distance"] = _mean(ratio)
-        found["family_founders"] = _mean(_column(families, "founders"))
-    return found
-
-
-def _of_arena(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
-    names = ("variability", "between", "real_time_factor")
-    found = dict.fromkeys(names, math.nan)
-    if "variability" in tables:
-        born = tables["variability"].filter(pc.field("birth") < births)
-        values = _column(born, "variability")
-        values = values[~np.isnan(values)]
-        found["variability"] = float(np.median(values)) if len(values) else math.nan
-    if "between" in tables:
-        until = tables["between"].filter(pc.field("births") <= births)
-        if until.num_rows:
-            found["between"] = float(_column(until, "between")[-1])
-    return found
-
-
-def _of_contacts(tables: Mapping[str, pa.Table]) -> dict[str, float]:
-    found = dict.fromkeys(("touched", "touching"), math.nan)
-    if "interactions" in tables:
-        for name in found:
-            found[name] = _mean(_column(tables["interactions"], name))
-    return found
+def _of_lives(
+    tables: Mapping[str, pa.Table], births: int, going_on: Sequence[int]
+) -> dict[str, float]:
+    """Return outcomes of families, contacts and variability of the other islands."""
+    families, contacts, lives = (
+        _table(tables, name, going_on)
+        for name in ("families", "interactions", "variability")
+    )
+    distance, apart = (
+        _column(families, name) for name in ("distance", "founder_distance")
+    )
+    ratio = np.full(len(apart), np.nan)
+    np.divide(distance, apart, out=ratio, where=apart > 0)
+    ranges = _column(lives.filter(pc.field("birth") < births), "variability")
+    ranges = ranges[~np.isnan(ranges)]
+    until = _table(tables, "between").filter(pc.field("births") <= births)
+    between = _column(until, "between")
+    return {
+        "family_distance": _mean(ratio),
+        "family_founders": _mean(_column(families, "founders")),
+        "variability": float(np.median(ranges)) if len(ranges) else math.nan,
+        "between": float(between[-1]) if len(between) else math.nan,
+        "real_time_factor": math.nan,
+        "touched": _mean(_column(contacts, "touched")),
+        "touching": _mean(_column(contacts, "touching")),
+    }
 
 
 def _correlation(first: Numbers, second: Numbers) -> float:
@@ -212,7 +197,7 @@ def _correlation(first: Numbers, second: Numbers) -> float:
     first, second = first[is_known], second[is_known]
     if len(first) < 2 or not np.ptp(first) or not np.ptp(second):  # noqa: PLR2004
         return math.nan
-    return float(np.corrcoef(ranks(first), ranks(second))[0, 1])
+    return float(stats.spearmanr(first, second).statistic)
 
 
 def _column(table: pa.Table, name: str) -> Numbers:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from analysis.comparison.statistics import half_interval
 from analysis.measures.outputs import POPULATION, schema
@@ -60,9 +61,10 @@ def run_means(populations: pa.Table, measure: str) -> pa.Table:
     keys = ["experiment", "folder", "births"]
     known = populations.filter(populations[measure].is_valid())
     means = known.group_by(keys).aggregate([(measure, "mean"), (measure, "count")])
-    whole = _whole_runs(means, f"{measure}_count").drop_columns(f"{measure}_count")
-    named = whole.rename_columns([*keys, "mean"])
-    return named.sort_by([(key, "ascending") for key in keys])
+    named = means.rename_columns([*keys, "mean", "islands"])
+    most = named.group_by("folder").aggregate([("islands", "max")])
+    whole = _with_count(named, "islands", "folder", most).drop_columns("islands")
+    return whole.sort_by([(key, "ascending") for key in keys])
 
 
 def mean_of_all_runs(progression: pa.Table, by_run: pa.Table) -> pa.Table:
@@ -75,22 +77,20 @@ def mean_of_all_runs(progression: pa.Table, by_run: pa.Table) -> pa.Table:
         by_run: the same measure, as ``run_means`` returns it.
     """
     runs = by_run.group_by("experiment").aggregate([("folder", "count_distinct")])
-    names, counts = runs["experiment"], runs["folder_count_distinct"]
-    wanted = dict(zip(names.to_pylist(), counts.to_pylist(), strict=True))
-    rows = zip(
-        progression["experiment"].to_pylist(),
-        progression["runs"].to_pylist(),
-        strict=True,
+    return _with_count(progression, "runs", "experiment", runs)
+
+
+def _with_count(rows: pa.Table, count: str, key: str, wanted: pa.Table) -> pa.Table:
+    """Return the rows whose count is that of their key.
+
+    Args:
+        rows: with the columns ``count`` and ``key``.
+        count: column of counts.
+        key: column of keys.
+        wanted: count of each key; its columns are the key and the count.
+    """
+    names, counts = (
+        wanted[name].combine_chunks() for name in (key, wanted.column_names[-1])
     )
-    chosen = [count == wanted.get(name) for name, count in rows]
-    return progression.filter(pa.array(chosen, pa.bool_()))
-
-
-def _whole_runs(by_run: pa.Table, count: str) -> pa.Table:
-    """Return rows at which all islands of a run have a value."""
-    islands = np.asarray(by_run[count], np.int64)
-    folders = by_run["folder"].combine_chunks().dictionary_encode().indices
-    runs = np.asarray(folders, np.int64)
-    most = np.zeros(len(runs), np.int64)
-    np.maximum.at(most, runs, islands)
-    return by_run.filter(pa.array(islands == most[runs]))
+    own = pc.take(counts, pc.index_in(rows[key], names))
+    return rows.filter(pc.fill_null(pc.equal(rows[count], own), fill_value=False))

@@ -1,20 +1,20 @@
 """Effect sizes and tests of the difference between experiments; the unit is the run.
 
 Experiments are compared by ranks, without assuming a distribution. Probabilities are
-exact, also for few runs.
+exact, also for few runs: SciPy's exact rank tests do not apply to tied values.
 """
 
 import math
-from collections.abc import Callable
-from statistics import NormalDist
 
 import numpy as np
+from scipy import optimize, stats
 
 from analysis.measures.population_table import Numbers
 from analysis.measures.trees import Integers
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
+_Z = float(stats.norm.ppf((1 + LEVEL) / 2))
 EQUAL_RUNS = 10
 """Fewer equal runs than this do not show that there is no spread: ten show with 95 %
 confidence that at most 26 % of all runs differ."""
@@ -49,15 +49,15 @@ def delta_interval(delta: float, first: int, second: int) -> tuple[float, float]
     Source: Newcombe, *Confidence intervals for an effect size measure based on the
     Mann-Whitney statistic*, part 2, method 5, Statistics in Medicine 25, 2006.
     """
-    found = (delta + 1) / 2
-    z = NormalDist().inv_cdf((1 + LEVEL) / 2)
+    middle = (delta + 1) / 2
 
-    def is_inside(theta: float) -> bool:
-        return (theta - found) ** 2 <= z**2 * score_variance(theta, first, second)
+    def excess(theta: float) -> float:
+        return (theta - middle) ** 2 - _Z**2 * score_variance(theta, first, second)
 
-    low = _edge(is_inside, found, 0.0)
-    high = _edge(is_inside, found, 1.0)
-    return 2 * low - 1, 2 * high - 1
+    # The excess is negative near the middle, and 0 at 0 and 1 if that is the middle.
+    low = optimize.brentq(excess, 0.0, max(middle - 1e-9, 0.0))
+    high = optimize.brentq(excess, min(middle + 1e-9, 1.0), 1.0)
+    return 2 * float(low) - 1, 2 * float(high) - 1
 
 
 def score_variance(theta: float, first: int, second: int) -> float:
@@ -69,14 +69,6 @@ def score_variance(theta: float, first: int, second: int) -> float:
     bracket = (1 - theta) / (2 - theta) + theta / (1 + theta)
     spread = theta * (1 - theta) * (1 + (mean_runs - 1) * bracket)
     return spread / (first * second)
-
-
-def _edge(is_inside: Callable[[float], bool], inner: float, outer: float) -> float:
-    """Return the edge of an interval between a point inside and a point outside."""
-    for _ in range(60):
-        middle = (inner + outer) / 2
-        inner, outer = (middle, outer) if is_inside(middle) else (inner, middle)
-    return (inner + outer) / 2
 
 
 def rank_sum_p(a: Numbers, b: Numbers) -> float:
@@ -137,18 +129,9 @@ def signed_rank(values: Numbers) -> tuple[float, float]:
     return 2 * above / int(places.sum()) - 1, _tails(ways, above)
 
 
-def ranks(values: Numbers) -> Numbers:
-    """Return the rank of each number, (N,), from 1; equal numbers share their mean."""
-    found: Numbers = _doubled_ranks(values) / 2
-    return found
-
-
 def _doubled_ranks(values: Numbers) -> Integers:
     """Return twice the rank of each number; equal numbers share their mean."""
-    _, where, counts = np.unique(values, return_inverse=True, return_counts=True)
-    doubled = 2 * np.cumsum(counts) - counts + 1
-    found: Integers = doubled[where]
-    return found
+    return (2 * stats.rankdata(values)).astype(np.int64)
 
 
 def _tails(ways: Numbers, found: int) -> float:
@@ -160,22 +143,6 @@ def _tails(ways: Numbers, found: int) -> float:
     return min(1.0, float(ways[is_far].sum() / total))
 
 
-def false_discovery(p: Numbers) -> Numbers:
-    """Return p values corrected for multiple tests, in their order.
-
-    At most 5 % of the tests with a corrected value below 0.05 are expected to be
-    false discoveries.
-
-    Source: Benjamini and Hochberg, *Controlling the false discovery rate*, J. R.
-    Statist. Soc. B 57(1), 1995.
-    """
-    order = np.argsort(p)[::-1]
-    scaled = p[order] * len(p) / np.arange(len(p), 0, -1)
-    found = np.empty(len(p))
-    found[order] = np.minimum(np.minimum.accumulate(scaled), 1.0)
-    return found
-
-
 def standard_error(values: Numbers) -> float:
     """Return the standard error of a mean; NaN if the spread over runs is unknown.
 
@@ -185,11 +152,10 @@ def standard_error(values: Numbers) -> float:
     Args:
         values: (N,) one number per run.
     """
-    count = len(values)
     # The deviation of equal numbers may be rounded to more than 0.
     if not np.ptp(values):
-        return 0.0 if count >= EQUAL_RUNS else math.nan
-    return float(values.std(ddof=1)) / math.sqrt(count)
+        return 0.0 if len(values) >= EQUAL_RUNS else math.nan
+    return float(values.std(ddof=1)) / math.sqrt(len(values))
 
 
 def mean(values: Numbers) -> float:
@@ -204,6 +170,8 @@ def mean(values: Numbers) -> float:
 def mean_difference(a: Numbers, b: Numbers | float) -> tuple[float, float, float]:
     """Return the difference of two means and the ends of its 95 % interval.
 
+    SciPy's intervals warn of nearly equal numbers, and have other rules for few runs.
+
     Args:
         a: (N,) one number per run.
         b: (M,) one number per run of the other experiment, or a reference.
@@ -217,14 +185,12 @@ def mean_difference(a: Numbers, b: Numbers | float) -> tuple[float, float, float
     difference = mean(a) - mean(np.atleast_1d(b))
     parts = [standard_error(sample) ** 2 for sample in samples]
     total = sum(parts)
-    if math.isnan(total):
-        return difference, math.nan, math.nan
-    if total == 0:
-        return difference, difference, difference
+    if total == 0 or math.isnan(total):
+        return difference, difference + total, difference + total
     freedom = total**2 / sum(
         part**2 / max(len(x) - 1, 1) for part, x in zip(parts, samples, strict=True)
     )
-    half = t_quantile(freedom) * math.sqrt(total)
+    half = float(stats.t.ppf((1 + LEVEL) / 2, freedom)) * math.sqrt(total)
     return difference, difference - half, difference + half
 
 
@@ -236,41 +202,6 @@ def half_interval(deviation: Numbers, runs: Integers) -> Numbers:
             as Arrow does.
         runs: (N,) numbers of runs.
     """
-    known = {count: t_quantile(max(count - 1, 1)) for count in set(runs.tolist())}
-    quantiles = np.array([known[count] for count in runs.tolist()], np.float64)
-    half = deviation / np.sqrt(np.maximum(runs - 1, 1)) * quantiles
-    return np.where(runs > 1, half, np.nan)
-
-
-def t_quantile(freedom: float, level: float = LEVEL) -> float:
-    """Return the number that Student's t exceeds in size with probability 1 - level.
-
-    Args:
-        freedom: degrees of freedom, >= 1.
-        level: confidence level of a two-sided interval; 0.95 is the 97.5 % quantile.
-    """
-    angles, share = _t_shares(freedom)
-    angle = float(np.interp(level, share, angles))
-    return math.sqrt(freedom) * math.tan(angle)
-
-
-def t_tail(value: float, freedom: float) -> float:
-    """Return the probability that Student's t is above a value.
-
-    Args:
-        value: any number.
-        freedom: degrees of freedom, >= 1.
-    """
-    angles, share = _t_shares(freedom)
-    angle = math.atan(abs(value) / math.sqrt(freedom))
-    tail = (1 - float(np.interp(angle, angles, share))) / 2
-    return tail if value >= 0 else 1 - tail
-
-
-def _t_shares(freedom: float) -> tuple[Numbers, Numbers]:
-    """Return angles and the probability that t lies within each of them."""
-    # With t = sqrt(freedom) tan(angle) the density becomes cos(angle)^(freedom - 1).
-    angles = np.linspace(0.0, math.pi / 2, 20001)
-    area = np.cos(angles) ** (freedom - 1)
-    until = np.append(0.0, np.cumsum(area[1:] + area[:-1]))
-    return angles, until / until[-1]
+    freedom = np.where(runs > 1, runs - 1.0, np.nan)
+    half: Numbers = stats.t.ppf((1 + LEVEL) / 2, freedom) * deviation / np.sqrt(freedom)
+    return half

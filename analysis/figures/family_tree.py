@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 
 from analysis.measures.ancestry import ancestors, parents_first, parents_of
 from analysis.measures.population_table import individual_ids, rows_of
+from schema.errors import RunFolderError
 from schema.tables.last_populations import Row, best_of
 
 LINEAGE = pa.schema(
@@ -59,9 +60,16 @@ def best_robots(robots: pa.Table) -> list[Best]:
 
 
 def row_of(best: Best, births: pa.Table) -> int:
-    """Return the births row of a robot; -1 if its birth is not recorded."""
+    """Return the births row of a robot.
+
+    Raises:
+        RunFolderError: its birth is not recorded.
+    """
     named = pa.table({"birth_island": [best.birth_island], "birth": [best.birth]})
-    return int(rows_of(individual_ids(named), births)[0])
+    row = int(rows_of(individual_ids(named), births)[0])
+    if row < 0:
+        raise RunFolderError(f"{best.folder}: birth {best.birth} is not recorded")
+    return row
 
 
 def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:

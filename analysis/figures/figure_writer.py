@@ -11,7 +11,13 @@ import pyarrow.compute as pc
 from rich.progress import Progress
 
 from analysis.figures.catalogue import BIRTHS, FIGURES, DrawnFigure, Figure
-from analysis.figures.family_tree import LINEAGE, Best, best_robots
+from analysis.figures.family_tree import (
+    LINEAGE,
+    Best,
+    best_robots,
+    lineage,
+    row_of,
+)
 from analysis.figures.file_names import FileNames
 from analysis.figures.films import film
 from analysis.figures.forms import NothingToDraw, Tables, fitness_units
@@ -23,6 +29,7 @@ from analysis.figures.robot_pictures import (
 )
 from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
+from analysis.measures.families import family
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
@@ -45,8 +52,6 @@ GAITS = "6.10"
 """Number of the figure of gaits."""
 _SOURCE = ("robots", BIRTHS)
 _FILM = "best-robot-of-"
-_EARLIER = "figure-*.p??"
-"""Names of the files of all figures in earlier versions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +95,7 @@ class FigureWriter:
         """
         self._folder = folder
         self._names = FileNames()
-        for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif", _EARLIER):
+        for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif"):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
@@ -160,9 +165,10 @@ def draw_figures(
         bar: shows progress.
     """
     writer = FigureWriter(folder)
-    pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar)
-    lineages = [one.lineage for one in pictures.values() if one.family is not None]
-    given = {**tables, "lineage": pa.concat_tables([LINEAGE.empty_table(), *lineages])}
+    lines: dict[str, pa.Table] = {}
+    pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar, lines)
+    lineages = [LINEAGE.empty_table(), *lines.values()]
+    given = {**tables, "lineage": pa.concat_tables(lineages)}
     trees = dict.fromkeys((*_TREES, *pictures))
     task = bar.add_task("drawing figures", total=len(FIGURES) + 1 + len(trees))
     for figure in FIGURES:
@@ -174,8 +180,9 @@ def draw_figures(
     bar.advance(task)
     for name in trees:
         if name in pictures:
-            unit = units.get(name, "")
-            _add_tree(writer, pictures[name], tables["robots"], unit)
+            if name in lines:
+                unit, count = units.get(name, ""), lines[name].num_rows - 1
+                _add_tree(writer, pictures[name], count, tables["robots"], unit)
         else:
             why = f"no evaluated robot of {name} is in a recorded population"
             writer.leave_out(_tree_number(name), problems.get(name, why))
@@ -207,8 +214,12 @@ def _robot_pictures(
     runs: Mapping[Path, Run],
     simulate: Callable[[], Simulate],
     bar: Progress,
+    lines: dict[str, pa.Table],
 ) -> tuple[dict[str, RobotPicture], dict[str, str]]:
-    """Return pictures of the best robots by experiment, and why others have none."""
+    """Return pictures of the best robots by experiment, and why others have none.
+
+    The lineages of those whose family is shown are added to ``lines``.
+    """
     best = {one.experiment: one for one in best_robots(robots)}
     living = robots.filter(pc.field("is_last"))["experiment"].to_pylist()
     why = "all robots of its last populations failed"
@@ -224,14 +235,19 @@ def _robot_pictures(
             document = shown_document(run.document)
             if modules_named(document.encode()):
                 allow_plugins_of(run.folder)
+            births = learnt_births(run.folder)
+            row = row_of(best[name], births)
             pictures[name] = robot_picture(
                 best[name],
-                learnt_births(run.folder),
+                births,
+                family(births, row),
                 own_experiment(document),
                 simulation,
                 origin=Origin(seed=run.seed, run=run.number),
                 has_family=name not in _BASELINES,
             )
+            if name not in _BASELINES:
+                lines[name] = lineage(births, name, row)
         except RevolveError as error:
             problems[name] = str(error)
     return pictures, problems
@@ -263,14 +279,17 @@ def _add_gaits(
 
 
 def _add_tree(
-    writer: FigureWriter, one: RobotPicture, robots: pa.Table, unit: str
+    writer: FigureWriter,
+    one: RobotPicture,
+    ancestors: int,
+    robots: pa.Table,
+    unit: str,
 ) -> None:
     """Draw one experiment's best robot and its family, or record why not."""
-    best, family = one.best, one.family
-    if family is None:
-        return
+    best, relatives = one.best, one.family
+    assert relatives is not None
     number = _tree_number(best.experiment)
-    if len(family.levels) == 1:
+    if len(relatives.levels) == 1:
         why = f"the best robot of {best.experiment} is a founder"
         writer.leave_out(number, why)
         return
@@ -283,7 +302,7 @@ def _add_tree(
         "Above the dashed line are the founders whose parts survive in these robots; a "
         "part has the colour of its founder, and white parts were added by mutation."
     )
-    if not family.founders:
+    if not relatives.founders:
         colours = (
             "The encoding gives parts no identity that children inherit, so the "
             "founders of parts are not known."
@@ -293,10 +312,10 @@ def _add_tree(
         "robot of the last populations, at the bottom, and its ancestors over four "
         "levels of reproduction: parents are drawn above their children. A dotted line "
         f"leads to a parent that is drawn on another level. {colours} The robot has "
-        f"{one.lineage.num_rows - 1} ancestors in total."
+        f"{ancestors} ancestors in total."
     )
     title = f"Ancestry of the best robot of {label(best.experiment)}"
-    draw = partial(family_tree, one, family, fitness, unit)
+    draw = partial(family_tree, one, relatives, fitness, unit)
     subject = f"ancestry-of-{best.experiment}"
     writer.add(
         Figure(number, title, caption, _SOURCE, lambda _: draw(), "robots", subject), {}

@@ -1,6 +1,5 @@
 """Renders the best robots, their gaits and their families."""
 
-import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,11 +11,10 @@ import numpy as np
 import pyarrow as pa
 from msgspec.structs import replace
 
-from analysis.figures.family_tree import LINEAGE, Best, lineage, row_of
-from analysis.measures.families import Family, family
+from analysis.figures.family_tree import Best
+from analysis.measures.families import Family
 from analysis.render.picture import RobotRenderer, Simulate
 from analysis.render.stage import Picture
-from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -56,7 +54,7 @@ Source: Okabe and Ito, 2008.
 
 @dataclass(frozen=True, slots=True)
 class RobotPicture:
-    """Pictures and ancestry of an experiment's best robot.
+    """Pictures of an experiment's best robot.
 
     Attributes:
         best: the robot.
@@ -69,7 +67,6 @@ class RobotPicture:
         family: its nearest ancestors; None if they are not shown.
         pictures: pictures of the family, by births row.
         births: birth ids of the family, by births row.
-        lineage: the robot and all its ancestors, as ``family_tree.LINEAGE``.
     """
 
     best: Best
@@ -81,43 +78,9 @@ class RobotPicture:
     family: Family | None
     pictures: Mapping[int, Picture]
     births: Mapping[int, BirthId]
-    lineage: pa.Table
 
 
 def robot_picture(
-    best: Best,
-    births: pa.Table,
-    experiment: Experiment,
-    simulate: Simulate,
-    *,
-    origin: Origin,
-    has_family: bool,
-) -> RobotPicture:
-    """Return pictures of a robot, of its gait, and of its family.
-
-    Args:
-        best: the robot.
-        births: births table of its run.
-        experiment: experiment of the run.
-        simulate: the worker's simulation.
-        origin: seed and run, which determine the noise.
-        has_family: render the family, too.
-
-    Raises:
-        RunFolderError: the robot's birth is not recorded.
-        SimulationDiverged: the physics diverged.
-    """
-    row = row_of(best, births)
-    if row < 0:
-        raise RunFolderError(f"{best.folder}: birth {best.birth} is not recorded")
-    found = family_picture(
-        best, births, family(births, row), experiment, simulate,
-        origin=origin, has_family=has_family,
-    )  # fmt: skip
-    return dataclasses.replace(found, lineage=lineage(births, best.experiment, row))
-
-
-def family_picture(
     best: Best,
     births: pa.Table,
     relatives: Family,
@@ -127,7 +90,7 @@ def family_picture(
     origin: Origin,
     has_family: bool,
 ) -> RobotPicture:
-    """Return pictures as ``robot_picture`` does, without the lineage.
+    """Return pictures of a robot, of its gait, and of its family.
 
     Args:
         best: the robot, the only one on the first level of its family.
@@ -175,7 +138,6 @@ def family_picture(
         relatives if has_family else None,
         pictures,
         names,
-        LINEAGE.empty_table(),
     )
 
 
@@ -229,20 +191,23 @@ def _motion(
         chosen = range(first, len(poses), step)[:FRAMES]
 
     times_s = tuple((at - first) * tick_s for at in chosen)
-    with RobotRenderer(robot, settings, size=_FILMED) as renderer:
-        shown = [poses[at] for at in filmed]
-        look_at, distance_m = renderer.framing(shown, _FILM[:2])
-        film = tuple(
-            _cut(renderer.picture(pose, look_at=look_at, distance_m=distance_m), _FILM)
-            for pose in shown
-        )
-    with RobotRenderer(robot, settings, size=_LARGE) as renderer:
-        shown = [poses[at] for at in chosen]
-        look_at, distance_m = renderer.framing(shown, _WIDE[:2])
-        gait = tuple(
-            _cut(renderer.picture(pose, look_at=look_at, distance_m=distance_m), _WIDE)
-            for pose in shown
-        )
+
+    def pictures(
+        ticks: Sequence[int], size: tuple[int, int], share: tuple[float, float, float]
+    ) -> tuple[Picture, ...]:
+        shown = [poses[at] for at in ticks]
+        with RobotRenderer(robot, settings, size=size) as renderer:
+            look_at, distance_m = renderer.framing(shown, share[:2])
+            return tuple(
+                _cut(
+                    renderer.picture(pose, look_at=look_at, distance_m=distance_m),
+                    share,
+                )
+                for pose in shown
+            )
+
+    film = pictures(filmed, _FILMED, _FILM)
+    gait = pictures(chosen, _LARGE, _WIDE)
     return gait, times_s, film, film_step * tick_s, _way_m(poses, chosen)
 
 

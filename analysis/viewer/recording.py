@@ -9,6 +9,7 @@ import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +17,11 @@ import rerun as rr
 
 from analysis.viewer.body import BoxModel, Float32s
 from analysis.viewer.entities import AncestryNode, TimePoint, island_path
-from analysis.viewer.ground import Surface
+from analysis.viewer.ground import Relief, Surface
 from analysis.viewer.scene import Scene
 from schema.errors import RevolveError
+from schema.experiment.scenery import Solid
+from schema.mjcf.model import quaternion
 
 APPLICATION = "revolve"
 SIMULATED = "sim_time"
@@ -33,6 +36,7 @@ _HUES = (
     (213, 94, 0), (86, 180, 233), (240, 228, 66), (150, 150, 150),
 )  # fmt: skip
 """Colours of islands. Source: Okabe and Ito, 2008."""
+_EARTH = (0.78, 0.76, 0.72, 1.0)
 _MEMORY = "512MiB"
 
 
@@ -131,12 +135,8 @@ class Recording(AbstractContextManager["Recording"]):
             surfaces: surfaces above the plane.
         """
         for number, surface in enumerate(surfaces):
-            mesh = rr.Mesh3D(
-                vertex_positions=surface.corners.reshape(-1, 3),
-                vertex_normals=np.repeat(surface.normals, 3, axis=0),
-                albedo_factor=surface.colour,
-            )
-            self._stream.log(f"{path}/ground/{number}", mesh, static=True)
+            drawn = _relief(surface) if isinstance(surface, Relief) else _solid(surface)
+            self._stream.log(f"{path}/ground/{number}", drawn, static=True)
 
     def log_boxes(self, path: str, model: BoxModel, when: TimePoint) -> None:
         """Log the boxes of a robot, from a time on."""
@@ -249,3 +249,31 @@ class Recording(AbstractContextManager["Recording"]):
             self._stream.set_time(SIMULATED, duration=time)
         if when.births is not None:
             self._stream.set_time(BIRTHS, sequence=when.births)
+
+
+def _relief(ground: Relief) -> rr.Mesh3D:
+    return rr.Mesh3D(
+        vertex_positions=ground.corners.reshape(-1, 3),
+        vertex_normals=np.repeat(ground.normals, 3, axis=0),
+        albedo_factor=_EARTH,
+    )
+
+
+def _solid(solid: Solid) -> rr.AsComponents:
+    """Return a shape of scenery; a capsule's place is that of its lower end."""
+    a, b, _ = solid.size.tolist()
+    settings: dict[str, Any] = {
+        "quaternions": [np.roll(quaternion(solid.rotation), -1)],
+        "colors": [np.round(255 * np.array(solid.colour)).astype(np.uint8)],
+        "fill_mode": "solid",
+    }
+    if solid.shape == "capsule":
+        end = solid.centre - b * solid.rotation[:, 2]
+        return rr.Capsules3D(lengths=2 * b, radii=a, translations=end, **settings)
+    settings["centers"] = [solid.centre]
+    if solid.shape == "cylinder":
+        return rr.Cylinders3D(lengths=2 * b, radii=a, **settings)
+    if solid.shape == "box":
+        return rr.Boxes3D(half_sizes=[solid.size], **settings)
+    half = solid.size if solid.shape == "ellipsoid" else (a, a, a)
+    return rr.Ellipsoids3D(half_sizes=[half], **settings)

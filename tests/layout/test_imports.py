@@ -33,6 +33,7 @@ PERMITTED = {
     ),
     "rerun": ("analysis/viewer/*.py",),
     "plotnine": ("analysis/figures/*.py",),
+    "scipy": ("analysis/comparison/*.py",),
     "numba": ("analysis/measures/distance.py",),
     "matplotlib": ("analysis/figures/*.py",),
     "networkx": ("coordinator/islands/topology.py",),
@@ -48,7 +49,6 @@ TEST_ONLY = {
     "polars",
     "pytest",
     "ribs",
-    "scipy",
     "zss",
 }
 

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pytest
 
 from analysis.comparison.claims import ARENA, CLAIMS, Claim
-from analysis.comparison.comparison import Outcomes, comparison
-from analysis.comparison.findings import WithBenchmark, findings
+from analysis.comparison.comparison import comparison, outcomes_of
+from analysis.comparison.findings import findings, with_benchmark
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
 from analysis.measures.load import IslandSettings, Run
@@ -79,7 +79,7 @@ def test_measures_of_the_experiments_are_compared() -> None:
             every.append(
                 replace(one, run=run, tables={**one.tables, "named_measures": named})
             )
-    found = comparison(Outcomes(every)).to_pylist()
+    found = comparison(outcomes_of(every)).to_pylist()
     (row,) = [row for row in found if row["measure"].startswith("measures.")]
     assert (row["measure"], row["a"], row["b"]) == ("measures.energy", "a", "b")
     assert (row["mean_a"], row["mean_b"], row["effect"]) == (2.5, 6.0, -1.0)
@@ -222,7 +222,7 @@ def test_outcome_of_several_islands_is_their_mean() -> None:
 
 def test_every_measure_of_every_pair_is_compared_once() -> None:
     found = comparison(
-        Outcomes([*runs("b", [1, 2, 3]), *runs("a", [4, 5, 6]), *runs("c", [2, 2])])
+        outcomes_of([*runs("b", [1, 2, 3]), *runs("a", [4, 5, 6]), *runs("c", [2, 2])])
     ).to_pylist()
     fitness = [row for row in found if row["measure"] == "fitness"]
     assert [(row["a"], row["b"]) for row in fitness] == [
@@ -245,7 +245,7 @@ def test_measures_that_are_equal_in_all_runs_are_not_tested() -> None:
         for number, value in enumerate(values):
             level = {"births": 15, "fitness": value, "parts": parts, "hidden": 1.0}
             made.append(measured(name, number, tables([level])))
-    rows = comparison(Outcomes(made)).to_pylist()
+    rows = comparison(outcomes_of(made)).to_pylist()
     found = {(row["a"], row["b"], row["measure"]): row for row in rows}
     equal = found["a", "b", "parts"]
     assert (equal["p"], equal["q"], equal["difference"]) == (None, None, 0)
@@ -266,7 +266,7 @@ def test_fitness_is_compared_only_with_the_same_function() -> None:
         for number in range(2):
             one = measured(name, number, tables(levels))
             made.append(replace(one, run=replace(one.run, fitness=function)))
-    outcomes = Outcomes(made)
+    outcomes = outcomes_of(made)
     rows = comparison(outcomes).to_pylist()
     found: dict[tuple[str, str], set[str]] = {}
     for row in rows:
@@ -294,7 +294,7 @@ def test_experiments_are_compared_at_births_that_all_runs_reach() -> None:
     long = [measured("b", number, tables(levels)) for number in range(2)]
     (row,) = [
         row
-        for row in comparison(Outcomes([*short, *long])).to_pylist()
+        for row in comparison(outcomes_of([*short, *long])).to_pylist()
         if row["measure"] == "fitness"
     ]
     # Run 1 of a has nothing recorded up to 30 births.
@@ -303,7 +303,7 @@ def test_experiments_are_compared_at_births_that_all_runs_reach() -> None:
 
 def test_unfinished_runs_are_not_compared() -> None:
     made = tables([{"births": 30, "fitness": 0.2}])
-    outcomes = Outcomes([measured("a", 0, made, "running"), *runs("b", [1, 2])])
+    outcomes = outcomes_of([measured("a", 0, made, "running"), *runs("b", [1, 2])])
     assert outcomes.experiments == ["b"]
     assert outcomes.table()["fitness"].to_pylist() == [1, 2]
     assert comparison(outcomes).num_rows == 0
@@ -325,7 +325,7 @@ def test_findings_are_reproduced_not_reproduced_or_undecided() -> None:
         Claim("8", "no effect as expected", "fitness", "many", ">", "moderate"),
     ]
     many = [float(value % 10) for value in range(40)]
-    outcomes = Outcomes(
+    outcomes = outcomes_of(
         [
             *runs("high", HIGH),
             *runs("low", LOW),
@@ -368,7 +368,7 @@ def test_findings_of_few_births_spreads_shares_and_numbers() -> None:
         Claim("11", "may occur", "fitness", "seldom", "some"),
         Claim("12", "negligible", "fitness", "narrow", ">", reference=-0.1, margin=0.5),
     ]
-    outcomes = Outcomes(
+    outcomes = outcomes_of(
         [
             *runs("wide", wide),
             *runs("narrow", [value / 50 for value in wide]),
@@ -417,11 +417,11 @@ def test_an_arena_benchmark_is_compared_with_real_time() -> None:
     )
     claims = [Claim("1", "x", "real_time_factor", ARENA, ">", reference=1.0),
               Claim("2", "x", "fitness", "low", ">", reference=0.0)]  # fmt: skip
-    outcomes = Outcomes(runs("low", LOW))
-    fast, fit = findings(WithBenchmark(outcomes, rows), claims).to_pylist()
+    outcomes = outcomes_of(runs("low", LOW))
+    fast, fit = findings(with_benchmark(outcomes, rows), claims).to_pylist()
     assert (fast["runs_a"], fast["mean_a"], fast["births"]) == (3, 3.0, 0)
     assert (fit["runs_a"], fit["births"]) == (10, 100)
-    none = findings(WithBenchmark(outcomes, rows[:0]), claims).to_pylist()
+    none = findings(with_benchmark(outcomes, rows[:0]), claims).to_pylist()
     assert none[0]["why"] == f"no finished run of {ARENA} could be measured"
 
 

@@ -10,7 +10,7 @@ from analysis.comparison.equivalence import (
     mean_alike_p,
     mean_alike_power,
 )
-from analysis.comparison.statistics import cliffs_delta, delta_interval, t_tail
+from analysis.comparison.statistics import cliffs_delta, delta_interval
 
 MARGIN = 0.474
 
@@ -55,7 +55,7 @@ def test_mean_alike_equals_two_t_tests_of_scipy() -> None:
             stats.ttest_1samp(values, 1 - 0.8, alternative="greater").pvalue,
             stats.ttest_1samp(values, 1 + 0.8, alternative="less").pvalue,
         ]
-        assert mean_alike_p(values, 1, 0.8) == pytest.approx(max(sides), abs=1e-7)
+        assert mean_alike_p(values, 1, 0.8) == pytest.approx(max(sides), abs=1e-12)
     equal = np.full(10, 1.5)
     assert (mean_alike_p(equal, 1, 0.8), mean_alike_p(equal, 1, 0.2)) == (0, 1)
 
@@ -76,18 +76,4 @@ def test_mean_power_grows_with_the_margin_and_the_runs() -> None:
     error = values.std(ddof=1) / np.sqrt(30)
     t = stats.t(29)
     expected = 2 * t.cdf(0.6 / error - t.ppf(0.95)) - 1
-    assert powers[2] == pytest.approx(expected, abs=1e-4)
-
-
-def test_tails_of_t_equal_scipy() -> None:
-    for freedom in (1, 2.5, 29):
-        for value in (-3.0, 0.0, 0.7, 12.0):
-            expected = stats.t.sf(value, freedom)
-            assert t_tail(value, freedom) == pytest.approx(expected, abs=1e-6)
-
-
-@pytest.mark.parametrize("freedom", [1, 2.5, 5, 29])
-def test_tails_of_t_are_probabilities(freedom: float) -> None:
-    assert t_tail(1e18, freedom) == pytest.approx(0, abs=1e-15)
-    assert t_tail(1e18, freedom) >= 0
-    assert t_tail(-1e18, freedom) <= 1
+    assert powers[2] == pytest.approx(expected)

@@ -21,6 +21,7 @@ from analysis.figures.robots import lineages
 from analysis.measures.families import families, family
 from analysis.measures.outputs import schema
 from analysis.measures.run_tables import RunTables
+from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.last_populations import best_of
 from tests.analysis.bodies import Body, part
@@ -165,7 +166,8 @@ def test_of_equally_fit_robots_the_best_is_that_of_the_end_of_a_run() -> None:
 
 def test_row_of_a_robot_is_found_by_its_birth_id(members: pa.Table) -> None:
     assert row_of(Best("x", Path("f"), 0, 0, 4, 0.0), members) == 4
-    assert row_of(Best("x", Path("f"), 0, 1, 4, 0.0), members) == -1
+    with pytest.raises(RunFolderError, match="birth 4 is not recorded"):
+        row_of(Best("x", Path("f"), 0, 1, 4, 0.0), members)
 
 
 def test_a_level_is_sorted_by_the_level_below() -> None:
@@ -196,7 +198,6 @@ def robot_picture(members: pa.Table) -> RobotPicture:
         relatives,
         pictures,
         {row: BirthId(0 if row else 1, row) for row in pictures},
-        lineage(members, "scenario1", 5),
     )
 
 

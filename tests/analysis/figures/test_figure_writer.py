@@ -14,7 +14,7 @@ from rich.progress import Progress
 
 from analysis.figures import figure_writer
 from analysis.figures.catalogue import Figure
-from analysis.figures.family_tree import LINEAGE, Best
+from analysis.figures.family_tree import Best
 from analysis.figures.figure_writer import FigureWriter, draw_figures
 from analysis.figures.robot_pictures import RobotPicture
 from analysis.measures.families import LEVELS, Family
@@ -31,8 +31,7 @@ def tree_of(experiment: str) -> Figure:
 def robot_of(experiment: str, shade: int) -> RobotPicture:
     pictures = tuple(np.full((8, 8, 3), shade, np.uint8) for _ in range(2))
     best = Best(experiment, Path("f"), 0, 0, 1, 0.1)
-    lineage = LINEAGE.empty_table()
-    return RobotPicture(best, (), (), pictures, 0.1, 0.0, None, {}, {}, lineage)
+    return RobotPicture(best, (), (), pictures, 0.1, 0.0, None, {}, {})
 
 
 def test_each_experiment_has_files_of_its_own(tmp_path: Path) -> None:
@@ -95,7 +94,7 @@ def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors(
     chain = tuple((row,) for row in range(LEVELS))
     shown = replace(robot_of("a", 0), family=Family(chain, (), (), {}))
     robots = table("robots", [])
-    figure_writer._add_tree(writer, shown, robots, "m/s")
+    figure_writer._add_tree(writer, shown, 4, robots, "m/s")
     (tree,) = writer.drawn
     assert "its ancestors over four levels of reproduction" in tree.caption
 

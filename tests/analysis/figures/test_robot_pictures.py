@@ -9,6 +9,7 @@ import pytest
 
 from analysis.figures.family_tree import Best
 from analysis.figures.robot_pictures import robot_picture, shown_document
+from analysis.measures.families import family
 from coordinator.evolution.generation import generate
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Islands
@@ -38,6 +39,7 @@ def test_gait_uses_noise_of_the_run_and_the_island_of_the_fitness() -> None:
         robot_picture(
             Best("x", Path("f"), 1, 2, 4, 0.1),
             members,
+            family(members, 0),
             EXPERIMENT,
             simulate,
             origin=Origin(seed=7, run=3),

@@ -1,7 +1,7 @@
 """Tests of the surfaces of ground and scenery."""
 
-import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,92 +9,79 @@ from rerun.blueprint import Spatial3DView
 from rerun.chunk import RrdReader
 
 from analysis.viewer.blueprint import layout
-from analysis.viewer.ground import Surface, surfaces
+from analysis.viewer.ground import Relief, surfaces
 from analysis.viewer.recording import Recording
 from analysis.viewer.scene import scene_of
 from schema.experiment.document import Arena, Experiment, Islands, Simulation
 from schema.experiment.environment import FLAT, Environment, relief
+from schema.experiment.scenery import Solid
 from schema.robot.ids import BirthId
 
 WORLD = Simulation()
 
 
-def solid(geom: str) -> Surface:
-    """Return the surface of the one geom of a scene."""
+def shown(geom: str, folder: Path) -> dict[str, Any]:
+    """Return what is recorded of the one geom of an arena's scenery."""
     scenery = f"<mujoco><worldbody><geom {geom}/></worldbody></mujoco>"
-    (found,) = surfaces(Environment(scenery=scenery), WORLD)
-    return found
+    environment = Environment(scenery=scenery)
+    scene = scene_of(Experiment(name="a", arena=Arena(), environment=environment))
+    with Recording("a", layout(scene), file=folder / "a.rrd") as recording:
+        recording.add_scene(scene)
+    chunks = RrdReader(folder / "a.rrd").stream().filter(content="/islands/0/ground/**")
+    (chunk,) = chunks
+    (row,) = chunk.to_record_batch().to_pylist()
+    return {name.partition(":")[2]: value for name, value in row.items()}
 
 
-def volume(surface: Surface) -> float:
-    """Return what a surface encloses: positive if its triangles face outward."""
-    a, b, c = surface.corners.astype(np.float64).transpose(1, 0, 2)
-    return float((a * np.cross(b, c)).sum() / 6.0)
+TURN = 'pos="1 2 3" euler="0 90 0" rgba="0 0.2 1 1"'
+"""The axis of a shape is along x."""
 
 
 @pytest.mark.parametrize(
-    ("geom", "half_sizes", "expected"),
+    ("geom", "expected"),
     [
-        ('type="box" size="0.1 0.2 0.3"', (0.1, 0.2, 0.3), 8 * 0.006),
-        ('type="sphere" size="0.3"', (0.3, 0.3, 0.3), 4 / 3 * math.pi * 0.027),
-        (
-            'type="ellipsoid" size="0.3 0.2 0.1"',
-            (0.3, 0.2, 0.1),
-            4 / 3 * math.pi * 0.006,
-        ),
-        ('type="cylinder" size="0.2 0.5"', (0.2, 0.2, 0.5), math.pi * 0.04),
-        (
-            'type="capsule" size="0.2 0.5"',
-            (0.2, 0.2, 0.7),
-            math.pi * 0.04 + 4 / 3 * math.pi * 0.008,
-        ),
+        ('type="box" size="0.1 0.2 0.3"',
+         {"half_sizes": [[0.1, 0.2, 0.3]], "centers": [[1, 2, 3]]}),
+        ('type="sphere" size="0.3"',
+         {"half_sizes": [[0.3, 0.3, 0.3]], "centers": [[1, 2, 3]]}),
+        ('type="ellipsoid" size="0.3 0.2 0.1"',
+         {"half_sizes": [[0.3, 0.2, 0.1]], "centers": [[1, 2, 3]]}),
+        ('type="cylinder" size="0.2 0.5"',
+         {"radii": [0.2], "lengths": [1.0], "centers": [[1, 2, 3]]}),
+        # The viewer places a capsule by an end of its axis.
+        ('type="capsule" size="0.2 0.5"',
+         {"radii": [0.2], "lengths": [1.0], "translations": [[0.5, 2, 3]]}),
     ],
-)
-def test_a_shape_has_its_size_and_faces_outward(
-    geom: str, half_sizes: tuple[float, float, float], expected: float
+)  # fmt: skip
+def test_scenery_has_its_size_place_and_colour(
+    geom: str, expected: dict[str, Any], tmp_path: Path
 ) -> None:
-    drawn = solid(geom)
-    reached = np.abs(drawn.corners).max(axis=(0, 1))
-    assert reached == pytest.approx(half_sizes, rel=0.02)
-    assert volume(drawn) == pytest.approx(expected, rel=0.05)
-    if "box" in geom:
-        assert reached == pytest.approx(half_sizes, rel=1e-6)
-        assert volume(drawn) == pytest.approx(expected, rel=1e-5)
-    lengths = np.linalg.norm(drawn.normals, axis=1)
-    assert set(np.round(lengths, 5).tolist()) <= {0.0, 1.0}
-
-
-def test_scenery_has_its_place_and_colour() -> None:
-    """A bar of 2 m by 0.2 m, turned by 30 degrees, about (1, 2, 3)."""
-    drawn = solid(
-        'type="box" size="1 0.1 0.1" pos="1 2 3" euler="0 0 30" rgba="0 0.5 1 1"'
-    )
-    assert drawn.colour == (0.0, 0.5, 1.0, 1.0)
-    low, high = drawn.corners.min(axis=(0, 1)), drawn.corners.max(axis=(0, 1))
-    assert 0.5 * (low + high) == pytest.approx([1.0, 2.0, 3.0], abs=1e-6)
-    wide, deep = math.sqrt(0.75) + 0.05, 0.5 + 0.1 * math.sqrt(0.75)
-    assert 0.5 * (high - low) == pytest.approx([wide, deep, 0.1], abs=1e-6)
+    found = shown(f"{geom} {TURN}", tmp_path)
+    for name, values in expected.items():
+        assert np.array(found[name]) == pytest.approx(np.array(values), abs=1e-6), name
+    assert found["colors"] == [0x0033FFFF]
+    turn = np.array([0.0, 0.5**0.5, 0.0, 0.5**0.5])
+    assert np.abs(found["quaternions"][0] @ turn) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_the_light_is_a_ball_at_its_place() -> None:
-    (ball,) = surfaces(FLAT, WORLD, (1.0, 2.0, 3.0))
-    low, high = ball.corners.min(axis=(0, 1)), ball.corners.max(axis=(0, 1))
-    assert 0.5 * (low + high) == pytest.approx([1.0, 2.0, 3.0], abs=1e-3)
-    assert 0.5 * (high - low) == pytest.approx([0.03] * 3, abs=1e-3)
-    place = (1.0, 0.0, 0.5)
-    lit = Environment(light=place)
+    place = (1.0, 2.0, 3.0)
+    (ball,) = surfaces(FLAT, WORLD, place)
+    assert isinstance(ball, Solid)
+    assert (ball.shape, ball.size[0]) == ("sphere", 0.03)
+    assert tuple(ball.centre) == place
     scenes = [
-        scene_of(Experiment(name="alone", environment=lit)),
+        scene_of(Experiment(name="alone", environment=Environment(light=place))),
         scene_of(Experiment(name="arena", arena=Arena(light=place))),
         scene_of(Experiment(name="dark")),
     ]
-    counts = [len(each.surfaces[0]) for each in scenes]
-    assert counts == [1, 1, 0]
+    assert [len(each.surfaces[0]) for each in scenes] == [1, 1, 0]
 
 
 def test_rough_ground_is_drawn_node_by_node() -> None:
     environment = Environment(roughness_m=0.1, patch_m=0.5, extent_m=1.0)
     (drawn,) = surfaces(environment, WORLD)
+    assert isinstance(drawn, Relief)
     assert len(drawn.corners) == 2 * 4 * 4
     assert (drawn.normals[:, 2] > 0.0).all()
     shares = relief(environment)
@@ -145,10 +132,10 @@ def test_an_arena_shows_its_recorded_ground(tmp_path: Path) -> None:
     }
     found = {path: found[path] for path in sorted(found) if "/ground/" in path}
     assert list(found) == ["/islands/1/ground/0", "/islands/1/ground/1"]
-    for number, surface in enumerate(scene.surfaces[1]):
-        columns = found[f"/islands/1/ground/{number}"]
-        (corners,) = columns["Mesh3D:vertex_positions"].to_pylist()
-        assert corners == surface.corners.reshape(-1, 3).tolist()
+    (ground, _) = scene.surfaces[1]
+    assert isinstance(ground, Relief)
+    (corners,) = found["/islands/1/ground/0"]["Mesh3D:vertex_positions"].to_pylist()
+    assert corners == ground.corners.reshape(-1, 3).tolist()
     views: list[object] = [plan.root_container]
     shown: list[str] = []
     while views:

@@ -1,8 +1,7 @@
 """Compares learners with random search on fixed bodies, for docs/learning.md.
 
-    python -m docs.learners_campaign run random     # start, or go on after an end
-    python -m docs.learners_campaign run evolved
-    python -m docs.learners_campaign table          # draw the picture, print the table
+    python -m docs.studies.learners run    # start, or go on after an end
+    python -m docs.studies.learners page   # draw the picture, write the table
 
 The bodies are ten random robots of scenario 1 and ten that evolved in scenario 3. Each
 learner starts with the robot's own brain, ten times with other random streams. Rows are
@@ -10,25 +9,33 @@ kept in docs/learners_data/, one per finished search. Evaluations take 4 s, a
 third of the time of scenario 1.
 """
 
-import argparse
-import csv
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable
 from itertools import accumulate, product
 from math import inf, sqrt
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pyarrow.parquet as pq
 from msgspec import structs
+from scipy import stats
 
-from analysis.comparison.statistics import mean_difference, t_quantile
+from analysis.comparison.statistics import mean_difference
 from analyzer.report import analyze
 from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.learners.brain_parameters import BrainParameters
 from coordinator.evolution.learners.learner import Batch, NewbornLearner, Points
 from coordinator.evolution.random_streams import Purpose, stream
-from docs.page_parts import csv_rows
+from docs.studies.pages import (
+    DOCS,
+    PICTURES,
+    ROOT,
+    Parts,
+    append_csv,
+    command,
+    csv_rows,
+    markdown,
+)
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Vetting, body_space
@@ -41,15 +48,13 @@ from schema.robot.robot import Robot
 from schema.wire.protobuf import decode_genome
 from worker.robot.evaluation import evaluate
 
-ROOT = Path(__file__).resolve().parents[1]
-DATA = ROOT / "docs" / "learners_data"
+DATA = DOCS / "learners_data"
 EVOLVED = ROOT / "tests" / "benchmarks" / "evolved.parquet"
 EXPERIMENT = read_experiment("scenario1")
 SHORT = structs.replace(EXPERIMENT.simulation, window_steps=800)
 """Evaluations of 4 s: the ones of scenario 1 take 12 s."""
 SETTINGS = structs.replace(evaluation_settings_of(EXPERIMENT), simulation=SHORT)
 BODIES, SEEDS, BUDGET = 10, 10, 60
-PICTURE = ROOT / "docs" / "pictures" / "learners.png"
 COLOURS = ("#D55E00", "#E69F00", "#0072B2", "#7F7F7F")
 BASE = "random"
 LEARNERS = {
@@ -130,24 +135,21 @@ def _known(bodies: str) -> list[dict[str, str]]:
     return csv_rows(DATA / f"{bodies}.csv")
 
 
-def run(bodies: str) -> None:
-    """Make the searches on some bodies whose rows are missing."""
-    done = {(row["body"], row["learner"], row["seed"]) for row in _known(bodies)}
-    robots = SETS[bodies](BODIES)
-    DATA.mkdir(exist_ok=True)
-    with (DATA / f"{bodies}.csv").open("a", newline="") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        if not done:
-            trials = [f"best_{trial}" for trial in range(BUDGET)]
-            rows.writerow(["body", "learner", "seed", *trials])
+def run(_: object = None) -> None:
+    """Make the searches whose rows are missing."""
+    for bodies, make in SETS.items():
+        done = {(row["body"], row["learner"], row["seed"]) for row in _known(bodies)}
+        robots = make(BODIES)
         for seed, learner in product(range(SEEDS), LEARNERS):
             for number, robot in enumerate(robots):
-                if (str(number), learner, str(seed)) not in done:
+                names = {"body": str(number), "learner": learner, "seed": str(seed)}
+                if (*names.values(),) not in done:
                     rules, name = LEARNERS[learner], BirthId(0, number)
                     best = search(robot, rules, name, seed, BUDGET)
-                    short = [f"{each:.9g}" for each in best]
-                    rows.writerow([number, learner, seed, *short])
-                    file.flush()
+                    trials = {
+                        f"best_{at}": f"{each:.9g}" for at, each in enumerate(best)
+                    }
+                    append_csv(DATA / f"{bodies}.csv", names | trials)
             print(f"seed {seed}, {bodies} bodies, {learner}", flush=True)
 
 
@@ -167,15 +169,12 @@ def courses() -> dict[tuple[str, str], np.ndarray[tuple[int, int, int]]]:
     }
 
 
-def lines() -> Iterator[str]:
-    """Yield the lines of the table: means over bodies, intervals over seeds."""
-    yield (
-        "| bodies | learner | at birth | after 20 trials | more than `random` "
-        "(95 % interval) | after 60 trials | more than `random` (95 % interval) "
-        "| better, of 100 |"
-    )
-    yield "|---|---|---|---|---|---|---|---|"
-    found = courses()
+def lines() -> list[str]:
+    """Return the lines of the table: means over bodies, intervals over seeds."""
+    more = "more than `random` (95 % interval)"
+    heads = ["bodies", "learner", "at birth", "after 20 trials", more,
+             "after 60 trials", more, "better, of 100"]  # fmt: skip
+    found, rows = courses(), []
     for (bodies, learner), best in found.items():
         cells = [bodies, f"`{learner}`", f"{best[:, :, 0].mean():.4f}"]
         for trials in (20, BUDGET):
@@ -185,7 +184,8 @@ def lines() -> Iterator[str]:
             cells.append(f"{reached.mean():.4f}")
             cells.append("" if learner == BASE else _interval(reached - base))
         cells.append("" if learner == BASE else str((reached > base).sum()))
-        yield f"| {' | '.join(cells)} |"
+        rows.append(cells)
+    return markdown(heads, rows)
 
 
 def _interval(more: np.ndarray[tuple[int, int]]) -> str:
@@ -198,12 +198,13 @@ def draw() -> None:
     """Write the picture: means over bodies by trial, with intervals over seeds."""
     figure, axes = plt.subplots(1, len(SETS), figsize=(9, 3.6), layout="constrained")
     found, trials = courses(), np.arange(BUDGET)
+    quantile = stats.t.ppf(0.975, SEEDS - 1)
     for panel, bodies in zip(axes, SETS, strict=True):
         for learner, colour in zip(LEARNERS, COLOURS, strict=True):
             if (bodies, learner) not in found:
                 continue
             means = found[bodies, learner].mean(axis=1)
-            half = t_quantile(SEEDS - 1) * means.std(axis=0, ddof=1) / sqrt(SEEDS)
+            half = quantile * means.std(axis=0, ddof=1) / sqrt(SEEDS)
             middle = means.mean(axis=0)
             panel.plot(trials, middle, color=colour, label=learner)
             panel.fill_between(
@@ -213,21 +214,15 @@ def draw() -> None:
         panel.spines[["top", "right"]].set_visible(False)
     axes[0].set_ylabel("best fitness so far [m/s]")
     axes[-1].legend(frameon=False, loc="lower right")
-    figure.savefig(PICTURE, dpi=120)
+    figure.savefig(PICTURES / "learners.png", dpi=120)
 
 
-def main() -> None:
-    """Do what the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("run", "table"))
-    parser.add_argument("bodies", nargs="?", choices=tuple(SETS), default="random")
-    options = parser.parse_args()
-    if options.what == "run":
-        run(options.bodies)
-    else:
-        draw()
-        print("\n".join(lines()))
+def pages() -> dict[str, Parts]:
+    """Return the generated part of the page."""
+    return {"learning.md": {"learners": lines()}}
 
+
+main = command(__doc__, pages, draw, run=("make the searches that are missing", run))
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main(None))

@@ -1,16 +1,15 @@
 """Writes the tables and the picture of docs/arena_settings.md from docs/sweeps.
 
     revolve analyze SWEEP --out REPORT
-    python -m docs.arena_settings keep REPORT ...   # keep the rows of finished sweeps
-    python -m docs.arena_settings page              # write tables and picture
-    python -m docs.arena_settings page --check      # fail if the tables differ
+    python -m docs.studies.arena_settings keep REPORT ...  # keep rows
+    python -m docs.studies.arena_settings page             # write tables and picture
+    python -m docs.studies.arena_settings page --check     # fail if the tables differ
 
 Each sweep has one file of rows, one per run: docs/sweeps/NAME.csv.
 """
 
-import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +21,9 @@ from scipy.stats import friedmanchisquare
 
 from analysis.comparison.statistics import mean_difference
 from analysis.figures.sweeps import sweep_map
-from docs.ablation_rows import save_small
-from docs.page_parts import write_parts
+from docs.studies.pages import DOCS, Parts, command, markdown, save_small
 
-DOCS = Path(__file__).resolve().parent
-ROWS, PAGE = DOCS / "sweeps", DOCS / "arena_settings.md"
+ROWS = DOCS / "sweeps"
 GRID, CHECK, LIMIT = "arena-settings", "arena-settings-check", "arena-limit"
 INTERVAL, SHARE = "arena.birth_interval_s", "arena.survive_share_of_mean"
 POPULATION_LIMIT = "arena.population_limit"
@@ -50,23 +47,13 @@ TESTED = {
 """Outcomes of the table of effects, and their names."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the commands; return 0, or 1 if a check fails."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(dest="command", required=True)
-    keeping = commands.add_parser("keep", help="keep the rows of finished sweeps")
-    keeping.add_argument("reports", type=Path, nargs="+", help="of revolve analyze")
-    writing = commands.add_parser("page", help="write tables and picture")
-    writing.add_argument("--check", action="store_true", help="write nothing; compare")
-    options = parser.parse_args(arguments)
-    if options.command == "page":
-        return write_page(is_check=options.check)
-    for report in options.reports:
-        keep(report)
-    return 0
+def keep(reports: Sequence[Path]) -> None:
+    """Keep the rows of the sweeps of reports."""
+    for report in reports:
+        _keep(report)
 
 
-def keep(report: Path) -> None:
+def _keep(report: Path) -> None:
     """Keep the rows of the sweep of a report, one per finished run."""
     sweeps, outcomes, runs, populations = (
         pq.read_table(report / "measures" / f"{name}.parquet").to_pandas()
@@ -110,59 +97,57 @@ def drawn(name: str) -> Any:  # noqa: ANN401 - a figure
     return sweep_map(tables, name)
 
 
-def write_page(*, is_check: bool) -> int:
-    """Write the page's tables and picture, or check the tables."""
-    command = "python -m docs.arena_settings page"
-    code = write_parts(PAGE, parts(), command, is_check=is_check)
-    if not is_check:
-        save_small(drawn(GRID), GRID)
-    return code
+def draw() -> None:
+    """Write the picture of the page."""
+    save_small(drawn(GRID), GRID)
 
 
-def parts() -> dict[str, list[str]]:
-    """Return the generated parts of the page, by name."""
+def pages() -> dict[str, Parts]:
+    """Return the generated parts of the page."""
     grid = kept(GRID)
-    return {
-        "intervals": [*setting_lines(grid, INTERVAL)],
-        "shares": [*setting_lines(grid, SHARE)],
-        "limits": [*setting_lines(kept(LIMIT), POPULATION_LIMIT)],
-        "effects": [*effect_lines(grid)],
-        "check": [*check_lines(grid, kept(CHECK))],
+    parts = {
+        "intervals": setting_lines(grid, INTERVAL),
+        "shares": setting_lines(grid, SHARE),
+        "limits": setting_lines(kept(LIMIT), POPULATION_LIMIT),
+        "effects": effect_lines(grid),
+        "check": check_lines(grid, kept(CHECK)),
     }
+    return {"arena_settings.md": parts}
 
 
-def setting_lines(rows: Frame, setting: str) -> Iterator[str]:
-    """Yield a table of means over all runs with the same value of a setting.
+def setting_lines(rows: Frame, setting: str) -> list[str]:
+    """Return a table of means over all runs with the same value of a setting.
 
     The interval of mean fitness is that of the mean over these runs.
     """
-    yield (
-        f"| `{setting.removeprefix('arena.')}` | runs | mean fitness [m/s] "
-        "| best [m/s] | late gain | tree edit distance | living robots (least) "
-        "| simulated time per birth [s] |"
-    )
-    yield "|---|---|---|---|---|---|---|---|"
+    heads = [f"`{setting.removeprefix('arena.')}`", "runs", "mean fitness [m/s]",
+             "best [m/s]", "late gain", "tree edit distance", "living robots (least)",
+             "simulated time per birth [s]"]  # fmt: skip
+    lines = []
     for value, own in rows.groupby(setting):
         middle, low, high = mean_difference(own["fitness"].to_numpy(), 0.0)
         means = own.mean(numeric_only=True)
-        yield (
-            f"| {value:g} | {len(own)} | {middle:.4f} ({low:.4f} to {high:.4f}) "
-            f"| {means['fitness_best']:.4f} | {100 * own['late_gain'].median():.0f} % "
-            f"| {means['diversity']:.1f} "
-            f"| {means['size_mean']:.1f} ({means['size_least']:.1f}) "
-            f"| {means['birth_s']:.1f} |"
-        )
+        lines.append([
+            f"{value:g}", str(len(own)), f"{middle:.4f} ({low:.4f} to {high:.4f})",
+            f"{means['fitness_best']:.4f}", f"{100 * own['late_gain'].median():.0f} %",
+            f"{means['diversity']:.1f}",
+            f"{means['size_mean']:.1f} ({means['size_least']:.1f})",
+            f"{means['birth_s']:.1f}",
+        ])  # fmt: skip
+    return markdown(heads, lines)
 
 
-def effect_lines(grid: Frame) -> Iterator[str]:
-    """Yield a table: which outcomes depend on a setting, and which on the founders.
+def effect_lines(grid: Frame) -> list[str]:
+    """Return a table: which outcomes depend on a setting, and which on the founders.
 
     Friedman's test compares the values of a setting between runs of the same repeat,
     so with the same founders, and of the same other setting. The last column is the
     share of an outcome's variance that lies between repeats.
     """
-    yield "| outcome | interval: p | share: p | variance between repeats |"
-    yield "|---|---|---|---|"
+    heads, lines = (
+        ["outcome", "interval: p", "share: p", "variance between repeats"],
+        [],
+    )
     repeats = grid.index.str.rpartition("-").get_level_values(2)
     for measure, name in TESTED.items():
         rows = grid.assign(repeat=repeats)
@@ -174,21 +159,19 @@ def effect_lines(grid: Frame) -> Iterator[str]:
             found.append(friedmanchisquare(*blocks.to_numpy().T).pvalue)
         means = rows.groupby("repeat")[measure].transform("mean")
         between = means.var(ddof=0) / rows[measure].var(ddof=0)
-        cells = " | ".join(f"{p:.2g}" for p in found)
-        yield f"| {name} | {cells} | {100 * between:.0f} % |"
+        cells = (f"{p:.2g}" for p in found)
+        lines.append([name, *cells, f"{100 * between:.0f} %"])
+    return markdown(heads, lines)
 
 
-def check_lines(grid: Frame, others: Frame) -> Iterator[str]:
-    """Yield a table of points that are not in the grid.
+def check_lines(grid: Frame, others: Frame) -> list[str]:
+    """Return a table of points that are not in the grid.
 
     It has values interpolated from the grid's means, and observed values.
     """
-    names = [name for name, _ in SHOWN.values()]
-    yield (
-        f"| birth interval [s] | survival share | runs | "
-        f"{' | '.join(f'{name}: expected | observed' for name in names)} |"
-    )
-    yield "|---|---|---|" + "---|" * (2 * len(names))
+    heads, lines = ["birth interval [s]", "survival share", "runs"], []
+    for name, _ in SHOWN.values():
+        heads += [f"{name}: expected", "observed"]
     for (interval, share), own in others.groupby([INTERVAL, SHARE]):
         cells = []
         for measure, (_, digits) in SHOWN.items():
@@ -197,7 +180,8 @@ def check_lines(grid: Frame, others: Frame) -> Iterator[str]:
             observed = f"{own[measure].mean():.{digits}f}"
             spread = f"{least:.{digits}f} to {most:.{digits}f}"
             cells += [f"{expected:.{digits}f}", f"{observed} ({spread})"]
-        yield f"| {interval:g} | {share:g} | {len(own)} | {' | '.join(cells)} |"
+        lines.append([f"{interval:g}", f"{share:g}", str(len(own)), *cells])
+    return markdown(heads, lines)
 
 
 def interpolated(grid: Frame, measure: str, interval: float, share: float) -> float:
@@ -207,5 +191,7 @@ def interpolated(grid: Frame, measure: str, interval: float, share: float) -> fl
     return float(at((interval, share)))
 
 
+main = command(__doc__, pages, draw, keep=("keep the rows of finished sweeps", keep))
+
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(None))

@@ -1,8 +1,8 @@
 """Runs the campaign of docs/results.md; collects its rows in docs/data; checks them.
 
-    python docs/campaign.py run runs/results
-    python docs/campaign.py collect runs/results
-    python docs/campaign.py check
+    python -m docs.studies.thesis.campaign run runs/results
+    python -m docs.studies.thesis.campaign collect runs/results
+    python -m docs.studies.thesis.campaign check
 
 ``docs/data/README.md`` describes the rows.
 """
@@ -17,12 +17,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from analysis.measures.load import Run, read_runs
-from docs.campaign_check import check, problems_of
-from docs.campaign_data import DATA, PARTS, Part, parquet, path_of, replace, stem
-from docs.campaign_rows import measured_rows
+from docs.studies.pages import ROOT
+from docs.studies.thesis.check import check, problems_of
+from docs.studies.thesis.data import (
+    DATA,
+    PARTS,
+    Part,
+    parquet,
+    path_of,
+    replace,
+    stem,
+)
+from docs.studies.thesis.rows import measured_rows
 from schema.errors import RevolveError
 
-ROOT = Path(__file__).resolve().parents[1]
 COMMIT = "commit"
 """File in a campaign's folder with the commit of the code that started it."""
 

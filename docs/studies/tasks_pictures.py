@@ -1,6 +1,6 @@
-"""Draws the pictures of docs/tasks.md: best robots that docs/tasks_campaign.py kept.
+"""Draws the pictures of docs/tasks.md: best robots that docs/studies/tasks.py kept.
 
-    python -m docs.tasks_pictures
+    python -m docs.studies.tasks_pictures
 
 Each picture shows three moments of an evaluation from a fixed camera.
 """
@@ -18,7 +18,7 @@ from schema.experiment.settings import EvaluationSettings, evaluation_settings_o
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
-PICTURES = Path(__file__).resolve().parent / "pictures" / "tasks"
+PICTURES = Path(__file__).resolve().parents[1] / "pictures" / "tasks"
 SIZE = (280, 210)
 """Width and height of each of the three pictures [pixels]."""
 SHARES = (0.1, 0.5, 0.99)
@@ -29,7 +29,7 @@ def main() -> int:
     """Draw all tasks; return 0."""
     choose_engine()
     # They import MuJoCo, which needs to know the engine.
-    from docs.tasks_campaign import ROBOTS, TASKS  # noqa: PLC0415
+    from docs.studies.tasks import ROBOTS, TASKS  # noqa: PLC0415
     from schema.formats.files import read_robot  # noqa: PLC0415
     from worker.robot.evaluation import simulate  # noqa: PLC0415
 

@@ -11,7 +11,8 @@ from analysis.comparison.claims import TOUCHES
 from analysis.comparison.equivalence import ALPHA, alike_power
 from analysis.comparison.verdicts import LARGE, SURE
 from analysis.figures.style import in_order, label, pair_name
-from docs.campaign_data import PARTS
+from docs.studies.pages import Parts, markdown
+from docs.studies.thesis.data import PARTS
 
 Tables = Mapping[str, pa.Table]
 Row = dict[str, Any]
@@ -63,11 +64,11 @@ _SPEEDS = (5, 15, 30, 50)
 """Numbers of robots whose speed is printed."""
 
 
-def parts_of(tables: Tables) -> dict[str, dict[str, str]]:
-    """Return the Markdown of each generated part by page and name.
+def pages_of(tables: Tables) -> dict[str, Parts]:
+    """Return the lines of each generated part by page and name.
 
     Args:
-        tables: as ``docs.results.tables_of`` returns them.
+        tables: as ``docs.studies.thesis.results.tables_of`` returns them.
     """
     return {
         "results.md": {
@@ -84,12 +85,7 @@ def parts_of(tables: Tables) -> dict[str, dict[str, str]]:
     }
 
 
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def _runs(tables: Tables) -> str:
+def _runs(tables: Tables) -> list[str]:
     """Return repeats, births, platform and commit of each experiment."""
     details = tables["runs"].to_pylist()
     rows = []
@@ -107,7 +103,7 @@ def _runs(tables: Tables) -> str:
                     ", ".join(f"`{tag}`" for tag in sorted(platforms)) or "-",
                 ]
             )
-    return _table(["experiment", "repeats", "births", "commit", "platform"], rows)
+    return markdown(["experiment", "repeats", "births", "commit", "platform"], rows)
 
 
 def _last(tables: Tables) -> dict[str, pa.Table]:
@@ -120,7 +116,7 @@ def _last(tables: Tables) -> dict[str, pa.Table]:
     return found
 
 
-def _ends(tables: Tables) -> str:
+def _ends(tables: Tables) -> list[str]:
     """Return means over runs at the end, with least and greatest run."""
     last = _last(tables)
     heads = [
@@ -135,10 +131,10 @@ def _ends(tables: Tables) -> str:
         [text, *(_of_runs(runs, measure, decimals) for runs in last.values()), axis]
         for measure, text, decimals, axis in _ROWS
     ]
-    return _table(heads, rows)
+    return markdown(heads, rows)
 
 
-def _arenas(tables: Tables) -> str:
+def _arenas(tables: Tables) -> list[str]:
     """Return one row per arena of scenario 3: how many lived there, and its end."""
     arenas, populations = _last(tables).get("scenario3"), tables["populations"]
     rows = []
@@ -159,10 +155,10 @@ def _arenas(tables: Tables) -> str:
     heads = ["repeat", "living robots (most)", "mature robots (most)",
              f"populations of {_CROWDED}", "fitness [m/s]", "rank",
              "retention"]  # fmt: skip
-    return _table(heads, rows)
+    return markdown(heads, rows)
 
 
-def _controls(tables: Tables) -> str:
+def _controls(tables: Tables) -> list[str]:
     """Return measures of findings beside those of the baselines, means over runs."""
     last = _last(tables)
     names = [name for name in last if name != TOUCHES]
@@ -170,7 +166,7 @@ def _controls(tables: Tables) -> str:
         [figure, text, *(_of_runs(last[name], measure, 2) for name in names)]
         for measure, text, figure in _CONTROLS
     ]
-    return _table(["figure", "measure", *map(label, names)], rows)
+    return markdown(["figure", "measure", *map(label, names)], rows)
 
 
 def _of_runs(outcomes: pa.Table, measure: str, decimals: int) -> str:
@@ -201,7 +197,7 @@ def _counts(rows: Sequence[Row]) -> str:
     )
 
 
-def _verdicts(tables: Tables) -> str:
+def _verdicts(tables: Tables) -> list[str]:
     """Return how many findings have which verdict."""
     rows = tables["findings"].to_pylist()
     sure = [row for row in rows if not row["near_automatic"]]
@@ -219,10 +215,10 @@ def _verdicts(tables: Tables) -> str:
             f"- {len(untested)} of the undecided ones have no numbers yet "
             f"({'; '.join(reasons)})."
         )
-    return "\n".join(lines)
+    return lines
 
 
-def _power(tables: Tables) -> str:
+def _power(tables: Tables) -> list[str]:
     """Return the power of the equivalence test, as it stands and as planned.
 
     The corrected p of a test is below 5 % if p is below this share of 5 %: the number
@@ -249,7 +245,7 @@ def _power(tables: Tables) -> str:
                 ]
             )
     heads = ["compared", "repeats", "power", f"power at p < {corrected:.3f}"]
-    return _table(heads, rows)
+    return markdown(heads, rows)
 
 
 def _grouped(tables: Tables, chosen: Callable[[Row], bool]) -> dict[Any, list[Row]]:
@@ -262,7 +258,7 @@ def _grouped(tables: Tables, chosen: Callable[[Row], bool]) -> dict[Any, list[Ro
     return groups
 
 
-def _topics(tables: Tables) -> str:
+def _topics(tables: Tables) -> list[str]:
     """Return one row per finding without names: the pairs by verdict."""
     rows = []
     found = set(tables["findings"]["verdict"].to_pylist())
@@ -273,10 +269,10 @@ def _topics(tables: Tables) -> str:
             for verdict in verdicts
         ]
         rows.append([figure, topic, *cells])
-    return _table(["figure", "finding", *verdicts], rows)
+    return markdown(["figure", "finding", *verdicts], rows)
 
 
-def _differences(tables: Tables) -> str:
+def _differences(tables: Tables) -> list[str]:
     """Return the findings that are not reproduced, with their numbers."""
     rows = [
         [row["figure"], row["claim"], *_numbers(row)]
@@ -284,8 +280,8 @@ def _differences(tables: Tables) -> str:
         if row["verdict"] == "not reproduced"
     ]
     if not rows:
-        return "None of the findings is *not reproduced*."
-    return _table(["figure", "finding", *_NUMBERS], rows)
+        return ["None of the findings is *not reproduced*."]
+    return markdown(["figure", "finding", *_NUMBERS], rows)
 
 
 _NUMBERS = ("means", "difference (95 %)", "effect (95 %)", "q", "q alike")
@@ -321,7 +317,7 @@ def _short(value: float) -> str:
     return _plain(rounded, 4).rstrip("0").rstrip(".")
 
 
-def _all(tables: Tables) -> str:
+def _all(tables: Tables) -> list[str]:
     """Return one row per finding, with its numbers and the rule of the verdict."""
     rows = []
     for row in tables["findings"].to_pylist():
@@ -339,10 +335,10 @@ def _all(tables: Tables) -> str:
             ]
         )
     heads = ["figure", "finding", "runs", *_NUMBERS, "power", "verdict", "rule"]
-    return _table(heads, rows)
+    return markdown(heads, rows)
 
 
-def _speed(tables: Tables) -> str:
+def _speed(tables: Tables) -> list[str]:
     """Return real-time factors of arenas."""
     rows = []
     for kind, text in (("arena", "random robots"), ("spider", "spiders")):
@@ -356,4 +352,4 @@ def _speed(tables: Tables) -> str:
         count = int((sizes == _SPEEDS[0]).sum())
         rows.append([text, *means, str(count)])
     heads = ["arena of", *(f"{size} robots" for size in _SPEEDS), "repetitions"]
-    return _table(heads, rows)
+    return markdown(heads, rows)

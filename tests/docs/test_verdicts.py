@@ -1,53 +1,24 @@
-"""docs/results.md agrees with docs/data; each verdict is recomputed with SciPy."""
+"""Each verdict of docs/results.md is recomputed with SciPy from docs/data."""
 
 import math
-import re
 from functools import cache
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from scipy import optimize, stats
 
 from analysis.comparison.claims import ARENA, CLAIMS, Claim
 from analysis.measures.population_table import Numbers
-from docs import results
-from docs.campaign_data import DATA
-from docs.page_parts import with_parts
-from docs.results_parts import _short, parts_of
+from docs.studies.thesis.data import DATA
+from docs.studies.thesis.parts import _short
+from docs.studies.thesis.results import tables_of
 
 Row = dict[str, Any]
 FEW = 10
 """Fewer equal runs show no spread."""
 DRAWS = 20000
-
-
-@pytest.fixture(scope="module")
-def tables() -> dict[str, pa.Table]:
-    return results.tables_of(DATA)
-
-
-def test_page_and_pictures_are_up_to_date(tables: dict[str, pa.Table]) -> None:
-    stale = results.stale_files(results.pages_of(tables), tables)
-    assert stale == [], "run python -m docs.results"
-
-
-def test_a_changed_number_is_found(tables: dict[str, pa.Table]) -> None:
-    outcomes = tables["outcomes"]
-    at = outcomes.schema.get_field_index("fitness")
-    other = pa.array(np.asarray(outcomes["fitness"]) + 0.1)
-    changed = tables | {"outcomes": outcomes.set_column(at, "fitness", other)}
-    pages = results.pages_of(changed)
-    assert results.stale_files(pages, changed) == ["results.md"]
-
-
-def test_a_page_with_other_parts_is_refused() -> None:
-    page = "<!-- begin: ends -->\nold\n<!-- end -->\n"
-    assert with_parts(page, {"ends": ["new"]}) == page.replace("old", "new")
-    with pytest.raises(ValueError, match=re.escape("must have parts ['runs']")):
-        with_parts(page, {"runs": ["new"]})
 
 
 @pytest.mark.parametrize(
@@ -59,19 +30,6 @@ def test_a_page_with_other_parts_is_refused() -> None:
 )  # fmt: skip
 def test_short_numbers_have_no_negative_zero(value: float, text: str) -> None:
     assert _short(value) == text
-
-
-def test_contact_time_is_not_called_a_share_of_life(
-    tables: dict[str, pa.Table],
-) -> None:
-    """A robot that touches two others at once counts twice, so it can exceed 1."""
-    words = "contact time per lifetime (simultaneous contacts count separately)"
-    assert f"| {words} |" in parts_of(tables)["results.md"]["ends"]
-    assert words in (results.DOCS / "analysis.md").read_text("utf-8")
-    (claim,) = [claim for claim in CLAIMS if claim.measure == "touching"]
-    assert words in claim.text
-    page = (results.DOCS / "results.md").read_text("utf-8")
-    assert "an upper bound" in " ".join(page.split())
 
 
 @cache
@@ -237,8 +195,8 @@ def _verdict(claim: Claim, row: Row) -> str:
     return "reproduced" if row["effect"] > 0 else "not reproduced"
 
 
-def test_every_verdict_is_recomputed_with_scipy(tables: dict[str, pa.Table]) -> None:
-    ours = tables["findings"].to_pylist()
+def test_every_verdict_is_recomputed_with_scipy() -> None:
+    ours = tables_of(DATA)["findings"].to_pylist()
     found = [_recomputed(claim) for claim in CLAIMS]
     tested = [row for row in found if "p" in row]
     q = stats.false_discovery_control([row["p"] for row in tested])

@@ -21,10 +21,10 @@ from analysis.figures.courses import over_births
 from analysis.figures.findings import effects
 from analysis.figures.style import in_order
 from analysis.render.stage import choose_engine
+from docs.studies.pages import PICTURES
 
 Tables = Mapping[str, pa.Table]
 
-PICTURES = Path(__file__).resolve().parent / "pictures"
 _DIGEST = "rows"
 """Key of the digest in a PNG; in a JPEG it is the comment."""
 _WIDTHS = {"progression.png": 1152, "findings.png": 1300, "arena-speed.png": 900,
@@ -82,7 +82,7 @@ def digests(tables: Tables) -> dict[Path, str]:
     """Return the digest that each picture should hold.
 
     Args:
-        tables: as ``docs.results.tables_of`` returns them.
+        tables: as ``docs.studies.thesis.results.tables_of`` returns them.
     """
     return {PICTURES / name: _digest(rows) for name, rows in _sources(tables).items()}
 
@@ -115,7 +115,7 @@ def draw(tables: Tables) -> Iterator[str]:
     """Draw the pictures that are not up to date; yield the names of those drawn.
 
     Args:
-        tables: as ``docs.results.tables_of`` returns them.
+        tables: as ``docs.studies.thesis.results.tables_of`` returns them.
 
     Raises:
         RevolveError: a robot cannot be rendered.
@@ -171,7 +171,7 @@ def _robots(tables: Tables) -> dict[str, Figure]:
     # They import MuJoCo, which needs to know the engine.
     from analysis.figures.family_tree import Best  # noqa: PLC0415
     from analysis.figures.pictures import family_tree, gaits  # noqa: PLC0415
-    from analysis.figures.robot_pictures import family_picture  # noqa: PLC0415
+    from analysis.figures.robot_pictures import robot_picture  # noqa: PLC0415
     from schema.experiment.document import body_space  # noqa: PLC0415
     from schema.experiment.file import own_experiment  # noqa: PLC0415
     from schema.experiment.identity import Origin  # noqa: PLC0415
@@ -204,7 +204,7 @@ def _robots(tables: Tables) -> dict[str, Figure]:
                 "robot": pa.nulls(rows.num_rows, pa.binary()),
             }
         )
-        pictures[name] = family_picture(
+        pictures[name] = robot_picture(
             best,
             births,
             relatives[name],

@@ -1,29 +1,34 @@
 """Compares evolution with random search on each task of docs/tasks.md.
 
-    python -m docs.tasks_campaign run runs/tasks    # start, or go on after an end
-    python -m docs.tasks_campaign table             # write the table of docs/tasks.md
+    python -m docs.studies.tasks run runs/tasks    # start, or go on after an end
+    python -m docs.studies.tasks page              # write the table of docs/tasks.md
 
 Each search has the same number of births. The random one is the shipped experiment with
 ``selection.parents = "none"``, as in ``no-reproduction``. Rows are kept in
 docs/tasks_data/results.csv, one per finished run.
 """
 
-import argparse
-import csv
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.load import read_runs
-from docs.page_parts import csv_rows, write_parts
+from docs.studies.pages import (
+    DOCS,
+    ROOT,
+    Parts,
+    append_csv,
+    command,
+    csv_rows,
+    markdown,
+)
 from schema.experiment.document import Experiment
 from schema.experiment.file import own_experiment
 from schema.experiment.identity import Identity, Origin
@@ -35,13 +40,11 @@ from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth
 from worker.robot.evaluation import evaluate
 
-ROOT = Path(__file__).resolve().parents[1]
 SHIPPED = ROOT / "schema" / "experiment" / "shipped"
-ROBOTS = ROOT / "docs" / "tasks_data"
-"""Best robot of each task with seed ``DRAWN``, for docs/tasks_pictures.py."""
+ROBOTS = DOCS / "tasks_data"
+"""Best robot of each task with seed ``DRAWN``, for docs/studies/tasks_pictures.py."""
 DRAWN = 1
 ROWS = ROBOTS / "results.csv"
-PAGE = ROOT / "docs" / "tasks.md"
 
 TASKS = {
     "locomotion": ("scenario1", "m/s"),
@@ -68,45 +71,24 @@ TRIALS = range(1000, 1020)
 RESAMPLES = 10_000
 FEW = 3
 """Least number of seeds for an interval."""
-COLUMNS = ("task", "search", "seed", "births", "best", "mean", "failed", "commit")
 _RANDOM = 'parents = "none"'
 
-Numbers = npt.NDArray[np.float64]
 
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the commands; return 0, or the exit code of ``revolve``."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(dest="command", required=True)
-    running = commands.add_parser("run", help="run what is missing, seed by seed")
-    running.add_argument("folder", type=Path, help="folder of the runs")
-    running.add_argument("--only", nargs="*", choices=SEARCHED, default=list(SEARCHED))
-    running.add_argument("--workers", type=int, default=1, help="workers per run")
-    commands.add_parser("table", help="write the table of docs/tasks.md")
-    options = parser.parse_args(arguments)
-    if options.command == "table":
-        write_table()
-        return 0
-    return run(options.folder, options.only, options.workers)
-
-
-def run(folder: Path, tasks: Sequence[str], workers: int = 1) -> int:
-    """Run all missing runs, at the lowest priority, all tasks of a seed together."""
+def run(folders: Sequence[Path]) -> None:
+    """Run all missing runs in a folder, at the lowest priority, seed by seed."""
+    (folder,) = folders
     os.nice(19)
     folder.mkdir(parents=True, exist_ok=True)
     for seed in SEEDS:
-        for task in tasks:
+        for task in SEARCHED:
             for search in SEARCHES:
                 known = {(r["task"], r["search"], int(r["seed"])) for r in rows()}
-                if (task, search, seed) in known:
-                    continue
-                if code := _run_one(folder, task, search, seed, workers):
-                    return code
-    return 0
+                if (task, search, seed) not in known:
+                    _run_one(folder, task, search, seed)
 
 
-def _run_one(folder: Path, task: str, search: str, seed: int, workers: int) -> int:
-    """Run or resume one search and keep its row; return the exit code."""
+def _run_one(folder: Path, task: str, search: str, seed: int) -> None:
+    """Run or resume one search, and keep its row."""
     name = f"{_file_name(task)}-{search}"
     out = folder / f"{name}-{seed}"
     if (out / "run.json").exists():
@@ -116,27 +98,16 @@ def _run_one(folder: Path, task: str, search: str, seed: int, workers: int) -> i
         document.write_text(_document(task, search), encoding="utf-8")
         words = ["run", str(document), "--seed", str(seed), "--out", str(out)]
         words += ["--births", str(BIRTHS)]
-    words += ["--workers", str(workers), "--quiet"]
+    words += ["--workers", "1", "--quiet"]
     print(f"revolve {' '.join(words)}", flush=True)
-    done = subprocess.run(
-        [sys.executable, "-m", "revolve", *words], cwd=ROOT, check=False
-    )
-    if done.returncode:
-        return done.returncode
+    subprocess.run([sys.executable, "-m", "revolve", *words], cwd=ROOT, check=True)
     row = {"task": task, "search": search, "seed": seed, **_outcome(out)}
-    ROBOTS.mkdir(exist_ok=True)
-    is_new = not ROWS.exists()
-    with ROWS.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        if is_new:
-            writer.writeheader()
-        writer.writerow({**row, "commit": _commit()})
+    append_csv(ROWS, {**row, "commit": _commit()})
     if search == "evolution" and seed == DRAWN:
         experiment, _, robot = best_robot(out)
         path = ROBOTS / f"{_file_name(task)}.yaml"
         write_robot(robot, path, evaluation_settings_of(experiment))
     shutil.rmtree(out)
-    return 0
 
 
 def _file_name(task: str) -> str:
@@ -210,7 +181,7 @@ def _commit() -> str:
         return done.stdout.strip()
 
     # The rows that this script writes change no birth.
-    own = f":!{ROBOTS.relative_to(ROOT)}"
+    own = ":!docs/tasks_data"
     is_changed = said("status", "--porcelain", "--untracked-files=no", "--", ".", own)
     return said("rev-parse", "--short", "HEAD") + ("-dirty" if is_changed else "")
 
@@ -220,12 +191,14 @@ def rows() -> list[dict[str, str]]:
     return csv_rows(ROWS)
 
 
-def difference(first: Numbers, second: Numbers) -> tuple[float, float, float]:
+def difference(
+    first: Sequence[float], second: Sequence[float]
+) -> tuple[float, float, float]:
     """Return the difference of two medians, and its 95 % bootstrap interval.
 
     Args:
-        first: (N,) one number per run.
-        second: (M,) one number per run of the other search.
+        first: one number per run.
+        second: one number per run of the other search.
 
     Source: Efron, *Bootstrap methods*, 1979: percentiles, with a fixed seed.
     """
@@ -238,10 +211,11 @@ def difference(first: Numbers, second: Numbers) -> tuple[float, float, float]:
     return float(np.median(first) - np.median(second)), low, high
 
 
-def table(kept: Sequence[Mapping[str, str]]) -> Iterator[str]:
-    """Yield the lines of the table, in Markdown."""
-    yield "| task | seeds | evolution | random search | difference | 95 % interval |"
-    yield "|---|---|---|---|---|---|"
+def table(kept: Sequence[Mapping[str, str]]) -> list[str]:
+    """Return the lines of the table: seeds that both searches have."""
+    heads = ["task", "seeds", "evolution", "random search", "difference",
+             "95 % interval"]  # fmt: skip
+    lines = []
     for task, (_, unit) in SEARCHED.items():
         found = {
             search: {
@@ -254,25 +228,25 @@ def table(kept: Sequence[Mapping[str, str]]) -> Iterator[str]:
         seeds = sorted(set(found["evolution"]) & set(found["random"]))
         if not seeds:
             continue
-        first, second = (
-            np.array([found[search][seed] for seed in seeds]) for search in SEARCHES
-        )
+        first, second = ([found[search][seed] for seed in seeds] for search in SEARCHES)
         change, low, high = difference(first, second)
         interval = (
             f"{low:+.3f} to {high:+.3f}" if len(seeds) >= FEW else "too few seeds"
         )
         suffix = "" if unit == "1" else f" {unit}"
-        yield (
-            f"| {task} | {len(seeds)} | {np.median(first):.3f}{suffix} | "
-            f"{np.median(second):.3f}{suffix} | {change:+.3f}{suffix} | "
-            f"{interval} |"
-        )
+        lines.append([
+            task, str(len(seeds)), f"{np.median(first):.3f}{suffix}",
+            f"{np.median(second):.3f}{suffix}", f"{change:+.3f}{suffix}", interval,
+        ])  # fmt: skip
+    return markdown(heads, lines)
 
 
-def write_table() -> None:
-    """Replace the table of docs/tasks.md by that of the rows."""
-    write_parts(PAGE, {"results": ["", *table(rows()), ""]}, "", is_check=False)
+def pages() -> dict[str, Parts]:
+    """Return the generated part of the page."""
+    return {"tasks.md": {"results": ["", *table(rows()), ""]}}
 
+
+main = command(__doc__, pages, run=("run in a folder what is missing", run))
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(None))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from docs.campaign_data import (
+from docs.studies.thesis.data import (
     BENCHMARKS,
     NAMES,
     PARTS,

@@ -1,8 +1,8 @@
 """Makes the films and recordings of docs/gallery/.
 
-    python -m docs.gallery_robots FOLDER
+    python -m docs.studies.gallery FOLDER
 
-The robots of the tasks are those that docs/tasks_campaign.py kept. The arena is a run
+The robots of the tasks are those that docs/studies/tasks.py kept. The arena is a run
 of scenario 3, which is made in FOLDER if it is not there yet (several minutes). Each
 film is a GIF of the first seconds; each recording (.rrd) opens in Rerun's viewer.
 """
@@ -22,7 +22,7 @@ from schema.experiment.settings import evaluation_settings_of
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 GALLERY = ROOT / "docs" / "gallery"
 SIZE = (220, 165)
 """Width and height of a film [pixels]."""
@@ -42,7 +42,7 @@ def main(folder: Path) -> int:
     choose_engine()
     # It imports MuJoCo, which needs to know the engine.
     from analysis.viewer.arena_film import SPEED, draw_film  # noqa: PLC0415 - the same
-    from docs.tasks_campaign import ROBOTS, TASKS  # noqa: PLC0415
+    from docs.studies.tasks import ROBOTS, TASKS  # noqa: PLC0415
     from schema.formats.files import read_robot  # noqa: PLC0415
 
     for task, (shipped, _) in TASKS.items():
@@ -85,7 +85,7 @@ def save_film(pictures: list[Picture], path: Path, interval_s: float) -> None:
 
 def film_robot(robot: Robot, experiment: Experiment, path: Path) -> None:
     """Write a film of an evaluation, with a camera that follows the robot."""
-    from docs.tasks_pictures import motion  # noqa: PLC0415 - after the engine is chosen
+    from docs.studies.tasks_pictures import motion  # noqa: PLC0415 - after the engine is chosen
     from worker.robot.evaluation import simulate  # noqa: PLC0415 - the same
 
     settings = evaluation_settings_of(experiment)

@@ -3,6 +3,7 @@
 A table is a folder with one file per repeat. Rows of a finished repeat never change.
 """
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from analysis.comparison.comparison import Outcomes, RunOutcomes
 from analysis.comparison.outcomes import of_courses
 from analysis.measures.outputs import BODY, schema
-from analysis.measures.population_table import Numbers
+from docs.studies.pages import DOCS
 
-DATA = Path(__file__).resolve().parent / "data"
+DATA = DOCS / "data"
 BENCHMARKS = ("arena", "spider")
 """Kinds of ``revolve bench`` whose files are in the folder ``bench``."""
 SPACING = 15
@@ -246,49 +248,22 @@ def _with_courses(outcomes: pa.Table, data: Path) -> pa.Table:
     return outcomes
 
 
-class KeptOutcomes:
-    """Outcomes of the kept runs, for ``analysis.comparison``.
+def kept_outcomes(rows: pa.Table, most: int | None = None) -> Outcomes:
+    """Return the outcomes of the kept runs, which have the thesis's fitness function.
 
     Args:
         rows: rows of the table ``outcomes``, as ``kept`` returns them.
         most: most births at which experiments are compared; None is no limit.
-
-    Attributes:
-        experiments: experiments with rows, by name.
     """
-
-    def __init__(self, rows: pa.Table, most: int | None = None) -> None:
-        self._rows = rows if most is None else rows.filter(pc.field("births") <= most)
-        names = self._rows["experiment"].to_pylist()
-        self._places: dict[tuple[str, int], list[int]] = {}
-        births = self._rows["births"].to_pylist()
-        for row, place in enumerate(zip(names, births, strict=True)):
-            self._places.setdefault(place, []).append(row)
-        self.experiments: list[str] = sorted(set(names))
-
-    def births(self, *experiments: str) -> int:
-        """Return the most births at which all runs have rows; 0 if there are none."""
-        reached: dict[str, set[int]] = {}
-        columns = ("experiment", "folder", "births")
-        for experiment, folder, births in zip(
-            *(self._rows[name].to_pylist() for name in columns), strict=True
-        ):
-            if experiment in experiments:
-                reached.setdefault(folder, set()).add(births)
-        return max(set.intersection(*reached.values()), default=0)
-
-    def values(self, experiment: str, measure: str, births: int) -> Numbers:
-        """Return the runs' values of a measure; runs without a value are skipped."""
-        places = np.array(self._places.get((experiment, births), []), np.int64)
-        found = np.asarray(self._rows[measure].to_numpy(), np.float64)[places]
-        known: Numbers = found[~np.isnan(found)]
-        return known
-
-    def own_measures(self, births: int, *experiments: str) -> list[str]:
-        """Return no measures: the kept runs name none."""
-        del births, experiments
-        return []
-
-    def fitness_functions(self, *experiments: str) -> list[str]:
-        """Return the only fitness function: the kept runs have the thesis's."""
-        return ["locomotion"] if experiments else []
+    at: dict[tuple[str, str], dict[int, dict[str, float]]] = {}
+    for row in rows.to_pylist():
+        if most is None or row["births"] <= most:
+            found = {name: math.nan if value is None else value
+                     for name, value in row.items()}  # fmt: skip
+            names = row["experiment"], row["folder"]
+            at.setdefault(names, {})[row["births"]] = found
+    runs: dict[str, list[RunOutcomes]] = {}
+    for (experiment, folder), mine in at.items():
+        one = RunOutcomes(folder, "locomotion", tuple(mine), mine.__getitem__)
+        runs.setdefault(experiment, []).append(one)
+    return Outcomes(runs)

@@ -1,6 +1,6 @@
 """Draws docs/tutorials/pictures/ from the runs of the tutorials.
 
-    python -m docs.tutorial_pictures FOLDER
+    python -m docs.studies.tutorial_pictures FOLDER
 
 FOLDER has what the commands of tutorials 1, 3 and 4 write. Fitness is an SVG; the
 pictures of robots are copies of those that the tutorials' commands draw.
@@ -16,7 +16,7 @@ from matplotlib import pyplot as plt
 
 import revolve as rv
 
-PICTURES = Path(__file__).resolve().parent / "tutorials" / "pictures"
+PICTURES = Path(__file__).resolve().parents[1] / "tutorials" / "pictures"
 COPIES = {"best.png": "first-gait.png", "jump.png": "jump.png", "feet.png": "feet.png"}
 
 

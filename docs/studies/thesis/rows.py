@@ -10,7 +10,7 @@ from analysis.comparison.outcomes import outcome
 from analysis.measures.families import family
 from analysis.measures.load import Run
 from analysis.measures.study import measure_run, reach
-from docs.campaign_data import SPACING, TABLES
+from docs.studies.thesis.data import SPACING, TABLES
 from schema.errors import RunFolderError
 from schema.tables.files import read_table
 
