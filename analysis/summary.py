@@ -10,11 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from analysis.measures.fitness_functions import (
-    by_function,
-    functions_of,
-    measured_apart,
-)
+from analysis.measures.fitness_functions import not_compared
 from analysis.measures.populations import last_rows
 from schema.agent.terminal.progress_line import print_line
 from schema.errors import rounded
@@ -49,16 +45,8 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     keys = ["experiment", "differs"]
     for row in renamed.group_by(keys, use_threads=False).aggregate([]).to_pylist():
         print_line(console, f"{row['experiment']}: {row['differs']}")
-    groups = by_function(functions_of(tables["runs"]))
-    if len(groups) > 1:
-        lists = "; ".join(f"{', '.join(each)} by {one}" for one, each in groups.items())
-        text = "fitness is not compared between different fitness functions"
-        print_line(console, f"{text}: {lists}")
-    online, offline = measured_apart(tables["runs"])
-    if online:
-        text = "fitness is measured differently in arenas and off-line"
-        lists = f"{', '.join(online)} in arenas; {', '.join(offline)} off-line"
-        print_line(console, f"{text}: {lists}")
+    for line in not_compared(tables["runs"]):
+        print_line(console, line)
     for line in _left_out(tables["left_out"].to_pylist()):
         print_line(console, line)
 

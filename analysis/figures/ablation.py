@@ -4,8 +4,7 @@ import plotnine as p9
 import pyarrow as pa
 
 from analysis.comparison.ablation import ALL, DEAD, HELD, MEAN, ONE, RANDOM
-from analysis.figures.forms import NothingToDraw
-from analysis.figures.robustness import points_of_shares
+from analysis.figures.robustness import known_shares, points_of_shares
 
 _SENSORS = {HELD: "at 0", MEAN: "at mean"}
 _MOTOR = " motor dead"
@@ -25,10 +24,7 @@ def ablation(table: pa.Table) -> p9.ggplot:
     Raises:
         NothingToDraw: no robot has a positive fitness without changes.
     """
-    rows = table.to_pandas()
-    rows = rows[rows["share"].notna()].reset_index(drop=True)
-    if rows.empty:
-        raise NothingToDraw("no robot has a positive fitness without changes")
+    rows = known_shares(table)
     robot = ["folder", "island", "birth"]
     is_motor = (rows["group"] == DEAD) & (rows["scope"] == ONE)
     ordered = rows[is_motor].groupby(robot)["share"]

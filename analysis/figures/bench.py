@@ -18,46 +18,18 @@ _TICKS = [factor * 10.0**power for power in range(-2, 5) for factor in (1, 3)]
 _OURS, _THEIRS = "this machine", "thesis, i7-4790K"
 
 
-def arena_speed(tables: Tables) -> p9.ggplot:
-    """Return the real-time factor of arenas of random robots by population.
+def speed(tables: Tables, kind: str) -> p9.ggplot:
+    """Return the real-time factor of arenas by population.
 
     Args:
-        tables: ``benchmark``, rows of ``revolve bench arena --out``.
+        tables: ``benchmark``, rows of ``revolve bench arena|spider --out``.
+        kind: "arena", of random robots, beside the thesis's fit; or "spider".
 
     Raises:
         NothingToDraw: no benchmark was read.
 
-    Source: Hupkes 2016, figure 6.1.
+    Source: Hupkes 2016, figures 6.1 and 7.1, without its comparison with RoboGen.
     """
-    rows = _rows(tables, "arena")
-    sizes = np.unique(np.asarray(rows["population"], np.float64))
-    line = np.linspace(sizes.min(), max(sizes.max(), sizes.min() + 1), 100)
-    a, b, c = _THESIS
-    factors = a + b / line + c / line**2
-    fit = pa.table({"population": line, "factor": factors})
-    # Of many robots it is negative.
-    fit = fit.filter(factors >= _LEAST)
-    if fit.num_rows <= 1:
-        return _speed(rows)
-    dashes = p9.geom_line(data=fit.to_pandas().assign(of=_THEIRS), size=0.7)
-    return _speed(rows) + dashes
-
-
-def spider_speed(tables: Tables) -> p9.ggplot:
-    """Return the real-time factor of arenas of spiders by population.
-
-    Args:
-        tables: ``benchmark``, rows of ``revolve bench spider --out``.
-
-    Raises:
-        NothingToDraw: no benchmark was read.
-
-    Source: Hupkes 2016, figure 7.1, without its comparison with RoboGen.
-    """
-    return _speed(_rows(tables, "spider"))
-
-
-def _rows(tables: Tables, kind: str) -> pa.Table:
     rows = tables.get("benchmark")
     if rows is not None:
         rows = rows.filter(pc.field("benchmark") == kind)
@@ -66,10 +38,21 @@ def _rows(tables: Tables, kind: str) -> pa.Table:
             f"no benchmark file was read; create one with: revolve bench {kind} --out "
             f"RUNS/{kind}.parquet"
         )
-    return rows
+    figure = _points(rows)
+    if kind != "arena":
+        return figure
+    sizes = np.unique(np.asarray(rows["population"], np.float64))
+    line = np.linspace(sizes.min(), max(sizes.max(), sizes.min() + 1), 100)
+    a, b, c = _THESIS
+    factors = a + b / line + c / line**2
+    # Of many robots it is negative.
+    fit = pa.table({"population": line, "factor": factors}).filter(factors >= _LEAST)
+    if fit.num_rows <= 1:
+        return figure
+    return figure + p9.geom_line(data=fit.to_pandas().assign(of=_THEIRS), size=0.7)
 
 
-def _speed(rows: pa.Table) -> p9.ggplot:
+def _points(rows: pa.Table) -> p9.ggplot:
     means = rows.group_by("population").aggregate([("factor", "mean")])
     line = means.rename_columns(["population", "factor"]).to_pandas().assign(of=_OURS)
     return (

@@ -27,10 +27,10 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
     Raises:
         NothingToDraw: no robot has a parent.
     """
-    known = tables.get("brains")
-    if known is None or known["body_change"].null_count == known.num_rows:
+    known = tables["brains"].filter(tables["brains"]["body_change"].is_valid())
+    if not known:
         raise NothingToDraw("no robot has parents")
-    rows = known.filter(known["body_change"].is_valid()).to_pandas()
+    rows = known.to_pandas()
     width = max(int(rows["birth"].max()) // _BINS + 1, _LEAST)
     rows["births"] = rows.groupby(rows["birth"] // width)["birth"].transform("mean")
     stacked = rows.melt(

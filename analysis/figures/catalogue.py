@@ -6,12 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from analysis.figures.bench import arena_speed, spider_speed
+from analysis.figures.bench import speed
 from analysis.figures.brains import changes_over_births
 from analysis.figures.courses import course_caption, over_births
 from analysis.figures.file_names import file_name
 from analysis.figures.findings import effects
 from analysis.figures.forms import (
+    NothingToDraw,
     Panels,
     Tables,
     fitness_note,
@@ -59,6 +60,8 @@ class Figure:
         draw: returns the drawing, or raises ``NothingToDraw`` with the reason.
         section: section of the report.
         subject: words of the file name; those of the title if empty.
+        nothing: reason why it is not drawn if its first source has no rows; empty if
+            ``draw`` says it.
     """
 
     number: str
@@ -68,6 +71,17 @@ class Figure:
     draw: Callable[[Tables], Any]
     section: Section
     subject: str = ""
+    nothing: str = ""
+
+    def drawn(self, tables: Tables) -> Any:  # noqa: ANN401 - of two libraries
+        """Return the drawing.
+
+        Raises:
+            NothingToDraw: the tables lack its data.
+        """
+        if self.nothing and not tables.get(self.source[0]):
+            raise NothingToDraw(self.nothing)
+        return self.draw(tables)
 
     @property
     def stem(self) -> str:
@@ -123,7 +137,7 @@ FIGURES: tuple[Figure, ...] = (
            "logarithmic axis. Points are repetitions, the solid line joins their "
            "means, the dashed line is the thesis's fit for its own machine. Values "
            "above 1 are faster than real time.",
-           (_BENCHMARK,), arena_speed, "speed"),
+           (_BENCHMARK,), partial(speed, kind="arena"), "speed"),
     _spread("fitness", "6.2", "Fitness at the end", {"fitness": "mean fitness"}),
     _course("fitness", "6.3", "Fitness over births", "fitness", "mean fitness"),
     _spread("diversity", "6.4", "Unique ancestors per robot of the last population",
@@ -139,7 +153,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure("6.8", "Variability of fitness on-line",
            "Density over robots of the range of a robot's fitness divided by the range "
            "of fitness in the population during its life. Thin lines are single runs.",
-           ("variability",), variability, "islands"),
+           ("variability",), variability, "islands", nothing="no run has an arena"),
     _spread("bodies", "6.9", "Parts at the end", {"parts": "parts"}),
     _spread("bodies", "6.11", "Joints at the end",
             {"active_joints": "active joints",
@@ -155,10 +169,12 @@ FIGURES: tuple[Figure, ...] = (
            partial(_with_note, text="Points are means over the runs that have such "
            "robots. Bars are 95 % intervals of the mean, shown for three or more runs. "
            "Left: the last populations. Right: all robots ever evaluated."),
-           ("extremities",), partial(extremities_and_fitness, by="count"), "bodies"),
+           ("extremities",), partial(extremities_and_fitness, by="count"), "bodies",
+           nothing="no robot was evaluated"),
     Figure("6.14b", "Fitness by extremities per part",
            "As figure 6.14a, in bins of 0.1; each point is at the middle of its bin.",
-           ("extremities",), partial(extremities_and_fitness, by="per_part"), "bodies"),
+           ("extremities",), partial(extremities_and_fitness, by="per_part"), "bodies",
+           nothing="no robot was evaluated"),
     _spread("bodies", "6.15", "Touch sensors at the end",
             {"touch_sensors": "touch sensors",
              "without_touch": "share of robots without any"}),
@@ -174,7 +190,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure("7.1", "Speed of an arena of spiders by its population",
            "Simulated by wall-clock time of identical spiders on a grid, on a "
            "logarithmic axis. Points are repetitions, the line joins their means.",
-           (_BENCHMARK,), spider_speed, "speed"),
+           (_BENCHMARK,), partial(speed, kind="spider"), "speed"),
     _spread("bodies", "A", "Connections at the end",
             {"connections": "connections",
              "connections_per_part": "connections per part"},
@@ -187,7 +203,8 @@ FIGURES: tuple[Figure, ...] = (
     Figure("C", "Migration between islands",
            "The width of an arrow is the number of migrants. Its colour is the share "
            "of migrants that are alive, or have a living descendant, at the end.",
-           ("migrants",), migration_graph, "islands"),
+           ("migrants",), migration_graph, "islands",
+           nothing="no run has several islands with migrants"),
     Figure("D", "Diversity within and between islands",
            "Mean tree edit distance of pairs of robots on the same island, and of "
            "pairs on different islands.",
@@ -205,28 +222,30 @@ FIGURES: tuple[Figure, ...] = (
     Figure("H", "Measures over births",
            "Mean over the population of each measure that the experiment names. Each "
            "line is an island of a run; units are those of the measure.",
-           ("named_measures",), measures_over_births, "measures"),
+           ("named_measures",), measures_over_births, "measures",
+           nothing="no experiment names measures"),
     Figure("I", "Body and brain change over births",
            "Mean distance between a child and its first parent, the one whose copy was "
            "changed, by the child's number of birth. Left: bodies, tree edit distance. "
            "Right: brains, neurons and connections that are new, lost or changed "
            "(changes count 0 to 1). Thick lines are means over runs, thin lines runs.",
-           ("brains",), changes_over_births, "bodies"),
+           ("brains",), changes_over_births, "bodies", nothing="no robot has parents"),
     Figure("J", "Learning curves",
            "Best fitness of a newborn so far by trial: the line is the median over all "
            "robots of a run, the band their quartiles, both as means over runs. Trial "
            "0 is the brain at birth; failed trials count 0.",
-           ("learning_curves",), learning_curves, "learning"),
+           ("learning_curves",), learning_curves, "learning",
+           nothing="no robot learns"),
     Figure("K", "Fitness at birth and after learning",
            "Medians over the newborns of each interval of births, with the brain at "
            "birth and with the best one that they tried; bands are quartiles. The "
            "distance of the lines is what learning gains.",
-           ("learning",), learning_gain, "learning"),
+           ("learning",), learning_gain, "learning", nothing="no robot learns"),
     Figure("L", "Bodies that learning saved",
            "Share of newborns that are in the next recorded population, after the "
            "founders; in an arena in the second one recorded since they are mature. "
            "Learning has saved a body if its robot is there although its fitness at "
            "birth is below that of each robot of that population.",
-           ("learning",), bodies_saved, "learning"),
+           ("learning",), bodies_saved, "learning", nothing="no robot learns"),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

@@ -1,6 +1,6 @@
 """Draws all figures that the data allows; records why the others are left out."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from glob import escape
@@ -101,11 +101,18 @@ class FigureWriter:
         self.left_out: list[LeftOut] = []
 
     def add(self, figure: Figure, tables: Tables) -> None:
-        """Draw a figure and write it, or record why it cannot be drawn."""
+        """Draw a figure and write it, or record why it cannot be drawn.
+
+        One of an earlier analysis is removed then.
+        """
         try:
-            drawn = figure.draw(tables)
+            drawn = figure.drawn(tables)
         except NothingToDraw as error:
-            self.leave_out(figure.number, str(error))
+            # Files of experiments are removed already; a name may begin as they do.
+            if "-" not in figure.number:
+                self._remove(f"{escape(figure.number)}-*.p??")
+            what = f"figure {figure.number}"
+            self.left_out.append(LeftOut("", what, str(error)))
             return
         stem = self._folder / self._names.add(figure.stem)
         save(drawn, stem)
@@ -113,13 +120,6 @@ class FigureWriter:
         caption = figure.caption
         text = caption if isinstance(caption, str) else caption(tables)
         self.drawn.append(DrawnFigure(figure, text, picture))
-
-    def leave_out(self, number: str, why: str) -> None:
-        """Record why there is no such figure, and remove one of an earlier analysis."""
-        # Files of experiments are removed already; a name may begin as they do.
-        if "-" not in number:
-            self._remove(f"{escape(number)}-*.p??")
-        self.left_out.append(LeftOut("", f"figure {number}", why))
 
     def add_film(self, one: RobotPicture) -> Film:
         """Write the moving picture of a robot."""
@@ -169,35 +169,30 @@ def draw_figures(
     pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar, lines)
     lineages = [LINEAGE.empty_table(), *lines.values()]
     given = {**tables, "lineage": pa.concat_tables(lineages)}
-    trees = dict.fromkeys((*_TREES, *pictures))
-    task = bar.add_task("drawing figures", total=len(FIGURES) + 1 + len(trees))
-    for figure in FIGURES:
-        writer.add(figure, given)
-        bar.advance(task)
-    _add_sweeps(writer, given)
     units = fitness_units(tables)
-    _add_gaits(writer, list(pictures.values()), problems, units)
-    bar.advance(task)
-    for name in trees:
-        if name in pictures:
-            if name in lines:
-                unit, count = units.get(name, ""), lines[name].num_rows - 1
-                _add_tree(writer, pictures[name], count, tables["robots"], unit)
-        else:
-            why = f"no evaluated robot of {name} is in a recorded population"
-            writer.leave_out(_tree_number(name), problems.get(name, why))
-        bar.advance(task)
+    every = [
+        *FIGURES,
+        *_sweeps(tables),
+        *_gaits([*pictures.values()], problems, units),
+        *_trees(pictures, problems, lines, tables["robots"], units),
+    ]
+    for figure in bar.track(every, description="drawing figures"):
+        writer.add(figure, given)
     films = [writer.add_film(one) for one in pictures.values()]
     figures = sorted(writer.drawn, key=_place)
     return Drawings(figures, films, problems, writer.left_out)
 
 
-def _add_sweeps(writer: FigureWriter, tables: Tables) -> None:
-    """Draw the map of each sweep."""
-    if "sweeps" not in tables:
-        return
-    for name in in_order(tables["sweeps"]["experiment"].to_pylist()):
-        figure = Figure(
+def _missing(number: str, why: str) -> Figure:
+    """Return a figure that cannot be drawn."""
+    return Figure(number, "", "", ("",), list, "robots", nothing=why)
+
+
+def _sweeps(tables: Tables) -> Iterator[Figure]:
+    """Yield the map of each sweep."""
+    rows = tables.get("sweeps")
+    for name in in_order(rows["experiment"].to_pylist() if rows else ()):
+        yield Figure(
             f"S-{name}",
             f"Outcomes of the sweep {label(name)}",
             partial(sweep_caption, experiment=name),
@@ -206,7 +201,6 @@ def _add_sweeps(writer: FigureWriter, tables: Tables) -> None:
             "sweeps",
             f"sweep-{name}",
         )
-        writer.add(figure, tables)
 
 
 def _robot_pictures(
@@ -253,46 +247,55 @@ def _robot_pictures(
     return pictures, problems
 
 
-def _add_gaits(
-    writer: FigureWriter,
+def _gaits(
     pictures: Sequence[RobotPicture],
     problems: Mapping[str, str],
     units: Mapping[str, str],
-) -> None:
-    number = GAITS
+) -> Iterator[Figure]:
+    """Yield the figure of gaits, and what is missing in it."""
     for name, why in problems.items():
-        writer.leave_out(f"{number} of {name}", why)
+        yield _missing(f"{GAITS} of {name}", why)
     if not pictures and not problems:
-        writer.leave_out(number, "no evaluated robot is in a recorded population")
-    if not pictures:
-        return
-    caption = (
-        "The fittest robot of each experiment's last populations, simulated alone and "
-        "shown from the middle of its evaluation on, by a camera that stands still; a "
-        "tile of the floor has 20 cm. Pictures of robots that move less than 10 cm in "
-        "that time are taken further apart, up to the end of the evaluation. "
-        f"{PART_COLOURS}"
-    )
-    title = "Gaits of the best robots"
-    draw = partial(gaits, pictures, units)
-    writer.add(Figure(number, title, caption, _SOURCE, lambda _: draw(), "robots"), {})
+        yield _missing(GAITS, "no evaluated robot is in a recorded population")
+    if pictures:
+        yield Figure(
+            GAITS,
+            "Gaits of the best robots",
+            "The fittest robot of each experiment's last populations, simulated alone "
+            "and shown from the middle of its evaluation on, by a camera that stands "
+            "still; a tile of the floor has 20 cm. Pictures of robots that move less "
+            "than 10 cm in that time are taken further apart, up to the end of the "
+            f"evaluation. {PART_COLOURS}",
+            _SOURCE,
+            lambda _: gaits(pictures, units),
+            "robots",
+        )
 
 
-def _add_tree(
-    writer: FigureWriter,
-    one: RobotPicture,
-    ancestors: int,
+def _trees(
+    pictures: Mapping[str, RobotPicture],
+    problems: Mapping[str, str],
+    lines: Mapping[str, pa.Table],
     robots: pa.Table,
-    unit: str,
-) -> None:
-    """Draw one experiment's best robot and its family, or record why not."""
+    units: Mapping[str, str],
+) -> Iterator[Figure]:
+    """Yield the family of each best robot but those of baselines."""
+    for name in dict.fromkeys((*_TREES, *pictures)):
+        if name in lines:
+            ancestors = lines[name].num_rows - 1
+            yield _tree(pictures[name], ancestors, robots, units.get(name, ""))
+        elif name not in pictures:
+            why = f"no evaluated robot of {name} is in a recorded population"
+            yield _missing(_tree_number(name), problems.get(name, why))
+
+
+def _tree(one: RobotPicture, ancestors: int, robots: pa.Table, unit: str) -> Figure:
+    """Return the figure of one experiment's best robot and its family."""
     best, relatives = one.best, one.family
     assert relatives is not None
     number = _tree_number(best.experiment)
     if len(relatives.levels) == 1:
-        why = f"the best robot of {best.experiment} is a founder"
-        writer.leave_out(number, why)
-        return
+        return _missing(number, f"the best robot of {best.experiment} is a founder")
     mine = robots.filter(pc.field("folder") == str(best.folder))
     known = mine.select(["birth_island", "birth", "fitness"]).to_pylist()
     fitness = {
@@ -314,9 +317,12 @@ def _add_tree(
         f"leads to a parent that is drawn on another level. {colours} The robot has "
         f"{ancestors} ancestors in total."
     )
-    title = f"Ancestry of the best robot of {label(best.experiment)}"
-    draw = partial(family_tree, one, relatives, fitness, unit)
-    subject = f"ancestry-of-{best.experiment}"
-    writer.add(
-        Figure(number, title, caption, _SOURCE, lambda _: draw(), "robots", subject), {}
+    return Figure(
+        number,
+        f"Ancestry of the best robot of {label(best.experiment)}",
+        caption,
+        _SOURCE,
+        lambda _: family_tree(one, relatives, fitness, unit),
+        "robots",
+        f"ancestry-of-{best.experiment}",
     )

@@ -25,7 +25,6 @@ from analysis.figures.style import (
 
 _PAIRS = {"within": "within islands", "between": "between islands"}
 _IN_A_ROW = 12
-_NO_ISLANDS = "no run has several islands"
 
 
 def fitness_by_island(tables: Tables) -> p9.ggplot:
@@ -74,7 +73,7 @@ def _of_several(tables: Tables) -> pa.Table:
     """
     several = tables["runs"].filter(pc.field("islands") > 1)
     if not several:
-        raise NothingToDraw(_NO_ISLANDS)
+        raise NothingToDraw("no run has several islands")
     return several
 
 
@@ -118,13 +117,8 @@ def migration_graph(tables: Tables) -> p9.ggplot:
 
     Args:
         tables: ``migrants``.
-
-    Raises:
-        NothingToDraw: no robot migrated.
     """
-    rows = tables.get("migrants")
-    if not rows:
-        raise NothingToDraw(f"{_NO_ISLANDS} with migrants")
+    rows = tables["migrants"]
     left = pc.greater(rows["living"], 0).cast(pa.float64())
     edges = (
         rows.append_column("line", left)

@@ -9,14 +9,8 @@ from analysis.figures.style import in_order, label, scales, theme_of_size
 
 _BINS, _WIDTH = 20, 10
 """Most intervals of births of a figure, and their least length."""
+_BEFORE_AFTER = ["#D55E00", "#0072B2"]
 _KEPT, _SAVED = "also with the brain at birth", "saved by learning"
-
-
-def _frame(tables: Tables, name: str) -> Any:  # noqa: ANN401 - pandas
-    rows = tables.get(name)
-    if not rows:
-        raise NothingToDraw("no robot learns")
-    return rows.to_pandas()
 
 
 def learning_curves(tables: Tables) -> p9.ggplot:
@@ -26,9 +20,9 @@ def learning_curves(tables: Tables) -> p9.ggplot:
         tables: ``learning_curves``, and ``runs`` for the unit.
 
     Raises:
-        NothingToDraw: no robot learns, or none has two trials.
+        NothingToDraw: no experiment has two trials.
     """
-    frame = _frame(tables, "learning_curves")
+    frame = tables["learning_curves"].to_pandas()
     mean = frame.groupby(["experiment", "trial"], as_index=False)[
         ["median", "low", "high"]
     ].mean()
@@ -62,9 +56,9 @@ def learning_gain(tables: Tables) -> p9.ggplot:
         tables: ``learning``, and ``runs`` for the unit.
 
     Raises:
-        NothingToDraw: no robot learns, or for less than two intervals of births.
+        NothingToDraw: no experiment has births in two intervals.
     """
-    frame = _binned(_frame(tables, "learning"))
+    frame = _binned(tables["learning"].to_pandas())
     texts = {"at_birth": "with the brain at birth", "fitness": "after learning"}
     long = frame.melt(
         ["experiment", "births"], [*texts], var_name="when", value_name="value"
@@ -78,8 +72,8 @@ def learning_gain(tables: Tables) -> p9.ggplot:
         p9.ggplot(found, p9.aes("births", "median", fill="when", colour="when"))
         + p9.geom_ribbon(p9.aes(ymin="low", ymax="high"), alpha=0.25, colour="none")
         + p9.geom_line(size=0.9)
-        + p9.scale_fill_manual(["#D55E00", "#0072B2"], name="")
-        + p9.scale_colour_manual(["#D55E00", "#0072B2"], name="")
+        + p9.scale_fill_manual(_BEFORE_AFTER, name="")
+        + p9.scale_colour_manual(_BEFORE_AFTER, name="")
         + p9.expand_limits(y=0)
         + p9.labs(x="births", y=fitness_text(tables, "fitness of newborns"))
         + _panels(found)
@@ -95,7 +89,7 @@ def bodies_saved(tables: Tables) -> p9.ggplot:
     Raises:
         NothingToDraw: no robot that learns was born after the founders.
     """
-    frame = _frame(tables, "learning")
+    frame = tables["learning"].to_pandas()
     frame = frame[frame["kept"].notna()]
     if frame.empty:
         raise NothingToDraw("no robot that learns was born after the founders")

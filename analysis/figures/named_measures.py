@@ -4,7 +4,7 @@ import re
 
 import plotnine as p9
 
-from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.forms import Tables
 from analysis.figures.style import in_order, lone_points, scales, theme_of_size
 
 _NARROW = 3
@@ -25,14 +25,8 @@ def measures_over_births(tables: Tables) -> p9.ggplot:
 
     Args:
         tables: ``named_measures``.
-
-    Raises:
-        NothingToDraw: no experiment names measures.
     """
-    rows = tables.get("named_measures")
-    if not rows:
-        raise NothingToDraw("no experiment names measures")
-    frame = rows.to_pandas()
+    frame = tables["named_measures"].to_pandas()
     frame["line"] = frame["folder"] + " " + frame["island"].astype(str)
     experiments = in_order(frame["experiment"])
     frame["measure"] = list(map(_with_unit, frame["measure"], frame["about"]))

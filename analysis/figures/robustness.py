@@ -24,13 +24,22 @@ def robustness(table: pa.Table) -> p9.ggplot:
     Raises:
         NothingToDraw: no robot has a positive fitness without changes.
     """
-    rows = table.to_pandas()
-    rows = rows[rows["share"].notna()]
-    if rows.empty:
-        raise NothingToDraw("no robot has a positive fitness without changes")
+    rows = known_shares(table)
     raised = rows["change"].str.contains("higher")
     rows["label"] = rows["change"].where(~raised, "start raised by < 0.2 mm")
     return points_of_shares(rows, list(dict.fromkeys(rows["label"])), 5.2)
+
+
+def known_shares(table: pa.Table) -> Any:  # noqa: ANN401 - pandas
+    """Return the rows of a table that have a share, as a data frame.
+
+    Raises:
+        NothingToDraw: there are none.
+    """
+    rows = table.filter(table["share"].is_valid())
+    if not rows:
+        raise NothingToDraw("no robot has a positive fitness without changes")
+    return rows.to_pandas()
 
 
 def points_of_shares(

@@ -1,7 +1,6 @@
 """Maps of a sweep: outcomes of its runs by the settings that differ."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -91,17 +90,24 @@ def sweep_map(tables: Tables, experiment: str) -> Figure:
         NothingToDraw: no run of it is finished.
     """
     runs = sweep_runs(tables, experiment)
-    columns = len(runs.settings)
-    if columns == _is_map(runs) * 2:
-        return _panels(runs.measures, partial(_draw_map, runs))
-    cells = [(name, each) for name in runs.measures for each in runs.settings]
-    wide = columns if columns > 1 else min(_COLUMNS, len(cells))
+    is_map, columns = _is_map(runs), len(runs.settings)
+    shown = [None] if is_map else runs.settings
+    cells = [(name, setting) for name in runs.measures for setting in shown]
+    wide = columns if columns > 1 and not is_map else min(_COLUMNS, len(cells))
     high = -(-len(cells) // wide)
     size = (_PANEL_IN * wide + 0.8, _PANEL_IN * high)
+    if is_map:
+        size = ((_PANEL_IN + 0.9) * wide, (_PANEL_IN + 0.4) * high)
     figure, axes = plt.subplots(high, wide, figsize=size, squeeze=False)
-    for at, (measure, setting) in enumerate(cells):
-        _draw_points(runs, axes.flat[at], measure, setting)
-    return _finished(figure, axes, len(cells))
+    for panel, (measure, setting) in zip(axes.flat, cells, strict=False):
+        if setting is None:
+            _draw_map(runs, panel, measure)
+        else:
+            _draw_points(runs, panel, measure, setting)
+    for panel in axes.flat[len(cells) :]:
+        panel.set_visible(False)
+    figure.tight_layout()
+    return figure
 
 
 def sweep_caption(tables: Tables, experiment: str) -> str:
@@ -168,23 +174,6 @@ def _is_map(runs: SweepRuns) -> bool:
         return False
     points = runs.frame[runs.settings].drop_duplicates()
     return all(points[name].nunique() < len(points) for name in runs.settings)
-
-
-def _panels(measures: Sequence[str], draw: Any) -> Figure:  # noqa: ANN401 - a callable
-    wide = min(_COLUMNS, len(measures))
-    high = -(-len(measures) // wide)
-    size = ((_PANEL_IN + 0.9) * wide, (_PANEL_IN + 0.4) * high)
-    figure, axes = plt.subplots(high, wide, figsize=size, squeeze=False)
-    for panel, measure in zip(axes.flat, measures, strict=False):
-        draw(panel, measure)
-    return _finished(figure, axes, len(measures))
-
-
-def _finished(figure: Figure, axes: Any, used: int) -> Figure:  # noqa: ANN401 - array
-    for panel in axes.flat[used:]:
-        panel.set_visible(False)
-    figure.tight_layout()
-    return figure
 
 
 def _draw_map(runs: SweepRuns, panel: Axes, measure: str) -> None:

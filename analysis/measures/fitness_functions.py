@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import pyarrow as pa
 
@@ -64,6 +64,35 @@ def measured_apart(runs: pa.Table) -> tuple[list[str], list[str]]:
         online += [name for name in names if name in in_arenas]
         offline += [name for name in names if name not in in_arenas]
     return sorted(online), sorted(offline)
+
+
+def not_compared(runs: pa.Table, name: Callable[[str], str] = str) -> list[str]:
+    """Return why fitness cannot be compared in some pairs; empty if it can in all.
+
+    Args:
+        runs: ``experiment``, ``fitness_function`` and ``simulated_s``.
+        name: returns the label of an experiment.
+    """
+
+    def listed(experiments: Iterable[str]) -> str:
+        return ", ".join(map(name, experiments))
+
+    lines = []
+    groups = by_function(functions_of(runs))
+    if len(groups) > 1:
+        lists = "; ".join(f"{listed(each)} by {one}" for one, each in groups.items())
+        lines.append(
+            "fitness is not compared between different fitness functions, because "
+            f"their numbers have different meanings: {lists}"
+        )
+    online, offline = measured_apart(runs)
+    if online:
+        lines.append(
+            f"fitness in arenas ({listed(online)}) is measured in another way than "
+            f"off-line ({listed(offline)}): among other robots, after falls, again and "
+            "again; a difference does not show which robots are better"
+        )
+    return lines
 
 
 def fitness_unit(function: str) -> str:

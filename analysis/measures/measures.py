@@ -174,23 +174,14 @@ def brains(run: RunTables) -> pa.Table:
         One row per robot, with the columns of ``outputs.OUTPUTS["brains"]`` except the
         run's.
     """
-    found = run.brains
-    own = {
-        "body_change": found.body_change,
-        "brain_change": found.varied + found.new + found.lost,
-        "brain_varied": found.varied,
-        "brain_new": found.new,
-        "brain_lost": found.lost,
-        "recurrent": found.recurrent,
-        "sensed": found.sensed,
-    }
     return pa.table(
         {
             "birth_island": run.births["island"],
             "birth": run.births["birth"],
-            **{name: pa.array(each, from_pandas=True) for name, each in own.items()},
+            **{name: pa.array(each, from_pandas=True)
+               for name, each in run.brains.items()},
         }
-    )
+    )  # fmt: skip
 
 
 _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {

@@ -1,21 +1,19 @@
 """Means over populations of the measures that an experiment names."""
 
 import ast
-from collections import defaultdict
 
 import numpy as np
 import pyarrow as pa
 
 from analysis.measures.load import Run
-from analysis.measures.population_table import Numbers, individual_ids, rows_of
+from analysis.measures.population_table import individual_ids, rows_of
 from analysis.measures.run_tables import RunTables
 from schema.experiment.bounded import read_bytes
 from schema.limits import LONGEST_NAME, MOST_PLUGIN_BYTES, printable
 from schema.plugins.kept import PLUGINS
 from schema.plugins.source import PATH
 
-_Row = tuple[int, int, str, float, int]
-"""Island, births, measure, mean, number of robots."""
+_KEYS = ["island", "births", "measure"]
 
 
 def named_measures(run: RunTables) -> pa.Table:
@@ -28,70 +26,64 @@ def named_measures(run: RunTables) -> pa.Table:
         One row per island, number of births and measure, with the columns of
         ``outputs.OUTPUTS["named_measures"]`` except the run's.
     """
-    rows = sorted([*_off_line(run), *_on_line(run)])
-    islands, births, measures, means, robots = zip(*rows, strict=True) if rows else (
-        (), (), (), (), ()
-    )  # fmt: skip
-    return pa.table(
+    samples = run.tables["fitness"]
+    mature = samples.filter(samples["is_mature"])
+    on_line = _values(mature, run.births, {"births": mature["births"]})
+    rows = pa.concat_tables(
+        [_off_line(run), on_line.select([*_KEYS, "robot", "value"])]
+    )
+    means = rows.group_by(_KEYS, use_threads=False).aggregate(
+        [("value", "mean"), ("robot", "count_distinct")]
+    )
+    return means.rename_columns([*_KEYS, "mean", "robots"]).sort_by(
+        [(key, "ascending") for key in _KEYS]
+    )
+
+
+def _values(table: pa.Table, births: pa.Table, more: dict[str, object]) -> pa.Table:
+    """Return one row per value of a named measure: island, robot, measure, value.
+
+    Args:
+        table: with ``measures``, ``island``, ``birth_island`` and ``birth``.
+        births: births of the run; ``robot`` is a row of it.
+        more: further columns of the table.
+    """
+    lists = table["measures"].combine_chunks()
+    offsets = np.asarray(lists.offsets)
+    owners = np.repeat(np.arange(len(lists)), np.diff(offsets))
+    start = int(offsets[0]) if len(offsets) else 0
+    names, values = (
+        each.slice(start, len(owners)) for each in (lists.keys, lists.items)
+    )
+    columns = {
+        "island": table["island"].cast(pa.int32()),
+        "robot": pa.array(rows_of(individual_ids(table), births)),
+        **more,
+    }
+    rows = pa.table(columns).take(pa.array(owners))
+    return rows.append_column("measure", names).append_column("value", values)
+
+
+def _off_line(run: RunTables) -> pa.Table:
+    """Return the values of the judged robots of each population off-line."""
+    table, evaluations = run.population_table, run.tables["evaluations"]
+    keys = ["island", "robot", "measure"]
+    values = _values(evaluations, run.births, {})
+    # Each island judges a migrant by its own evaluation.
+    last = values.group_by(keys, use_threads=False).aggregate([("value", "last")])
+    is_online = np.isin(table.islands, np.asarray(run.tables["fitness"]["island"]))
+    chosen = table.is_judged & ~is_online[table.group_of]
+    groups = table.group_of[chosen]
+    members = pa.table(
         {
-            "island": pa.array(islands, pa.int32()),
-            "births": pa.array(births, pa.int64()),
-            "measure": pa.array(measures, pa.string()),
-            "mean": pa.array(means, pa.float64()),
-            "robots": pa.array(robots, pa.int64()),
+            "island": pa.array(table.islands[groups], pa.int32()),
+            "births": pa.array(table.births[groups], pa.int64()),
+            "robot": pa.array(table.members[chosen], pa.int64()),
         }
     )
-
-
-def _off_line(run: RunTables) -> list[_Row]:
-    evaluations, table = run.tables["evaluations"], run.population_table
-    rows = rows_of(individual_ids(evaluations), run.births).tolist()
-    islands = np.asarray(evaluations["island"], np.int64)
-    # Each island judges a migrant by its own evaluation.
-    count = 1 + max(islands.max(initial=0), table.islands.max(initial=0))
-    values: dict[str, Numbers] = defaultdict(
-        lambda: np.full((count, run.births.num_rows), np.nan)
-    )
-    measures = evaluations["measures"].to_pylist()
-    for island, row, found in zip(islands.tolist(), rows, measures, strict=True):
-        for name, value in found or ():
-            if row >= 0:
-                values[name][island, row] = value
-    is_online = np.isin(table.islands, np.asarray(run.tables["fitness"]["island"]))
-    places = zip(table.islands.tolist(), table.births.tolist(), strict=True)
-    groups = [
-        (number, *place) for number, place in enumerate(places) if not is_online[number]
-    ]
-    found_rows: list[_Row] = []
-    for name, of_births in values.items():
-        own = of_births[table.islands[table.group_of], table.members]
-        judged = np.where(table.is_judged, own, np.nan)
-        means, counts = table.mean(judged), table.sum(1.0 - np.isnan(judged))
-        found_rows += [
-            (island, births, name, float(means[number]), int(counts[number]))
-            for number, island, births in groups
-            if counts[number]
-        ]
-    return found_rows
-
-
-def _on_line(run: RunTables) -> list[_Row]:
-    samples = run.tables["fitness"]
-    sums: dict[tuple[int, int, str], list[float]] = defaultdict(list)
-    robots: dict[tuple[int, int, str], set[int]] = defaultdict(set)
-    columns = ("island", "births", "is_mature", "measures")
-    found = zip(
-        *(samples[name].to_pylist() for name in columns),
-        individual_ids(samples).tolist(),
-        strict=True,
-    )
-    for island, births, is_mature, measures, robot in found:
-        for name, value in (measures or ()) if is_mature else ():
-            sums[island, births, name].append(value)
-            robots[island, births, name].add(robot)
-    return [
-        (*key, float(np.mean(values)), len(robots[key])) for key, values in sums.items()
-    ]
+    found = members.join(last, keys[:2], join_type="inner")
+    named = found.rename_columns({"value_last": "value"})
+    return named.select([*_KEYS, "robot", "value"])
 
 
 def with_docstrings(named: pa.Table, run: Run) -> pa.Table:

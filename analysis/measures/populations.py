@@ -60,51 +60,48 @@ def _ancestors(run: RunTables) -> Columns:
     """Return unique ancestors, in total and per robot (figure 6.4)."""
     count = unique_ancestors(run.population_table, run.lines).astype(np.float64)
     judged = run.population_table.sum(run.population_table.is_judged.astype(np.float64))
-    unknown = np.full(len(count), np.nan)
-    share = np.divide(count, judged, out=unknown, where=judged > 0)
+    share = np.full(len(count), np.nan)
+    np.divide(count, judged, out=share, where=judged > 0)
     return {"ancestors": count, "ancestors_per_robot": share}
 
 
-def _diversity(run: RunTables) -> Columns:
-    return {"diversity": diversity(run.population_table, run.trees)}
+def _means(run: RunTables, of_births: Columns) -> Columns:
+    """Return each population's means of one value per birth; unevaluated are ignored.
+
+    Rank (Hupkes 2016, eq. 6.1, figure 6.6), sizes (6.9 to 6.16), and brains.
+    """
+    table = run.population_table
+    return {
+        name: table.mean(np.where(table.is_judged, values[table.members], np.nan))
+        for name, values in of_births.items()
+    }
 
 
-def _retention(run: RunTables) -> Columns:
-    return {"retention": retention(run.population_table)}
-
-
-def _foreign(run: RunTables) -> Columns:
-    return {"foreign": foreign_share(run.population_table, run.births, run.parents)}
-
-
-def _means(run: RunTables) -> Columns:
-    """Return mean rank (Hupkes 2016, eq. 6.1, figure 6.6) and sizes (6.9 to 6.16)."""
-    of_births = {
+def _of_births(run: RunTables) -> Columns:
+    touch = run.sizes["touch_sensors"]
+    shares = {"without_touch": touch == 0, "one_touch": touch == 1,
+              "two_touch": touch > 1}  # fmt: skip
+    return {
         "rank": np.asarray(run.births["rank"], np.float64),
         **run.sizes,
-        "without_touch": (run.sizes["touch_sensors"] == 0).astype(np.float64),
-        "one_touch": (run.sizes["touch_sensors"] == 1).astype(np.float64),
-        "two_touch": (run.sizes["touch_sensors"] > 1).astype(np.float64),
+        **{name: is_so.astype(np.float64) for name, is_so in shares.items()},
     }
-    return {name: _mean(run, values) for name, values in of_births.items()}
 
 
-def _brains(run: RunTables) -> Columns:
-    """Return means of measures of brains."""
-    own = {"recurrent": run.brains.recurrent, "sensed": run.brains.sensed}
-    return {name: _mean(run, values) for name, values in own.items()}
-
-
-def _mean(run: RunTables, values: Numbers) -> Numbers:
-    """Return each population's mean of one value per birth; unevaluated are ignored."""
-    table = run.population_table
-    return table.mean(np.where(table.is_judged, values[table.members], np.nan))
-
-
-_POPULATION: tuple[Callable[[RunTables], Columns], ...] = (
-    _fitness, _ancestors, _diversity, _retention, _foreign, _means,
-    _brains,
-)  # fmt: skip
+_POPULATION: dict[str, Callable[[RunTables], Columns]] = {
+    "fitness": _fitness,
+    "ancestors": _ancestors,
+    "diversity": lambda run: {"diversity": diversity(run.population_table, run.trees)},
+    "retention": lambda run: {"retention": retention(run.population_table)},
+    "foreign": lambda run: {
+        "foreign": foreign_share(run.population_table, run.births, run.parents)
+    },
+    "means": lambda run: _means(run, _of_births(run)),
+    "brains": lambda run: _means(
+        run, {name: run.brains[name] for name in ("recurrent", "sensed")}
+    ),
+}
+"""Measures of populations, by the name under which they are reported if left out."""
 
 
 def populations(run: RunTables) -> tuple[pa.Table, Problems]:
@@ -116,11 +113,11 @@ def populations(run: RunTables) -> tuple[pa.Table, Problems]:
     """
     found: Columns = {}
     problems: Problems = {}
-    for measure in _POPULATION:
+    for name, measure in _POPULATION.items():
         try:
             found |= measure(run)
         except RevolveError as error:
-            problems[measure.__name__.strip("_")] = str(error)
+            problems[name] = str(error)
     table = run.population_table
     unknown = np.full(len(table), np.nan)
     columns = {"island": table.islands, "births": table.births} | {

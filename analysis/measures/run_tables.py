@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import body_sizes
-from analysis.measures.brains.measures import Brains, brain_measures
+from analysis.measures.brains.measures import brain_measures
 from analysis.measures.load import IslandSettings
 from analysis.measures.population_table import (
     Numbers,
@@ -71,6 +71,6 @@ class RunTables:
         return body_sizes(self.births)
 
     @cached_property
-    def brains(self) -> Brains:
-        """Measures of each individual's brain."""
+    def brains(self) -> dict[str, Numbers]:
+        """Measures of each individual's brain, by name."""
         return brain_measures(self.births, self.parents, self.trees)

@@ -2,13 +2,9 @@
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
-from analysis.measures.population_table import (
-    Numbers,
-    last_there,
-    residence_columns,
-    residence_ids,
-)
+from analysis.measures.population_table import last_there
 
 
 def variability(fitness: pa.Table) -> pa.Table:
@@ -31,49 +27,42 @@ def variability(fitness: pa.Table) -> pa.Table:
     Source: Hupkes 2016, figure 6.8; defined by its caption, as the code of the figure
     is not published.
     """
-    mature = fitness.filter(fitness["is_mature"])
-    times = np.asarray(mature["sim_time_s"], np.float64)
-    values = np.asarray(mature["fitness"], np.float64)
-    robots = residence_ids(mature)
-    order = np.lexsort((times, robots))
-    found, firsts, samples = np.unique(
-        robots[order], return_index=True, return_counts=True
+    mature = fitness.filter(fitness["is_mature"]).sort_by("sim_time_s")
+    keys, ends = ["island", "birth_island", "birth"], ("min", "max")
+    totals = [(name, end) for name in ("sim_time_s", "fitness") for end in ends]
+    stays = mature.group_by(keys, use_threads=False).aggregate(
+        [*totals, ("fitness", "count")]
     )
+    stays = stays.filter(pc.field("fitness_count") > 1)
+    stays = stays.sort_by([(key, "ascending") for key in keys])
     islands = np.asarray(mature["island"], np.int64)
-    moments = {
-        island: _moments(times[islands == island], values[islands == island])
-        for island in np.unique(islands).tolist()
-    }
-    own, population = np.zeros(len(found)), np.zeros(len(found))
-    for robot, (first, count) in enumerate(zip(firsts, samples, strict=True)):
-        mine = order[first : first + count]
-        own[robot] = np.ptp(values[mine])
-        clock, least, greatest = moments[int(islands[mine[0]])]
-        begin = np.searchsorted(clock, times[mine[0]], side="left")
-        until = np.searchsorted(clock, times[mine[-1]], side="right")
-        population[robot] = greatest[begin:until].max() - least[begin:until].min()
-    unknown = np.full(len(own), np.nan)
-    ratio = np.divide(own, population, out=unknown, where=population > 0)
-    table = pa.table(
+    times, values = (
+        np.asarray(mature[name], np.float64) for name in ("sim_time_s", "fitness")
+    )
+    own = np.asarray(stays["fitness_max"]) - np.asarray(stays["fitness_min"])
+    population = np.zeros(len(own))
+    homes = np.asarray(stays["island"], np.int64)
+    for island in np.unique(homes).tolist():
+        here = islands == island
+        times_here, fitness_here = times[here], values[here]
+        mine = np.flatnonzero(homes == island)
+        chosen = stays.take(pa.array(mine))
+        begin = np.searchsorted(times_here, chosen["sim_time_s_min"], side="left")
+        until = np.searchsorted(times_here, chosen["sim_time_s_max"], side="right")
+        spans = zip(mine.tolist(), begin.tolist(), until.tolist(), strict=True)
+        for robot, first, end in spans:
+            population[robot] = np.ptp(fitness_here[first:end])
+    ratio = np.full(len(own), np.nan)
+    np.divide(own, population, out=ratio, where=population > 0)
+    return pa.table(
         {
-            **residence_columns(found),
-            "samples": samples,
+            **{key: stays[key] for key in keys},
+            "samples": stays["fitness_count"],
             "fitness_range": own,
             "population_range": population,
             "variability": pa.array(ratio, from_pandas=True),
         }
     )
-    return table.filter(pa.array(samples > 1))
-
-
-def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-    """Return the sample times, and the least and greatest fitness at each of them."""
-    order = np.argsort(times)
-    clock, starts = np.unique(times[order], return_index=True)
-    least, greatest = (
-        extreme.reduceat(values[order], starts) for extreme in (np.minimum, np.maximum)
-    )
-    return clock, least, greatest
 
 
 def last_samples(fitness: pa.Table) -> pa.Table:

@@ -6,13 +6,9 @@ from math import comb
 
 from analysis.figures.forms import Row, Tables
 from analysis.figures.style import label
-from analysis.measures.fitness_functions import (
-    by_function,
-    functions_of,
-    measured_apart,
-)
+from analysis.measures.fitness_functions import measured_apart, not_compared
 from analysis.measures.outputs import OUTCOME, meaning
-from analysis.report.html import cell, folded, number, plural, table
+from analysis.report.html import capitalised, cell, folded, number, plural, table
 
 _MOST_PAIRS = 3
 """Pairs of experiments on the first screen, those with the smallest p."""
@@ -48,7 +44,7 @@ def differences(tables: Tables) -> str:
              if row["measure"] == "fitness" and row["p"] is not None}  # fmt: skip
     every.sort(key=lambda row: (row["apart"], known.get((row["a"], row["b"]), 1.0)))
     parts = [_differences_of(every, *one) for one in _COMPARED.items()]
-    apart = not_compared(tables)
+    apart = _apart(tables)
     if not any(parts):
         why = apart or (
             "<p>Nothing is compared: fewer than two experiments have a finished run "
@@ -65,37 +61,10 @@ def differences(tables: Tables) -> str:
     return "".join(parts) + apart + note
 
 
-def not_compared(tables: Tables) -> str:
-    """Return why fitness cannot be compared in some pairs; empty if it can in all.
-
-    Args:
-        tables: ``runs``.
-    """
-    parts = []
-    groups = by_function(functions_of(tables["runs"]))
-    if len(groups) > 1:
-        lists = "; ".join(
-            f"{_bold(names)} by {escape(function)}"
-            for function, names in groups.items()
-        )
-        parts.append(
-            "<p>Experiments with different fitness functions are not compared by "
-            f"fitness, because their numbers have different meanings: {lists}.</p>"
-        )
-    online, offline = measured_apart(tables["runs"])
-    if online:
-        parts.append(
-            f"<p>Fitness in arenas ({_bold(online)}) is measured in another way than "
-            f"off-line ({_bold(offline)}): among other robots, after falls, again and "
-            "again. A difference between the two does not show which robots are "
-            "better.</p>"
-        )
-    return "".join(parts)
-
-
-def _bold(names: Sequence[str]) -> str:
-    """Return the labels of experiments in bold."""
-    return f"<b>{escape(', '.join(map(label, names)))}</b>"
+def _apart(tables: Tables) -> str:
+    """Return why fitness cannot be compared in some pairs; empty if it can in all."""
+    lines = not_compared(tables["runs"], label)
+    return "".join(f"<p>{escape(capitalised(line))}.</p>" for line in lines)
 
 
 def _differences_of(comparison: Sequence[Row], measure: str, title: str) -> str:
@@ -234,7 +203,7 @@ def all_differences(tables: Tables) -> str:
         "are equal in all runs of both experiments are not tested."
     )
     folds.append(folded("What the measures mean", _meanings(shown)))
-    apart = not_compared(tables)
+    apart = _apart(tables)
     return f'{apart}<p class="note">{escape(note)}</p>{"".join(folds)}'
 
 

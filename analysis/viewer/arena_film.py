@@ -19,6 +19,7 @@ from analysis.viewer.replay import (
     read_poses,
     rows_by_robot,
     shown_run,
+    span_of,
 )
 from analysis.viewer.scene import scene_of
 from schema.agent.log import tell_user
@@ -70,11 +71,8 @@ def film(options: argparse.Namespace) -> int:
         raise NoPictures(f"--save {out}: a film needs a run folder")
     if not out.absolute().parent.is_dir():
         raise NoPictures(f"--save {out}: no such folder: {out.parent}")
-    end_s = last_time(options.run) if options.until is None else options.until
-    start_s = max(0.0, end_s - FILM_S) if options.start is None else options.start
-    if start_s > end_s:
-        raise NoPictures(f"--from {start_s:g}: must be before {end_s:g} s")
-    pictures, times_s = draw_film(options.run, (start_s, end_s), _SIZE)
+    span = span_of(options, FILM_S, NoPictures)
+    pictures, times_s = draw_film(options.run, span, _SIZE)
     interval_s = (times_s[-1] - times_s[0]) / max(1, len(times_s) - 1)
     save_animation(pictures, out, interval_s / SPEED)
     tell_user(

@@ -20,10 +20,10 @@ from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import (
     CHUNK_S,
-    last_time,
     read_news,
     read_poses,
     shown_run,
+    span_of,
 )
 from analysis.viewer.resimulate import Simulators, resimulate
 from analysis.viewer.scene import scene_of
@@ -95,7 +95,7 @@ def _replay(
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         recording.add_scene(scene)
         show = Show(recording, scene.space)
-        span = _span(options, folder) if scene.arenas else None
+        span = _span(options) if scene.arenas else None
         with bars(f"recording {name}") as bar:
             task = bar.add_task("births", total=None)
             show.tell(news)
@@ -150,12 +150,9 @@ def _motions(
     return motions
 
 
-def _span(options: argparse.Namespace, folder: Path) -> tuple[float, float]:
+def _span(options: argparse.Namespace) -> tuple[float, float]:
     """Return the simulated time to show; print it if it is not the whole run."""
-    end_s = last_time(folder) if options.until is None else options.until
-    start_s = max(0.0, end_s - LAST_S) if options.start is None else options.start
-    if start_s >= end_s:
-        raise ViewerError(f"--from {start_s:g}: must be before {end_s:g} s")
+    start_s, end_s = span_of(options, LAST_S, ViewerError)
     if start_s > 0.0:
         tell_user(
             f"showing poses from {start_s:g} s to {end_s:g} s; use --from and --until "

@@ -1,5 +1,6 @@
 """Reads the tables of a run, in the form of the messages of a live run."""
 
+import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.load import Run, read_run
-from schema.errors import RunFolderError
+from schema.errors import RevolveError, RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.files import campaign, read_table
 from schema.tables.segments import parquet_files
@@ -76,6 +77,23 @@ def last_time(folder: Path) -> float:
         for table in ("births", "fitness", "deaths")
     ]
     return float(max(times))
+
+
+def span_of(
+    options: argparse.Namespace, last_s: float, error: type[RevolveError]
+) -> tuple[float, float]:
+    """Return the simulated time to show, of the flags of ``revolve view`` [s].
+
+    Args:
+        options: ``run``, ``start`` and ``until``.
+        last_s: time that is shown by default, at the end of the run [s].
+        error: raised if the span ends before it starts.
+    """
+    end_s = last_time(options.run) if options.until is None else options.until
+    start_s = max(0.0, end_s - last_s) if options.start is None else options.start
+    if start_s > end_s:
+        raise error(f"--from {start_s:g}: must be before {end_s:g} s")
+    return start_s, end_s
 
 
 def read_poses(

@@ -28,7 +28,7 @@ from docs.studies import (
     tasks,
     tasks_pictures,
 )
-from docs.studies.pages import csv_rows, with_parts
+from docs.studies.pages import ROOT, csv_rows, with_parts
 from docs.studies.thesis import campaign
 from docs.studies.thesis import rows as campaign_rows
 from docs.studies.thesis.check import check
@@ -444,4 +444,4 @@ def test_code_of_the_readme_runs() -> None:
     assert len(blocks) == 2
     for block in blocks:
         words = [sys.executable, "-W", "error", "-c", block]
-        subprocess.run(words, cwd=campaign.ROOT, check=True)
+        subprocess.run(words, cwd=ROOT, check=True)

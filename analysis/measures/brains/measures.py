@@ -143,30 +143,10 @@ def _reached(edges: Mapping[tuple[Name, Name], float]) -> dict[Name, set[Name]]:
     return after
 
 
-class Brains(NamedTuple):
-    """Measures of the brain of each birth, and of its distance to the first parent.
-
-    Attributes:
-        body_change: (B,) tree edit distance of the bodies; NaN without parents.
-        varied: (B,) as of ``Change``; NaN without parents or common origin.
-        new: (B,) likewise.
-        lost: (B,) likewise.
-        recurrent: (B,) as ``recurrent``; NaN if the brain is not known.
-        sensed: (B,) as ``sensed``; NaN likewise.
-    """
-
-    body_change: Numbers
-    varied: Numbers
-    new: Numbers
-    lost: Numbers
-    recurrent: Numbers
-    sensed: Numbers
-
-
 def brain_measures(
     births: pa.Table, parents: Sequence[Sequence[int]], trees: Trees
-) -> Brains:
-    """Return the measures of all brains of a run.
+) -> dict[str, Numbers]:
+    """Return the measures of all brains of a run, and distances to first parents.
 
     Args:
         births: births of the run, B rows.
@@ -174,20 +154,27 @@ def brain_measures(
             copy was changed.
         trees: bodies of the births, row by row.
 
+    Returns:
+        Arrays (B,) by the columns of ``outputs.OUTPUTS["brains"]``: changes are NaN
+        without parents or common origin, the others if the brain is not known.
+
     Raises:
         MalformedMessage: the brains cannot be read.
     """
-    found = list(controllers(births))
-    columns = np.full((6, len(found)), np.nan)
+    brains = list(controllers(births))
+    names = ("body_change", "brain_varied", "brain_new", "brain_lost", "recurrent",
+             "sensed")  # fmt: skip
+    columns = np.full((len(names), len(brains)), np.nan)
     children = [row for row, couple in enumerate(parents) if couple]
     firsts = [parents[row][0] for row in children]
     pairs = (trees.tree_of[np.array(rows, np.int64)] for rows in (children, firsts))
     columns[0, children] = distances_of(trees, *pairs)
     for row, first in zip(children, firsts, strict=True):
-        child, parent = found[row], found[first]
+        child, parent = brains[row], brains[first]
         if child is not None and parent is not None:
             columns[1:4, row] = change(child, parent) or np.nan
-    for row, brain in enumerate(found):
+    for row, brain in enumerate(brains):
         if brain is not None:
             columns[4:, row] = recurrent(brain), sensed(brain)
-    return Brains(*columns)
+    made = dict(zip(names, columns, strict=True))
+    return made | {"brain_change": columns[1:4].sum(axis=0)}

@@ -16,7 +16,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from analysis.comparison.claims import TOUCHES
-from analysis.figures.bench import arena_speed
+from analysis.figures.bench import speed
 from analysis.figures.courses import over_births
 from analysis.figures.findings import effects
 from analysis.figures.style import in_order
@@ -127,7 +127,7 @@ def draw(tables: Tables) -> Iterator[str]:
             f"mean fitness [{_UNIT}]",
         ).draw(),
         "findings.png": lambda: effects(tables),
-        "arena-speed.png": lambda: arena_speed(tables).draw(),
+        "arena-speed.png": lambda: speed(tables, "arena").draw(),
     }
     stale = {
         path.name: digest

@@ -256,7 +256,7 @@ def test_catalogue_has_all_figures_of_the_thesis_and_each_names_missing_data() -
     }  # fmt: skip
     for one in FIGURES:
         with pytest.raises(NothingToDraw):
-            one.draw(nothing)
+            one.drawn(nothing)
 
 
 def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
@@ -307,6 +307,11 @@ def test_own_names_of_experiments_are_not_changed() -> None:
     assert label("scenario10") == "scenario10"
     assert two_line_label("my-long-robots-2") == "my-\nlong-robots-2"
     assert two_line_label("no-reproduction") == "no\nreproduction"
+    assert label("scenario1~2") == "scenario 1 ~2"
+    assert two_line_label("no-selection~2") == "no selection\n~2"
+    names = ["scenario1~2", "scenario1", "scenario2"]
+    assert in_order(names) == ["scenario1", "scenario2", "scenario1~2"]
+    assert len(set(colours(names).values())) == 3
 
 
 def test_each_fitness_function_has_its_own_panel() -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 from matplotlib import pyplot as plt
 from PIL import Image
 from rich.progress import Progress
@@ -62,8 +61,8 @@ def test_a_left_out_figure_removes_only_its_own_earlier_files(tmp_path: Path) ->
     (tmp_path / "6.2-fitness.png").touch()
     writer = FigureWriter(tmp_path)
     writer.add(tree_of("b"), {})
-    writer.leave_out("G-ancestry", "the best robot of ancestry is a founder")
-    writer.leave_out("6.2", "no finished run could be measured")
+    for number in ("G-ancestry", "6.2"):
+        writer.add(figure_writer._missing(number, "there is none"), {})
     assert [path.name for path in tmp_path.glob("*.png")] == ["G-ancestry-of-b.png"]
 
 
@@ -83,20 +82,12 @@ def test_figures_of_robots_name_what_is_missing(tmp_path: Path) -> None:
     )
 
 
-def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        figure_writer, "family_tree", lambda *_: plt.figure(figsize=(1, 1))
-    )
-    writer = FigureWriter(tmp_path)
+def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors() -> None:
     # The robot, and one ancestor on each level above it.
     chain = tuple((row,) for row in range(LEVELS))
     shown = replace(robot_of("a", 0), family=Family(chain, (), (), {}))
-    robots = table("robots", [])
-    figure_writer._add_tree(writer, shown, 4, robots, "m/s")
-    (tree,) = writer.drawn
-    assert "its ancestors over four levels of reproduction" in tree.caption
+    tree = figure_writer._tree(shown, 4, table("robots", []), "m/s")
+    assert "its ancestors over four levels of reproduction" in str(tree.caption)
 
 
 DRAW = """

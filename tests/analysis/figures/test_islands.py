@@ -4,7 +4,7 @@ import pyarrow as pa
 import pytest
 from matplotlib.text import Text
 
-from analysis.figures.bench import arena_speed
+from analysis.figures.bench import speed
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.islands import between, fitness_by_island, migration_graph
 from analysis.figures.robots import extremities_and_fitness
@@ -147,7 +147,7 @@ def test_a_speed_is_drawn_beside_the_thesiss() -> None:
         {"benchmark": "arena", "population": size, "factor": factor}
         for size, factor in ((5, 8.0), (5, 10.0), (10, 4.0))
     ] + [{"benchmark": "spider", "population": 5, "factor": 99.0}]
-    figure = arena_speed({"benchmark": pa.Table.from_pylist(rows)})
+    figure = speed({"benchmark": pa.Table.from_pylist(rows)}, "arena")
     means = dict(zip(figure.data["population"], figure.data["factor"], strict=True))
     assert means == {5: 9.0, 10: 4.0}
     fit = figure.layers[-1]._data
@@ -170,7 +170,7 @@ def test_the_thesiss_line_ends_where_it_is_about_zero(
         {"benchmark": "arena", "population": size, "factor": 100 / size}
         for size in sizes
     ]
-    figure = arena_speed({"benchmark": pa.Table.from_pylist(rows)})
+    figure = speed({"benchmark": pa.Table.from_pylist(rows)}, "arena")
     last = figure.layers[-1]._data
     assert (last["factor"].min() >= 0.1 and last["population"].max() < 100) == has_fit
     figure.draw()

@@ -43,5 +43,3 @@ def test_robots_that_do_not_differ_have_no_density(
     """One robot of each of two experiments, or two equal ones of one."""
     with pytest.raises(NothingToDraw, match="no two robots of an experiment differ"):
         variability(measured(("a", "a-0", 0.2), other))
-    with pytest.raises(NothingToDraw, match="no run has an arena"):
-        variability({})

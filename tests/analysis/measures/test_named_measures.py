@@ -99,4 +99,4 @@ def test_run_without_measures_has_no_rows_and_no_figure() -> None:
     assert found.num_rows == 0
     (figure,) = (each for each in FIGURES if each.number == "H")
     with pytest.raises(NothingToDraw, match="no experiment names measures"):
-        figure.draw({"named_measures": found})
+        figure.drawn({"named_measures": found})

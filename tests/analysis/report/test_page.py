@@ -192,7 +192,7 @@ def test_fitness_in_arenas_and_off_line_has_no_winner(others_s: float | None) ->
     runs = runs.set_column(places, "arena_births", runs["births"])
     given["runs"] = runs.append_column("simulated_s", pa.array(seconds, pa.float64()))
     text = read_page(given).text
-    where = "in arenas ( soft ) is measured in another way than off-line ( hard & <b> )"
+    where = "in arenas (soft) is measured in another way than off-line (hard & <b>)"
     verdict = "in an arena and off-line: this does not show which is fitter"
     is_mixed = others_s is None
     assert (f"Fitness {where}" in text) == is_mixed
