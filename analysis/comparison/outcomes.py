@@ -197,8 +197,8 @@ def _correlation(first: Numbers, second: Numbers) -> float:
     first, second = first[is_known], second[is_known]
     if len(first) < 2 or not np.ptp(first) or not np.ptp(second):  # noqa: PLR2004
         return math.nan
-    ranks = (stats.rankdata(values) for values in (first, second))
-    return float(np.corrcoef(*ranks)[0, 1])
+    first, second = stats.rankdata(first), stats.rankdata(second)
+    return float(np.corrcoef(first, second)[0, 1])
 
 
 def _column(table: pa.Table, name: str) -> Numbers:

@@ -3,7 +3,7 @@
 import errno
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.measures.load import Run, read_runs, read_tables
+from analysis.measures.load import LeftOut, Run, read_runs, read_tables
 from analysis.measures.study import MeasuredRun, measure_run, measure_runs
 from schema.errors import RunFolderError
 from schema.tables.description import run_columns
@@ -35,16 +35,23 @@ ROWS = {
 Maker = Callable[..., Path]
 
 
+def describe(folder: Path, seed: int = 1, **document: object) -> None:
+    """Write the description of a run, with its document."""
+    written = json.dumps({"births": 3, "arena": None, **document})
+    details = {"name": "e", "run": 0, "seed": seed, "document": written}
+    (folder / "run.json").write_text(json.dumps(details))
+
+
 @pytest.fixture
 def made(tmp_path: Path) -> Maker:
     """Return a function that makes a run folder, finished or not."""
 
-    def make(name: str, *, seed: int = 1, state: str = "finished") -> Path:
+    def make(
+        name: str, *, seed: int = 1, state: str = "finished", **document: object
+    ) -> Path:
         folder = tmp_path / name
         folder.mkdir()
-        document = json.dumps({"births": 3, "arena": None})
-        details = {"name": "e", "run": 0, "seed": seed, "document": document}
-        (folder / "run.json").write_text(json.dumps(details))
+        describe(folder, seed, **document)
         (folder / "state").write_text(state)
         for table_name, rows in ROWS.items():
             if state == "finished":
@@ -60,6 +67,10 @@ def made(tmp_path: Path) -> Maker:
         return folder
 
     return make
+
+
+def names(folders: Iterable[Run | LeftOut]) -> list[str]:
+    return [Path(one.folder).name for one in folders]
 
 
 def whys(measured: MeasuredRun) -> dict[str, str]:
@@ -95,18 +106,15 @@ def test_finished_and_unfinished_runs_are_measured_alike(
 
 
 def test_runs_are_found_below_in_order(made: Maker, tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="no run in or below this folder"):
+        read_runs([tmp_path])
+    with pytest.raises(RunFolderError, match="nowhere: no such folder"):
+        read_runs([tmp_path / "nowhere"])
     for number, name in enumerate(("two", "one")):
         made(name, seed=number)
     runs, left_out = read_runs([tmp_path, tmp_path / "one"])
     assert [(run.folder.name, run.seed) for run in runs] == [("one", 1), ("two", 0)]
     assert not left_out
-
-
-def test_a_folder_without_runs_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(RunFolderError, match="no run in or below this folder"):
-        read_runs([tmp_path])
-    with pytest.raises(RunFolderError, match="nowhere: no such folder"):
-        read_runs([tmp_path / "nowhere"])
 
 
 @pytest.mark.parametrize(
@@ -115,19 +123,13 @@ def test_a_folder_without_runs_is_an_error(tmp_path: Path) -> None:
 def test_an_unreadable_description_is_reported_and_others_are_read(
     made: Maker, tmp_path: Path, text: str
 ) -> None:
-    made("whole")
     (made("broken", seed=2) / "run.json").write_text(text)
-    runs, left_out = read_runs([tmp_path])
-    assert [run.folder.name for run in runs] == ["whole"]
-    (one,) = left_out
-    assert one.folder.endswith("broken")
-    assert one.why.startswith("run.json: ")
-
-
-def test_no_readable_run_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "run.json").write_text("{}")
     with pytest.raises(RunFolderError, match=r"no run can be read: .*: run.json: "):
         read_runs([tmp_path])
+    made("whole")
+    runs, left_out = read_runs([tmp_path])
+    assert (names(runs), names(left_out)) == (["whole"], ["broken"])
+    assert left_out[0].why.startswith("run.json: ")
 
 
 def test_a_finished_run_is_read_without_its_description(made: Maker) -> None:
@@ -144,53 +146,67 @@ def test_a_finished_run_is_read_without_its_description(made: Maker) -> None:
     assert fitness(measure_run(run, "parent")) == pytest.approx([0.2, 0.4])
 
 
-def test_a_run_in_two_folders_counts_once(made: Maker, tmp_path: Path) -> None:
+def damaged(folder: Path, *tables: str) -> None:
+    for name in tables:
+        parquet_path(folder, "e", 0, name).write_bytes(b"")
+
+
+def test_of_equal_runs_the_whole_finished_long_one_counts(
+    made: Maker, tmp_path: Path
+) -> None:
     made("a", state="running")
-    made("b")
-    shutil.copytree(tmp_path / "b", tmp_path / "c")
+    shutil.copytree(made("b"), tmp_path / "c")
     runs, left_out = read_runs([tmp_path])
-    assert [run.folder.name for run in runs] == ["b"]
-    assert [Path(one.folder).name for one in left_out] == ["c", "a"]
-    assert all(one.why.endswith("b") for one in left_out)
+    assert (names(runs), names(left_out)) == (["b"], ["c", "a"])
+    assert {one.why for one in left_out} == {f"the same run as {tmp_path / 'b'}"}
+    damaged(tmp_path / "b", "population")
+    shutil.copytree(tmp_path / "b", tmp_path / "d")
+    runs, left_out = read_runs([tmp_path])
+    assert names(runs) == ["c"]
+    same = f"the same run as {tmp_path / 'c'}"
+    broken = f"{same}, and not completely readable"
+    assert {Path(one.folder).name: one.why for one in left_out} == {
+        "a": same, "b": broken, "d": broken,
+    }  # fmt: skip
+    for name in ("c", "d"):
+        shutil.rmtree(tmp_path / name / "tables")
+    shutil.rmtree(tmp_path / "b")
+    path = segment_path(tmp_path / "a", "births", 0)
+    shutil.copytree(tmp_path / "a", tmp_path / "e")
+    path.write_bytes(path.read_bytes()[:-100])
+    assert names(read_runs([tmp_path])[0]) == ["e"]
 
 
 def test_runs_with_another_source_of_a_plug_in_are_different_runs(
     made: Maker, tmp_path: Path
 ) -> None:
-    document = {"births": 3, "fitness": {"function": "goals:fast"}}
     digests = {"a": "1a", "b": "1a", "c": "2b", "d": None}
     for name, digest in digests.items():
-        file = made(name) / "run.json"
-        details = {**json.loads(file.read_text()), "document": json.dumps(document)}
+        file = made(name, fitness={"function": "goals:fast"}) / "run.json"
         if digest:
-            details["plugins"] = {"goals": {"digest": digest}}
-        file.write_text(json.dumps(details))
+            plugins = {"goals": {"digest": digest}}
+            details = {**json.loads(file.read_text()), "plugins": plugins}
+            file.write_text(json.dumps(details))
     runs, left_out = read_runs([tmp_path])
     assert [(run.folder.name, run.fitness, run.plugins) for run in runs] == [
         ("a", "goals:fast (source 1a)", {"goals": "1a"}),
         ("c", "goals:fast (source 2b)", {"goals": "2b"}),
         ("d", "goals:fast (source unknown)", {"goals": "unknown"}),
     ]
-    assert [Path(one.folder).name for one in left_out] == ["b"]
+    assert names(left_out) == ["b"]
 
 
 def test_the_beginning_of_a_longer_run_is_not_another_run(
     made: Maker, tmp_path: Path
 ) -> None:
     islands: list[dict[str, object]] = [{"births": 3}]
-    documents: dict[str, dict[str, object]] = {
-        "a": {"births": 2, "islands": islands},
-        "b": {"births": 3, "islands": [{"births": 4}]},
-        "c": {"births": 3, "islands": islands, "seconds": 1},
-        "d": {"births": 3, "islands": islands},
-    }
-    for name, document in documents.items():
-        file = made(name) / "run.json"
-        details = {**json.loads(file.read_text()), "document": json.dumps(document)}
-        file.write_text(json.dumps(details))
-    parquet_path(tmp_path / "a", "e", 0, "population").unlink()
+    made("a", births=2, islands=islands)
+    made("b", islands=[{"births": 4}])
+    made("c", islands=islands, seconds=1)
+    made("d", islands=islands)
+    damaged(tmp_path / "a", "population")
     runs, left_out = read_runs([tmp_path])
-    assert [run.folder.name for run in runs] == ["b", "c"]
+    assert names(runs) == ["b", "c"]
     part = f"part of {tmp_path / 'b'}"
     assert [(Path(one.folder).name, one.why) for one in left_out] == [
         ("d", part),
@@ -209,21 +225,24 @@ def test_the_beginning_of_a_longer_run_is_not_another_run(
 def test_points_of_a_sweep_with_another_fitness_are_other_experiments(
     made: Maker, chosen: dict[str, object], name: str
 ) -> None:
-    file = made("a") / "run.json"
-    document = {"births": 3, "arena": None, "sweep": {"chosen": chosen}}
+    file = made("a", sweep={"chosen": chosen}) / "run.json"
     details = {**json.loads(file.read_text()), "name": "e-4"}
-    file.write_text(json.dumps({**details, "document": json.dumps(document)}))
+    file.write_text(json.dumps(details))
     assert found_in(file.parent).experiment == name
 
 
-def test_a_finished_run_without_tables_is_reported(made: Maker, tmp_path: Path) -> None:
+def test_a_run_without_tables_is_reported(made: Maker, tmp_path: Path) -> None:
     made("whole")
     shutil.rmtree(made("gone", seed=2) / "tables")
     runs, left_out = read_runs([tmp_path])
-    assert [run.folder.name for run in runs] == ["whole"]
-    (one,) = left_out
-    assert (Path(one.folder).name, one.what) == ("gone", "run")
-    assert one.why == "the run is finished, but its tables are missing"
+    assert (names(runs), names(left_out)) == (["whole"], ["gone"])
+    assert left_out[0].why == "the run is finished, but its tables are missing"
+    folder = made("x", state="running")
+    shutil.rmtree(folder / "segments")
+    assert whys(measure_run(found_in(folder), "parent")) == {
+        "measures": "no population is recorded",
+        "comparison": "the run is not finished: 0 of 3 births are recorded",
+    }
 
 
 @pytest.mark.parametrize("name", ["births", "population", "evaluations"])
@@ -237,46 +256,9 @@ def test_a_missing_table_of_a_finished_run_is_reported(made: Maker, name: str) -
 
 
 def test_a_missing_table_of_an_arena_is_reported(made: Maker) -> None:
-    folder = made("x")
-    document = {"births": 3, "arena": {"record_touches": True}}
-    details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
-    (folder / "run.json").write_text(json.dumps(details))
+    folder = made("x", arena={"record_touches": True})
     missing = {one.what for one in read_tables(found_in(folder))[1]}
     assert missing == {"table fitness", "table deaths", "table touches"}
-
-
-def test_a_copy_without_tables_is_not_used(made: Maker, tmp_path: Path) -> None:
-    for name in ("a", "b", "c"):
-        made(name)
-    shutil.rmtree(tmp_path / "a" / "tables")
-    parquet_path(tmp_path / "b", "e", 0, "births").unlink()
-    runs, _ = read_runs([tmp_path])
-    assert [run.folder.name for run in runs] == ["c"]
-
-
-def test_the_readable_copy_of_a_run_is_used(made: Maker, tmp_path: Path) -> None:
-    for name in ("a", "b", "c"):
-        made(name)
-    for name, damaged in (("a", "population"), ("c", "births")):
-        parquet_path(tmp_path / name, "e", 0, damaged).write_bytes(b"")
-    runs, left_out = read_runs([tmp_path])
-    assert [run.folder.name for run in runs] == ["b"]
-    same = f"the same run as {tmp_path / 'b'}, and not completely readable"
-    assert [(Path(one.folder).name, one.why) for one in left_out] == [
-        ("a", same),
-        ("c", same),
-    ]
-
-
-def test_the_longer_copy_of_an_unfinished_run_is_used(
-    made: Maker, tmp_path: Path
-) -> None:
-    for name in ("a", "b"):
-        made(name, state="stopped")
-    path = segment_path(tmp_path / "a", "births", 0)
-    path.write_bytes(path.read_bytes()[:-100])
-    runs, _ = read_runs([tmp_path])
-    assert [run.folder.name for run in runs] == ["b"]
 
 
 def test_a_damaged_table_is_reported_and_others_are_measured(made: Maker) -> None:
@@ -345,45 +327,27 @@ def test_a_truncated_segment_loses_only_its_last_rows(made: Maker, kept: float) 
     assert why.startswith("1 population" if known == 2 else "2 population")
 
 
-def test_a_run_without_tables_is_reported(made: Maker) -> None:
-    folder = made("x", state="running")
-    shutil.rmtree(folder / "segments")
-    measured = measure_run(found_in(folder), "parent")
-    assert whys(measured) == {
-        "measures": "no population is recorded",
-        "comparison": "the run is not finished: 0 of 3 births are recorded",
-    }
-
-
 def test_islands_have_their_own_settings(made: Maker) -> None:
-    folder = made("x")
-    arena = {"record_touches": True}
-    islands = [{"count": 2, "births": 5}, {"count": 1, "arena": arena}]
-    document = {"births": 3, "arena": None, "islands": islands}
-    details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
-    (folder / "run.json").write_text(json.dumps(details))
-    settings = found_in(folder).islands
-    assert [one.births for one in settings] == [5, 5, 3]
-    assert [one.is_online for one in settings] == [False, False, True]
-    assert [one.records_touches for one in settings] == [False, False, True]
-    for name in ("fitness", "deaths", "touches", "migrations"):
-        pq.write_table(table(name, []), parquet_path(folder, "e", 0, name))
-    measured = measure_run(found_in(folder), "parent")
-    assert {"between", "migrants", "variability"} <= set(measured.tables)
-
-
-def test_islands_know_how_reevaluations_count(made: Maker) -> None:
-    folder = made("x")
     selections: list[dict[str, object] | None] = [
         None, {"reevaluation": None}, {"reevaluation": {}},
         {"reevaluation": {"fitness": "mean"}},
     ]  # fmt: skip
-    islands = [{"selection": each} for each in selections]
-    document = {"births": 3, "arena": None, "islands": islands}
-    details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
-    (folder / "run.json").write_text(json.dumps(details))
-    found = [one.reevaluation for one in found_in(folder).islands]
-    assert found == ["", "", "replace", "mean"]
+    islands = [
+        {"count": 2, "births": 5},
+        {"arena": {"record_touches": True}},
+        *({"selection": each} for each in selections),
+    ]
+    folder = made("x", islands=islands)
+    settings = found_in(folder).islands
+    assert [one.births for one in settings] == [5, 5, 3, 3, 3, 3, 3]
+    places = [number for number, one in enumerate(settings) if one.is_online]
+    assert places == [n for n, one in enumerate(settings) if one.records_touches] == [2]
+    again = [one.reevaluation for one in settings]
+    assert again == ["", "", "", "", "", "replace", "mean"]
+    for name in ("fitness", "deaths", "touches", "migrations"):
+        pq.write_table(table(name, []), parquet_path(folder, "e", 0, name))
+    measured = measure_run(found_in(folder), "parent")
+    assert {"between", "migrants", "variability"} <= set(measured.tables)
 
 
 def test_immigrants_keep_their_birth_id(made: Maker) -> None:
