@@ -6,12 +6,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from analysis.viewer.body import box_model, neutral_pose, place, place_rows
+from analysis.viewer.body import BoxModel, box_model, neutral_pose, place, place_rows
 from schema.errors import MalformedMessage
 from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
 from schema.parts import (
     BUILT_IN,
+    BodySpace,
     Box,
     Joint,
     Matrix,
@@ -43,50 +44,51 @@ ROBOT = Robot(
 )
 
 
-def _oracle(root: Floats, angles: Floats) -> list[tuple[Floats, Floats]]:
-    """Return centre and set of corners of each geom, from MuJoCo."""
-    model = robot_spec(ROBOT, BUILT_IN, Simulation()).spec.compile()
+SIGNS = np.array(list(itertools.product((-1, 1), repeat=3)))
+
+
+def _engine(
+    robot: Robot, space: BodySpace, root: Floats, angles: Floats
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Return a robot in a pose, as MuJoCo has it."""
+    model = robot_spec(robot, space, Simulation()).spec.compile()
     data = mujoco.MjData(model)
     data.qpos[:7], data.qpos[7:] = root, angles
     mujoco.mj_kinematics(model, data)
-    return [
-        (data.geom_xpos[geom], _corners(data, model, geom))
-        for geom in range(model.ngeom)
-    ]
+    return model, data
 
 
-def _corners(data: mujoco.MjData, model: mujoco.MjModel, geom: int) -> Floats:
-    signs = np.array(list(itertools.product((-1, 1), repeat=3)))
-    turned = data.geom_xmat[geom].reshape(3, 3)
-    return np.asarray(data.geom_xpos[geom] + (signs * model.geom_size[geom]) @ turned.T)
+def _corners(drawn: BoxModel, centres: Floats, attitudes: Floats) -> Floats:
+    """Return the corners of each box, (B, 8, 3) for (B, 3) centres."""
+    matrices = np.zeros((len(centres), 9))
+    for matrix, attitude in zip(matrices, attitudes, strict=True):
+        mujoco.mju_quat2Mat(matrix, attitude[[3, 0, 1, 2]].astype(np.float64))
+    offsets = SIGNS * drawn.half_sizes[:, None]
+    turned = offsets @ matrices.reshape(-1, 3, 3).transpose(0, 2, 1)
+    return np.asarray(centres[:, None] + turned)
 
 
-def _own_corners(centre: Floats, attitude: Floats, half: Floats) -> Floats:
-    signs = np.array(list(itertools.product((-1, 1), repeat=3)))
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, attitude[[3, 0, 1, 2]].astype(np.float64))
-    return np.asarray(centre + (signs * half) @ matrix.reshape(3, 3).T)
+def _some_root(rng: np.random.Generator) -> Floats:
+    root = rng.normal(size=7)
+    root[3:] /= np.linalg.norm(root[3:])
+    return root
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_boxes_are_where_the_engine_has_them(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    root = rng.normal(size=7)
-    root[3:] /= np.linalg.norm(root[3:])
-    angles = rng.uniform(-0.7, 0.7, 3)
+    root, angles = _some_root(rng), rng.uniform(-0.7, 0.7, 3)
     drawn = box_model(ROBOT, BUILT_IN, is_plain=False)
     centres, attitudes = place(drawn, root[None], angles[None])
-    found = [
-        _own_corners(centre, attitude, half)
-        for centre, attitude, half in zip(
-            centres[0], attitudes[0], drawn.half_sizes, strict=True
-        )
-    ]
-    expected = [corners for _, corners in _oracle(root, angles)]
-    assert len(found) == len(expected)
-    for corners in expected:
-        nearest = min(found, key=lambda own: _apart(own, corners))
-        assert _apart(nearest, corners) < 1e-5
+    boxes = _corners(drawn, centres[0], attitudes[0])
+    model, data = _engine(ROBOT, BUILT_IN, root, angles)
+    turned = data.geom_xmat.reshape(-1, 3, 3).transpose(0, 2, 1)
+    geoms = data.geom_xpos[:, None] + (SIGNS * model.geom_size[:, None]) @ turned
+    assert len(boxes) == len(geoms)
+    for geom in geoms:
+        # Distances of its corners to those of each box, (B, 8, 8).
+        apart = np.linalg.norm(geom[None, :, None] - boxes[:, None], axis=-1)
+        assert apart.min(axis=1).max(axis=1).min() < 1e-5
 
 
 SLIDING: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
@@ -122,23 +124,12 @@ WHEELED = Robot(
 def test_sliders_and_cylinders_are_where_the_engine_has_them(seed: int) -> None:
     """Boxes of a cylinder are centred in it; their corners are on its rims."""
     rng = np.random.default_rng(seed)
-    root = rng.normal(size=7)
-    root[3:] /= np.linalg.norm(root[3:])
+    root = _some_root(rng)
     angles = np.array([0.01, 0.6, -0.015, 40.0]) * rng.uniform(-1.0, 1.0, 4)
-    model = robot_spec(WHEELED, SPACE, Simulation()).spec.compile()
-    data = mujoco.MjData(model)
-    data.qpos[:7], data.qpos[7:] = root, angles
-    mujoco.mj_kinematics(model, data)
+    model, data = _engine(WHEELED, SPACE, root, angles)
     drawn = box_model(WHEELED, SPACE, is_plain=False)
     centres, attitudes = place(drawn, root[None], angles[None])
-    corners = np.array(
-        [
-            _own_corners(centre, attitude, half)
-            for centre, attitude, half in zip(
-                centres[0], attitudes[0], drawn.half_sizes, strict=True
-            )
-        ]
-    )
+    corners = _corners(drawn, centres[0], attitudes[0])
     geoms = [model.geom(n).id for n in ("1/rod", "3/rod", "4/wheel")]
     for geom in geoms:
         radius, half = model.geom_size[geom, :2]
@@ -153,52 +144,27 @@ def test_sliders_and_cylinders_are_where_the_engine_has_them(seed: int) -> None:
     assert (wheel < 1e-6).sum() == 4
 
 
-def _apart(first: Floats, second: Floats) -> float:
-    """Return how far each corner of a box is from the nearest of another, at most."""
-    distances = np.linalg.norm(first[:, None] - second[None], axis=-1)
-    return float(distances.min(axis=1).max())
-
-
-def test_a_plain_model_has_one_box_per_part_and_segment() -> None:
-    drawn = box_model(ROBOT, BUILT_IN, is_plain=True)
-    assert len(drawn.half_sizes) == len(ROBOT.parts) + 3
-    assert len(drawn.parents) == 4
-
-
-def test_a_plain_model_covers_the_same_space() -> None:
+def test_a_plain_model_covers_the_same_space_with_fewer_boxes() -> None:
+    """One per part and segment."""
     root, angles = np.array([[0.0, 0, 0, 1, 0, 0, 0]]), np.zeros((1, 3))
     plain = box_model(ROBOT, BUILT_IN, is_plain=True)
     whole = box_model(ROBOT, BUILT_IN, is_plain=False)
+    assert len(plain.half_sizes) == len(ROBOT.parts) + 3
+    assert len(plain.parents) == 4
+    assert {*map(tuple, plain.colours.tolist())} == {(51, 102, 153), (255, 0, 128)}
     near, far = place(plain, root, angles)[0], place(whole, root, angles)[0]
     for centre in near[0]:
         assert np.linalg.norm(far[0] - centre, axis=1).min() < 0.02
-
-
-def test_boxes_share_few_attitudes() -> None:
-    drawn = box_model(ROBOT, BUILT_IN, is_plain=False)
-    # Four segments, and the tilts beyond the bar.
-    assert len(np.unique(drawn.attitude_of)) <= 6
-
-
-def test_boxes_have_the_colours_of_their_parts() -> None:
-    drawn = box_model(ROBOT, BUILT_IN, is_plain=True)
-    assert {tuple(colour) for colour in drawn.colours.tolist()} == {
-        (51, 102, 153),
-        (255, 0, 128),
-    }
+    # Attitudes are shared: those of four segments, and the tilts beyond the bar.
+    assert len(np.unique(whole.attitude_of)) <= 6
 
 
 def test_a_standing_robot_touches_the_ground() -> None:
     built = robot_spec(ROBOT, BUILT_IN, Simulation())
     drawn = box_model(ROBOT, BUILT_IN, is_plain=False)
     centres, attitudes = neutral_pose(drawn, (2.0, -1.0))
-    corners = np.concatenate(
-        [
-            _own_corners(*each)
-            for each in zip(centres[0], attitudes[0], drawn.half_sizes, strict=True)
-        ]
-    )
-    assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+    corners = _corners(drawn, centres[0], attitudes[0])
+    assert corners[..., 2].min() == pytest.approx(0.0, abs=1e-6)
     core = int(np.argmax(drawn.half_sizes.prod(axis=1)))
     assert centres[0, core] == pytest.approx((2.0, -1.0, built.height), abs=1e-6)
 

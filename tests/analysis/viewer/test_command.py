@@ -21,7 +21,6 @@ from analysis.viewer.entities import TimePoint, recording_name
 from analysis.viewer.flags import parser
 from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
-from analysis.viewer.live import Sequel
 from analysis.viewer.output import Output, Window, keep_serving, ways_to_view
 from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import shown_run
@@ -52,46 +51,6 @@ class Recorded:
         return lambda *words: self.calls.append((name, *words))
 
 
-def _news(sequence: int, run: str = "run", epoch: int = 1) -> Update:
-    return Update(run, epoch, sequence, is_whole=False, experiment="e")
-
-
-def test_consecutive_messages_need_no_complete_state() -> None:
-    sequel = Sequel()
-    assert sequel.is_behind
-    assert sequel.take(WHOLE)
-    assert sequel.take(_news(5))
-    assert sequel.take(_news(6))
-    assert not sequel.is_behind
-
-
-@pytest.mark.parametrize("late", [_news(6), _news(1, epoch=2)])
-def test_after_a_gap_the_complete_state_is_needed(late: Update) -> None:
-    sequel = Sequel()
-    sequel.take(WHOLE)
-    assert sequel.take(late)
-    assert sequel.is_behind
-    sequel.take(_news(late.sequence + 1, epoch=late.epoch))
-    assert sequel.is_behind
-    sequel.take(replace(WHOLE, epoch=late.epoch, sequence=late.sequence + 1))
-    assert not sequel.is_behind
-
-
-def test_messages_of_another_run_are_ignored() -> None:
-    sequel = Sequel()
-    sequel.take(WHOLE)
-    assert not sequel.take(_news(5, run="other"))
-    assert not sequel.take(replace(WHOLE, run="other"))
-    assert not sequel.is_behind
-
-
-def test_duplicate_messages_are_no_gap() -> None:
-    sequel = Sequel()
-    sequel.take(WHOLE)
-    sequel.take(_news(3))
-    assert not sequel.is_behind
-
-
 def test_a_ring_wall_is_where_mujoco_has_it() -> None:
     arena = Arena(wall_diameter_m=3.0, wall_segments=5)
     spec = mujoco.MjSpec()
@@ -113,12 +72,8 @@ def test_living_robots_keep_their_spot_and_dead_robots_free_it() -> None:
     models = dict.fromkeys(names, lambda: model)
     gallery.show(Level(0, 3, 3, 3, 0.0, 0.0, tuple(names[:3])), models)
     gallery.show(Level(0, 4, 3, 3, 0.0, 0.0, (names[0], names[2], names[3])), models)
-    kinds = [call[0] for call in recorded.calls]
-    assert kinds == ["log_boxes", "log_place"] * 3 + [
-        "remove",
-        "log_boxes",
-        "log_place",
-    ]
+    shown = ["log_boxes", "log_place"]
+    assert [call[0] for call in recorded.calls] == shown * 3 + ["remove", *shown]
     assert recorded.calls[6][1] == "islands/0/robots/0-1"
     centres = recorded.calls[8][2]
     assert isinstance(centres, np.ndarray)
@@ -229,11 +184,22 @@ def test_a_recording_is_written_though_rerun_is_turned_off(
     assert (tmp_path / "a.rrd").stat().st_size > 0
 
 
-def test_a_file_with_another_ending_or_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ViewerError, match=r"must end in \.rrd"):
-        Output.of(tmp_path / "a.txt", None)
-    with pytest.raises(ViewerError, match="no such folder"):
-        Output.of(tmp_path / "no" / "a.rrd", None)
+@pytest.mark.parametrize(
+    ("file", "address", "message"),
+    [
+        ("a.txt", None, r"must end in \.rrd"),
+        ("no/a.rrd", None, "no such folder"),
+        (None, "9876", "must be HOST:PORT"),
+        (None, "127.0.0.1:", "must be HOST:PORT"),
+        (None, "127.0.0.1:99999", "must be HOST:PORT"),
+        (None, ":x", "must be HOST:PORT"),
+    ],
+)
+def test_invalid_files_and_addresses_are_refused(
+    tmp_path: Path, file: str | None, address: str | None, message: str
+) -> None:
+    with pytest.raises(ViewerError, match=message):
+        Output.of(tmp_path / file if file else None, address)
 
 
 def test_a_window_that_fails_late_is_reported(
@@ -254,12 +220,6 @@ def test_a_window_that_fails_late_is_reported(
         keep_serving(output, window, recorded, threading.Event())
 
 
-@pytest.mark.parametrize("text", ["9876", "127.0.0.1:", "127.0.0.1:99999", ":x"])
-def test_an_invalid_address_is_refused(text: str) -> None:
-    with pytest.raises(ViewerError, match="must be HOST:PORT"):
-        Output.of(None, text)
-
-
 def test_a_campaign_is_told_to_name_a_run(tmp_path: Path) -> None:
     for number in (1, 0):
         (tmp_path / f"a-{number}").mkdir()
@@ -275,11 +235,6 @@ def test_plug_ins_of_a_running_run_are_those_of_its_folder(tmp_path: Path) -> No
         view(options, Simulators(*[NotImplemented] * 3))
 
 
-@pytest.mark.parametrize(
-    ("experiment", "folder", "name"),
-    [("pond", "pond-seed1", "pond-seed1"), ("pond", "zoo", "pond-zoo")],
-)
-def test_a_recording_has_the_names_of_experiment_and_folder(
-    experiment: str, folder: str, name: str
-) -> None:
-    assert recording_name(experiment, folder) == name
+def test_a_recording_has_the_names_of_experiment_and_folder() -> None:
+    assert recording_name("pond", "pond-seed1") == "pond-seed1"
+    assert recording_name("pond", "zoo") == "pond-zoo"

@@ -26,42 +26,53 @@ CHIEF = Member("default", "coordinator", "chief.1")
 OTHER = Member("default", "coordinator", "another.1")
 
 
-def news(sequence: int, *, is_whole: bool = False, births: int = 0) -> Update:
+def news(
+    sequence: int, *, epoch: int = 1, is_whole: bool = False, births: int = 0
+) -> Update:
     born = tuple(
         Birth(BirthId(0, number), (), 1, number + 1, None, None)
         for number in range(births)
     )
-    return Update("host:/run", 1, sequence, is_whole, "e", births=born)
+    return Update("host:/run", epoch, sequence, is_whole, "e", births=born)
 
 
 @pytest.mark.parametrize(
-    ("sequences", "state", "is_behind"),
+    ("places", "was_lost", "state", "is_behind"),
     [
-        ((), 5, False),
-        ((6, 7), 5, False),  # they came while the pages travelled
-        ((3, 4, 5, 6), 5, False),
-        ((7, 8), 5, True),  # 6 was lost
-        ((6, 8), 5, True),  # 7 was lost
-        ((6, 8), 7, False),
-        ((6, 7), 9, False),
+        ([], False, 5, False),
+        ([(1, 2), (1, 3)], False, 5, False),
+        ([(1, 1), (1, 2), (1, 1), (1, 2)], False, 5, False),  # duplicates
+        ([(1, 6), (1, 7)], True, 5, False),  # they came while the pages travelled
+        ([(1, 3), (1, 4), (1, 5), (1, 6)], True, 5, False),
+        ([(1, 7), (1, 8)], True, 5, True),  # 6 was lost
+        ([(1, 6), (1, 8)], True, 5, True),  # 7 was lost
+        ([(1, 6), (1, 8)], True, 7, False),
+        ([(1, 6), (1, 7)], True, 9, False),
+        ([(2, 1)], True, 9, True),  # of an epoch after the state's
     ],
 )
 def test_updates_go_on_from_a_state_or_one_was_lost(
-    sequences: tuple[int, ...],
+    places: list[tuple[int, int]],
+    was_lost: bool,  # noqa: FBT001 - a parameter of the test
     state: int,
     is_behind: bool,  # noqa: FBT001 - a parameter of the test
 ) -> None:
     sequel = Sequel()
+    assert sequel.is_behind
     assert sequel.take(news(1, is_whole=True))
     assert not sequel.is_behind
-    for sequence in sequences:
-        assert sequel.take(news(sequence))
+    for epoch, sequence in places:
+        assert sequel.take(news(sequence, epoch=epoch))
+    assert sequel.is_behind is was_lost
     assert sequel.take(news(state, is_whole=True))
     assert sequel.is_behind is is_behind
-    following = max((state, *sequences)) + 1
-    assert sequel.take(news(following))
+    epoch, last = max([(1, state), *places])
+    assert sequel.take(news(last + 1, epoch=epoch))
     assert sequel.is_behind is is_behind
-    assert not sequel.take(Update("host:/other", 1, following, False, "e"))
+    for whole in (False, True):
+        assert not sequel.take(Update("host:/other", 1, last + 1, whole, "e"))
+    assert sequel.take(news(last + 1, epoch=epoch, is_whole=True))
+    assert not sequel.is_behind
 
 
 class Chief:

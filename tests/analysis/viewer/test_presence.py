@@ -7,75 +7,54 @@ from schema.agent.topics import Member
 
 CHIEF = Member("default", "coordinator", "chief.1")
 OTHER = Member("default", "coordinator", "other.1")
-HUB = frozenset({"a0"})
+HUB, NEW_HUB, CHIEFS_HUB = (frozenset({name}) for name in ("a0", "b1", CHIEF.session))
 NONE: frozenset[str] = frozenset()
+BOTH = (CHIEF, OTHER)
+
+Step = tuple[tuple[Member, ...], frozenset[str], float]
 
 
-@pytest.fixture
-def presence() -> Presence:
-    made = Presence()
-    made.coordinators = {each.alive: each for each in (CHIEF, OTHER)}
-    made.watch(CHIEF.alive)
-    made.look(HUB, 0.0)
-    return made
-
-
-def test_run_has_ended_when_its_own_coordinator_stays_away(presence: Presence) -> None:
-    del presence.coordinators[CHIEF.alive]
-    presence.look(HUB, 1.0)
-    presence.look(HUB, 1.0 + 0.9 * SETTLED_S)
-    assert not presence.has_ended
-    presence.look(HUB, 1.0 + SETTLED_S)
-    assert presence.has_ended
-
-
-def test_another_coordinator_may_leave(presence: Presence) -> None:
-    del presence.coordinators[OTHER.alive]
-    presence.look(HUB, 1.0)
-    presence.look(HUB, 100.0)
-    assert not presence.has_ended
-
-
-def test_run_goes_on_without_the_hub_and_after_its_return(presence: Presence) -> None:
-    presence.coordinators.clear()
-    presence.look(NONE, 1.0)
-    presence.look(NONE, 1000.0)
-    presence.look(HUB, 1001.0)
-    presence.look(HUB, 1001.0 + 0.9 * PATIENCE_S)
-    presence.coordinators[CHIEF.alive] = CHIEF
-    presence.look(HUB, 1001.0 + 2 * PATIENCE_S)
-    assert not presence.has_ended
-
-
-def test_run_goes_on_after_a_hub_that_was_not_missed(presence: Presence) -> None:
-    presence.coordinators.clear()
-    presence.look(frozenset({"b1"}), 1.0)
-    presence.look(frozenset({"b1"}), 1.0 + 0.9 * PATIENCE_S)
-    assert not presence.has_ended
-    presence.look(frozenset({"b1"}), 1.0 + 1.01 * PATIENCE_S)
-    assert presence.has_ended
-
-
-def test_run_has_ended_if_only_the_hub_comes_back(presence: Presence) -> None:
-    presence.coordinators.clear()
-    presence.look(NONE, 1.0)
-    presence.look(HUB, 2.0)
-    presence.look(HUB, 2.0 + 1.01 * PATIENCE_S)
-    assert presence.has_ended
-
-
-def test_run_has_ended_with_the_hub_that_its_coordinator_is(
-    presence: Presence,
+@pytest.mark.parametrize(
+    ("steps", "has_ended"),
+    [
+        # Its own coordinator stays away.
+        ([((OTHER,), HUB, 1.0), ((OTHER,), HUB, 1.0 + 0.9 * SETTLED_S)], False),
+        ([((OTHER,), HUB, 1.0), ((OTHER,), HUB, 1.0 + SETTLED_S)], True),
+        # Another one may leave.
+        ([((CHIEF,), HUB, 1.0), ((CHIEF,), HUB, 100.0)], False),
+        # The run goes on without the hub and after its return.
+        (
+            [((), NONE, 1.0), ((), NONE, 1000.0), ((), HUB, 1001.0),
+             ((), HUB, 1001.0 + 0.9 * PATIENCE_S),
+             ((CHIEF,), HUB, 1001.0 + 2 * PATIENCE_S)],
+            False,
+        ),
+        # A hub was started again, and its absence was not noticed.
+        ([((), NEW_HUB, 1.0), ((), NEW_HUB, 1.0 + 0.9 * PATIENCE_S)], False),
+        ([((), NEW_HUB, 1.0), ((), NEW_HUB, 1.0 + 1.01 * PATIENCE_S)], True),
+        # Only the hub comes back.
+        ([((), NONE, 1.0), ((), HUB, 2.0), ((), HUB, 2.0 + 1.01 * PATIENCE_S)], True),
+        # The hub is the coordinator itself.
+        ([(BOTH, CHIEFS_HUB, 1.0), (BOTH, NONE, 2.0)], True),
+    ],
+)  # fmt: skip
+def test_a_run_has_ended_when_its_coordinator_stays_away(
+    steps: list[Step],
+    has_ended: bool,  # noqa: FBT001 - a parameter of the test
 ) -> None:
-    presence.look(frozenset({CHIEF.session}), 1.0)
-    presence.look(NONE, 2.0)
-    assert presence.has_ended
+    presence = Presence()
+    presence.coordinators = {each.alive: each for each in BOTH}
+    presence.watch(CHIEF.alive)
+    presence.look(HUB, 0.0)
+    for there, hubs, now_s in steps:
+        assert not presence.has_ended
+        presence.coordinators = {each.alive: each for each in there}
+        presence.look(hubs, now_s)
+    assert presence.has_ended == has_ended
 
 
 def test_nothing_has_ended_before_a_run_is_watched() -> None:
     presence = Presence()
-    presence.look(HUB, 0.0)
-    presence.look(NONE, 1.0)
-    presence.look(HUB, 100.0)
-    presence.look(HUB, 200.0)
+    for hubs, now_s in ((HUB, 0.0), (NONE, 1.0), (HUB, 100.0), (HUB, 200.0)):
+        presence.look(hubs, now_s)
     assert not presence.has_ended
