@@ -128,32 +128,33 @@ def test_outcomes_by_hand() -> None:
     assert math.isnan(found["touched"])
 
 
-def test_changes_are_counted_from_the_founders_of_the_experiment() -> None:
-    """Eight founders, not fifteen."""
+EIGHT = replace(SETTINGS[0], founders=8)
+
+
+@pytest.mark.parametrize(
+    ("settings", "island", "gain", "change"),
+    [
+        (SETTINGS, 0, 0.3, 3),
+        ((EIGHT,), 0, 0.5, 5),
+        # Island 2 is not in the document: it has the settings of the last one.
+        ((SETTINGS[0], EIGHT), 2, 0.5, 5),
+    ],
+)
+def test_changes_are_counted_from_the_founders_of_the_experiment(
+    settings: tuple[IslandSettings, ...], island: int, gain: float, change: float
+) -> None:
     levels = [
-        {"births": births, "fitness": fitness, "diversity": 10 * fitness}
+        {
+            "island": island,
+            "births": births,
+            "fitness": fitness,
+            "diversity": 10 * fitness,
+        }
         for births, fitness in ((8, 0.1), (16, 0.3), (24, 0.6))
     ]
-    eight = (replace(SETTINGS[0], founders=8),)
-    assert outcome(tables(levels), 24, eight)["gain"] == pytest.approx(0.5)
-    assert outcome(tables(levels), 24, eight)["diversity_change"] == pytest.approx(5)
-    assert outcome(tables(levels), 24, SETTINGS)["gain"] == pytest.approx(0.3)
-
-
-def test_an_island_that_is_not_in_the_document_has_the_settings_of_the_last() -> None:
-    """Eight founders, as island 1 has: the gain is 0.3 - 0.1."""
-    levels = [
-        {"island": 2, "births": births, "fitness": fitness}
-        for births, fitness in ((8, 0.1), (15, 0.6), (24, 0.3))
-    ]
-    settings = (SETTINGS[0], replace(SETTINGS[0], founders=8))
-    assert outcome(tables(levels), 24, settings)["gain"] == pytest.approx(0.2)
-
-
-def test_families_without_rows_have_no_outcome() -> None:
-    empty = pa.Table.from_pylist([], schema("families"))
-    made = {**tables([{"births": 15, "fitness": 0.1}]), "families": empty}
-    assert math.isnan(outcome(made, 15, SETTINGS)["family_distance"])
+    found = outcome(tables(levels), 24, settings)
+    assert found["gain"] == pytest.approx(gain)
+    assert found["diversity_change"] == pytest.approx(change)
 
 
 def test_contacts_and_families_of_later_births_do_not_count() -> None:
@@ -175,7 +176,10 @@ def test_contacts_and_families_of_later_births_do_not_count() -> None:
     names = ("touched", "family_distance")
     assert [found[0][name] for name in names] == pytest.approx([0.6, 0.3])
     assert [found[1][name] for name in names] == pytest.approx([0.5, 0.2])
+    made["families"] = made["families"].slice(0, 0)
+    found.append(outcome(made, 30, SETTINGS))
     assert all(math.isnan(found[2][name]) for name in names)
+    assert math.isnan(found[3]["family_distance"])
 
 
 @pytest.mark.parametrize(
@@ -311,41 +315,38 @@ def test_unfinished_runs_are_not_compared() -> None:
 
 HIGH = [11.0, 12, 13, 14, 15, 16, 17, 18, 19, 20]
 LOW = [1.0, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+MANY = [float(value % 10) for value in range(40)]
+WIDE = [value - 5.5 for value in range(12)]
+
+
+def decided(
+    claims: dict[Claim, str], values: dict[str, list[float]]
+) -> list[dict[str, Any]]:
+    """Return the findings about claims, which must have the given verdicts."""
+    made = [run for name, fitness in values.items() for run in runs(name, fitness)]
+    found: list[dict[str, Any]] = findings(outcomes_of(made), list(claims)).to_pylist()
+    assert [row["finding"] for row in found] == [*range(1, len(claims) + 1)]
+    assert [row["verdict"] for row in found] == [*claims.values()]
+    return found
 
 
 def test_findings_are_reproduced_not_reproduced_or_undecided() -> None:
-    claims = [
-        Claim("1", "reproduced", "fitness", "high", ">", "low"),
-        Claim("2", "the opposite", "fitness", "high", "<", "low"),
-        Claim("3", "two equal runs are undecided", "fitness", "low", ">", "few"),
-        Claim("4", "without runs", "fitness", "low", ">", "ghost"),
-        Claim("5", "far from alike", "fitness", "high", "=", "low"),
-        Claim("6", "alike", "fitness", "many", "=", "more"),
-        Claim("7", "above a reference", "fitness", "low", ">", reference=0.5),
-        Claim("8", "no effect as expected", "fitness", "many", ">", "moderate"),
-    ]
-    many = [float(value % 10) for value in range(40)]
-    outcomes = outcomes_of(
-        [
-            *runs("high", HIGH),
-            *runs("low", LOW),
-            *runs("few", [5, 6]),
-            *runs("many", many),
-            *runs("more", many),
-            *runs("moderate", [value + 2 for value in many]),
-        ]
-    )
-    found = findings(outcomes, claims).to_pylist()
-    assert [(row["finding"], row["verdict"]) for row in found] == [
-        (1, "reproduced"),
-        (2, "not reproduced"),
-        (3, "undecided"),
-        (4, "undecided"),
-        (5, "not reproduced"),
-        (6, "reproduced"),
-        (7, "reproduced"),
-        (8, "not reproduced"),
-    ]
+    claims = {
+        Claim("1", "so", "fitness", "high", ">", "low"): "reproduced",
+        Claim("2", "the opposite", "fitness", "high", "<", "low"): "not reproduced",
+        Claim("3", "two equal runs", "fitness", "low", ">", "few"): "undecided",
+        Claim("4", "without runs", "fitness", "low", ">", "ghost"): "undecided",
+        Claim("5", "far from alike", "fitness", "high", "=", "low"): "not reproduced",
+        Claim("6", "alike", "fitness", "many", "=", "more"): "reproduced",
+        Claim("7", "above", "fitness", "low", ">", reference=0.5): "reproduced",
+        Claim("8", "no effect", "fitness", "many", ">", "moderate"): "not reproduced",
+    }
+    moderate = [value + 2 for value in MANY]
+    found = decided(
+        claims,
+        {"high": HIGH, "low": LOW, "few": [5, 6], "many": MANY, "more": MANY,
+         "moderate": moderate},
+    )  # fmt: skip
     assert found[3]["why"] == "no finished run of ghost could be measured"
     assert found[3]["q"] is None
     assert (found[6]["mean_b"], found[6]["effect"]) == (0.5, 1)
@@ -353,47 +354,40 @@ def test_findings_are_reproduced_not_reproduced_or_undecided() -> None:
 
 
 def test_findings_of_few_births_spreads_shares_and_numbers() -> None:
-    wide = [value - 5.5 for value in range(12)]
-    claims = [
-        Claim("1", "too early", "fitness", "wide", ">", reference=-9, births=101),
-        Claim("2", "just in time", "fitness", "wide", ">", reference=-9, births=100),
-        Claim("3", "wider", "fitness", "wide", "!=", "narrow", is_spread=True),
-        Claim("4", "as wide", "fitness", "wide", "!=", "wide", is_spread=True),
-        Claim("5", "less than half", "fitness", "low", "<", "high", share=0.5),
-        Claim("6", "less than a tenth", "fitness", "low", "<", "high", share=0.1),
-        Claim("7", "about 0", "fitness", "narrow", "=", margin=0.2),
-        Claim("8", "about 1", "fitness", "narrow", "=", reference=1.0, margin=0.2),
-        Claim("9", "occurs", "fitness", "once", "some"),
-        Claim("10", "never occurs", "fitness", "never", "some"),
-        Claim("11", "may occur", "fitness", "seldom", "some"),
-        Claim("12", "negligible", "fitness", "narrow", ">", reference=-0.1, margin=0.5),
-    ]
-    outcomes = outcomes_of(
-        [
-            *runs("wide", wide),
-            *runs("narrow", [value / 50 for value in wide]),
-            *runs("low", LOW),
-            *runs("high", [value + 20 for value in HIGH]),
-            *runs("once", [0.0] * 9 + [0.1]),
-            *runs("never", [0.0] * 29),
-            *runs("seldom", [0.0] * 28),
-        ]
+    alone = ("fitness", "narrow")
+    claims = {
+        Claim("1", "early", "fitness", "wide", ">", reference=-9, births=101):
+            "does not apply",
+        Claim("2", "in time", "fitness", "wide", ">", reference=-9, births=100):
+            "reproduced",
+        Claim("3", "wider", "fitness", "wide", "!=", "narrow", is_spread=True):
+            "reproduced",
+        Claim("4", "as wide", "fitness", "wide", "!=", "wide", is_spread=True):
+            "undecided",
+        Claim("5", "half", "fitness", "low", "<", "high", share=0.5): "reproduced",
+        Claim("6", "a tenth", "fitness", "low", "<", "high", share=0.1):
+            "not reproduced",
+        Claim("7", "about 0", *alone, "=", margin=0.2): "reproduced",
+        Claim("8", "about 1", *alone, "=", reference=1.0, margin=0.2):
+            "not reproduced",
+        Claim("9", "occurs", "fitness", "once", "some"): "reproduced",
+        Claim("10", "never occurs", "fitness", "never", "some"): "not reproduced",
+        Claim("11", "may occur", "fitness", "seldom", "some"): "undecided",
+        Claim("12", "negligible", *alone, ">", reference=-0.1, margin=0.5):
+            "not reproduced",
+    }  # fmt: skip
+    found = decided(
+        claims,
+        {
+            "wide": WIDE,
+            "narrow": [value / 50 for value in WIDE],
+            "low": LOW,
+            "high": [value + 20 for value in HIGH],
+            "once": [0.0] * 9 + [0.1],
+            "never": [0.0] * 29,
+            "seldom": [0.0] * 28,
+        },
     )
-    found = findings(outcomes, claims).to_pylist()
-    assert [row["verdict"] for row in found] == [
-        "does not apply",
-        "reproduced",
-        "reproduced",
-        "undecided",
-        "reproduced",
-        "not reproduced",
-        "reproduced",
-        "not reproduced",
-        "reproduced",
-        "not reproduced",
-        "undecided",
-        "not reproduced",
-    ]
     assert (found[0]["births"], found[0]["p"]) == (100, None)
     # Means are those of what is compared: the distances from the median are 3 and
     # 3 / 50 on average; half of 35.5 is 17.75.

@@ -5,6 +5,7 @@ import io
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -67,6 +68,18 @@ def read_page(given: dict[str, pa.Table], drawn: Drawings = NOTHING) -> Reader:
     return reader
 
 
+def with_columns(
+    given: dict[str, pa.Table], name: str, **columns: list[Any]
+) -> dict[str, pa.Table]:
+    """Return tables of which one has other values in some columns."""
+    changed = given[name]
+    for column, values in columns.items():
+        field = changed.schema.field(column)
+        place = changed.schema.get_field_index(column)
+        changed = changed.set_column(place, field, [pa.array(values, field.type)])
+    return {**given, name: changed}
+
+
 @pytest.fixture(scope="module")
 def read(tmp_path_factory: pytest.TempPathFactory) -> Reader:
     return read_page(tables(), drawings(tmp_path_factory.mktemp("figures")))
@@ -102,68 +115,79 @@ def test_contents_lead_to_every_section_in_order(read: Reader) -> None:
     assert not {"islands", "diversity", "measures"} & set(anchors)
 
 
-def test_summary_has_one_row_per_experiment(read: Reader) -> None:
-    # Means of the last populations are 0.1, 0.2 and 0.3, the best 0, 0.5 and 1.
-    assert "3 runs, 165 births; written 2020-01-01" in read.text
-    assert "soft 2 finished 60 0.5 0.25 0.15 1 min 00 s 1" in read.text
-    assert "hard & <b> 1 not finished 45 1 1 0.3 – – " in read.text
-    assert " hard & <b>: births: 1 instead of 2 " in read.text
-    assert "Fitness function: locomotion [m/s]." in read.text
-
-
-def test_differences_have_an_interval_where_both_have_two_runs(read: Reader) -> None:
-    text = "hard & <b> minus soft : +0.05 , 95 % interval 0.01 to 0.09"
+@pytest.mark.parametrize(
+    "text",
+    [
+        # Means of the last populations are 0.1, 0.2 and 0.3, the best 0, 0.5 and 1.
+        "3 runs, 165 births; written 2020-01-01",
+        "soft 2 finished 60 0.5 0.25 0.15 1 min 00 s 1",
+        "hard & <b> 1 not finished 45 1 1 0.3 – – ",
+        " hard & <b>: births: 1 instead of 2 ",
+        "Fitness function: locomotion [m/s].",
+        # Six choices of two runs of four: p of both tails is a third at least.
+        "hard & <b> minus soft : +0.05 , 95 % interval 0.01 to 0.09",
+        "undecided: the interval excludes 0, but p is not below 0.05; "
+        "with 2 and 2 runs it cannot be below 0.333",
+        # One run of b is no spread of zero.
+        "\u22120.05 (2 and 1 run, at 30 births) no interval",
+        "1 measure is equal in all runs: size mean.",
+        "measure meaning fitness mean of judged robots",
+        "fitness best maximum of judged robots, in the same unit",
+        "soft, run 1, seed 7 mean fitness 0.2 at 30 births",
+        "mean of 2 runs",
+        "soft: fitness 0.3. Robot 0:2 of soft-1 (soft, run 1, seed 7)",
+        "hard & <b>: no moving picture: no driver <x>",
+        "0 reproduced, 1 not reproduced, 1 undecided.",
+        "a <b> fitter > 2 / 3 0.25 – \u22121 – – 0.01 not reproduced so",
+        "there is no finished run",
+        "soft 1 7 finished 60 1 0.5 0.2 1 min 01 s 1 soft-1",
+        "figure 6.1 no benchmark run runs/x broken & gone",
+        "revolve analyze runs software version numpy 9.9",
+    ],
+)
+def test_numbers_verdicts_and_provenance_are_shown(read: Reader, text: str) -> None:
     assert text in read.text
-    # Six choices of two runs of four: p of both tails is a third at least.
-    verdict = "undecided: the interval excludes 0, but p is not below 0.05; "
-    assert verdict + "with 2 and 2 runs it cannot be below 0.333" in read.text
-    # One run of b is no spread of zero.
-    assert "\u22120.05 (2 and 1 run, at 30 births) no interval" in read.text
-    assert "0.02" not in read.text
+
+
+@pytest.mark.parametrize("text", ["0.02", "size mean mean over"])
+def test_what_means_nothing_is_not_shown(read: Reader, text: str) -> None:
+    """The interval of a single run, and the meaning of a measure that is equal."""
+    assert text not in read.text
+
+
+def compared(*rows: dict[str, Any]) -> str:
+    """Return the section of differences of rows of the comparison."""
+    row = {"measure": "fitness", "a": "a", "b": "b", "births": 9, "runs_a": 3,
+           "runs_b": 3, "mean_a": 0.25, "mean_b": 0.6, "difference": -0.35,
+           "effect": -1.0}  # fmt: skip
+    every = [{**row, **changes} for changes in rows]
+    found = pa.Table.from_pylist(every, schema("comparison"))
+    return differences({**tables(), "comparison": found})
 
 
 def test_both_comparisons_of_fitness_show_the_pairs_in_one_order() -> None:
     pairs = {"fitness": {"b": 0.3, "c": 0.1}, "fitness_best": {"b": 0.2, "c": 0.4}}
     rows = [
-        {"measure": measure, "a": "a", "b": b, "births": 9, "runs_a": 1, "runs_b": 1,
-         "mean_a": 1.0, "mean_b": 1.0, "difference": 0.0, "effect": 0.0, "p": p}
+        {"measure": measure, "b": b, "p": p}
         for measure, found in pairs.items()
         for b, p in found.items()
-    ]  # fmt: skip
-    given = tables()
-    given["comparison"] = pa.Table.from_pylist(rows, schema("comparison"))
-    lines = re.findall(r"<b>a</b> minus <b>(.)</b>", differences(given))
+    ]
+    lines = re.findall(r"<b>a</b> minus <b>(.)</b>", compared(*rows))
     assert lines == ["c", "b"] * 2
 
 
 @pytest.mark.parametrize("p", [0.1, None])
 def test_equal_runs_have_no_interval_and_keep_their_p(p: float | None) -> None:
     """Three runs of 0.25 each against 0.5, 0.6 and 0.7: p is 2 of 20 ways."""
-    row = {"measure": "fitness", "a": "a", "b": "b", "births": 9, "runs_a": 3,
-           "runs_b": 3, "mean_a": 0.25, "mean_b": 0.6, "difference": -0.35,
-           "effect": -1.0, "p": p}  # fmt: skip
-    given = tables()
-    given["comparison"] = pa.Table.from_pylist([row], schema("comparison"))
-    text = re.sub("<[^>]+>", "", differences(given))
+    text = re.sub("<[^>]+>", "", compared({"p": p}))
     why = "no interval: all runs of one are equal, and they are fewer than ten"
     at = "&minus;0.35 (3 and 3 runs, at 9 births"
     assert (f"{at}; rank-sum p = 0.1){why}" if p else f"{at}){why}") in text
 
 
-def test_compared_measures_are_explained_and_equal_ones_counted(read: Reader) -> None:
-    assert "1 measure is equal in all runs: size mean." in read.text
-    assert "What the measures mean" in read.folds
-    meaning = "fitness best maximum of judged robots, in the same unit"
-    assert "measure meaning fitness mean of judged robots" in read.text
-    assert meaning in read.text
-    assert "size mean mean over" not in read.text
-
-
 def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
-    given = tables()
     functions = ["locomotion", "locomotion", "goals:far (limit = 2.0, source 1a)"]
-    runs = given["runs"].drop_columns("fitness_function")
-    given["runs"] = runs.append_column("fitness_function", pa.array(functions))
+    given = with_columns(tables(), "runs", fitness_function=functions)
     given["comparison"] = given["comparison"].slice(0, 0)
     found = read_page(given)
     assert "soft locomotion [m/s] 2 finished" in found.text
@@ -174,24 +198,21 @@ def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
         assert f"{title}: {near}." in found.text
     lists = f"hard & <b> by {far}; soft by {near}."
     assert f"their numbers have different meanings: {lists}" in found.text
-    assert "fitter" not in found.text.replace("fitter than all", "").replace(
-        "a <b> fitter", ""
-    )
+    others = found.text.replace("fitter than all", "").replace("a <b> fitter", "")
+    assert "fitter" not in others
     # Robot 2 of each run is at the same place in the plots of its own function only.
     assert found.text.count("robot 0:2, hard & <b>, run 0") == 2
 
 
 @pytest.mark.parametrize("others_s", [None, 9.0])
 def test_fitness_in_arenas_and_off_line_has_no_winner(others_s: float | None) -> None:
-    given = tables()
-    runs = given["runs"].drop_columns(["deaths", "simulated_s"])
-    names = runs["experiment"].to_pylist()
-    seconds = [9.0 if name == "soft" else others_s for name in names]
-    runs = runs.append_column("deaths", pa.array([0] * len(names), pa.int64()))
-    places = runs.schema.get_field_index("arena_births")
-    runs = runs.set_column(places, "arena_births", runs["births"])
-    given["runs"] = runs.append_column("simulated_s", pa.array(seconds, pa.float64()))
-    text = read_page(given).text
+    runs = tables()["runs"]
+    seconds = [
+        9.0 if name == "soft" else others_s for name in runs["experiment"].to_pylist()
+    ]
+    births = runs["births"].to_pylist()
+    columns = {"simulated_s": seconds, "arena_births": births, "deaths": [0] * 3}
+    text = read_page(with_columns(tables(), "runs", **columns)).text
     where = "in arenas (soft) is measured in another way than off-line (hard & <b>)"
     verdict = "in an arena and off-line: this does not show which is fitter"
     is_mixed = others_s is None
@@ -200,18 +221,14 @@ def test_fitness_in_arenas_and_off_line_has_no_winner(others_s: float | None) ->
     assert ("undecided: the interval excludes 0" in text) != is_mixed
 
 
-def with_arena(given: dict[str, pa.Table], **columns: float) -> None:
-    """Give the second run some columns of a run with an arena; the others have none."""
-    for name, value in columns.items():
-        runs = given["runs"]
-        place = runs.schema.get_field_index(name)
-        values = pa.array([None, value, None], runs.schema.field(name).type)
-        given["runs"] = runs.set_column(place, name, values)
+def with_arena(**columns: float) -> dict[str, pa.Table]:
+    """Return tables whose second run has some columns of a run with an arena."""
+    values = {name: [None, value, None] for name, value in columns.items()}
+    return with_columns(tables(), "runs", **values)
 
 
 def test_an_arena_is_summed_up(tmp_path: Path) -> None:
-    given = tables()
-    with_arena(given, arena_births=60, arena_living=50, deaths=9, simulated_s=125.0)
+    given = with_arena(arena_births=60, arena_living=50, deaths=9, simulated_s=125.0)
     text = read_page(given).text
     assert text.count("of simulated time") == 1
     assert (
@@ -225,12 +242,8 @@ def test_an_arena_is_summed_up(tmp_path: Path) -> None:
 
 
 def test_births_of_off_line_islands_are_no_births_in_arenas() -> None:
-    given = tables()
-    with_arena(given, arena_births=45, arena_living=16, deaths=35, simulated_s=125.0)
-    islands = given["runs"].schema.get_field_index("islands")
-    several = pa.array([1, 4, 1], pa.int64())
-    given["runs"] = given["runs"].set_column(islands, "islands", several)
-    text = read_page(given).text
+    given = with_arena(arena_births=45, arena_living=16, deaths=35, simulated_s=125.0)
+    text = read_page(with_columns(given, "runs", islands=[1, 4, 1])).text
     assert (
         "soft, run 1, seed 7: 45 of 60 robots were born in arenas, in 2 min 05 s of "
         "simulated time, 35 died, 16 were alive at the last birth." in text
@@ -239,52 +252,33 @@ def test_births_of_off_line_islands_are_no_births_in_arenas() -> None:
 
 
 def test_dots_are_in_the_order_of_birth_and_of_robots_that_did_not_fail() -> None:
-    given = tables()
-    robots = given["robots"]
     # As the founders of an arena: the one of the greatest number is born first.
-    places = robots.schema.get_field_index("births")
-    robots = robots.set_column(places, "births", pa.array([3, 2, 1] * 3, pa.int64()))
-    given["robots"] = robots
+    given = with_columns(tables(), "robots", births=[3, 2, 1] * 3)
     text = read_page(given).text
     for number, count in ((0, 0), (1, 1), (2, 2)):  # those of the last population, too
         assert text.count(f"robot 0:{number}, soft, run 1") == count
-    failed = robots.schema.get_field_index("is_failed")
-    is_failed = pa.array([False, False, True] * 3)
-    given["robots"] = robots.set_column(failed, "is_failed", is_failed)
-    text = read_page(given).text
-    assert text.count("robot 0:1, soft, run 1") == 2
+    given = with_columns(given, "robots", is_failed=[False, False, True] * 3)
+    assert read_page(given).text.count("robot 0:1, soft, run 1") == 2
 
 
 def test_dots_over_births_are_at_the_greatest_fitness_of_robots() -> None:
-    given = tables()
-    place = given["robots"].schema.get_field_index("fitness_max")
-    doubled = pc.multiply(given["robots"]["fitness"], 2.0)
-    given["robots"] = given["robots"].set_column(place, "fitness_max", doubled)
-    text = read_page(given).text
+    doubled = pc.multiply(tables()["robots"]["fitness"], 2.0).to_pylist()
+    text = read_page(with_columns(tables(), "robots", fitness_max=doubled)).text
     assert text.count("robot 0:2, soft, run 1, seed 7 fitness 0.6;") == 1
     assert text.count("robot 0:2, soft, run 1, seed 7 fitness 0.3;") == 1
     assert "In arenas" not in text
 
 
-def test_marks_tell_run_seed_and_robot(read: Reader) -> None:
-    assert "soft, run 1, seed 7 mean fitness 0.2 at 30 births" in read.text
+def test_a_robot_has_a_mark_in_each_plot_that_it_belongs_to(read: Reader) -> None:
     text = "robot 0:2, soft, run 1, seed 7 fitness 0.3; 9 parts, 3 motors, 2 hidden"
     # In both plots: fitter than all before, and in the last population.
     assert read.text.count(text) == 2
     # Robot 1 is less fit than robot 0.
     assert read.text.count("robot 0:1, soft, run 1") == 1
-    assert "mean of 2 runs" in read.text
-
-
-def test_films_are_shown_or_the_reason_is_given(read: Reader) -> None:
-    assert "soft: fitness 0.3. Robot 0:2 of soft-1 (soft, run 1, seed 7)" in read.text
-    assert "hard & <b>: no moving picture: no driver <x>" in read.text
 
 
 def test_findings_are_folded_unless_one_is_tested(read: Reader) -> None:
-    assert "0 reproduced, 1 not reproduced, 1 undecided." in read.text
-    assert "a <b> fitter > 2 / 3 0.25 – \u22121 – – 0.01 not reproduced so" in read.text
-    assert "there is no finished run" in read.text
+    assert "What the measures mean" in read.folds
     assert "All 2 findings" in read.unfolded
     given = tables()
     given["findings"] = given["findings"].slice(1)
@@ -292,12 +286,6 @@ def test_findings_are_folded_unless_one_is_tested(read: Reader) -> None:
     assert "None of the 1 findings can be tested" in others.text
     assert "All 1 findings" in others.folds
     assert "All 1 findings" not in others.unfolded
-
-
-def test_runs_left_out_items_and_provenance_are_shown(read: Reader) -> None:
-    assert "soft 1 7 finished 60 1 0.5 0.2 1 min 01 s 1 soft-1" in read.text
-    assert "figure 6.1 no benchmark run runs/x broken & gone" in read.text
-    assert "revolve analyze runs software version numpy 9.9" in read.text
 
 
 def test_one_experiment_has_no_comparison() -> None:
