@@ -74,11 +74,7 @@ def shares(rows: Iterable[Row], group: str, scope: str, kind: str = "") -> list[
 
 
 def summary(table: pa.Table) -> str:
-    """Return one line that says what carries the fitness of a run's robots.
-
-    Args:
-        table: rows of one run.
-    """
+    """Return one line that says what carries the fitness of a run's robots."""
     return line_of(table, _of_best, _of_last)
 
 

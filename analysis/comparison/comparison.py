@@ -120,9 +120,6 @@ def outcomes_of(measured: Sequence[MeasuredRun]) -> Outcomes:
 def comparison(outcomes: Outcomes) -> pa.Table:
     """Return the comparison of every pair of experiments by every measure.
 
-    Args:
-        outcomes: outcomes of finished runs.
-
     Returns:
         One row per measure and pair for which both experiments have values, with the
         columns of ``outputs``. Pairs with different fitness functions have no rows of

@@ -45,10 +45,6 @@ def _speed(factor: float) -> Callable[[int], dict[str, float]]:
 def findings(outcomes: Outcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     """Return the test of each finding of the thesis.
 
-    Args:
-        outcomes: outcomes of finished runs.
-        claims: the findings.
-
     Returns:
         One row per claim, in order, with the columns of ``outputs``; claims about
         experiments without finished runs are undecided.

@@ -15,9 +15,6 @@ def progression(populations: pa.Table) -> pa.Table:
     its islands have a value: islands are not recorded equally often. A run contributes
     at every number of births at which its own populations were recorded.
 
-    Args:
-        populations: populations of several runs, with the columns of ``outputs``.
-
     Returns:
         One row per ``experiment``, ``measure`` (a column of ``populations``) and
         ``births``, ascending: ``mean`` over runs, ``low`` and ``high`` (the mean's
@@ -49,10 +46,6 @@ def progression(populations: pa.Table) -> pa.Table:
 
 def run_means(populations: pa.Table, measure: str) -> pa.Table:
     """Return a measure of each run by number of births, the mean over its islands.
-
-    Args:
-        populations: populations of several runs, with the columns of ``outputs``.
-        measure: column of ``populations``.
 
     Returns:
         ``experiment``, ``folder``, ``births``, ``mean``, in ascending order, at the

@@ -75,9 +75,6 @@ def kept(rows: Sequence[Row]) -> float | None:
 
     The mean over groups of the mean over the changes of a group, so that groups of many
     changes count no more than others. Failed evaluations are left out.
-
-    Args:
-        rows: of one robot, all changes.
     """
     groups: dict[str, list[float]] = {}
     for row in rows:
@@ -87,11 +84,7 @@ def kept(rows: Sequence[Row]) -> float | None:
 
 
 def summary(table: pa.Table) -> str:
-    """Return one line that says how much of its fitness a run keeps.
-
-    Args:
-        table: rows of one run.
-    """
+    """Return one line that says how much of its fitness a run keeps."""
     return line_of(table, _of_best, _of_last)
 
 

@@ -18,9 +18,6 @@ def ablation(table: pa.Table) -> p9.ggplot:
     Sensors are shown by kind, motors in the order of what the robot loses without
     them.
 
-    Args:
-        table: of ``analysis.comparison.ablation``.
-
     Raises:
         NothingToDraw: no robot has a positive fitness without changes.
     """

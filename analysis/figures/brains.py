@@ -21,9 +21,6 @@ _LEAST = 20
 def changes_over_births(tables: Tables) -> p9.ggplot:
     """Return the change of bodies and of brains from the first parent to its child.
 
-    Args:
-        tables: ``brains``.
-
     Raises:
         NothingToDraw: no robot has a parent.
     """

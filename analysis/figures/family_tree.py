@@ -73,13 +73,7 @@ def row_of(best: Best, births: pa.Table) -> int:
 
 
 def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:
-    """Return a robot and all its ancestors as ``LINEAGE``; the robot is last.
-
-    Args:
-        births: births table of the robot's run.
-        experiment: name of the run's experiment.
-        row: row of the robot.
-    """
+    """Return row ``row`` of births and all its ancestors as ``LINEAGE``; it is last."""
     parents = parents_of(births)
     line = ancestors(parents)[row] | 1 << row
     rows = [order for order in parents_first(parents) if line >> order & 1]

@@ -73,9 +73,6 @@ def effects(tables: Tables) -> Figure:
     Pairs of experiments have Cliff's delta, experiments that are compared with a
     number have the difference divided by its margin; both with 95 % intervals.
 
-    Args:
-        tables: ``findings``.
-
     Raises:
         NothingToDraw: no finding could be tested.
     """

@@ -30,9 +30,6 @@ _IN_A_ROW = 12
 def fitness_by_island(tables: Tables) -> p9.ggplot:
     """Return the mean fitness of each island by number of births.
 
-    Args:
-        tables: ``runs`` and ``populations``.
-
     Raises:
         NothingToDraw: no run has several islands, or none has a judged population.
     """
@@ -80,9 +77,6 @@ def _of_several(tables: Tables) -> pa.Table:
 def between(tables: Tables) -> p9.ggplot:
     """Return the mean distances of bodies within and between islands, over runs.
 
-    Args:
-        tables: ``runs`` and ``between``.
-
     Raises:
         NothingToDraw: no run has several islands, or all have too few births.
     """
@@ -113,11 +107,7 @@ def between(tables: Tables) -> p9.ggplot:
 
 
 def migration_graph(tables: Tables) -> p9.ggplot:
-    """Return the numbers of migrants between islands, and the share that survives.
-
-    Args:
-        tables: ``migrants``.
-    """
+    """Return the numbers of migrants between islands, and the share that survives."""
     rows = tables["migrants"]
     left = pc.greater(rows["living"], 0).cast(pa.float64())
     edges = (

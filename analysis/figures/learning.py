@@ -16,9 +16,6 @@ _KEPT, _SAVED = "also with the brain at birth", "saved by learning"
 def learning_curves(tables: Tables) -> p9.ggplot:
     """Return the best fitness so far by trial: median and quartiles over robots.
 
-    Args:
-        tables: ``learning_curves``, and ``runs`` for the unit.
-
     Raises:
         NothingToDraw: no experiment has two trials.
     """
@@ -52,9 +49,6 @@ def _binned(frame: Any) -> Any:  # noqa: ANN401 - pandas
 def learning_gain(tables: Tables) -> p9.ggplot:
     """Return the fitness at birth and after learning over births: medians of bins.
 
-    Args:
-        tables: ``learning``, and ``runs`` for the unit.
-
     Raises:
         NothingToDraw: no experiment has births in two intervals.
     """
@@ -82,9 +76,6 @@ def learning_gain(tables: Tables) -> p9.ggplot:
 
 def bodies_saved(tables: Tables) -> p9.ggplot:
     """Return the shares of newborns that were kept, and of those saved, over births.
-
-    Args:
-        tables: ``learning``.
 
     Raises:
         NothingToDraw: no robot that learns was born after the founders.

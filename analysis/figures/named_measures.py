@@ -21,11 +21,7 @@ UNITS = {
 
 
 def measures_over_births(tables: Tables) -> p9.ggplot:
-    """Return the mean of each measure over births, a line per run and island.
-
-    Args:
-        tables: ``named_measures``.
-    """
+    """Return the mean of each measure over births, a line per run and island."""
     frame = tables["named_measures"].to_pandas()
     frame["line"] = frame["folder"] + " " + frame["island"].astype(str)
     experiments = in_order(frame["experiment"])

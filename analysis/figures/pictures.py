@@ -34,11 +34,7 @@ _RIM, _BELOW = 0.35, 0.25
 def gaits(
     robot_pictures: Sequence[RobotPicture], units: Mapping[str, str] = _NO_UNITS
 ) -> Figure:
-    """Return one row of consecutive pictures per robot.
-
-    Args:
-        robot_pictures: pictures of the best robots; at least one.
-        units: unit of fitness by experiment.
+    """Return one row of consecutive pictures per robot; units are by experiment.
 
     Source: Hupkes 2016, figure 6.10.
     """

@@ -36,9 +36,6 @@ _DODGE = 0.13
 def variability(tables: Tables) -> p9.ggplot:
     """Return the density of the variability of robots' fitness in arenas.
 
-    Args:
-        tables: ``variability``.
-
     Raises:
         NothingToDraw: no two robots of an experiment differ in variability.
 

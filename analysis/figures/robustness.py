@@ -18,9 +18,6 @@ _MOST = 2.0
 def robustness(table: pa.Table) -> p9.ggplot:
     """Return the share of its fitness that each robot keeps under each change.
 
-    Args:
-        table: of ``analysis.comparison.robustness``.
-
     Raises:
         NothingToDraw: no robot has a positive fitness without changes.
     """

@@ -32,9 +32,6 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
     lists how they differ. For an experiment of another name than the first one,
     ``differs`` lists how it differs from the earlier one that is most like it, and
     names that one.
-
-    Args:
-        runs: runs of any experiments.
     """
     groups: dict[str, dict[str, list[Run]]] = {}
     for run in runs:

@@ -337,11 +337,7 @@ def meaning(outcome: str) -> str:
 
 
 def schema(table: str) -> pa.Schema:
-    """Return the Arrow schema of a table, with ``meaning`` in each field's metadata.
-
-    Args:
-        table: a key of ``OUTPUTS``.
-    """
+    """Return the Arrow schema of a table, with ``meaning`` in each field's metadata."""
     return pa.schema(
         [
             pa.field(name, _kind(table, name), metadata={"meaning": meaning})

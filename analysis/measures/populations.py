@@ -128,11 +128,7 @@ def populations(run: RunTables) -> tuple[pa.Table, Problems]:
 
 
 def last_rows(populations: pa.Table) -> list[dict[str, Any]]:
-    """Return the rows of each island's last population, by experiment and folder.
-
-    Args:
-        populations: with the columns of ``outputs``.
-    """
+    """Return the rows of each island's last population, by experiment and folder."""
     keys = ["experiment", "folder", "island"]
     last = populations.group_by(keys, use_threads=False).aggregate([("births", "max")])
     joined = populations.join(last, keys)

@@ -27,10 +27,6 @@ PICTURE_ENDING = ".png"
 def render(options: argparse.Namespace, simulate: Simulate) -> int:
     """Render a robot in neutral pose or in motion; return the exit code.
 
-    Args:
-        options: of the command line.
-        simulate: the worker's simulation.
-
     Returns:
         0 if the picture was written.
 

@@ -25,9 +25,6 @@ _SURE = 2
 def differences(tables: Tables) -> str:
     """Return the differences of fitness between experiments, with intervals.
 
-    Args:
-        tables: ``comparison`` and ``runs``.
-
     Returns:
         HTML; empty if there is one experiment.
     """
@@ -165,9 +162,6 @@ def all_differences(tables: Tables) -> str:
 
     Measures without a p are equal in all runs of the pair: they are only counted. The
     meanings of the others are in a folded list below.
-
-    Args:
-        tables: ``comparison`` and ``runs``.
     """
     pairs: dict[tuple[str, str], list[Row]] = {}
     for row in tables["comparison"].to_pylist():

@@ -50,9 +50,6 @@ def of_each_function(tables: Tables) -> dict[str, Tables]:
 
     Plots of different functions must not share an axis. The table ``runs`` is complete
     everywhere: it determines the colours.
-
-    Args:
-        tables: ``runs``, ``robots``, ``populations``, ``progression``.
     """
     groups = by_function(functions_of(tables["runs"]))
     names = ("robots", "populations", "progression")
@@ -73,10 +70,6 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
 
     Robots of arenas are at their greatest fitness, because the lines are means of the
     fitness at each birth: at their last fitness they could all be below the lines.
-
-    Args:
-        tables: ``runs``, ``robots``, ``populations``, ``progression``.
-        y_text: label of the y axis.
 
     Returns:
         HTML; empty if no run has two populations.
@@ -186,10 +179,6 @@ def _described(row: Row, fitness: float) -> str:
 
 def last_populations(tables: Tables, y_text: str = "fitness") -> str:
     """Return the plot of all robots of the last populations, a column per run.
-
-    Args:
-        tables: ``runs`` and ``robots``.
-        y_text: label of the y axis.
 
     Returns:
         HTML; empty if no run has a population, or if there are too many robots.

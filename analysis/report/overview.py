@@ -23,11 +23,7 @@ _MOST_TEXT = 800
 
 
 def summary(tables: Tables) -> str:
-    """Return one row per experiment: runs, births, fitness, time, failures.
-
-    Args:
-        tables: ``runs`` and ``populations``.
-    """
+    """Return one row per experiment: runs, births, fitness, time, failures."""
     runs = tables["runs"].to_pylist()
     fitness = _last_fitness(tables["populations"])
     names = in_order(row["experiment"] for row in runs)
@@ -121,9 +117,6 @@ def _summary_note(functions: Collection[str], *, has_islands: bool) -> str:
 def arenas(tables: Tables) -> str:
     """Return a sentence about what happened in the arenas of each experiment.
 
-    Args:
-        tables: ``runs``.
-
     Returns:
         HTML; empty if no run has an arena.
     """
@@ -170,11 +163,7 @@ def _last_fitness(populations: pa.Table) -> dict[str, tuple[float, float]]:
 
 
 def all_runs(tables: Tables) -> str:
-    """Return one row per run.
-
-    Args:
-        tables: ``runs`` and ``populations``.
-    """
+    """Return one row per run."""
     fitness = _last_fitness(tables["populations"])
     names = run_names(tables["runs"])
     rows = []
@@ -192,11 +181,7 @@ def all_runs(tables: Tables) -> str:
 
 
 def speed(tables: Tables) -> str:
-    """Return the births per second of each experiment's runs.
-
-    Args:
-        tables: ``runs``.
-    """
+    """Return the births per second of each experiment's runs."""
     rows = []
     runs = [row for row in tables["runs"].to_pylist() if row["duration_s"]]
     for name in in_order(row["experiment"] for row in runs):

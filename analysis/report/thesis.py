@@ -18,11 +18,7 @@ _NOTE = (
 
 
 def findings(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the tests of the findings; folded if none could be tested.
-
-    Args:
-        rows: of the table ``findings``.
-    """
+    """Return a table of the findings' tests; folded if none could be tested."""
     if not rows:
         return ""
     verdicts = [str(row["verdict"]) for row in rows]

@@ -45,9 +45,6 @@ Frames = Mapping[float, Poses]
 def film(options: argparse.Namespace) -> int:
     """Write a film of the arenas of a run.
 
-    Args:
-        options: of the command line.
-
     Returns:
         0.
 

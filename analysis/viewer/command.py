@@ -42,10 +42,6 @@ from schema.tables.description import allow_plugins_of
 def view(options: argparse.Namespace, simulators: Simulators) -> int:
     """Show a run in the viewer.
 
-    Args:
-        options: of the command line.
-        simulators: functions that simulate robots again.
-
     Returns:
         0.
 

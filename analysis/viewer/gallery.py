@@ -26,12 +26,7 @@ class Gallery:
         self._spots: dict[int, dict[BirthId, int]] = {}
 
     def show(self, level: Level, models: BoxModels) -> None:
-        """Show the members of a population, and remove all other robots.
-
-        Args:
-            level: the population.
-            models: models of the known robots.
-        """
+        """Show the members of a population, and remove all other robots."""
         spots = self._spots.setdefault(level.island, {})
         when = TimePoint(None, level.births)
         for birth in sorted(set(spots).difference(level.members)):

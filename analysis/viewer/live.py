@@ -103,11 +103,6 @@ class LiveSource:
     def __init__(self, connect: str, fleet: str, tls: Tls | None) -> None:
         """Check the address; ``__enter__`` connects.
 
-        Args:
-            connect: address of the hub.
-            fleet: name of the fleet.
-            tls: certificate files, for a ``tls/`` address.
-
         Raises:
             NetworkError: the name or the address is invalid.
         """

@@ -112,11 +112,7 @@ class Window:
 
 
 def ways_to_view(output: Output) -> list[str]:
-    """Return lines about the viewers that can show what is served.
-
-    Args:
-        output: with a server.
-    """
+    """Return lines about the viewers that can show what is served."""
     assert output.serve is not None
     host, port = output.serve
     lines = [f"serving; to view: rerun --connect {output.url}"]

@@ -26,10 +26,6 @@ _PLACES = ("x", "y", "z")
 def check_update(news: Update, scene: Scene) -> None:
     """Raise unless all that a message holds can be shown.
 
-    Args:
-        news: the message, decoded.
-        scene: of the run.
-
     Raises:
         MalformedMessage: an unknown island, a body that breaks the rules of the run, a
             time beyond the limit, a text that is too long.

@@ -77,12 +77,7 @@ class _ShownRobot:
 
 
 class Show:
-    """One run in one recording.
-
-    Args:
-        recording: recording to log to.
-        space: the part types.
-    """
+    """One run in one recording."""
 
     def __init__(self, recording: Recording, space: BodySpace) -> None:
         self._recording = recording

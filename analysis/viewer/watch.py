@@ -38,12 +38,6 @@ def watch(
 ) -> None:
     """Record a run until it ends or ``stop`` is set.
 
-    Args:
-        source: an open source.
-        output: destination of the recording.
-        follow: robot that the camera follows.
-        stop: stops the recording.
-
     Raises:
         NetworkError: no coordinator sends a run.
         ViewerError: the window cannot be opened.
