@@ -8,7 +8,8 @@ from analysis.figures.forms import Row, Tables
 from analysis.figures.style import label
 from analysis.measures.fitness_functions import measured_apart, not_compared
 from analysis.measures.outputs import OUTCOME, meaning
-from analysis.report.html import capitalised, cell, folded, number, plural, table
+from analysis.report.html import capitalised, cell, folded, number, table
+from schema.errors import counted
 
 _MOST_PAIRS = 3
 """Pairs of experiments on the first screen, those with the smallest p."""
@@ -93,7 +94,7 @@ def _difference(row: Row, reach: float) -> str:
     """Return a difference in words and as a bar from ``-reach`` to ``reach``."""
     a, b = (f"<b>{escape(label(row[name]))}</b>" for name in "ab")
     both = _interval(row)
-    counts = f"{row['runs_a']} and {plural(row['runs_b'], 'run')}"
+    counts = f"{row['runs_a']} and {counted(row['runs_b'], 'run')}"
     has_two = min(row["runs_a"], row["runs_b"]) >= _SURE
     is_tested = has_two and row["p"] is not None
     p = f"; rank-sum p = {number(row['p'])}" * is_tested
@@ -130,7 +131,7 @@ def _verdict(row: Row, higher: str) -> str:
     least = 2.0 / comb(row["runs_a"] + row["runs_b"], row["runs_a"])
     if least < _LEVEL:
         return verdict
-    counts = f"{row['runs_a']} and {plural(row['runs_b'], 'run')}"
+    counts = f"{row['runs_a']} and {counted(row['runs_b'], 'run')}"
     return f"{verdict}; with {counts} it cannot be below {number(least)}"
 
 
@@ -182,8 +183,8 @@ def all_differences(tables: Tables) -> str:
             first = f'<td title="{escape(meaning(name))}">{escape(_words(name))}</td>'
             rows.append([first, *(cell(known[column]) for column in columns)])
         title = (
-            f"{label(a)} ({plural(every[0]['runs_a'], 'run')}) and {label(b)} "
-            f"({plural(every[0]['runs_b'], 'run')}) at {every[0]['births']} births"
+            f"{label(a)} ({counted(every[0]['runs_a'], 'run')}) and {label(b)} "
+            f"({counted(every[0]['runs_b'], 'run')}) at {every[0]['births']} births"
         )
         folds.append(folded(title, table(heads, rows) + _equal(every)))
     if not folds:
@@ -206,7 +207,7 @@ def _equal(rows: Sequence[Row]) -> str:
     names = [_words(row["measure"]) for row in rows if row["p"] is None]
     if not names:
         return ""
-    count = f"{plural(len(names), 'measure')} {'is' if len(names) == 1 else 'are'}"
+    count = f"{counted(len(names), 'measure')} {'is' if len(names) == 1 else 'are'}"
     text = f"{count} equal in all runs: {', '.join(names)}."
     return f'<p class="note">{escape(text)}</p>'
 

@@ -68,11 +68,6 @@ def capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def plural(count: int, noun: str) -> str:
-    """Return a number and a noun, for example ``3 runs``."""
-    return f"{count} {noun}{'s' * (count != 1)}"
-
-
 def legend(experiments: Sequence[str], of_all: Sequence[str]) -> str:
     """Return the names of experiments beside their colours.
 

@@ -14,7 +14,8 @@ from analysis.measures.fitness_functions import (
 )
 from analysis.measures.populations import last_rows
 from analysis.report.fitness import run_names
-from analysis.report.html import cell, duration, folded, plural, table
+from analysis.report.html import cell, duration, folded, table
+from schema.errors import counted
 
 _MOST_LINES = 3
 """Differing experiments, or runs of arenas, that are described without a fold."""
@@ -74,7 +75,7 @@ def _differing(differs: Mapping[str, str]) -> str:
     ]
     text = "".join(lines)
     if len(lines) > _MOST_LINES or len(text) > _MOST_TEXT:
-        title = f"Settings that differ: {plural(len(lines), 'experiment')}"
+        title = f"Settings that differ: {counted(len(lines), 'experiment')}"
         return folded(title, text)
     return text
 
@@ -128,7 +129,7 @@ def arenas(tables: Tables) -> str:
         alive = f"{row['arena_living']} were alive at the last birth"
         if row["islands"] == 1:
             alive = f"{row['births'] - row['deaths']} were alive at the end"
-        born, place = plural(row["births"], "robot"), ""
+        born, place = counted(row["births"], "robot"), ""
         if row["arena_births"] < row["births"]:
             born, place = f"{row['arena_births']} of {born}", "in arenas, "
         lines.append(

@@ -23,9 +23,10 @@ from analysis.report.fitness import (
     of_each_function,
     run_names,
 )
-from analysis.report.html import capitalised, cell, folded, number, plural, table
+from analysis.report.html import capitalised, cell, folded, number, table
 from analysis.report.overview import all_runs, arenas, speed, summary
 from analysis.report.thesis import findings
+from schema.errors import counted
 
 _SHOWN_PIXELS = 1400
 """Width of figures in the report; their files are wider."""
@@ -82,7 +83,7 @@ def report(
     title = f"Revolve Islands: {', '.join(names)}" if names else "Revolve Islands"
     births = sum(row["births"] for row in runs)
     lead = (
-        f"{plural(len(runs), 'run')}, {plural(births, 'birth')}; "
+        f"{counted(len(runs), 'run')}, {counted(births, 'birth')}; "
         f"written {when:%Y-%m-%d %H:%M} UTC"
     )
     sections = {
@@ -305,7 +306,7 @@ def _left_out(rows: Sequence[Mapping[str, object]]) -> str:
     lines = [[cell(row[name]) for name in ("what", "folder", "why")] for row in rows]
     content = table(("what", "run or file", "why"), lines)
     is_data = any(row["folder"] for row in rows)
-    title = f"{plural(len(rows), 'item')} and why"
+    title = f"{counted(len(rows), 'item')} and why"
     return folded(title, content, is_open=is_data)
 
 
