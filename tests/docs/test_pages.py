@@ -1,4 +1,4 @@
-"""Runs the code of the tutorials, and checks the links of all pages below docs/."""
+"""Runs the code of the tutorials and notebooks."""
 
 import json
 import os
@@ -15,12 +15,6 @@ from tests.system.workspace import runtime_directory
 TOP = Path(__file__).parents[2]
 DOCS = TOP / "docs"
 TUTORIALS = DOCS / "tutorials"
-PAGES = sorted(
-    page
-    for folder in ("tutorials", "concepts", "gallery", "notebooks")
-    for page in (DOCS / folder).glob("*.md")
-) + [DOCS / f"{name}.md" for name in ("faq", "comparison", "benchmarks")]
-
 pytestmark = pytest.mark.system
 
 
@@ -76,33 +70,6 @@ def test_every_tutorial_is_in_the_list_of_tutorials() -> None:
         r"\]\((\d\d-[\w-]+\.md)\)", (TUTORIALS / "README.md").read_text()
     )
     assert listed == [page.name for page in sorted(TUTORIALS.glob("[0-9]*.md"))]
-
-
-def _anchors(page: Path) -> set[str]:
-    """Return the anchors of a page's headings, as code hosts make them."""
-    text = re.sub(
-        r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL
-    )
-    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
-    return {
-        re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles
-    }
-
-
-@pytest.mark.parametrize(
-    "page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}"
-)
-def test_links_have_targets(page: Path) -> None:
-    text = re.sub(
-        r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL
-    )
-    for link in re.findall(r"\]\(([^)\s]+)\)", text):
-        if "://" in link:
-            continue
-        name, _, anchor = link.partition("#")
-        target = (page.parent / name) if name else page
-        assert target.exists(), link
-        assert not anchor or anchor in _anchors(target), link
 
 
 def test_a_page_that_says_something_wrong_is_found(
