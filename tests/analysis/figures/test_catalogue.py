@@ -20,14 +20,10 @@ from tests.analysis.drawn import Row, layers, table
 
 def outcomes(experiment: str, *fitness: float) -> list[Row]:
     return [
-        {
-            "experiment": experiment,
-            "folder": f"{experiment}-{n}",
-            "fitness": value,
-            "births": 60,
-        }
+        {"experiment": experiment, "folder": f"{experiment}-{n}", "fitness": value,
+         "births": 60}
         for n, value in enumerate(fitness)
-    ]
+    ]  # fmt: skip
 
 
 def robots(experiment: str, *fitness: float) -> list[Row]:
@@ -83,40 +79,37 @@ def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
     figure.draw()
 
 
-def test_violins_show_no_robots_of_later_births() -> None:
-    """Of run 0 the outcome is at 60 of 90 births; run 2 is not finished."""
-    found = [{**row, "folder": f"a-{n}"} for n in range(3) for row in
-             robots("a", 1.0 + n, 1.5 + n)]  # fmt: skip
-    populations = [
-        {"experiment": "a", "folder": f"a-{n}", "births": births}
-        for n, births in ((0, 60), (0, 90), (1, 30), (1, 60), (2, 60))
-    ]
-    tables = {
-        "outcomes": table("outcomes", outcomes("a", 0.1, 0.4)),
-        "robots": table("robots", found),
-        "populations": table("populations", populations),
-    }
-    shown = layers(over_runs(tables, FITNESS))
-    assert shown["geom_violin"]["value"] == [2.0, 2.5]
-
-
-def test_violins_show_the_islands_of_a_run_that_end_at_its_outcome() -> None:
-    """The outcome is at 60 births, which both islands reach; island 1 has 75."""
+@pytest.mark.parametrize(
+    ("islands", "recorded", "shown"),
+    [
+        # Of run 0 the outcome is at 60 of 90 births; run 2 is not finished.
+        ([(0, 0), (1, 0), (2, 0)],
+         [(0, 0, 60), (0, 0, 90), (1, 0, 30), (1, 0, 60), (2, 0, 60)], [2.0, 2.5]),
+        # The outcome is at 60 births, which both islands reach; island 1 has 75.
+        ([(0, 0), (0, 1)], [(0, 0, 60), (0, 1, 60), (0, 1, 75)], [1.0, 1.5]),
+    ],
+)  # fmt: skip
+def test_violins_show_the_islands_of_runs_that_end_at_the_outcome(
+    islands: list[tuple[int, int]],
+    recorded: list[tuple[int, int, int]],
+    shown: list[float],
+) -> None:
     found = [
-        {**row, "folder": "a-0", "island": island}
-        for island in range(2)
-        for row in robots("a", 1.0 + island, 1.5 + island)
+        {**row, "folder": f"a-{number}", "island": island}
+        for number, island in islands
+        for row in robots("a", 1.0 + number + island, 1.5 + number + island)
     ]
     populations = [
-        {"experiment": "a", "folder": "a-0", "island": island, "births": births}
-        for island, births in ((0, 60), (1, 60), (1, 75))
+        {"experiment": "a", "folder": f"a-{n}", "island": island, "births": births}
+        for n, island, births in recorded
     ]
+    finished = {number for number, _ in islands} - {2}
     tables = {
-        "outcomes": table("outcomes", outcomes("a", 0.1)),
+        "outcomes": table("outcomes", outcomes("a", *(0.1 * n for n in finished))),
         "robots": table("robots", found),
         "populations": table("populations", populations),
     }
-    assert layers(over_runs(tables, FITNESS))["geom_violin"]["value"] == [1.0, 1.5]
+    assert layers(over_runs(tables, FITNESS))["geom_violin"]["value"] == shown
     assert spread_caption(tables, FITNESS).endswith(
         "Pale shapes show the robots of the last populations at those births, each "
         "once, from the least to the greatest value."
@@ -260,22 +253,14 @@ def test_catalogue_has_all_figures_of_the_thesis_and_each_names_missing_data() -
 
 
 def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
-    assert in_order(["b", "no-selection", "scenario1", "b"]) == [
-        "scenario1",
-        "no-selection",
-        "b",
-    ]
+    ordered = ["scenario1", "no-selection", "b"]
+    assert in_order(["b", "no-selection", "scenario1", "b"]) == ordered
     alone, others = colours(["scenario2"]), colours(["x", "scenario2", "scenario1"])
     assert alone["scenario2"] == others["scenario2"]
     assert len(set(others.values())) == 3
-    assert [label("scenario3"), label("no-selection")] == ["scenario 3", "no selection"]
-
-
-def test_a_figure_of_some_experiments_has_the_colours_of_the_report() -> None:
     rows = [{"experiment": name} for name in ("a", "b", "c")]
-    lines, fills = scales({"runs": table("runs", rows)}, ["c", "b"])
     paint = colours(["a", "b", "c"])
-    for scale in (lines, fills):
+    for scale in scales({"runs": table("runs", rows)}, ["c", "b"]):
         assert scale.limits == ["b", "c"]
         assert scale.palette(2) == [paint["b"], paint["c"]]
 
@@ -302,13 +287,26 @@ def test_colours_of_many_experiments_differ() -> None:
             assert max(abs(a - b) for a, b in zip(one, other, strict=True)) >= 20
 
 
-def test_own_names_of_experiments_are_not_changed() -> None:
-    assert [label("my-robots-2"), label("a-b~3")] == ["my-robots-2", "a-b ~3"]
-    assert label("scenario10") == "scenario10"
-    assert two_line_label("my-long-robots-2") == "my-\nlong-robots-2"
-    assert two_line_label("no-reproduction") == "no\nreproduction"
-    assert label("scenario1~2") == "scenario 1 ~2"
-    assert two_line_label("no-selection~2") == "no selection\n~2"
+@pytest.mark.parametrize(
+    ("name", "one_line", "two_lines"),
+    [
+        ("scenario3", "scenario 3", "scenario 3"),
+        ("no-selection", "no selection", "no\nselection"),
+        ("scenario1~2", "scenario 1 ~2", "scenario 1\n~2"),
+        ("no-selection~2", "no selection ~2", "no selection\n~2"),
+        ("no-reproduction", "no reproduction", "no\nreproduction"),
+        # Own names are not changed.
+        ("my-robots-2", "my-robots-2", "my-robots-2"),
+        ("my-long-robots-2", "my-long-robots-2", "my-\nlong-robots-2"),
+        ("a-b~3", "a-b ~3", "a-b\n~3"),
+        ("scenario10", "scenario10", "scenario10"),
+    ],
+)
+def test_names_of_experiments(name: str, one_line: str, two_lines: str) -> None:
+    assert (label(name), two_line_label(name)) == (one_line, two_lines)
+
+
+def test_experiments_of_one_name_have_colours_of_their_own() -> None:
     names = ["scenario1~2", "scenario1", "scenario2"]
     assert in_order(names) == ["scenario1", "scenario2", "scenario1~2"]
     assert len(set(colours(names).values())) == 3

@@ -61,75 +61,66 @@ PARENT = core(
 )
 
 
-def distance(child: Node, parent: Node = PARENT) -> tuple[float, int, int]:
-    found = change(of_genome(child), of_genome(parent))
-    assert found is not None
-    back = change(of_genome(parent), of_genome(child))
-    assert back == (found.varied, found.lost, found.new)
-    return found
+HINGES = PARENT.children
+EDGES = PARENT.connections
+# Bias -1 to 1, gain 0 to 1; period 0 to 10, phase 0 to 3.14, amplitude 0 to 2.
+OTHERS = (NeuronGene("Simple", (-0.5, 0.75)), NeuronGene("Oscillator", (2.5, 1.0, 2.0)))
+VARIED = (1.0 / 2 + 0.5) / 2 + (2.5 / 10 + 0 + 1.0 / 2) / 3
+GROWN = (
+    link(("input", 0), ("hidden", 0), 0.5),
+    link(("input", 5), ("hidden", 1), 0.5),
+    link(("input", 5), ("output", 0), 0.5, 2),
+)
+HEAVY = (
+    link(("input", 0), ("hidden", 0), 0.75),
+    link(("hidden", 0), ("output", 0), 7.0, 0),
+)
+NOWHERE = (
+    *EDGES,
+    link(("input", 1), ("output", 0), 0.5, 1),
+    link(("input", 1), ("hidden", 4), 0.5),
+    link(("input", 0), ("hidden", 0), 0.9),
+)
+STILL = replace(PARENT, connections=())
+LONE = core((0, hinge(2, LINEAR)))
 
 
-def test_equal_brains_have_no_distance() -> None:
-    assert distance(PARENT) == (0.0, 0, 0)
-    # The body may change meanwhile.
-    moved = replace(
-        PARENT, children=((1, hinge(2, LINEAR)), (2, hinge(3, CLOCK))), connections=()
+@pytest.mark.parametrize(
+    ("child", "parent", "expected"),
+    [
+        (PARENT, PARENT, (0.0, 0, 0)),
+        # The body may change meanwhile.
+        (replace(STILL, children=((1, HINGES[0][1]), HINGES[1])), STILL, (0.0, 0, 0)),
+        # Parameters count by the width of their range, weights as they are.
+        (replace(PARENT, children=((0, hinge(2, OTHERS[0])), (2, hinge(3, OTHERS[1])))),
+         PARENT, (VARIED, 0, 0)),
+        (replace(PARENT, hidden=(NeuronGene("Sigmoid", (90.0, 0.5)),)), PARENT,
+         (1.0, 0, 0)),
+        (replace(PARENT, connections=HEAVY), PARENT, (0.25 + 1.0, 0, 0)),
+        # One hidden neuron and two connections are new, one connection is lost.
+        (replace(PARENT, hidden=(SIGMOID, SIGMOID), connections=GROWN), PARENT,
+         (0.0, 3, 1)),
+        (replace(PARENT, children=HINGES[:1]), PARENT, (0.0, 0, 1)),
+        # Another type is another neuron; its connections are others, too.
+        (replace(PARENT, hidden=(LINEAR,)), PARENT, (0.0, 3, 3)),
+        # So is the neuron of another part.
+        (replace(PARENT, children=((0, hinge(9, LINEAR)), HINGES[1])), PARENT,
+         (0.0, 2, 2)),
+        # Copies of a part are told apart.
+        (core((0, hinge(2, LINEAR)), (2, hinge(2, CLOCK)), (3, hinge(2, LINEAR))),
+         LONE, (0.0, 2, 0)),
+        # Connections that lead nowhere, or are there twice, are left out.
+        (replace(PARENT, connections=NOWHERE), PARENT, (0.0, 0, 0)),
+    ],
+)  # fmt: skip
+def test_distances_by_hand(
+    child: Node, parent: Node, expected: tuple[float, int, int]
+) -> None:
+    varied, new, lost = expected
+    assert change(of_genome(child), of_genome(parent)) == pytest.approx(expected)
+    assert change(of_genome(parent), of_genome(child)) == pytest.approx(
+        (varied, lost, new)
     )
-    still = replace(PARENT, connections=())
-    assert distance(moved, still) == (0.0, 0, 0)
-
-
-def test_parameters_count_by_the_width_of_their_range() -> None:
-    """Bias -1 to 1, gain 0 to 1; period 0 to 10, phase 0 to 3.14, amplitude 0 to 2."""
-    linear = NeuronGene("Simple", (-0.5, 0.75))
-    clock = NeuronGene("Oscillator", (2.5, 1.0, 2.0))
-    child = replace(PARENT, children=((0, hinge(2, linear)), (2, hinge(3, clock))))
-    wanted = (1.0 / 2 + 0.5) / 2 + (2.5 / 10 + 0 + 1.0 / 2) / 3
-    assert distance(child) == pytest.approx((wanted, 0, 0))
-    far = replace(PARENT, hidden=(NeuronGene("Sigmoid", (90.0, 0.5)),))
-    assert distance(far) == (1.0, 0, 0)
-
-
-def test_weights_count_as_they_are() -> None:
-    edges = (
-        link(("input", 0), ("hidden", 0), 0.75),
-        link(("hidden", 0), ("output", 0), 7.0, 0),
-    )
-    assert distance(replace(PARENT, connections=edges)) == (0.25 + 1.0, 0, 0)
-
-
-def test_new_and_lost_elements_count_one_each() -> None:
-    edges = (
-        link(("input", 0), ("hidden", 0), 0.5),
-        link(("input", 5), ("hidden", 1), 0.5),
-        link(("input", 5), ("output", 0), 0.5, 2),
-    )
-    grown = replace(PARENT, hidden=(SIGMOID, SIGMOID), connections=edges)
-    # One hidden neuron and two connections are new, one connection is lost.
-    assert distance(grown) == (0.0, 3, 1)
-    without = replace(PARENT, children=PARENT.children[:1])
-    assert distance(without) == (0.0, 0, 1)
-    # Another type is another neuron; its connections are others, too.
-    other = replace(PARENT, hidden=(LINEAR,))
-    assert distance(other) == (0.0, 3, 3)
-    # So is the neuron of another part.
-    foreign = replace(PARENT, children=((0, hinge(9, LINEAR)), PARENT.children[1]))
-    assert distance(foreign) == (0.0, 2, 2)
-
-
-def test_copies_of_a_part_are_told_apart() -> None:
-    twice = core((0, hinge(2, LINEAR)), (2, hinge(2, CLOCK)), (3, hinge(2, LINEAR)))
-    assert distance(twice, core((0, hinge(2, LINEAR)))) == (0.0, 2, 0)
-
-
-def test_connections_that_lead_nowhere_are_left_out() -> None:
-    edges = (
-        *PARENT.connections,
-        link(("input", 1), ("output", 0), 0.5, 1),
-        link(("input", 1), ("hidden", 4), 0.5),
-        link(("input", 0), ("hidden", 0), 0.9),
-    )
-    assert distance(replace(PARENT, connections=edges)) == (0.0, 0, 0)
 
 
 def test_parts_without_identity_have_no_distance() -> None:
