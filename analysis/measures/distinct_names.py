@@ -8,14 +8,14 @@ reach.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 from typing import Any
 
+from msgspec import to_builtins
+
 from analysis.measures.load import Run
-from schema.errors import ExperimentError
-from schema.experiment.file import experiment_from_text, experiment_text
+from schema.experiment.file import experiment_from_text
 
 MARK = "~"
 """Separator of a name and a number that makes it distinct."""
@@ -59,9 +59,7 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
 
 def _settings(document: str) -> dict[str, Any]:
     """Return a document's settings, with current defaults for an older document."""
-    with suppress(ExperimentError):  # otherwise it is compared unchanged
-        document = experiment_text(experiment_from_text(document))
-    entries: dict[str, Any] = json.loads(document)
+    entries: dict[str, Any] = to_builtins(experiment_from_text(document))
     # Runs of a sweep are one experiment.
     for key in (entries.get("sweep") or {}).pop("chosen", None) or {}:
         _mark_swept(entries, key.split("."))

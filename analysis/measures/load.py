@@ -15,8 +15,9 @@ import pyarrow.compute as pc
 from msgspec import structs
 from pyarrow.parquet import read_schema
 
-from schema.errors import RunFolderError
-from schema.experiment.document import Selection
+from schema.errors import ExperimentError, RunFolderError
+from schema.experiment.document import Experiment, Selection, island_experiments
+from schema.experiment.file import experiment_from_text
 from schema.experiment.fitness_keys import fitness_text
 from schema.plugins.source import modules_named
 from schema.tables.columns import TABLES, VERSION
@@ -29,7 +30,6 @@ TABLE = "table "
 """Prefix of the name of a table that was left out."""
 
 _FOUNDERS = Selection().population
-_MOST_ISLANDS = 10_000
 _NEEDED = (
     "births", "evaluations", "population", "fitness", "deaths", "touches",
     "migrations", "learning",
@@ -203,30 +203,22 @@ def read_run(folder: Path) -> Run:
     """
     details = _details(folder)
     try:
-        document = json.loads(details["document"])
-        islands = tuple(_settings(document))
-        name, number, seed = details["name"], details["run"], details["seed"]
-        measures = tuple(map(str, document.get("measures", {}).get("names") or ()))
-        function = str(document.get("fitness", {}).get("function", ""))
-        plugins = _plugins(details)
-        fitness = fitness_text(document, plugins)
-        point = dict((document.get("sweep") or {}).get("chosen") or {})
-    except (
-        ValueError, KeyError, TypeError, AttributeError, RecursionError
-    ) as error:  # fmt: skip
-        cause = f"{type(error).__name__}: {error}"
-        raise RunFolderError(f"{DETAILS}: cannot be read: {cause}") from None
+        settings = experiment_from_text(details["document"])
+    except ExperimentError as error:
+        raise RunFolderError(f"{DETAILS}: cannot be read: {error}") from None
+    plugins = _plugins(details)
+    point = settings.sweep.chosen if settings.sweep else {}
     run = Run(
         folder=folder,
-        experiment=_experiment(str(name), point),
-        number=int(number),
-        seed=int(seed),
+        experiment=_experiment(details["name"], point),
+        number=details["run"],
+        seed=details["seed"],
         state=_state(folder, details),
-        document=str(details["document"]),
-        islands=islands,
-        measures=measures,
-        function=function,
-        fitness=fitness,
+        document=details["document"],
+        islands=tuple(map(_settings, island_experiments(settings))),
+        measures=settings.measures.names,
+        function=settings.fitness.function,
+        fitness=fitness_text(json.loads(details["document"]), plugins),
         plugins=plugins,
         point=point,
     )
@@ -294,24 +286,17 @@ def _state(folder: Path, details: dict[str, Any]) -> str:
     return state
 
 
-def _settings(document: dict[str, Any]) -> Iterable[IslandSettings]:
-    """Yield each island's settings; older documents have no islands."""
-    for entry in document.get("islands") or [{}]:
-        arena = entry.get("arena") or document.get("arena")
-        births = int(entry.get("births") or document["births"])
-        touches = bool(arena and arena.get("record_touches"))
-        count = int(entry.get("count", 1))
-        if not 0 < count <= _MOST_ISLANDS:
-            raise ValueError(f"islands: count must be from 1 to {_MOST_ISLANDS}")
-        learns = bool(entry.get("learning") or document.get("learning"))
-        selection = entry.get("selection") or document.get("selection") or {}
-        founders = int(selection.get("population", _FOUNDERS))
-        again = selection.get("reevaluation")
-        reevaluation = "" if again is None else str(again.get("fitness", "replace"))
-        for _ in range(count):
-            yield IslandSettings(
-                births, arena is not None, touches, learns, founders, reevaluation
-            )
+def _settings(island: Experiment) -> IslandSettings:
+    """Return what an analysis needs of the settings of an island."""
+    arena, again = island.arena, island.selection.reevaluation
+    return IslandSettings(
+        births=island.births,
+        is_online=arena is not None,
+        records_touches=arena is not None and arena.record_touches,
+        learns=island.learning is not None,
+        founders=island.selection.population,
+        reevaluation="" if again is None else again.fitness,
+    )
 
 
 def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:

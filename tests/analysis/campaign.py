@@ -48,7 +48,7 @@ def write_run(
     rng = np.random.default_rng([number, *experiment.encode()])
     is_online = experiment == ONLINE
     arena = {"record_touches": True} if is_online else None
-    document = json.dumps({"births": births, "arena": arena})
+    document = json.dumps({"name": experiment, "births": births, "arena": arena})
     details = {"name": experiment, "run": number, "seed": 1, "document": document}
     folder.mkdir(parents=True)
     (folder / "run.json").write_text(json.dumps(details))

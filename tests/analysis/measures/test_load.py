@@ -37,7 +37,7 @@ Maker = Callable[..., Path]
 
 def describe(folder: Path, seed: int = 1, **document: object) -> None:
     """Write the description of a run, with its document."""
-    written = json.dumps({"births": 3, "arena": None, **document})
+    written = json.dumps({"name": "e", "births": 3, **document})
     details = {"name": "e", "run": 0, "seed": seed, "document": written}
     (folder / "run.json").write_text(json.dumps(details))
 
@@ -134,7 +134,7 @@ def test_an_unreadable_description_is_reported_and_others_are_read(
 
 def test_a_finished_run_is_read_without_its_description(made: Maker) -> None:
     folder = made("x")
-    document = json.dumps({"births": 3, "arena": None})
+    document = json.dumps({"name": "e", "births": 3})
     row = {"name": "e", "run": 4, "seed": 9, "document": document, "state": "finished"}
     path = parquet_path(folder, "e", 0, "runs")
     row |= {"start": 0, "end": 0}
@@ -202,7 +202,7 @@ def test_the_beginning_of_a_longer_run_is_not_another_run(
     islands: list[dict[str, object]] = [{"births": 3}]
     made("a", births=2, islands=islands)
     made("b", islands=[{"births": 4}])
-    made("c", islands=islands, seconds=1)
+    made("c", islands=islands, arena={})
     made("d", islands=islands)
     damaged(tmp_path / "a", "population")
     runs, left_out = read_runs([tmp_path])
@@ -225,7 +225,7 @@ def test_the_beginning_of_a_longer_run_is_not_another_run(
 def test_points_of_a_sweep_with_another_fitness_are_other_experiments(
     made: Maker, chosen: dict[str, object], name: str
 ) -> None:
-    file = made("a", sweep={"chosen": chosen}) / "run.json"
+    file = made("a", sweep={"settings": {}, "chosen": chosen}) / "run.json"
     details = {**json.loads(file.read_text()), "name": "e-4"}
     file.write_text(json.dumps(details))
     assert found_in(file.parent).experiment == name
