@@ -83,16 +83,8 @@ def test_families_are_those_of_the_fittest_of_the_last_populations(
     members: pa.Table,
 ) -> None:
     rows = [(15, 4, 0.9), (30, 3, 0.1), (30, 5, 0.3), (30, 2, None)]
-    living = pa.table(
-        {
-            "island": [0] * 4,
-            "births": [births for births, _, _ in rows],
-            "birth_island": [0] * 4,
-            "birth": [birth for _, birth, _ in rows],
-            "fitness": pa.array([fitness for _, _, fitness in rows], pa.float64()),
-            "is_online": [True] * 4,
-        }
-    )
+    levels = [(0, births, {(0, birth): fitness}) for births, birth, fitness in rows]
+    living = population(*levels, is_online=True)
     run = RunTables({"births": members, "population": living})
     (found,) = families(run).to_pylist()
     assert (found["births"], found["birth"], found["members"]) == (30, 5, 5)

@@ -1,5 +1,6 @@
 """Maps of sweeps: which runs they show, and which form they have."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import pyarrow as pa
@@ -8,24 +9,24 @@ from matplotlib import pyplot as plt
 
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.sweeps import sweep_caption, sweep_map, sweep_runs
-from analysis.measures.outputs import schema
+from tests.analysis.drawn import table
 
 
-def _tables(points: list[dict[str, Any]]) -> dict[str, pa.Table]:
+def _tables(
+    points: list[dict[str, Any]], fitness: Sequence[float | None] | None = None
+) -> dict[str, pa.Table]:
     """Return the tables of one run per point; fitness is the sum of its numbers."""
     sweeps, outcomes = [], []
     for number, point in enumerate(points):
         names = {"experiment": "e", "folder": f"f{number}"}
         numbers = [each for each in point.values() if isinstance(each, float)]
-        outcomes.append({**names, "births": 9, "fitness": sum(numbers), "size": 5.0})
-        for setting, value in point.items():
-            number_of = value if isinstance(value, float) else None
-            row = {"setting": setting, "value": str(value), "number": number_of}
+        value = fitness[number] if fitness else sum(numbers)
+        outcomes.append({**names, "births": 9, "fitness": value, "size": 5.0})
+        for setting, each in point.items():
+            number_of = each if isinstance(each, float) else None
+            row = {"setting": setting, "value": str(each), "number": number_of}
             sweeps.append({**names, **row})
-    return {
-        "sweeps": pa.Table.from_pylist(sweeps, schema("sweeps")),
-        "outcomes": pa.Table.from_pylist(outcomes, schema("outcomes")),
-    }
+    return {"sweeps": table("sweeps", sweeps), "outcomes": table("outcomes", outcomes)}
 
 
 GRID = [{"a.b": a, "c": c} for a in (1.0, 2.0) for c in (10.0, 30.0) for _ in range(2)]
@@ -52,11 +53,8 @@ def test_a_grid_of_two_settings_is_a_map_of_means_over_runs() -> None:
 
 def test_a_caption_says_how_sure_the_best_point_is() -> None:
     """Means 2 and 2.5 of two runs each, variances 0.5 and 0.5: t of 2 d.f. is 4.303."""
-    tables = _tables([{"a": 1.0}, {"a": 1.0}, {"a": 2.0}, {"a": 2.0}])
-    at = tables["outcomes"].schema.get_field_index("fitness")
-    values = pa.array([1.5, 2.5, 2.0, 3.0], pa.float64())
-    tables["outcomes"] = tables["outcomes"].set_column(at, "fitness", values)
-    assert sweep_caption(tables, "e").endswith(
+    points = [{"a": 1.0}, {"a": 1.0}, {"a": 2.0}, {"a": 2.0}]
+    assert sweep_caption(_tables(points, [1.5, 2.5, 2.0, 3.0]), "e").endswith(
         "Each point is a run; the line joins means over runs. Mean fitness is highest "
         "at a = 2: 2.5 (sd 0.71), then at a = 1: 2 (sd 0.71). The difference of these "
         "two, 0.5 (95 % interval -2.5 to 3.5, Welch's t), is not shown; the best of "
@@ -70,15 +68,12 @@ def test_a_caption_says_how_sure_the_best_point_is() -> None:
 
 
 def test_a_caption_names_no_best_point_among_those_without_fitness() -> None:
-    tables = _tables([{"a": 1.0}, {"a": 2.0}, {"a": 3.0}])
-    at = tables["outcomes"].schema.get_field_index("fitness")
+    points = [{"a": 1.0}, {"a": 2.0}, {"a": 3.0}]
     one = "One run at a point has no spread; --repeats adds runs."
     best = f"highest at a = 1: 1.5, then at a = 3: 0.5. {one}"
     none = "(3 runs at 3 points). Each point is a run."
     for fitness, end in (([1.5, None, 0.5], best), ([None] * 3, none)):
-        values = pa.array(fitness, pa.float64())
-        tables["outcomes"] = tables["outcomes"].set_column(at, "fitness", values)
-        assert sweep_caption(tables, "e").endswith(end)
+        assert sweep_caption(_tables(points, fitness), "e").endswith(end)
 
 
 def test_settings_keep_their_digits() -> None:
@@ -107,7 +102,7 @@ def test_scattered_settings_have_a_panel_each() -> None:
 def test_runs_of_other_experiments_are_not_shown() -> None:
     tables = _tables(GRID)
     other = {"experiment": "o", "folder": "o", "births": 9, "fitness": 99.0}
-    more = pa.Table.from_pylist([other], schema("outcomes"))
+    more = table("outcomes", [other])
     tables["outcomes"] = pa.concat_tables([tables["outcomes"], more])
     assert sweep_runs(tables, "e").frame["fitness"].max() == 32
     tables["outcomes"] = more

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from rerun.blueprint import Spatial3DView
 from rerun.chunk import RrdReader
@@ -11,7 +12,7 @@ from rerun.chunk import RrdReader
 from analysis.viewer.blueprint import layout
 from analysis.viewer.ground import Relief, surfaces
 from analysis.viewer.recording import Recording
-from analysis.viewer.scene import scene_of
+from analysis.viewer.scene import Scene, scene_of
 from schema.experiment.document import Arena, Experiment, Islands, Simulation
 from schema.experiment.environment import FLAT, Environment, relief
 from schema.experiment.scenery import Solid
@@ -20,16 +21,24 @@ from schema.robot.ids import BirthId
 WORLD = Simulation()
 
 
-def shown(geom: str, folder: Path) -> dict[str, Any]:
-    """Return what is recorded of the one geom of an arena's scenery."""
-    scenery = f"<mujoco><worldbody><geom {geom}/></worldbody></mujoco>"
-    environment = Environment(scenery=scenery)
-    scene = scene_of(Experiment(name="a", arena=Arena(), environment=environment))
+SCENERY = "<mujoco><worldbody><geom {}/></worldbody></mujoco>"
+
+
+def recorded(scene: Scene, folder: Path) -> dict[str, pa.RecordBatch]:
+    """Return what is recorded of the ground and the scenery, by entity."""
     with Recording("a", layout(scene), file=folder / "a.rrd") as recording:
         recording.add_scene(scene)
-    chunks = RrdReader(folder / "a.rrd").stream().filter(content="/islands/0/ground/**")
-    (chunk,) = chunks
-    (row,) = chunk.to_record_batch().to_pylist()
+    chunks = RrdReader(folder / "a.rrd").stream().filter(content="/islands/**")
+    found = {str(chunk.entity_path): chunk.to_record_batch() for chunk in chunks}
+    return {path: found[path] for path in sorted(found) if "/ground/" in path}
+
+
+def shown(geom: str, folder: Path) -> dict[str, Any]:
+    """Return what is recorded of the one geom of an arena's scenery."""
+    environment = Environment(scenery=SCENERY.format(geom))
+    scene = scene_of(Experiment(name="a", arena=Arena(), environment=environment))
+    (rows,) = recorded(scene, folder).values()
+    (row,) = rows.to_pylist()
     return {name.partition(":")[2]: value for name, value in row.items()}
 
 
@@ -111,32 +120,20 @@ def test_ground_is_below_robots_at_their_recorded_places() -> None:
 
 
 def test_an_arena_shows_its_recorded_ground(tmp_path: Path) -> None:
-    geom = '<geom type="box" size="0.1 0.1 0.1"/>'
+    scenery = SCENERY.format('type="box" size="0.1 0.1 0.1"')
     environment = Environment(
-        roughness_m=0.1,
-        patch_m=0.5,
-        extent_m=1.0,
-        scenery=f"<mujoco><worldbody>{geom}</worldbody></mujoco>",
+        roughness_m=0.1, patch_m=0.5, extent_m=1.0, scenery=scenery
     )
     # Island 0 is off-line: its robots hang side by side, with no ground below them.
     islands = (Islands(), Islands(arena=Arena()))
     scene = scene_of(Experiment(name="a", environment=environment, islands=islands))
-    plan = layout(scene)
-    with Recording("a", plan, file=tmp_path / "a.rrd") as recording:
-        recording.add_scene(scene)
-    found = {
-        str(chunk.entity_path): chunk.to_record_batch()
-        for chunk in RrdReader(tmp_path / "a.rrd")
-        .stream()
-        .filter(content="/islands/**")
-    }
-    found = {path: found[path] for path in sorted(found) if "/ground/" in path}
+    found = recorded(scene, tmp_path)
     assert list(found) == ["/islands/1/ground/0", "/islands/1/ground/1"]
     (ground, _) = scene.surfaces[1]
     assert isinstance(ground, Relief)
     (corners,) = found["/islands/1/ground/0"]["Mesh3D:vertex_positions"].to_pylist()
     assert corners == ground.corners.reshape(-1, 3).tolist()
-    views: list[object] = [plan.root_container]
+    views: list[object] = [layout(scene).root_container]
     shown: list[str] = []
     while views:
         view = views.pop()
