@@ -1,4 +1,4 @@
-"""Commands of the coordinator: runs, their comparison, plug-ins, bench dispatch."""
+"""Commands of the coordinator: runs, their comparison, plug-ins."""
 
 import argparse
 from collections.abc import Callable
@@ -85,8 +85,6 @@ def main(arguments: list[str]) -> int:
     skip_pandas()
     if command == "compare":
         return _compare(options)
-    if command == "bench dispatch":
-        return _bench(options)
     start_log("coordinator", as_json=options.log_json)
     allow(options.plugins)
     if not options.in_process and options.command != "coordinator":
@@ -284,20 +282,6 @@ def _is_repeated(options: argparse.Namespace) -> bool:
     """Return whether repeats make a campaign; ``resume`` has no such flags."""
     counts = (getattr(options, name, None) for name in ("repeats", "first_repeat"))
     return any(count is not None for count in counts)
-
-
-def _bench(options: argparse.Namespace) -> int:
-    """Run the benchmark; imports the rooms of worker and analyzer."""
-    import analyzer.service
-    import worker.serve.null
-    from coordinator.cli import dispatch_bench
-
-    bodies = (
-        worker.serve.null.process,
-        worker.serve.null.timed_process,
-        analyzer.service.process,
-    )
-    return dispatch_bench.run(options, *bodies)
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -28,7 +28,6 @@ def parser(_command: str = "view") -> Flags:
             "revolve view runs/scenario3-seed1 --save arena.gif --from 100 --until 120",
             "revolve view --connect runs/scenario3-seed1    # while it runs",
         ),
-        allow_abbrev=False,
     )
     flags.add_argument(
         "run",

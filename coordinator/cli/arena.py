@@ -142,7 +142,6 @@ def parser(_command: str = "arena") -> Flags:
             "revolve arena pause --connect runs/scenario3-seed1",
             "revolve arena remove 17",
         ),
-        allow_abbrev=False,
     )
     actions = flags.add_subparsers(dest="action", required=True, metavar="ACTION")
     for name, what in ACTIONS.items():
@@ -150,7 +149,6 @@ def parser(_command: str = "arena") -> Flags:
             name,
             help=what,
             description=f"{what.capitalize()}.",
-            allow_abbrev=False,
             examples=[
                 f"revolve arena {name} {words}".rstrip() for words in _EXAMPLES[name]
             ],

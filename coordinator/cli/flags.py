@@ -59,13 +59,6 @@ _COMMANDS = {
             "revolve compare runs/before runs/after    # two campaigns",
         ),
     ),
-    "bench dispatch": (
-        "Measure the coordinator's cost per job and per birth; simulate large fleets.",
-        (
-            "revolve bench dispatch",
-            "revolve bench dispatch --seconds 2 --workers 4 --births 300",
-        ),
-    ),
 }
 """Description and examples of each command."""
 
@@ -82,14 +75,10 @@ def parser(command: str) -> Flags:
         prog=f"revolve {command}",
         description=description,
         examples=examples,
-        allow_abbrev=False,
     )
     if command == "compare":
         flags.add_argument("first", metavar="FOLDER", help="run or campaign folder")
         flags.add_argument("second", metavar="FOLDER", help="run or campaign folder")
-        return flags
-    if command == "bench dispatch":
-        _add_bench(flags)
         return flags
     if command == "resume":
         flags.add_argument("folder", metavar="FOLDER", help="run or campaign folder")
@@ -157,18 +146,6 @@ def _host_and_port(text: str) -> tuple[str, int]:
 def _changed(value: float, default: float) -> str | None:
     """Return the text of a number; None if it is the default."""
     return None if value == default else f"{value:.12g}"
-
-
-def _add_bench(flags: argparse.ArgumentParser) -> None:
-    flags.add_argument(
-        "--seconds",
-        type=positive_number,
-        default=5.0,
-        metavar="S",
-        help="duration of each measurement over the network, in seconds (default: 5)",
-    )
-    add_count(flags, "--workers", 8, "number of workers; each sleeps 40 ms per job")
-    add_count(flags, "--births", 1500, "number of births, without physics")
 
 
 def _add_experiments(flags: argparse.ArgumentParser) -> None:

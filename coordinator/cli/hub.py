@@ -53,7 +53,6 @@ def parser(_command: str = "hub") -> Flags:
             "revolve hub --listen tcp/127.0.0.1:7447",
             "revolve hub --listen tls/0.0.0.0:7447 --access access.json",
         ),
-        allow_abbrev=False,
     )
     flags.add_argument(
         "--listen",

@@ -162,7 +162,6 @@ def parser(_command: str = "log") -> Flags:
             "revolve log runs/scenario1-seed1 --follow",
             "revolve log runs/scenario1-seed1 --birth 12 --json",
         ),
-        allow_abbrev=False,
     )
     flags.add_argument("folder", type=Path, metavar="RUN", help="run folder")
     islands = "island number; only events of this island are printed (default: all)"

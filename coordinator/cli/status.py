@@ -294,7 +294,6 @@ def parser(_command: str = "status") -> Flags:
             "revolve status runs",
             "revolve status runs/thesis-seed1 --json",
         ),
-        allow_abbrev=False,
     )
     flags.add_argument(
         "folder",

@@ -126,7 +126,6 @@ def parser(_command: str = "cluster") -> Flags:
             "revolve cluster add lab worker-d",
             "revolve cluster list lab",
         ),
-        allow_abbrev=False,
     )
     actions = flags.add_subparsers(dest="action", required=True, metavar="ACTION")
 
@@ -135,7 +134,6 @@ def parser(_command: str = "cluster") -> Flags:
             name,
             help=what,
             description=f"{what.capitalize()}.",
-            allow_abbrev=False,
             examples=[f"revolve cluster {name} {words}" for words in _EXAMPLES[name]],
         )
         made.add_argument("folder", metavar="DIR", help="folder of the kit")

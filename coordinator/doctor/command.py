@@ -127,7 +127,6 @@ def parser(_command: str = "doctor") -> Flags:
             "revolve doctor",
             "revolve doctor --connect tls/hub.example:7447",
         ),
-        allow_abbrev=False,
     )
     add_connect(flags)
     add_access(flags)

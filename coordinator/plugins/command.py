@@ -132,7 +132,6 @@ def check_flags(kinds: Sequence[Kind]) -> Flags:
             "revolve check mine.toml",
             "revolve check my_lab:walk --kind fitness --plugins my_lab",
         ),
-        allow_abbrev=False,
     )
     flags.add_argument(
         "plugin",
@@ -162,7 +161,6 @@ def list_flags() -> Flags:
             "revolve plugins",
             "revolve plugins --plugins my_lab.py --json",
         ),
-        allow_abbrev=False,
     )
     flags.add_argument("--json", action="store_true", help="print JSON, one list")
     add_plugins(flags)

@@ -26,7 +26,6 @@ COMMANDS = {
     "ablate": ("revolve.cli.reevaluate", "re-evaluate a run without sensors or motors"),
     "completion": ("revolve.cli.completion", "print a completion script for a shell"),
     "bench": ("worker.__main__", "benchmark this machine"),
-    "bench dispatch": (_COORDINATOR, "benchmark the coordinator"),
 }
 """Module and summary of each command.
 

@@ -63,7 +63,6 @@ def parser(_command: str = "completion") -> Flags:
         prog="revolve completion",
         description="Print a script that completes commands, flags, experiments and "
         "run folders when you press Tab.",
-        allow_abbrev=False,
         examples=[f"revolve completion {one} > {_SHELLS[one]}" for one in _SHELLS],
     )
     flags.add_argument(

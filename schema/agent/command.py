@@ -344,7 +344,6 @@ def parser(role: Role, processes: int) -> Flags:
             f"revolve {role} --connect tcp/127.0.0.1:7447 --processes 2",
             f"revolve {role} --connect runs/scenario1-seed1",
         ),
-        allow_abbrev=False,
     )
     add_connect(flags)
     flags.add_argument(

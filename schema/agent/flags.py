@@ -19,6 +19,8 @@ _MOST_DIGITS = 20
 class Flags(argparse.ArgumentParser):
     """Parser that reports an error in one line and ends its help with examples.
 
+    Flags cannot be abbreviated: a new flag would change what an abbreviation means.
+
     Args:
         examples: command lines, each complete; text after ``#`` is a comment.
         settings: those of argparse.
@@ -30,7 +32,7 @@ class Flags(argparse.ArgumentParser):
         examples: Sequence[str] = (),
         **settings: Any,  # noqa: ANN401 - passed on
     ) -> None:
-        super().__init__(**settings)
+        super().__init__(**settings, allow_abbrev=False)
         self.examples = tuple(examples)
 
     def error(self, message: str) -> NoReturn:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import worker.serve.null
-from coordinator.cli.dispatch_bench import Rate, Stream, measure
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from schema.agent.access import Certificate
 from schema.agent.network import Agent
 from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
+from tests.benchmarks.dispatch_bench import Rate, Stream, measure
 from tests.system.fleet import make_certificate
 from tests.system.test_agents import free_address
 

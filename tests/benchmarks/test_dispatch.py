@@ -17,16 +17,7 @@ import pytest
 from msgspec.structs import replace
 
 import analyzer.service
-import worker.serve.null
 import worker.serve.service
-from coordinator.cli.dispatch_bench import (
-    LEAST_NULL_PER_S,
-    LEAST_WORKERS,
-    MOST_NULL_CPU_S,
-    birth_cost,
-    null_rate,
-)
-from coordinator.cli.fleet_model import Setting, most_workers
 from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
@@ -43,6 +34,14 @@ from schema.limits import ANSWER_BYTES
 from schema.tables.arrow import skip_pandas
 from schema.wire.codec import decode
 from schema.wire.messages import Answer
+from tests.benchmarks.dispatch_bench import (
+    LEAST_NULL_PER_S,
+    LEAST_WORKERS,
+    MOST_NULL_CPU_S,
+    birth_cost,
+    null_rate,
+)
+from tests.benchmarks.fleet_model import Setting, most_workers
 
 # As the command does, before the first session is opened.
 prepare_process()
@@ -127,7 +126,7 @@ def test_utilisation_of_two_workers_of_a_campaign(tmp_path: Path) -> None:
 
 def test_rate_and_cpu_time_of_null_evaluations() -> None:
     best = max(
-        (null_rate(worker.serve.null.process, 3.0) for _ in range(3)),
+        (null_rate(3.0) for _ in range(3)),
         key=lambda rate: rate.per_s,
     )
     print(f"\n{best.per_s:.0f} null evaluations/s, {1e3 * best.cpu_s:.3f} ms CPU each")
@@ -136,7 +135,7 @@ def test_rate_and_cpu_time_of_null_evaluations() -> None:
 
 
 def test_coordinator_serves_a_thousand_workers_at_ten_seconds_per_evaluation() -> None:
-    cost = birth_cost(worker.serve.null.process, analyzer.service.process, 600).cpu_s
+    cost = birth_cost(600).cpu_s
     setting = Setting(1, 10.0, cost)
     reached, outcome = most_workers(setting)
     rate = outcome.births_per_s

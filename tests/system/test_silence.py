@@ -13,7 +13,6 @@ import pytest
 
 import analyzer.service
 import worker.serve.service
-from coordinator.cli.dispatch_bench import Body, real_fleet
 from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced
@@ -25,6 +24,7 @@ from coordinator.storage.journal import Journal
 from schema.experiment.file import experiment_text, read_experiment
 from schema.wire.arena_codec import decode_advance_request
 from schema.wire.codec import request_kind
+from tests.benchmarks.dispatch_bench import Body, real_fleet
 from tests.system.fleet import Fleets
 from tests.system.silent_agents import silent_agents
 

@@ -45,7 +45,6 @@ COMMANDS = {
     "analyzer": ("analyzer", "--connect", NOWHERE),
     "hub": ("hub", "--listen", "tcp/127.0.0.1:0"),
     "bench": ("bench", "evaluate", "--robots", "10000"),
-    "bench dispatch": ("bench", "dispatch", "--seconds", "100"),
 }
 ADVICE = {
     "run": "to resume: revolve resume run --workers 2",

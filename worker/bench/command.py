@@ -1,27 +1,20 @@
-"""Benchmarks of simulation: its speed on this machine, and its fidelity.
+"""Benchmarks of the speed of simulation on this machine.
 
 'revolve bench evaluate' compares evaluations with bare physics steps. 'revolve bench
-fidelity RUN' re-simulates a run's robots with a time step five times finer. 'revolve
-bench arena' and 'revolve bench spider' repeat the thesis's benchmarks.
+arena' and 'revolve bench spider' repeat the thesis's benchmarks.
 """
 
 import argparse
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from math import isnan
-from pathlib import Path
 from typing import TypeVar
 
-import msgspec
 import mujoco
-import numpy as np
-from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
 
-from schema.agent.flags import Flags, add_count, add_plugins
+from schema.agent.flags import Flags, add_count
 from schema.errors import (
     FitnessUndefined,
     RevolveError,
@@ -29,28 +22,21 @@ from schema.errors import (
     SimulationDiverged,
     counted,
 )
-from schema.experiment.check import check_experiment
-from schema.experiment.document import Experiment, Simulation, body_space
+from schema.experiment.document import body_space
 from schema.experiment.file import (
-    experiment_from_tables,
-    parse_toml,
     read_experiment,
 )
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
-from schema.plugins.permission import allow
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from worker.bench import arena_bench, fidelity
+from worker.bench import arena_bench
 from worker.robot import evaluation
-from worker.robot.robustness import finer
 
 T = TypeVar("T")
 _REPEATS = 7
 LEAST_RATIO = 0.85
 """Goal for the ratio of bare engine time to evaluation time (design, section 9)."""
-LEAST_SPEARMAN = 0.95
-"""Goal for the rank correlation of fitness with a time step five times finer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,28 +135,22 @@ def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
         0 if the measurement meets its goal, 1 if not.
 
     Raises:
-        ExperimentError: an invalid experiment, a changed setting that does not fit the
-            run, or a run with too few robots.
-        RunFolderError: no run, or a damaged one.
+        ExperimentError: an invalid experiment.
         RevolveError: the evaluation of all robots that were to be timed failed.
     """
     options = parser().parse_args(arguments[1:])
     if options.what == "evaluate":
         return _evaluate(options, robots)
-    if options.what in ("arena", "spider"):
-        return arena_bench.run(options, robots)
-    return _fidelity(options)
+    return arena_bench.run(options, robots)
 
 
 def parser() -> Flags:
     """Return the parser of ``revolve bench``."""
     flags = Flags(
         prog="revolve bench",
-        description="Benchmark simulation: its speed on this machine, and its "
-        "fidelity.",
+        description="Benchmark simulation: its speed on this machine.",
         examples=(
             "revolve bench evaluate    # compare with bare physics steps",
-            "revolve bench fidelity runs/scenario1-seed1",
             "revolve bench arena --out arena.parquet    # the thesis's benchmark",
         ),
     )
@@ -187,32 +167,6 @@ def parser() -> Flags:
     arena_bench.add_experiment(timing, "scenario1")
     add_count(timing, "--robots", 30, "number of robots, drawn at random")
     add_count(timing, "--seed", 1, "random seed, of the robots", least=0)
-    study = kinds.add_parser(
-        "fidelity",
-        help="re-simulate a run's robots with other settings",
-        description="Re-simulate a run's robots with a time step five times finer, or "
-        "with other settings.",
-        examples=(
-            "revolve bench fidelity runs/scenario1-seed1",
-            "revolve bench fidelity runs/scenario1-seed1 --against armature=0.02",
-        ),
-    )
-    study.add_argument("run", type=Path, metavar="RUN", help="run folder")
-    add_count(
-        study,
-        "--per-third",
-        20,
-        "robots drawn from each third of the run's robots in order of fitness",
-    )
-    add_count(study, "--seed", 1, "random seed, of the choice of robots", least=0)
-    study.add_argument(
-        "--against",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="compare with this simulation setting instead of a finer time step",
-    )
-    add_plugins(study)
     arena_bench.add_commands(kinds)
     return flags
 
@@ -240,49 +194,6 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
             f"one: {timing.failures[0]}"
         )
     return 0 if timing.ratio >= LEAST_RATIO else 1
-
-
-def _fidelity(options: argparse.Namespace) -> int:
-    allow(options.plugins)
-    population = fidelity.read_population(options.run)
-    change: fidelity.Change = partial(_changed, options.against)
-    chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)
-    best = fidelity.winners(population.fitness)
-
-    def compared(which: list[int], name: str) -> Floats:
-        robots = _shown([population.robots[index] for index in which], name)
-        return fidelity.compare(robots, change)
-
-    found, top = compared(chosen, "robots drawn"), compared(best, "winners")
-    spearman = fidelity.spearman(*found)
-    thirds = np.split(found, fidelity.THIRDS, axis=1)
-    print(
-        f"{len(chosen)} robots of {options.run}: Spearman {_rounded(spearman, 4)} "
-        f"(promised: {LEAST_SPEARMAN}); mean {found[0].mean():.4f} here, "
-        f"{found[1].mean():.4f} there"
-    )
-    by_third = ", ".join(_rounded(fidelity.spearman(*each), 3) for each in thirds)
-    print(f"  by thirds, least fit first: {by_third}")
-    for rank, (here, there) in enumerate(top.T, start=1):
-        print(f"  winner {rank}: {here:.4f} here, {there:.4f} there")
-    return 0 if spearman >= LEAST_SPEARMAN else 1
-
-
-def _changed(settings: Sequence[str], experiment: Experiment) -> Simulation:
-    """Return the experiment's simulation with some keys set, or finer; checked."""
-    if not settings:
-        return finer(experiment.simulation)
-    where = "--against"
-    tables = parse_toml("[simulation]\n" + "\n".join(settings), where)
-    simulation = msgspec.to_builtins(experiment.simulation) | tables["simulation"]
-    tables |= {"name": experiment.name, "simulation": simulation}
-    changed = experiment_from_tables(tables, where).simulation
-    check_experiment(replace(experiment, simulation=changed), where)
-    return changed
-
-
-def _rounded(correlation: float, digits: int) -> str:
-    return "undefined" if isnan(correlation) else f"{correlation:.{digits}f}"
 
 
 def _shown(robots: Sequence[T], what: str) -> Iterable[T]:

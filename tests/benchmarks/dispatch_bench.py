@@ -1,13 +1,14 @@
-"""``revolve bench dispatch``: cost of dispatch, and the largest fleet it can serve.
+"""Cost of dispatch, and the largest fleet that one coordinator can serve.
+
+``python -m tests.benchmarks.dispatch_bench`` prints the figures of docs/scaling.md.
 
 Evaluations that return at once measure dispatch and network alone. Births without
 physics measure a birth's cost for the coordinator. Evaluations of fixed duration
 measure the utilisation of workers. From the cost of a birth, larger fleets than this
-machine can hold are simulated (``coordinator.cli.fleet_model``).
+machine can hold are simulated (``tests.benchmarks.fleet_model``).
 """
 
 import argparse
-import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -15,27 +16,20 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from threading import Event
 
 import msgspec
 import numpy as np
 
-from coordinator.cli.fleet_model import (
-    LEAST_UTILISATION,
-    FleetModel,
-    Setting,
-    most_workers,
-)
+import analyzer.service
 from coordinator.dispatch.events import AgentKind, Client, Deliver, Job
-from coordinator.dispatch.fleet import End, Fleet
+from coordinator.dispatch.fleet import Fleet
 from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.agent.network import Agent
-from schema.agent.stopping import STOP_SIGNALS
 from schema.agent.supervision import ProcessSlot
-from schema.agent.supervisor import ProcessPool, stop_on_signals
+from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
 from schema.experiment.document import body_space
 from schema.experiment.file import experiment_text, read_experiment
@@ -44,6 +38,13 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode
 from schema.wire.messages import Evaluate, Request
+from tests.benchmarks.fleet_model import (
+    LEAST_UTILISATION,
+    FleetModel,
+    Setting,
+    most_workers,
+)
+from worker.serve import null
 
 Body = Callable[[Agent, ProcessSlot], None]
 """Function that a process of a pool runs."""
@@ -120,50 +121,21 @@ class Stream:
             self._ask()
 
 
-class _BenchFleet(Fleet):
-    """Fleet whose ``listen`` raises ``KeyboardInterrupt`` once a signal has come.
-
-    A signal handler that raises may do so while the network's engine runs Python code,
-    and the engine drops the exception.
-    """
-
-    stop: Event | None = None
-
-    def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
-        found = super().listen(timeout_s, now_s)
-        if self.stop is not None and self.stop.is_set():
-            raise KeyboardInterrupt
-        return found
-
-
-@contextmanager
-def _noted_signals() -> Iterator[Event]:
-    """Note stop signals in an event meanwhile, instead of interrupting."""
-    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
-    try:
-        yield stop_on_signals()
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 @contextmanager
 def real_fleet(
-    bodies: dict[AgentKind, tuple[Body, int]], stop: Event | None = None
+    bodies: dict[AgentKind, tuple[Body, int]],
 ) -> Iterator[Fleet]:
     """Start a fleet of processes on this machine and wait until all have joined.
 
     Args:
         bodies: function and number of the processes of each kind.
-        stop: set when a signal asks to stop.
 
     Raises:
         RuntimeError: a process does not join.
     """
     with ExitStack() as stack:
         network = stack.enter_context(Network(name=unique_name("bench")))
-        fleet = _BenchFleet(network)
-        fleet.stop = stop
+        fleet = Fleet(network)
         for kind, (body, size) in bodies.items():
             agent = Agent(kind, kind, network.address)
             stack.enter_context(ProcessPool(body, (agent,), size=size))
@@ -197,21 +169,20 @@ def measure(stream: Stream, seconds: float) -> Rate:
     return rate
 
 
-def null_rate(body: Body, seconds: float, stop: Event | None = None) -> Rate:
+def null_rate(seconds: float) -> Rate:
     """Measure null evaluations over the network."""
-    with real_fleet({"worker": (body, 1)}, stop) as fleet:
+    with real_fleet({"worker": (null.process, 1)}) as fleet:
         return measure(Stream(fleet, _IN_FLIGHT), seconds)
 
 
-def birth_cost(
-    null: Body, analyzer: Body, births: int, stop: Event | None = None
-) -> Rate:
+def birth_cost(births: int) -> Rate:
     """Measure whole births without physics, journal and tables included."""
     shipped = read_experiment("scenario1")
     experiment = msgspec.structs.replace(shipped, births=births)
+    bodies = {"worker": (null.process, 1), "analyzer": (analyzer.service.process, 1)}
     with (
         tempfile.TemporaryDirectory() as folder,
-        real_fleet({"worker": (null, 1), "analyzer": (analyzer, 1)}, stop) as fleet,
+        real_fleet(bodies) as fleet,  # type: ignore[arg-type]
     ):
         details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
         run = RunSession(RunFolder(Path(folder) / "run", details), fleet)
@@ -226,53 +197,37 @@ def birth_cost(
     return Rate(births / wall_s, cpu_s / births)
 
 
-def run(options: argparse.Namespace, null: Body, timed: Body, analyzer: Body) -> int:
+def main(seconds: float, workers: int, births: int) -> None:
     """Measure and simulate; print the results.
 
     Args:
-        options: options of the command line.
-        null: worker that answers at once.
-        timed: worker that sleeps 40 ms per evaluation.
-        analyzer: analyzer of real runs.
-
-    Returns:
-        0 if all figures meet their requirements, 1 if not.
+        seconds: duration of each measurement over the network [s].
+        workers: number of workers that sleep 40 ms per evaluation.
+        births: number of births without physics.
     """
-    with _noted_signals() as stop:
-        birth, is_met = _measured(options, (null, timed, analyzer), stop)
-    return 0 if simulate(birth.cpu_s) and is_met else 1
-
-
-def _measured(
-    options: argparse.Namespace, bodies: tuple[Body, Body, Body], stop: Event
-) -> tuple[Rate, bool]:
-    """Measure and print; return the cost of births, and whether dispatch is in time."""
-    null, timed, analyzer = bodies
-    seconds = options.seconds
-    rate = null_rate(null, seconds, stop)
+    rate = null_rate(seconds)
     _say(
         f"null evaluations, real network, 1 worker: {rate.per_s:.0f}/s "
         f"(required: {LEAST_NULL_PER_S}), coordinator {1e3 * rate.cpu_s:.3f} ms CPU "
         f"each (required: {1e3 * MOST_NULL_CPU_S:.1f})"
     )
-    is_met = rate.per_s >= LEAST_NULL_PER_S and rate.cpu_s <= MOST_NULL_CPU_S
-    with real_fleet({"worker": (timed, options.workers)}, stop) as fleet:
-        slow = measure(Stream(fleet, 3 * options.workers), seconds)
+    with real_fleet({"worker": (null.timed_process, workers)}) as fleet:
+        slow = measure(Stream(fleet, 3 * workers), seconds)
     _say(
-        f"evaluations of 40 ms, real network, {options.workers} workers: "
+        f"evaluations of 40 ms, real network, {workers} workers: "
         f"{slow.per_s:.0f}/s, utilisation "
-        f"{100 * slow.per_s * _SHORT_S / options.workers:.1f} %"
+        f"{100 * slow.per_s * _SHORT_S / workers:.1f} %"
     )
-    birth = birth_cost(null, analyzer, options.births, stop)
+    birth = birth_cost(births)
     _say(
         f"whole births without physics: {birth.per_s:.0f}/s, coordinator "
         f"{1e3 * birth.cpu_s:.2f} ms CPU per birth"
     )
-    return birth, is_met
+    simulate(birth.cpu_s)
 
 
-def simulate(coordinator_s: float) -> bool:
-    """Simulate fleets, print the results, return whether they meet the requirement.
+def simulate(coordinator_s: float) -> None:
+    """Simulate fleets and print the results.
 
     Args:
         coordinator_s: the coordinator's CPU time per birth [s].
@@ -286,7 +241,6 @@ def simulate(coordinator_s: float) -> bool:
         f"coordinator busy {100 * outcome.coordinator:.0f} % of the time, dispatch "
         f"{1e3 * outcome.dispatch_s:.3f} ms CPU per birth"
     )
-    reached = 0
     for evaluation_s in (_SHORT_S, _LONG_S):
         found = replace(setting, evaluation_s=evaluation_s, losses_per_s=0.0)
         reached, outcome = most_workers(found)
@@ -296,4 +250,12 @@ def simulate(coordinator_s: float) -> bool:
             f"{outcome.births_per_s:.0f} births/s"
         )
     _say(f"required for {_LONG_S:g} s: {LEAST_WORKERS} workers")
-    return reached >= LEAST_WORKERS
+
+
+if __name__ == "__main__":
+    flags = argparse.ArgumentParser(description=__doc__)
+    flags.add_argument("--seconds", type=float, default=5.0)
+    flags.add_argument("--workers", type=int, default=8)
+    flags.add_argument("--births", type=int, default=1500)
+    prepare_process()  # before the first session is opened
+    main(**vars(flags.parse_args()))

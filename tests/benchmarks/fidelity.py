@@ -2,18 +2,23 @@
 
 Robots of a run, drawn from each third of its robots in order of fitness, are
 re-simulated with a finer time step, or with another changed setting; the two rankings
-are compared.
+are compared: ``python -m tests.benchmarks.fidelity RUN``.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from msgspec.structs import replace
+from scipy.stats import spearmanr
 
+from schema.agent.flags import Flags, add_plugins
+from schema.agent.supervisor import prepare_process
 from schema.errors import (
     ExperimentError,
     FitnessUndefined,
@@ -21,14 +26,20 @@ from schema.errors import (
     SensorFailed,
     SimulationDiverged,
 )
+from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     Experiment,
     Simulation,
     island_experiment,
     steps_of,
 )
-from schema.experiment.file import own_experiment
+from schema.experiment.file import (
+    experiment_from_tables,
+    own_experiment,
+    parse_toml,
+)
 from schema.experiment.settings import evaluation_settings_of, lasting
+from schema.plugins.permission import allow
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.tables.description import allow_plugins_of
@@ -36,10 +47,13 @@ from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth
 from schema.wire.updates import individual
 from worker.robot.evaluation import evaluate
+from worker.robot.robustness import finer
 
 THIRDS = 3
 WINNERS = 10
-
+LEAST_SPEARMAN = 0.95
+"""Goal for the rank correlation of fitness with a time step five times finer."""
+_AGAINST = "--against"
 
 Change = Callable[[Experiment], Simulation]
 """Returns the simulation to compare with that of an experiment."""
@@ -154,25 +168,66 @@ def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
 
 
 def spearman(first: Floats, second: Floats) -> float:
-    """Return the rank correlation of two samples; ties share their mean rank.
+    """Return the rank correlation of two samples; NaN if one's numbers are all equal.
 
     Args:
         first: (N,).
         second: (N,).
-
-    Returns:
-        The correlation; NaN if the numbers of a sample are all equal.
-
-    Source: Spearman, 1904; tested against scipy in tests/worker/bench/test_fidelity.py.
     """
-    ranks = _ranks(first), _ranks(second)
-    if not all(each.std() for each in ranks):
+    if not (np.ptp(first) and np.ptp(second)):
         return math.nan
-    return float(np.corrcoef(*ranks)[0, 1])
+    return float(spearmanr(first, second).statistic)
 
 
-def _ranks(values: Floats) -> Floats:
-    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    last = np.cumsum(count)
-    ranks: Floats = (last - (count - 1) / 2)[place]
-    return ranks
+def main(folder: Path, per_third: int, seed: int, against: Sequence[str]) -> None:
+    """Compare and print the results.
+
+    Args:
+        folder: of the run.
+        per_third: number of robots drawn from each third of the run's robots.
+        seed: of the draw.
+        against: changed simulation settings, "KEY=VALUE" in TOML; none: finer steps.
+    """
+    population = read_population(folder)
+    change = partial(changed, against)
+    chosen = sample_thirds(population.fitness, per_third, seed)
+    best = winners(population.fitness)
+    found, top = (
+        compare([population.robots[index] for index in which], change)
+        for which in (chosen, best)
+    )
+    print(
+        f"{len(chosen)} robots of {folder}: Spearman {spearman(*found):.4f} (goal: "
+        f"{LEAST_SPEARMAN}); mean {found[0].mean():.4f} here, {found[1].mean():.4f} "
+        "there"
+    )
+    thirds = np.split(found, THIRDS, axis=1)
+    by_third = ", ".join(f"{spearman(*each):.3f}" for each in thirds)
+    print(f"  by thirds, least fit first: {by_third}")
+    for rank, (here, there) in enumerate(top.T, start=1):
+        print(f"  winner {rank}: {here:.4f} here, {there:.4f} there")
+
+
+def changed(settings: Sequence[str], experiment: Experiment) -> Simulation:
+    """Return the experiment's simulation with some keys set, or finer; checked."""
+    if not settings:
+        return finer(experiment.simulation)
+    tables = parse_toml("[simulation]\n" + "\n".join(settings), _AGAINST)
+    simulation = msgspec.to_builtins(experiment.simulation) | tables["simulation"]
+    tables |= {"name": experiment.name, "simulation": simulation}
+    found = experiment_from_tables(tables, _AGAINST).simulation
+    check_experiment(replace(experiment, simulation=found), _AGAINST)
+    return found
+
+
+if __name__ == "__main__":
+    flags = Flags(description=__doc__)
+    flags.add_argument("folder", type=Path, metavar="RUN")
+    flags.add_argument("--per-third", type=int, default=20)
+    flags.add_argument("--seed", type=int, default=1)
+    flags.add_argument("--against", action="append", default=[], metavar="KEY=VALUE")
+    add_plugins(flags)
+    options = vars(flags.parse_args())
+    prepare_process()
+    allow(options.pop("plugins"))
+    main(**options)

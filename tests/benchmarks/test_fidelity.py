@@ -1,39 +1,30 @@
 """Arithmetic of the fidelity benchmark."""
 
 import math
-from collections.abc import Callable
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from scipy.stats import spearmanr
 
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.document import Experiment, Fitness, Islands, Simulation
 from schema.plugins.permission import allow
 from schema.robot.brain import Brain
 from schema.robot.robot import Robot
-from tests.worker.bench.run_folder import write_run
-from worker.bench.fidelity import (
+from tests.benchmarks.fidelity import (
     Evaluated,
+    changed,
     compare,
+    main,
     read_population,
     sample_thirds,
     spearman,
-    winners,
 )
+from tests.benchmarks.run_folder import write_run
+from tests.worker.conftest import random_robot
 from worker.robot.robustness import finer
-
-
-def test_spearman_equals_that_of_scipy_with_ties() -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        first = rng.integers(0, 6, 25).astype(float)
-        second = first + rng.integers(-2, 3, 25).astype(float)
-        assert spearman(first, second) == pytest.approx(
-            spearmanr(first, second).statistic, abs=1e-12
-        )
 
 
 def test_each_third_is_sampled_equally() -> None:
@@ -45,11 +36,6 @@ def test_each_third_is_sampled_equally() -> None:
     assert len(set(chosen.tolist())) == 12
     with pytest.raises(ExperimentError, match="3 x 11 robots are needed"):
         sample_thirds(fitness, 11, 1)
-
-
-def test_winners_are_the_ten_fittest_in_order() -> None:
-    fitness = np.arange(20.0)
-    assert winners(fitness) == list(range(19, 9, -1))
 
 
 def test_finer_simulation_has_the_same_duration() -> None:
@@ -64,13 +50,12 @@ def test_folder_without_a_run_is_rejected(tmp_path: Path) -> None:
         read_population(tmp_path)
 
 
-def test_robots_have_the_settings_of_their_islands(
-    turtle: Robot, tmp_path: Path
-) -> None:
+def test_robots_have_the_settings_of_their_islands(tmp_path: Path) -> None:
     """A robot of island 0 moves to island 1; one evaluation has its own length."""
     clocks = [Simulation(window_steps=steps) for steps in (200, 400)]
     islands = tuple(Islands(simulation=clock) for clock in clocks)
     experiment = Experiment(name="test", islands=islands)
+    turtle = random_robot(1)
     other = Robot(turtle.parts[:1], Brain(turtle.brain.neurons[:6]))
     write_run(
         tmp_path,
@@ -90,16 +75,16 @@ def test_robots_have_the_settings_of_their_islands(
     assert [clock.warmup_steps for clock in clocks] == [0, 0, 100]
 
 
-def test_same_simulation_agrees_and_a_diverging_one_counts_zero(turtle: Robot) -> None:
+def test_same_simulation_agrees_and_a_diverging_one_counts_zero() -> None:
     short = Simulation(window_steps=400)
-    one = Evaluated(turtle, Experiment(name="test", simulation=short))
+    one = Evaluated(random_robot(1), Experiment(name="test", simulation=short))
     same = compare([one], lambda experiment: experiment.simulation)
     assert same[0].tolist() == same[1].tolist() != [0.0]
     wild = replace(short, timestep_s=0.5, servo_armature=0.0, servo_stiffness=1e9)
     assert compare([one], lambda _experiment: wild)[1].tolist() == [0.0]
 
 
-def test_undefined_fitness_counts_zero(turtle: Robot, tmp_path: Path) -> None:
+def test_undefined_fitness_counts_zero(tmp_path: Path) -> None:
     (tmp_path / "undefined.py").write_text("def value(trace, fitness):\n    1 / 0\n")
     allow([str(tmp_path / "undefined.py")])
     experiment = Experiment(
@@ -107,7 +92,7 @@ def test_undefined_fitness_counts_zero(turtle: Robot, tmp_path: Path) -> None:
         simulation=Simulation(window_steps=80),
         fitness=Fitness(function="undefined:value"),
     )
-    one = Evaluated(turtle, experiment)
+    one = Evaluated(random_robot(1), experiment)
     assert compare([one], lambda each: finer(each.simulation)).tolist() == [[0], [0]]
 
 
@@ -116,10 +101,42 @@ def test_correlation_of_equal_numbers_is_undefined() -> None:
         assert math.isnan(spearman(np.array(first), np.arange(1.0 * len(first))))
 
 
-def test_random_robots_agree_with_finer_steps(robot_of: Callable[[int], Robot]) -> None:
-    """A small version of ``revolve bench fidelity``."""
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        (
+            ["pose_steps=48", "brain_steps=33"],
+            "simulation.window_steps: .* multiple of .* = 48, got 1000",
+        ),
+        (["armatur=0.1"], "simulation.armatur: no such key"),
+    ],
+)
+def test_changes_are_checked_together_with_the_run(
+    changes: list[str], problem: str
+) -> None:
+    """125 divides the run's window of 1000 steps, not the default one of 2400."""
+    run = Experiment(name="test", simulation=Simulation(window_steps=1000))
+    with pytest.raises(ExperimentError, match=problem):
+        changed(changes, run)
+    assert changed(["pose_steps=125"], run).pose_steps == 125
+
+
+def test_random_robots_agree_with_finer_steps(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A small version of the benchmark."""
     experiment = Experiment(name="test", simulation=Simulation(window_steps=1200))
-    robots = [Evaluated(robot_of(seed), experiment) for seed in range(12)]
-    found = compare(robots, lambda each: finer(each.simulation))
-    assert found.shape == (2, 12)
-    assert spearman(*found) > 0.8
+    numbers = range(12)
+    write_run(
+        tmp_path,
+        experiment,
+        births=[(0, number, random_robot(number)) for number in numbers],
+        evaluations=[(0, number, None, 6.0, 0.1 * number) for number in numbers],
+    )
+    main(tmp_path, 4, 1, [])
+    first, _, *best = capsys.readouterr().out.splitlines()
+    correlation = re.search(r"12 robots .*: Spearman ([\d.]+)", first)
+    assert correlation is not None
+    assert float(correlation[1]) > 0.8
+    assert len(best) == 10

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.cli.fleet_model import FleetModel, Setting, most_workers
+from tests.benchmarks.fleet_model import FleetModel, Setting, most_workers
 
 FREE = Setting(workers=20, evaluation_s=1.0, coordinator_s=1e-9, latency_s=0.0)
 
