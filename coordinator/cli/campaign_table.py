@@ -1,23 +1,16 @@
 """Table at the end of a campaign: the outcome of each experiment."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, stdev
 
-from rich.console import Console
-from rich.table import Table
-
-from coordinator.cli.format import duration
+from coordinator.cli.status_text import duration, show, table_of
 from coordinator.storage.folder_status import folder_status
 from schema.errors import RevolveError, rounded
 from schema.experiment.fitness_keys import fitness_text
 from schema.tables.files import read_table
-
-_WIDEST = 1000
-_HEADS = ("experiment", "runs", "best", "mean of bests", "sd", "time per run",
-          "failed")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +27,9 @@ class RunOutcome:
     """
 
     experiment: str
-    best: float | None
-    took_s: float | None
-    has_failed: bool
+    best: float | None = None
+    took_s: float | None = None
+    has_failed: bool = False
     function: str = ""
     point: str = ""
 
@@ -50,7 +43,7 @@ def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome
         has_failed: as in ``RunOutcome``.
     """
     if has_failed:
-        return RunOutcome(experiment, None, None, has_failed=True)
+        return RunOutcome(experiment, has_failed=True)
     try:
         bests = [island.best for island in folder_status(folder).islands]
         (row,) = read_table(folder, "runs").to_pylist()
@@ -58,62 +51,62 @@ def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome
         function = fitness_text(document)
         chosen = (document.get("sweep") or {}).get("chosen") or {}
     except (RevolveError, ValueError):
-        return RunOutcome(experiment, None, None, has_failed=True)
-    judged = [best for best in bests if best is not None]
-    took_s = (row["end"] - row["start"]).total_seconds() if row["end"] else None
-    best = max(judged, default=None)
-    point = ", ".join(f"{key} = {json.dumps(value)}" for key, value in chosen.items())
+        return RunOutcome(experiment, has_failed=True)
     return RunOutcome(
-        experiment, best, took_s, has_failed=False, function=function, point=point
+        experiment,
+        best=max((best for best in bests if best is not None), default=None),
+        took_s=(row["end"] - row["start"]).total_seconds() if row["end"] else None,
+        function=function,
+        point=", ".join(
+            f"{key} = {json.dumps(value)}" for key, value in chosen.items()
+        ),
     )
 
 
-def rows(outcomes: Iterable[RunOutcome]) -> list[tuple[str, ...]]:
-    """Return the cells of the table, one row per experiment in order of appearance.
+def _or_dash(
+    number: Callable[[list[float]], float], text: Callable[[float], str], least: int = 1
+) -> Callable[[list[float]], str]:
+    """Return what writes a number of a sample, "-" of one that is too small."""
+    return lambda sample: text(number(sample)) if len(sample) >= least else "-"
 
-    Mean and standard deviation are those of the best fitness of the runs; the latter
-    is that of a sample, and missing with fewer than two runs.
-    """
+
+_BESTS = {
+    "best": _or_dash(max, rounded),
+    "mean of bests": _or_dash(fmean, rounded),
+    "sd": _or_dash(stdev, rounded, least=2),
+}
+"""Columns of the fitness of each run's best robot; the last is that of a sample."""
+
+
+def columns(outcomes: Iterable[RunOutcome]) -> dict[str, list[str]]:
+    """Return the cells of each column, one per experiment in order of appearance."""
     groups: dict[str, list[RunOutcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.experiment, []).append(outcome)
-    return [_row(name, runs) for name, runs in groups.items()]
+    runs = groups.values()
+    bests = [[run.best for run in own if run.best is not None] for own in runs]
+    times_s = [[run.took_s for run in own if run.took_s is not None] for own in runs]
+    return {
+        "experiment": [*groups],
+        "runs": [str(len(own)) for own in runs],
+        **{head: [*map(text, bests)] for head, text in _BESTS.items()},
+        "time per run": [*map(_or_dash(fmean, duration), times_s)],
+        "failed": [str(sum(run.has_failed for run in own)) for own in runs],
+    }
 
 
-def _row(name: str, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
-    bests = [run.best for run in runs if run.best is not None]
-    times_s = [run.took_s for run in runs if run.took_s is not None]
-    return (
-        name,
-        str(len(runs)),
-        rounded(max(bests)) if bests else "-",
-        rounded(fmean(bests)) if bests else "-",
-        rounded(stdev(bests)) if len(bests) > 1 else "-",
-        duration(fmean(times_s)) if times_s else "-",
-        str(sum(run.has_failed for run in runs)),
-    )
-
-
-def show(outcomes: Iterable[RunOutcome]) -> None:
-    """Print the table on standard output, with a line that explains it.
+def show_outcomes(outcomes: Iterable[RunOutcome]) -> None:
+    """Print the table on standard output, with lines that explain it.
 
     Args:
         outcomes: of all runs, in any order.
     """
-    table = Table(box=None, pad_edge=False)
-    for number, head in enumerate(_HEADS):
-        table.add_column(head, justify="right" if number else "left", no_wrap=True)
     known = list(outcomes)
-    for cells in rows(known):
-        table.add_row(*cells)
-    # Wide: a narrow terminal wraps lines, but nothing is cut.
-    console = Console(width=_WIDEST, highlight=False, markup=False)
-    console.print(table)
-    console.print("fitness of each run's best robot in its last population")
     points = {run.experiment: run.point for run in known if run.point}
-    for name, point in points.items():
-        console.print(f"{name}: {point}")
     functions = {run.experiment: run.function for run in known if run.function}
+    lines = [f"{name}: {point}" for name, point in points.items()]
     if len(set(functions.values())) > 1:
         lists = ", ".join(f"{name} {text}" for name, text in functions.items())
-        console.print(f"not comparable, as fitness functions differ: {lists}")
+        lines.append(f"not comparable, as fitness functions differ: {lists}")
+    table = table_of(columns(known), justify="right")
+    show(table, "fitness of each run's best robot in its last population", *lines)

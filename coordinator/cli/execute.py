@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from coordinator.cli.campaign_table import outcome_of, show
+from coordinator.cli.campaign_table import outcome_of, show_outcomes
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.main_loop import execute_runs
 from coordinator.cli.summary import Conclusion, conclude, has_evaluated, restore_best
@@ -247,7 +247,7 @@ def _execute_campaign(
         *(str(path.resolve()) for path in failed),
         *(status.folder for status, _ in scheduler.failed),
     }
-    show(
+    show_outcomes(
         outcome_of(
             Path(one.status.folder),
             one.status.name,

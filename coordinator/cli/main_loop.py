@@ -9,8 +9,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from coordinator.cli.deployment import Deployment, connected_agents
-from coordinator.cli.format import fault_lines
 from coordinator.cli.progress import Display
+from coordinator.cli.status_text import fault_lines
 from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network

@@ -5,9 +5,9 @@ that no request can disturb or delay a run.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from typing import Protocol
+from typing import NamedTuple
 
 from coordinator.dispatch.faults import MEANINGS
 from schema.agent.extras import install_advice
@@ -24,7 +24,52 @@ except ImportError:
     ) from None
 
 _STATES = ("waiting", "running", "stopped", "finished", "failed", "damaged")
-_NOTHING = Status((), 0, 0, 0.0)
+
+
+class Snapshot(NamedTuple):
+    """Status of all runs, and the number of agents that may not join."""
+
+    status: Status = Status((), 0, 0, 0.0)
+    refused_agents: int = 0
+
+
+Samples = Mapping[tuple[str, ...], float]
+"""Values of a metric by those of its labels."""
+
+
+def _states(shown: Snapshot) -> Samples:
+    counts = Counter(run.state for run in shown.status.runs)
+    return {(state,): counts[state] for state in {*_STATES, *counts}}
+
+
+def _faults(shown: Snapshot) -> Samples:
+    counts = Counter[str]()
+    for fault in shown.status.faults:
+        counts[fault.kind] += fault.count
+    return {(kind,): counts[kind] for kind in {*MEANINGS, *counts}}
+
+
+_METRICS: dict[str, tuple[str, tuple[str, ...], Callable[[Snapshot], Samples]]] = {
+    "workers": ("Connected workers", (), lambda it: {(): it.status.workers}),
+    "analyzers": ("Connected analyzers", (), lambda it: {(): it.status.analyzers}),
+    "refused_agents": ("Agents that may not take part", (),
+        lambda it: {(): it.refused_agents}),
+    "jobs_waiting": ("Requests that no agent has", ("kind",),
+        lambda it: {(jobs.kind,): jobs.waiting for jobs in it.status.queues}),
+    "jobs_assigned": ("Requests that agents have", ("kind",),
+        lambda it: {(jobs.kind,): jobs.assigned for jobs in it.status.queues}),
+    "births": ("Births of a run", ("name", "run"),
+        lambda it: {(run.name, str(run.run)): run.births for run in it.status.runs}),
+    "births_wanted": ("Births of a run at its end", ("name", "run"),
+        lambda it: {(run.name, str(run.run)): run.wanted for run in it.status.runs}),
+    "births_per_second": ("Recent rate of all runs", (),
+        lambda it: {(): it.status.births_per_s}),
+    "runs": ("Runs by state", ("state",), _states),
+    "faults": ("Messages of peers that were not used", ("kind",), _faults),
+}  # fmt: skip
+"""Meaning, labels and samples of each metric, by its name after ``revolve_``."""
+_COUNTERS = {"births", "faults"}
+"""Metrics that only grow."""
 
 
 class MetricsServer(AbstractContextManager["MetricsServer"]):
@@ -44,9 +89,9 @@ class MetricsServer(AbstractContextManager["MetricsServer"]):
         Raises:
             NetworkError: an address that cannot be listened on.
         """
-        self._collector = _Collector()
+        self._snapshot = Snapshot()
         registry = CollectorRegistry()
-        registry.register(self._collector)
+        registry.register(self)
         try:
             self._server, self._thread = start_http_server(
                 port, addr=host.strip("[]"), registry=registry
@@ -63,90 +108,15 @@ class MetricsServer(AbstractContextManager["MetricsServer"]):
         self._thread.join()
 
     def publish(self, status: Status, refused_agents: int) -> None:
-        """Replace what is shown.
-
-        Args:
-            status: of all runs.
-            refused_agents: number of agents that may not join.
-        """
-        self._collector.snapshot = (status, refused_agents)
-
-
-class _Family(Protocol):
-    """A metric whose samples have labels."""
-
-    def add_metric(self, labels: list[str], value: float, /) -> None:
-        """Add a sample."""
-
-
-class _Collector:
-    """Metrics of the last snapshot: status, and number of refused agents."""
-
-    def __init__(self) -> None:
-        self.snapshot: tuple[Status, int] = (_NOTHING, 0)
+        """Replace what is shown; see ``Snapshot``."""
+        self._snapshot = Snapshot(status, refused_agents)
 
     def collect(self) -> Iterator[Metric]:
         """Yield all metrics of one snapshot."""
-        status, refused_agents = self.snapshot
-        yield from _agents(status, refused_agents)
-        yield from _queues(status)
-        yield from _runs(status)
-        faults = CounterMetricFamily(
-            "revolve_faults", "Messages of peers that were not used", labels=["kind"]
-        )
-        by_kind = Counter[str](dict.fromkeys(MEANINGS, 0))
-        for fault in status.faults:
-            by_kind[fault.kind] += fault.count
-        _fill(faults, by_kind)
-        yield faults
-
-
-def _agents(status: Status, refused: int) -> Iterator[Metric]:
-    yield GaugeMetricFamily("revolve_workers", "Connected workers", status.workers)
-    yield GaugeMetricFamily(
-        "revolve_analyzers", "Connected analyzers", status.analyzers
-    )
-    yield GaugeMetricFamily(
-        "revolve_refused_agents", "Agents that may not take part", refused
-    )
-
-
-def _queues(status: Status) -> Iterator[Metric]:
-    waiting = GaugeMetricFamily(
-        "revolve_jobs_waiting", "Requests that no agent has", labels=["kind"]
-    )
-    assigned = GaugeMetricFamily(
-        "revolve_jobs_assigned", "Requests that agents have", labels=["kind"]
-    )
-    for queue in status.queues:
-        waiting.add_metric([queue.kind], queue.waiting)
-        assigned.add_metric([queue.kind], queue.assigned)
-    yield waiting
-    yield assigned
-
-
-def _runs(status: Status) -> Iterator[Metric]:
-    births = CounterMetricFamily(
-        "revolve_births", "Births of a run", labels=["name", "run"]
-    )
-    wanted = GaugeMetricFamily(
-        "revolve_births_wanted", "Births of a run at its end", labels=["name", "run"]
-    )
-    for run in status.runs:
-        births.add_metric([run.name, str(run.run)], run.births)
-        wanted.add_metric([run.name, str(run.run)], run.wanted)
-    yield births
-    yield wanted
-    yield GaugeMetricFamily(
-        "revolve_births_per_second", "Recent rate of all runs", status.births_per_s
-    )
-    states = GaugeMetricFamily("revolve_runs", "Runs by state", labels=["state"])
-    by_state = Counter(dict.fromkeys(_STATES, 0))
-    by_state.update(run.state for run in status.runs)
-    _fill(states, by_state)
-    yield states
-
-
-def _fill(family: _Family, counts: Counter[str]) -> None:
-    for label, value in sorted(counts.items()):
-        family.add_metric([label], value)
+        shown = self._snapshot
+        for name, (meaning, labels, samples) in _METRICS.items():
+            kind = CounterMetricFamily if name in _COUNTERS else GaugeMetricFamily
+            family = kind(f"revolve_{name}", meaning, labels=labels)
+            for values, number in sorted(samples(shown).items()):
+                family.add_metric(values, number)
+            yield family

@@ -4,29 +4,27 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Self
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TaskID,
-    TextColumn,
-)
-from rich.table import Column
+from rich.console import Console, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Column, Table
+from rich.text import Text
 
-from coordinator.cli.format import (
+from coordinator.cli.status_text import (
     about_arenas,
     best_text,
-    duration,
+    births_done,
     missing_agents,
+    pace,
     run_details,
+    runs_done,
+    time_left,
+    waiting_text,
 )
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
 from schema.agent.log import log_form, tell_user, warn_user
-from schema.errors import counted
 from schema.plugins.permission import FLAG
 from schema.wire.status import IslandStatus, RunStatus, Status
 
@@ -69,14 +67,9 @@ class Display:
         self._flags = [word for each in plugins for word in (FLAG, each)]
         self._patience_s = _SOON_S if place and not quiet else _LINE_S
         # Bars would break lines of JSON.
-        self._has_bars = self._console.is_terminal and log_form() != "json"
-        self._progress = Progress(
-            *_columns(self._console.width),
-            console=self._console,
-            disable=quiet or not self._has_bars,
-            expand=True,
-        )
-        self._tasks: dict[str, TaskID] = {}
+        is_terminal = self._console.is_terminal and log_form() != "json"
+        self._has_bars = is_terminal and not quiet
+        self._live = Live(console=self._console, auto_refresh=False)
         self._next_line_s = -math.inf
         self._missing: list[str] = []
         self._missing_since_s: float | None = None
@@ -84,12 +77,13 @@ class Display:
 
     def __enter__(self) -> Self:
         """Start drawing."""
-        self._progress.start()
+        if self._has_bars:
+            self._live.start()
         return self
 
     def __exit__(self, *_error: object) -> None:
         """Stop drawing; the last state stays on the screen."""
-        self._progress.stop()
+        self._live.stop()
 
     def update(self, now_s: float) -> None:
         """Show the present state.
@@ -98,11 +92,10 @@ class Display:
             now_s: the time, of any clock that only goes forward [s].
         """
         status = self._scheduler.status(now_s)
-        if self._quiet:
-            pass
-        elif self._has_bars:
-            self._draw(status)
-        elif now_s >= self._next_line_s:
+        if self._has_bars:
+            bars = _bars(status, self._recoveries(), self._console.width)
+            self._live.update(bars, refresh=True)
+        elif now_s >= self._next_line_s and not self._quiet:
             self._next_line_s = now_s + _LINE_S
             tell_user(", ".join([_line(status), *self._recoveries()]))
         self._warn_of_missing(status, now_s)
@@ -116,36 +109,6 @@ class Display:
             for run in self._scheduler.active
             if run.recovery is not None
         ]
-
-    def _draw(self, status: Status) -> None:
-        rows: dict[str, tuple[IslandStatus | RunStatus | Status, str]] = {}
-        left = f"{duration(status.left_s)} left"
-        rates = ", ".join([_pace(status), *self._recoveries()])
-        if len(status.runs) > 1:
-            name = _runs_done(status)
-            rows[""] = (status, f"{left}, {rates}")
-            active = [run for run in status.runs if run.state == "running"]
-            for run in active[:MOST_BARS]:
-                rows[f"{run.name}-{run.run}"] = (run, run_details(run))
-        else:
-            (run,) = status.runs
-            name = run.name
-            rows[""] = (run, f"{left}, {best_text(run)}, {rates}{about_arenas(run)}")
-            islands = run.islands if 1 < len(run.islands) <= MOST_BARS else ()
-            for number, island in enumerate(islands):
-                rows[f"  island {number}"] = (island, best_text(island))
-        for gone in [key for key in self._tasks if key not in rows]:
-            self._progress.remove_task(self._tasks.pop(gone))
-        for key, (shown, what) in rows.items():
-            if key not in self._tasks:
-                self._tasks[key] = self._progress.add_task(key, about="")
-            self._progress.update(
-                self._tasks[key],
-                description=key or name,
-                completed=shown.births,
-                total=shown.wanted,
-                about=what,
-            )
 
     def _warn_of_missing(self, status: Status, now_s: float) -> None:
         """Warn of missing kinds of agents, and of arenas without a suitable worker."""
@@ -162,7 +125,7 @@ class Display:
                 if is_refused
                 else "none is connected"
             )
-            line = f"waiting for {' and '.join(missing)}: {who}"
+            line = f"{waiting_text(missing)}: {who}"
             starts = [
                 command(kind.removesuffix("s"), "--connect", self._place, *self._flags)
                 for kind in missing
@@ -177,7 +140,7 @@ class Display:
         self._shown_waiting = set(waiting)
 
     def _warn(self, line: str) -> None:
-        if self._has_bars and not self._quiet:
+        if self._has_bars:
             # Names and platforms are texts of others: brackets are no markup.
             self._console.print(line, soft_wrap=True, markup=False, highlight=False)
         else:
@@ -206,40 +169,55 @@ def _waiting(run: RunSession, missing: Sequence[str]) -> Iterator[str]:
 
 def _line(status: Status) -> str:
     """Return the state as one line of a log."""
-    about = f"{status.births} of {counted(status.wanted, 'birth')}, {_rates(status)}"
+    line = f"{births_done(status)}, {pace(status)}, {time_left(status)}"
     if len(status.runs) == 1:
-        return f"{about}{about_arenas(status.runs[0])}"
-    return f"{_runs_done(status)}, {about}"
+        return f"{line}{about_arenas(status.runs[0])}"
+    return f"{runs_done(status)}, {line}"
 
 
-def _runs_done(status: Status) -> str:
-    done = sum(run.state == "finished" for run in status.runs)
-    return f"{done} of {counted(len(status.runs), 'run')}"
+Counted = IslandStatus | RunStatus | Status
 
 
-def _rates(status: Status) -> str:
-    left = f"{duration(status.left_s)} left"
-    return f"{status.births_per_s:.1f}/s, {left}, {counted(status.workers, 'worker')}"
+def _rows(status: Status, notes: Sequence[str]) -> Iterator[tuple[str, Counted, str]]:
+    """Yield name, births and details of all runs together, then of some parts."""
+    left, rates = time_left(status), ", ".join([pace(status), *notes])
+    if len(status.runs) > 1:
+        yield runs_done(status), status, f"{left}, {rates}"
+        active = [run for run in status.runs if run.state == "running"]
+        for run in active[:MOST_BARS]:
+            yield f"{run.name}-{run.run}", run, run_details(run)
+        return
+    (run,) = status.runs
+    details = f"{left}, {best_text(run.islands)}, {rates}{about_arenas(run)}"
+    yield run.name, run, details
+    for number, island in enumerate(run.islands):
+        if 1 < len(run.islands) <= MOST_BARS:
+            yield f"  island {number}", island, best_text([island])
 
 
-def _pace(status: Status) -> str:
-    return f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}"
+def _bars(status: Status, notes: Sequence[str], width: int) -> Table:
+    """Return a row of each bar: the count first, the least important last.
 
-
-def _columns(width: int) -> list[ProgressColumn]:
-    """Return the columns of the bars: the count first, the least important last.
-
-    Only the last one is cut where the terminal is narrow.
+    Only the last column is cut where the terminal is narrow.
 
     Args:
+        status: of all runs.
+        notes: about what else is going on.
         width: of the terminal in characters.
     """
     name = Column(no_wrap=True, overflow="ellipsis", max_width=max(12, width // 3))
     rest = Column(no_wrap=True, overflow="ellipsis", ratio=1)
-    bar = [BarColumn(bar_width=width // 8)] if width >= _LEAST_FOR_BAR else []
-    return [
-        MofNCompleteColumn(table_column=Column(no_wrap=True, justify="right")),
-        TextColumn("{task.description}", markup=False, table_column=name),
-        *bar,
-        TextColumn("{task.fields[about]}", markup=False, table_column=rest),
-    ]
+    bar = [Column()] if width >= _LEAST_FOR_BAR else []
+    count = Column(no_wrap=True, justify="right")
+    table = Table.grid(count, name, *bar, rest, padding=(0, 1), expand=True)
+    for title, part, details in _rows(status, notes):
+        total = str(part.wanted)
+        cells: list[RenderableType] = [
+            Text(f"{part.births:{len(total)}}/{total}", "progress.download"),
+            Text(title),
+        ]
+        if bar:
+            done = min(part.births, part.wanted)
+            cells.append(ProgressBar(part.wanted, done, width=width // 8))
+        table.add_row(*cells, Text(details))
+    return table

@@ -1,38 +1,37 @@
 """``revolve status``: progress of runs, from their coordinator or their folders."""
 
 import argparse
+import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 from uuid import uuid4
 
-from rich.console import Console
-from rich.table import Table
+from msgspec import to_builtins
 
-from coordinator.cli.format import (
-    duration,
-    fault_lines,
+from coordinator.cli.status_text import (
+    births_done,
     missing_agents,
-    run_details,
-    silent_lines,
-    state_of,
+    pace,
+    run_table,
+    runs_done,
+    show,
+    time_left,
+    trouble_lines,
+    waiting_text,
 )
-from coordinator.cli.status_json import Source, status_json
 from coordinator.network.client_service import ask_coordinators
-from coordinator.storage.campaign import CAMPAIGN, is_campaign, read_campaign
-from coordinator.storage.folder import EPOCH, RunDetails, holds_run
-from coordinator.storage.folder_status import folder_status, unbegun_status
+from coordinator.storage.campaign import is_campaign
+from coordinator.storage.folder import holds_run
+from coordinator.storage.folder_status import status_below
 from coordinator.storage.hints import command, resume_command
-from coordinator.storage.journal import NAME as JOURNAL
-from coordinator.storage.lock import LOCK, read_holder
+from coordinator.storage.lock import read_holder
 from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.flags import Flags
 from schema.agent.log import tell_user
-from schema.errors import NetworkError, RevolveError, RunFolderError, counted
-from schema.limits import printable
+from schema.errors import NetworkError, counted
 from schema.tables.arrow import skip_pandas
-from schema.tables.description import DETAILS, check_folder
-from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.codec import encode
 from schema.wire.operator import (
     GetStatus,
@@ -42,9 +41,18 @@ from schema.wire.operator import (
 )
 from schema.wire.status import RunStatus, Status
 
-_COLUMNS = ("run", "state", "births", "births/s", "best of population, arenas")
-_WIDEST = 1000
-"""Characters of the widest line that is not wrapped."""
+VERSION = 1
+"""Of the JSON document; it changes when a key changes its meaning or is removed."""
+_SUMS = ("births", "wanted", "left_s")
+"""Keys of the document that follow from others."""
+
+
+class Source(NamedTuple):
+    """A status, and the coordinator that reported it or the folder that shows it."""
+
+    status: Status
+    coordinator: str | None = None
+    folder: str | None = None
 
 
 def main(arguments: list[str]) -> int:
@@ -66,19 +74,18 @@ def main(arguments: list[str]) -> int:
     if options.folder is not None and options.connect is not None:
         flags.error("give either a folder or --connect")
     if options.folder is None:
-        found = _at_hub(options)
-        sources = [Source(status, name) for name, status in found.items()]
+        sources = [Source(status, name) for name, status in _at_hub(options).items()]
         code = 0
     else:
         folder = Path(options.folder)
-        name, status = _live(folder, options) or (None, _by_folder(folder))
+        name, status = _live(folder, options) or (None, status_below(folder))
         sources = [Source(status, name, str(folder))]
         code = int(any(run.state in ("damaged", "failed") for run in status.runs))
     if options.json:
         print(status_json(sources))
         return code
     for source in sources:
-        _show(source)
+        show_source(source)
     return code
 
 
@@ -150,113 +157,52 @@ def _live(folder: Path, options: argparse.Namespace) -> tuple[str, Status] | Non
     return None
 
 
-def _by_folder(folder: Path) -> Status:
-    """Return the status of all runs at or below a folder, read from disk.
+def status_json(sources: Sequence[Source]) -> str:
+    """Return the JSON document of all sources; docs/machines.md describes its keys."""
 
-    Raises:
-        RunFolderError: there is no run and no campaign.
-    """
-    check_folder(folder)
-    planned: dict[Path, RunDetails] = {}
-    runs: list[RunStatus] = []
-    for path in _below(folder, CAMPAIGN):
-        try:
-            planned.update(read_campaign(path).runs(path))
-        except RunFolderError as error:
-            runs.append(_damaged(path, error))
-    others = [path for path in _below(folder, DETAILS) if path not in planned]
-    for path in (*planned, *filter(_is_ours, others)):
-        try:
-            is_begun = path not in planned or holds_run(path)
-            runs.append(
-                folder_status(path) if is_begun else unbegun_status(path, planned[path])
-            )
-        except RevolveError as error:
-            runs.append(_damaged(path, error))
-    if not runs:
-        raise RunFolderError(
-            f"{folder}: no run and no campaign in this folder or below"
-        )
-    return Status(tuple(runs), 0, 0, 0.0)
+    def facts(shown: Status | RunStatus) -> dict[str, object]:
+        sums = {key: getattr(shown, key) for key in _SUMS}
+        return {**sums, **to_builtins(shown)}
+
+    coordinators = [
+        {
+            "name": source.coordinator,
+            "folder": source.folder,
+            **facts(source.status),
+            "runs": [facts(run) for run in source.status.runs],
+        }
+        for source in sources
+    ]
+    document = {"version": VERSION, "coordinators": coordinators}
+    return json.dumps(document, indent=2, allow_nan=False)
 
 
-def _below(folder: Path, name: str) -> list[Path]:
-    """Return the folders at any depth that hold a file of a name.
-
-    Symbolic links are followed one level deep only: deeper ones may form a cycle.
-    """
-    found = {*folder.glob(f"**/{name}"), *folder.glob(f"*/{name}")}
-    return sorted(path.parent for path in found)
-
-
-def _is_ours(folder: Path) -> bool:
-    """Return whether a folder with a ``run.json`` has any other file of a run."""
-    names = (LOCK, EPOCH, JOURNAL, SEGMENTS, FINISHED)
-    return any((folder / name).exists() for name in names)
-
-
-def _damaged(folder: Path, error: RevolveError) -> RunStatus:
-    """Report what is wrong with a folder; return a status without any counts."""
-    tell_user(f"damaged: {error}")
-    return RunStatus(str(folder.resolve()), folder.name, 0, "damaged")
-
-
-def _show(source: Source) -> None:
+def show_source(source: Source) -> None:
     """Print the progress of runs, named by path below the folder or folder name."""
     status, is_live = source.status, source.coordinator is not None
     root = Path(source.folder) if source.folder else None
     above = root and root.resolve()
-    rows = []
-    for run in status.runs:
+
+    def name_of(run: RunStatus) -> str:
         folder = Path(run.folder)
         if above and above in folder.parents:
-            name = str(folder.relative_to(above))
-        else:
-            name = folder.name
-        rows.append(
-            (
-                name,
-                state_of(run, status, is_live=is_live),
-                f"{run.births} of {run.wanted}" if run.islands else "",
-                f"{run.births_per_s:.1f}" if run.births_per_s else "",
-                run_details(run) if run.islands else "",
-            )
-        )
-    done = sum(run.state == "finished" for run in status.runs)
-    births = f"{status.births} of {counted(status.wanted, 'birth')}"
-    runs = counted(len(status.runs), "run")
+            return str(folder.relative_to(above))
+        return folder.name
+
     lines = [
         source.folder or source.coordinator or "",
-        f"{done} of {runs} finished, {births}",
+        f"{runs_done(status)} finished, {births_done(status)}",
     ]
     if status.workers or status.analyzers:
-        lines.append(
-            f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}, "
-            f"{counted(status.analyzers, 'analyzer')}, {duration(status.left_s)} left"
-        )
-    elif done < len(status.runs) and root is not None and not is_live:
-        lines.append(_without_coordinator(status, root))
-    elif done < len(status.runs):
-        lines.append(f"waiting for {' and '.join(missing_agents(status))}")
-    about = (*silent_lines(status.silent), *fault_lines(status.faults))
-    lines += [printable(line, _WIDEST) for line in about]
-    # Wide: a narrow terminal wraps lines, but none is cut.
-    console = Console(width=_WIDEST, highlight=False, markup=False)
-    for line in lines:
-        console.print(line)
-    console.print(_table(rows))
-
-
-def _table(rows: Sequence[Sequence[str]]) -> Table:
-    """Return a table of runs without the columns that are empty in all rows."""
-    table = Table(box=None)
-    columns = dict(zip(_COLUMNS, zip(*rows, strict=True), strict=False))
-    shown = {name: cells for name, cells in columns.items() if any(cells)}
-    for name in shown:
-        table.add_column(name)
-    for row in zip(*shown.values(), strict=True):
-        table.add_row(*row)
-    return table
+        analyzers = counted(status.analyzers, "analyzer")
+        lines.append(f"{pace(status)}, {analyzers}, {time_left(status)}")
+    elif any(run.state != "finished" for run in status.runs):
+        if root is not None and not is_live:
+            lines.append(_without_coordinator(status, root))
+        else:
+            lines.append(waiting_text(missing_agents(status)))
+    table = run_table(status, name_of, is_live=is_live)
+    show(*lines, *trouble_lines(status), table)
 
 
 def _without_coordinator(status: Status, root: Path) -> str:
@@ -273,15 +219,10 @@ def _without_coordinator(status: Status, root: Path) -> str:
         return "no coordinator is running"
     # Each coordinator has a folder of its own: that of its campaign or its run.
     first, above = running[0], running[0].parent
-    where = _from(root, above if is_campaign(above) else first)
+    where, here = above if is_campaign(above) else first, root.resolve()
+    if where.is_relative_to(here):
+        where = root / where.relative_to(here)
     return f"from the files; to ask a coordinator: {command('status', where)}"
-
-
-def _from(root: Path, folder: Path) -> Path:
-    """Return an absolute path by way of a folder that may be relative."""
-    above = root.resolve()
-    is_below = folder.is_relative_to(above)
-    return root / folder.relative_to(above) if is_below else folder
 
 
 def parser(_command: str = "status") -> Flags:

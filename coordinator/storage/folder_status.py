@@ -1,21 +1,25 @@
-"""Status of a run, read from its folder."""
+"""Status of runs, read from their folders."""
 
 from collections import Counter
 from pathlib import Path
 
 from msgspec.structs import replace
 
-from coordinator.storage.folder import RunDetails, read_details
+from coordinator.storage.campaign import CAMPAIGN, read_campaign
+from coordinator.storage.folder import EPOCH, RunDetails, holds_run, read_details
 from coordinator.storage.hints import command
+from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import is_begun
-from coordinator.storage.lock import read_holder
-from schema.errors import RunFolderError
+from coordinator.storage.lock import LOCK, read_holder
+from schema.agent.log import tell_user
+from schema.errors import RevolveError, RunFolderError
 from schema.experiment.document import island_experiments
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
-from schema.tables.description import STATE, read_state
+from schema.tables.description import DETAILS, STATE, check_folder, read_state
 from schema.tables.files import damage_of, has_rows, is_sealed, read_table
-from schema.wire.status import IslandStatus, RunStatus
+from schema.tables.segments import FINISHED, SEGMENTS
+from schema.wire.status import IslandStatus, RunStatus, Status
 
 
 def folder_status(folder: Path) -> RunStatus:
@@ -56,6 +60,57 @@ def folder_status(folder: Path) -> RunStatus:
         for number, island in enumerate(status.islands)
     )
     return replace(status, state=state, islands=islands)
+
+
+def status_below(folder: Path) -> Status:
+    """Return the status of all runs at or below a folder, read from disk.
+
+    Raises:
+        RunFolderError: there is no run and no campaign.
+    """
+    check_folder(folder)
+    planned: dict[Path, RunDetails] = {}
+    runs: list[RunStatus] = []
+    for path in _below(folder, CAMPAIGN):
+        try:
+            planned.update(read_campaign(path).runs(path))
+        except RunFolderError as error:
+            runs.append(_damaged(path, error))
+    others = [path for path in _below(folder, DETAILS) if path not in planned]
+    for path in (*planned, *filter(_is_ours, others)):
+        try:
+            is_begun = path not in planned or holds_run(path)
+            runs.append(
+                folder_status(path) if is_begun else unbegun_status(path, planned[path])
+            )
+        except RevolveError as error:
+            runs.append(_damaged(path, error))
+    if not runs:
+        raise RunFolderError(
+            f"{folder}: no run and no campaign in this folder or below"
+        )
+    return Status(tuple(runs), 0, 0, 0.0)
+
+
+def _below(folder: Path, name: str) -> list[Path]:
+    """Return the folders at any depth that hold a file of a name.
+
+    Symbolic links are followed one level deep only: deeper ones may form a cycle.
+    """
+    found = {*folder.glob(f"**/{name}"), *folder.glob(f"*/{name}")}
+    return sorted(path.parent for path in found)
+
+
+def _is_ours(folder: Path) -> bool:
+    """Return whether a folder with a ``run.json`` has any other file of a run."""
+    names = (LOCK, EPOCH, JOURNAL, SEGMENTS, FINISHED)
+    return any((folder / name).exists() for name in names)
+
+
+def _damaged(folder: Path, error: RevolveError) -> RunStatus:
+    """Report what is wrong with a folder; return a status without any counts."""
+    tell_user(f"damaged: {error}")
+    return RunStatus(str(folder.resolve()), folder.name, 0, "damaged")
 
 
 def table_damages(folder: Path) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from coordinator.cli.format import about_arenas, best_text, duration
+from coordinator.cli.status_text import about_arenas, best_text, duration
 from coordinator.run.session import RateMeter
 from coordinator.storage.campaign import (
     Campaign,
@@ -196,8 +196,8 @@ def test_a_command_can_be_pasted() -> None:
 def test_the_best_fitness_of_few_islands_is_shown_per_island() -> None:
     islands = (IslandStatus(1, 9, 0.25, 3), IslandStatus(0, 9, None, 0))
     run = RunStatus("a", "a", 0, "running", islands=islands)
-    assert best_text(run) == "best 0.250 -"
-    assert best_text(islands[1]) == "best -"
+    assert best_text(islands) == "best 0.250 -"
+    assert best_text(islands[1:]) == "best -"
     assert about_arenas(run) == ""
     arena = IslandStatus(1, 9, 0.5, 4, simulated_s=20.0, is_paused=True)
     both = replace(run, islands=(*islands, arena))
