@@ -130,7 +130,7 @@ def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
                 folder,
                 [Planned(status, lambda: held)],
                 deployment,
-                lambda run: conclusions.append(conclude(run)),
+                lambda run: conclusions.append(_concluded(run)),
                 lambda _status, _error: None,  # raised below
             )
         except NetworkError:
@@ -233,7 +233,7 @@ def _execute_campaign(
         tell_user(f"{finished} of {counted(len(planned), 'run')} already finished")
 
     def conclude_run(run: RunSession) -> None:
-        conclusion = conclude(run)
+        conclusion = _concluded(run)
         if conclusion.failures:
             warn_user(f"{run.held.path}: {conclusion.failures}")
         if not conclusion.has_evaluated:
@@ -265,6 +265,10 @@ def _execute_campaign(
     runs = counted(len(planned), "run")
     print(f"{runs} finished\ntry next:\n  {command('analyze', folder)}")
     return 1 if failed else 0
+
+
+def _concluded(run: RunSession) -> Conclusion:
+    return conclude(run.held.path, run.experiment)
 
 
 def _report(status: RunStatus, error: RevolveError) -> None:

@@ -1,7 +1,7 @@
 """Summary of a finished run: best robots, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,8 +11,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from msgspec import to_builtins
 
-from coordinator.arena.arena import Arena
-from coordinator.run.session import RunSession
 from coordinator.storage.disk import replace_text, storage_errors
 from coordinator.storage.folder import read_details
 from coordinator.storage.hints import command
@@ -20,7 +18,12 @@ from schema.agent.log import tell_user, warn_user
 from schema.agent.terminal.screen import missing_screen
 from schema.errors import ExperimentError, InvalidRobot, counted, rounded
 from schema.experiment.brains import types_of
-from schema.experiment.document import Experiment, body_space, island_experiments
+from schema.experiment.document import (
+    Experiment,
+    body_space,
+    island_count,
+    island_experiments,
+)
 from schema.experiment.file import own_experiment
 from schema.experiment.fitness_keys import fitness_text
 from schema.formats.files import BEST
@@ -51,20 +54,19 @@ class Conclusion:
     has_evaluated: bool
 
 
-def conclude(run: RunSession) -> Conclusion:
+def conclude(folder: Path, experiment: Experiment) -> Conclusion:
     """Write the best robot of the last population; return the summary of a run.
 
     Args:
-        run: a finished run with its tables.
+        folder: of a finished run with its tables.
+        experiment: of the run.
 
     Raises:
         RunFolderError: a table cannot be read, or the robot cannot be written.
     """
-    folder = run.held.path
     failures = _failures(folder)
-    lines = _results(run)
-    if failures:
-        lines.insert(1, failures)
+    first, *others = _results(folder, experiment)
+    lines = [first, *filter(None, [failures]), *others]
     lines += [f"tables: {folder / 'tables'}", "try next:", *next_steps(folder)]
     return Conclusion("\n".join(lines), failures, has_evaluated(folder))
 
@@ -83,8 +85,7 @@ def restore_best(folder: Path) -> None:
     try:
         allow_plugins_of(folder, is_resumed=False)
         experiment = own_experiment(read_details(folder).document)
-        born = Counter(read_table(folder, "births", ["island"])["island"].to_pylist())
-        if _is_extinct(experiment, born):
+        if _is_extinct(experiment, _born(folder)):
             return
         _, robot = _read_best(folder, best, experiment)
         done = _write_best(robot, folder, experiment)
@@ -93,6 +94,11 @@ def restore_best(folder: Path) -> None:
         warn_user(f"{folder}: the file {BEST} is missing and not written: {error}")
         return
     tell_user(f"{folder}: {BEST} was missing; {_BEST}: {done}")
+
+
+def _born(folder: Path) -> Counter[int]:
+    """Return the number of births of each island."""
+    return Counter(read_table(folder, "births", ["island"])["island"].to_pylist())
 
 
 def _is_extinct(experiment: Experiment, births: Mapping[int, int]) -> bool:
@@ -120,48 +126,39 @@ def next_steps(folder: Path) -> list[str]:
     return [f"  {step}" for step in steps]
 
 
-def _results(run: RunSession) -> list[str]:
+def _results(folder: Path, experiment: Experiment) -> list[str]:
     """Describe the last recorded population; write its best robot to a file.
 
     The tables, not the living: robots of an arena have newer windows at the end of a
     run than the last population has, which status and report show.
     """
-    folder, islands = run.held.path, run.loop.islands
-    born = {number: island.births for number, island in islands.items()}
-    births = counted(sum(born.values()), "birth")
-    if _is_extinct(run.experiment, born):
+    born, islands = _born(folder), island_experiments(experiment)
+    births = counted(born.total(), "birth")
+    if _is_extinct(experiment, born):
         return [f"extinct after {births}: too few robots are left to mate"]
     last = last_populations(folder)
     best = best_of(last)
     if best is None:
         return [f"{births}; no robot of the last population has a fitness"]
-    means = _means(run, last)
+    # As analyses compute it: robots of arenas without a fitness do not count.
+    arenas = {number for number, own in enumerate(islands) if own.arena is not None}
+    means = [level.mean for level in read_levels(last, arenas) if level.judged]
     mean = f"mean fitness of the last population {rounded(fmean(means))}"
     if len(means) > 1:
         mean += f", the mean over {len(means)} islands"
     return [
         f"{births}; {mean}",
-        *judged_apart(run.experiment),
-        *_windows([one.experiment for one in islands.values()]),
-        *_best_robot(run, best),
+        *judged_apart(islands),
+        *_windows(islands),
+        *_best_robot(folder, best, experiment),
         *_better_ever(folder, best),
     ]
 
 
-def _means(run: RunSession, last: Sequence[Row]) -> list[float]:
-    """Return the mean fitness of each island, as analyses compute it.
-
-    Failed evaluations count. Robots of arenas without a fitness do not.
-    """
-    islands = run.loop.islands.items()
-    arenas = {number for number, one in islands if isinstance(one, Arena)}
-    return [each.mean for each in read_levels(last, arenas) if each.judged]
-
-
-def judged_apart(experiment: Experiment) -> list[str]:
+def judged_apart(islands: Iterable[Experiment]) -> list[str]:
     """Return a line if the fitness of different islands cannot be compared."""
     each: dict[str, list[str]] = {}
-    for number, own in enumerate(island_experiments(experiment)):
+    for number, own in enumerate(islands):
         text = fitness_text({"fitness": to_builtins(own.fitness)})
         text += " in an arena" * (own.arena is not None)
         each.setdefault(text, []).append(str(number))
@@ -174,19 +171,19 @@ def judged_apart(experiment: Experiment) -> list[str]:
     return [f"fitness of different islands is not comparable: {lists}"]
 
 
-def _best_robot(run: RunSession, best: Row) -> list[str]:
+def _best_robot(folder: Path, best: Row, experiment: Experiment) -> list[str]:
     """Describe the robot of a population row; write it to a file."""
-    birth = individual(best)
-    folder, space = run.held.path, body_space(run.experiment.space)
-    rank, robot = _read_best(folder, best, run.experiment)
-    motors = motor_count(robot, space)
-    where = f" of island {birth.island}" if len(run.loop.islands) > 1 else ""
+    birth, space = individual(best), body_space(experiment.space)
+    rank, robot = _read_best(folder, best, experiment)
+    is_alone = island_count(experiment) == 1
+    where = "" if is_alone else f" of island {birth.island}"
     lives = f" on island {best['island']}" if best["island"] != birth.island else ""
-    what = f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
+    parts = counted(len(robot.parts), "part")
+    motors = counted(motor_count(robot, space), "motor")
     line = f"{_BEST}: birth {birth.number}{where}, fitness {rounded(best['fitness'])}"
     return [
-        f"{line}{lives}, rank in ancestry {rank} (founders: 1), {what}",
-        _write_best(robot, folder, run.experiment),
+        f"{line}{lives}, rank in ancestry {rank} (founders: 1), {parts}, {motors}",
+        _write_best(robot, folder, experiment),
     ]
 
 
@@ -229,9 +226,9 @@ def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
 
 def _windows(islands: Iterable[Experiment]) -> list[str]:
     """Return a line about the windows in which robots of arenas were judged, if any."""
-    clocks = [each.simulation for each in islands if each.arena is not None]
-    seconds = sorted({each.window_steps * each.timestep_s for each in clocks})
-    lasts = " or ".join(f"{each:g}" for each in seconds)
+    clocks = [own.simulation for own in islands if own.arena is not None]
+    seconds = sorted({clock.window_steps * clock.timestep_s for clock in clocks})
+    lasts = " or ".join(f"{window_s:g}" for window_s in seconds)
     what = f"a robot's last {lasts} s before the last birth"
     return [f"in arenas fitness is that of {what}"] if seconds else []
 

@@ -1,14 +1,12 @@
 """Tests of the commands that the summary of a run suggests."""
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
 from msgspec import structs
 
-from coordinator.arena.arena import Arena as LivingArena
 from coordinator.cli import summary
 from schema.errors import RunFolderError
 from schema.experiment.document import (
@@ -18,6 +16,7 @@ from schema.experiment.document import (
     Islands,
     Simulation,
     island_experiment,
+    island_experiments,
 )
 from schema.formats.files import BEST, read_robot
 from schema.robot.robot import Robot
@@ -44,11 +43,15 @@ def test_only_commands_that_work_are_suggested(
     assert summary.next_steps(tmp_path) == [render, f"  revolve {show}", analyze]
 
 
+def judged_apart(*islands: Islands) -> list[str]:
+    return summary.judged_apart(island_experiments(Experiment("e", islands=islands)))
+
+
 def test_islands_that_judge_in_other_ways_are_said() -> None:
     alike = (Islands(count=2), Islands(fitness=Fitness()))
-    assert summary.judged_apart(Experiment("e", islands=alike)) == []
+    assert judged_apart(*alike) == []
     others = (Islands(fitness=Fitness(limit=0.5)), Islands(arena=Arena()))
-    (line,) = summary.judged_apart(Experiment("e", islands=alike + others))
+    (line,) = judged_apart(*alike, *others)
     assert line == (
         "fitness of different islands is not comparable: locomotion on islands 0, 1, "
         "2; locomotion (limit = 0.5) on island 3; locomotion in an arena on island 4"
@@ -88,23 +91,27 @@ def test_run_is_extinct_if_all_of_its_arenas_have_too_few_births(
     assert not summary._is_extinct(off_line, {0: 2, 1: 0})
 
 
-def test_run_that_ends_with_too_few_robots_to_mate_has_a_best_one(
-    tmp_path: Path,
+def write_tables(folder: Path, rows: dict[str, list[dict[str, Any]]]) -> None:
+    for name, own in rows.items():
+        path = parquet_path(folder, "e", 0, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(table(name, own), path)
+
+
+@pytest.mark.parametrize(
+    ("births", "line"),
+    [
+        (3, "3 births; no robot of the last population has a fitness"),
+        (2, "extinct after 2 births: too few robots are left to mate"),
+    ],
+)
+def test_a_run_with_all_of_its_births_is_not_extinct(
+    tmp_path: Path, births: int, line: str
 ) -> None:
-    """As ``restore_best`` finds in its tables."""
     experiment = Experiment("e", births=3, arena=Arena())
-    arena = LivingArena(experiment, 1, 0)
-    arena.births, arena.is_extinct = 3, True
-    run: Any = SimpleNamespace(
-        held=SimpleNamespace(path=tmp_path),
-        loop=SimpleNamespace(islands={0: arena}),
-        experiment=experiment,
-    )
-    none = "no robot of the last population has a fitness"
-    assert summary._results(run) == [f"3 births; {none}"]
-    arena.births = 2
-    (line,) = summary._results(run)
-    assert line.startswith("extinct after 2 births: ")
+    rows: list[dict[str, Any]] = [{"birth": number} for number in range(births)]
+    write_tables(tmp_path, {"births": rows, "population": []})
+    assert summary._results(tmp_path, experiment) == [line]
 
 
 def test_robot_without_a_file_is_said(tmp_path: Path, chain: Robot) -> None:
@@ -128,10 +135,7 @@ def test_a_better_robot_that_died_is_named(
         "evaluations": [{"birth": 4, "fitness": 0.3}, {"birth": 2, "fitness": ever}],
         "fitness": [],
     }
-    for name, own in rows.items():
-        path = parquet_path(tmp_path, "e", 0, name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        pq.write_table(table(name, own), path)
+    write_tables(tmp_path, rows)
     best = {"island": 0, "birth_island": None, "birth": 4, "fitness": 0.3}
     shown = f"revolve view {tmp_path} --robot best-ever"
     said = [f"best ever: robot 0:2, fitness 0.5000: {shown}"] if is_said else []
