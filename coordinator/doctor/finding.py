@@ -27,3 +27,15 @@ class Finding:
         """Return the finding as one line."""
         line = f"{self.level:4}  {self.subject:12}  {self.text}"
         return f"{line}; {self.advice}" if self.advice else line
+
+
+Case = tuple[bool, Level, str, str]
+"""Whether a case holds; level, text and advice of its finding."""
+
+
+def judged(subject: str, text: str, *cases: Case) -> Finding:
+    """Return the finding of the first case that holds, else "ok" with the text."""
+    for holds, level, found, advice in cases:
+        if holds:
+            return Finding(level, subject, found, advice)
+    return Finding("ok", subject, text)

@@ -1,6 +1,6 @@
 """Checks of hub, rights and coordinators; each takes what was seen."""
 
-from coordinator.doctor.finding import Finding
+from coordinator.doctor.finding import Finding, judged
 from coordinator.network.probe_service import ROLES, HubProbe
 from schema.limits import printable
 
@@ -17,11 +17,9 @@ def no_hub(connect: str, why: str, *, is_wanted: bool) -> Finding:
         why: there is no connection.
         is_wanted: the user has named it; else this user needs none.
     """
-    if is_wanted:
-        advice = "start the hub, or check --connect, name service and firewall"
-        return Finding("fail", "hub", f"{connect}: {why}", advice)
+    advice = "start the hub, or check --connect, name service and firewall"
     text = "none is running: revolve run needs none, revolve coordinator starts one"
-    return Finding("ok", "hub", text)
+    return judged("hub", text, (is_wanted, "fail", f"{connect}: {why}", advice))
 
 
 def refused(error: str) -> Finding:
@@ -41,54 +39,50 @@ def check_hub(probe: HubProbe, connect: str) -> list[Finding]:
     text = f"{connect}, round trip {1e3 * probe.round_trip_s:.1f} ms"
     slow = "a slow link: give workers there more jobs ahead by more --processes"
     is_slow = probe.round_trip_s > _SLOW_S
-    hub = Finding("warn", "hub", text, slow) if is_slow else Finding("ok", "hub", text)
-    return [hub, *_rights(probe), _coordinators(probe), *_offset(probe)]
+    hub = judged("hub", text, (is_slow, "warn", text, slow))
+    return [hub, _rights(probe), _coordinators(probe), *_offset(probe)]
 
 
-def _rights(probe: HubProbe) -> list[Finding]:
-    if probe.roles is None:
-        return [Finding("ok", "rights", "all: no certificates at this address")]
-    if probe.roles == ROLES:
-        text = "all roles: the hub gives every certificate all rights"
-        return [Finding("warn", "rights", text, "start it with --access")]
-    if probe.roles:
-        return [Finding("ok", "rights", f"those of {' and '.join(probe.roles)}")]
-    if probe.replies or probe.malformed:
-        return [Finding("ok", "rights", "those of operator")]
-    if probe.coordinators:
-        return [Finding("ok", "rights", "those of viewer")]
-    return [
-        Finding(
+def _rights(probe: HubProbe) -> Finding:
+    no_rights = (
+        "unless this is a viewer or operator, the certificate was revoked, or it is "
+        "not in the access.json that the hub has read when it started"
+    )
+    return judged(
+        "rights",
+        "those of viewer",
+        (probe.roles is None, "ok", "all: no certificates at this address", ""),
+        (
+            probe.roles == ROLES,
             "warn",
-            "rights",
+            "all roles: the hub gives every certificate all rights",
+            "start it with --access",
+        ),
+        (bool(probe.roles), "ok", f"those of {' and '.join(probe.roles or ())}", ""),
+        (bool(probe.replies or probe.malformed), "ok", "those of operator", ""),
+        (
+            not probe.coordinators,
+            "warn",
             "none that can be tried while no coordinator is running",
-            "unless this is a viewer or operator, the certificate was revoked, or it "
-            "is not in the access.json that the hub has read when it started",
-        )
-    ]
+            no_rights,
+        ),
+    )
 
 
 def _coordinators(probe: HubProbe) -> Finding:
-    if probe.malformed:
-        names = ", ".join(probe.malformed)
-        advice = "install one version of Revolve Islands everywhere"
-        return Finding(
-            "warn", "coordinators", f"another version or damaged: {names}", advice
-        )
-    if not probe.coordinators:
-        return Finding("ok", "coordinators", "none is running")
-    names = ", ".join(probe.coordinators[:_MOST_NAMES])
+    others = f"another version or damaged: {', '.join(probe.malformed)}"
+    advice = "install one version of Revolve Islands everywhere"
+    names = ", ".join(probe.coordinators[:_MOST_NAMES]) or "none is running"
     more = len(probe.coordinators) - _MOST_NAMES
-    return Finding(
-        "ok", "coordinators", names + (f" and {more} more" if more > 0 else "")
-    )
+    text = f"{names} and {more} more" if more > 0 else names
+    is_malformed = bool(probe.malformed)
+    return judged("coordinators", text, (is_malformed, "warn", others, advice))
 
 
 def _offset(probe: HubProbe) -> list[Finding]:
     if probe.offset_s is None:
         return []
     text = f"{probe.offset_s:+.2f} s against this machine's"
-    if abs(probe.offset_s) > _MOST_OFFSET_S:
-        advice = "set both clocks, for example with NTP: certificates depend on them"
-        return [Finding("warn", "its clock", text, advice)]
-    return [Finding("ok", "its clock", text)]
+    is_far = abs(probe.offset_s) > _MOST_OFFSET_S
+    advice = "set both clocks, for example with NTP: certificates depend on them"
+    return [judged("its clock", text, (is_far, "warn", text, advice))]
