@@ -16,7 +16,6 @@ from analysis.measures.named_measures import with_docstrings
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
-from schema.agent.import_path import safe_import_path
 from schema.tables.description import run_columns
 
 
@@ -56,7 +55,7 @@ def measure_runs(
     except OSError:  # This system has no semaphores.
         yield from map(measure_run, runs, repeat(slots))
         return
-    with safe_import_path(), pool:
+    with pool:
         try:
             yield from pool.map(measure_run, runs, repeat(slots))
         except BaseException:

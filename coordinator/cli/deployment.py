@@ -79,7 +79,7 @@ class Deployment:
 @contextmanager
 def connected_agents(
     folder: Path, deployment: Deployment
-) -> Iterator[tuple[Network | LocalAgents, dict[AgentKind, ProcessPool]]]:
+) -> Iterator[tuple[Network | LocalAgents, list[ProcessPool]]]:
     """Open the connection to agents and start the processes of a deployment.
 
     Args:
@@ -87,11 +87,11 @@ def connected_agents(
         deployment: what to open and start.
 
     Yields:
-        The connection, and the process pools by kind, which need regular supervision.
+        The connection, and the process pools, which need regular supervision.
     """
     if deployment.answers is not None:
         keep_flags(folder, deployment.resume_flags)
-        yield LocalAgents(deployment.answers, platform_tag()), {}
+        yield LocalAgents(deployment.answers, platform_tag()), []
         return
     with ExitStack() as stack:
         hub = deployment.connect or ""
@@ -116,7 +116,7 @@ def connected_agents(
         if deployment.view:
             open_viewer(network.own_address, deployment.fleet, deployment.tls)
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
-        pools: dict[AgentKind, ProcessPool] = {}
+        pools: list[ProcessPool] = []
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
                 kind, f"own-{kind}", network.own_address, deployment.fleet,
@@ -125,12 +125,12 @@ def connected_agents(
                 wait_limit_s=deployment.wait_limit_s, processes=size,
                 plugins=allowed(),
             )  # fmt: skip
-            pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
-            pools[kind] = stack.enter_context(pool)
+            pool = ProcessPool(deployment.bodies[kind], (agent,), size=size, role=kind)
+            pools.append(stack.enter_context(pool))
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
         # All at once before one is waited for: their grace times run together.
-        stack.callback(_terminate, pools.values())
+        stack.callback(_terminate, pools)
         yield network, pools
 
 

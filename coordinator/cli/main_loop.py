@@ -4,23 +4,22 @@ import logging
 import math
 import resource
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from pathlib import Path
 
 from coordinator.cli.deployment import Deployment, connected_agents
 from coordinator.cli.progress import Display
 from coordinator.cli.status_text import fault_lines
-from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from coordinator.run.live_server import LiveServer
 from coordinator.run.operators import answer_operator
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
-from schema.agent.command import tell_restart
 from schema.agent.log import tell_user, warn_user
-from schema.agent.supervisor import ProcessPool, stop_on_signals
+from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
 from schema.plugins.permission import allowed
 from schema.wire.status import RunStatus, Status
@@ -84,7 +83,6 @@ def execute_runs(
             scheduler, quiet=deployment.quiet, place=place, plugins=allowed()
         ) as display:
             shown_s = done_s = -math.inf
-            processes = OwnProcesses(pools)
             wait_s = 0.0  # the first progress is shown at once
             while not (scheduler.is_finished or stop.is_set()):
                 scheduler.turn(wait_s, time.monotonic)
@@ -103,7 +101,8 @@ def execute_runs(
                     done_s = now_s
                     scheduler.do_chores(now_s)
                     _tell_faults(scheduler)
-                    processes.look_after()
+                    for line in chain(*(pool.look_after() for pool in pools)):
+                        warn_user(line)
             if server is not None:
                 server.serve(time.monotonic())
         scheduler.stop()
@@ -146,31 +145,6 @@ def _tell_faults(scheduler: RunScheduler) -> None:
     """Tell the user what peers have begun to send that is not used."""
     for line in scheduler.fleet.faults.lines():
         warn_user(line)
-
-
-class OwnProcesses:
-    """Process pools of a run; says when one of their processes is restarted."""
-
-    def __init__(self, pools: Mapping[AgentKind, ProcessPool]) -> None:
-        self._pools = pools
-        self._exits = 0
-        self._losses = dict.fromkeys(pools, 0)
-
-    def look_after(self) -> None:
-        """Start missing processes and tell the user about those that ended."""
-        for pool in self._pools.values():
-            pool.look_after()
-        before = self._exits
-        self._exits = sum(pool.exits for pool in self._pools.values())
-        if self._exits > before:
-            warn_user(
-                "a worker or analyzer process of this run ended outside a job, for the "
-                "reason that it wrote above; it is restarted"
-            )
-        for kind, pool in self._pools.items():
-            if pool.losses > self._losses[kind]:
-                warn_user(tell_restart(kind))
-            self._losses[kind] = pool.losses
 
 
 class _Server:

@@ -90,8 +90,8 @@ def new_socket() -> str:
         NetworkError: there is no directory that only this user can enter.
     """
     # A run goes on when its user logs out.
-    place = runtime_directory(is_of_login=False)
-    if not can_lock(place):
+    place, has_locks = _runtime(is_of_login=False)
+    if not has_locks:
         warn_user(f"{place}: no file locks; 127.0.0.1 is used, which any user reaches")
         with socket.create_server(("127.0.0.1", 0)) as free:
             return f"tcp/127.0.0.1:{free.getsockname()[1]}"
@@ -123,18 +123,24 @@ def default_connect() -> str:
     return os.environ.get(CONNECT_VARIABLE) or user_hub()
 
 
-def runtime_directory(*, is_of_login: bool = True) -> Path:
+def runtime_directory() -> Path:
     """Return the directory of this user's sockets; create it if it is missing.
 
     It is ``revolve`` in ``$XDG_RUNTIME_DIR``, else ``revolve-UID`` among the temporary
     files or in ``/tmp``: the first that can be used and has file locks. Nobody but its
     owner can enter it.
 
-    Args:
-        is_of_login: prefer the first, which may be removed when the user logs out.
-
     Raises:
         NetworkError: it cannot be created, or others could enter it.
+    """
+    return _runtime(is_of_login=True)[0]
+
+
+def _runtime(*, is_of_login: bool) -> tuple[Path, bool]:
+    """Return ``runtime_directory``, and whether its file system has locks.
+
+    Args:
+        is_of_login: prefer the first, which may be removed when the user logs out.
     """
     login, own = os.environ.get("XDG_RUNTIME_DIR"), f"revolve-{os.getuid()}"
     places = [Path("/tmp") / own]  # noqa: S108 - refused if it is not private
@@ -146,8 +152,8 @@ def runtime_directory(*, is_of_login: bool = True) -> Path:
     for place in places:
         _make_private(place)
         if can_lock(place):
-            return place
-    return places[0]
+            return place, True
+    return places[0], False
 
 
 def _is_usable(place: Path) -> bool:

@@ -25,7 +25,7 @@ from schema.agent.flags import Flags, add_plugins, positive_number, whole_number
 from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config, hub_config
 from schema.agent.service import GAVE_UP, gave_up
-from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
+from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import (
     MOST_PER_CORE,
     ProcessPool,
@@ -269,22 +269,20 @@ def run_pool(
     stop = stop_on_signals()
     if options.until_closed:
         stop_with_input(stop.set)
-    restarts = deaths = 0
     try:
-        with ProcessPool(body, (agent,), size=options.processes) as process_pool:
+        with ProcessPool(
+            body, (agent,), size=options.processes, role=role
+        ) as process_pool:
             while not stop.is_set():
-                process_pool.look_after()
+                lines = process_pool.look_after()
                 process_pool.wait(_POLL_S)
-                for death in process_pool.deaths[deaths:]:
-                    warn_user(tell_death(death))
-                if process_pool.restarts > restarts:
-                    warn_user(tell_restart(role))
-                restarts, deaths = process_pool.restarts, len(process_pool.deaths)
                 if GAVE_UP in process_pool.exit_codes:
                     tell_error(gave_up(connect, options.give_up_after))
                     return 1
                 if len(process_pool.exit_codes) == options.processes:
                     return max(process_pool.exit_codes)
+                for line in lines:
+                    warn_user(line)
     except KeyboardInterrupt:
         return 130
     return 0
@@ -315,18 +313,6 @@ def name_at(hub: str, tls: Tls | None, default: str) -> str:
     from schema.agent.certificate import certificate_name
 
     return certificate_name(tls.certificate)
-
-
-def tell_restart(role: Role) -> str:
-    """Return a line about a process of a role that ended."""
-    article = "an" if role == "analyzer" else "a"
-    return f"{article} {role} process ended and is restarted"
-
-
-def tell_death(death: Death) -> str:
-    """Return a line about the job that crashed a process."""
-    task = death.task
-    return f"{task.agent} died of job {task.number} of {task.run}: {death.cause}"
 
 
 def parser(role: Role, processes: int) -> Flags:

@@ -7,10 +7,7 @@ standard library, so children search where their parent does.
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
-from multiprocessing import spawn
 from pathlib import Path
 
 from schema.agent.log import warn_user
@@ -19,7 +16,8 @@ from schema.errors import one_line
 GRAPHICS = "MUJOCO_GL"
 """Environment variable: graphics library that MuJoCo loads when it is imported."""
 NO_GRAPHICS = "disable"
-_FLAG = "PYTHONSAFEPATH"
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Environment variable: if set, Python does not import from the current folder."""
 
 
 def python_command(module: str) -> list[str]:
@@ -31,28 +29,6 @@ def environment() -> dict[str, str]:
     """Return the environment of children, which import what this process can."""
     paths = [str(Path(path).absolute()) for path in sys.path]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
-
-
-@contextmanager
-def safe_import_path() -> Iterator[None]:
-    """Let processes spawned in the block not import from the current folder."""
-    before, command_line = os.environ.get(_FLAG), spawn.get_command_line
-
-    # Without a traceback if the parent dies before it has said what to do.
-    def quiet(**names: object) -> list[str]:
-        *words, program, mark = command_line(**names)
-        return [*words, f"try:\n  {program}\nexcept EOFError:\n  pass", mark]
-
-    os.environ[_FLAG] = "1"
-    spawn.get_command_line = quiet
-    try:
-        yield
-    finally:
-        spawn.get_command_line = command_line
-        if before is None:
-            del os.environ[_FLAG]
-        else:
-            os.environ[_FLAG] = before
 
 
 def check_graphics() -> None:

@@ -16,13 +16,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from multiprocessing import connection, get_context, parent_process, resource_tracker
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
 from schema.agent.capacity import core_quota
-from schema.agent.import_path import check_graphics, safe_import_path
+from schema.agent.import_path import SAFE_PATH, check_graphics
 from schema.agent.log import warn_user
 from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import (
@@ -73,10 +73,11 @@ _REPEAT_S = 1.0
 def prepare_process() -> None:
     """Prepare this process and its children to share a machine with many others.
 
-    Libraries and the network use one thread; a process that wakes up does not interrupt
+    Libraries and the network use one thread, children do not import from the current
+    folder; a process that wakes up does not interrupt
     one that computes, for a few milliseconds; unused memory is returned to the system.
     """
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    os.environ.update(dict.fromkeys((*_ONE_THREAD, SAFE_PATH), "1"))
     given = os.environ.pop("ZENOH_RUNTIME", None)
     if given is not None:
         warn_user(f"ZENOH_RUNTIME: has no effect here, got {shown(given)}")
@@ -117,32 +118,45 @@ def most_processes() -> int:
     return MOST_PER_CORE * cores()
 
 
-class ProcessPool:
-    """Processes that all run ``body(*arguments, slot)``; use it in a ``with``.
+@dataclass(slots=True)
+class _Place:
+    """A slot, its process if one is running, and when to start the next one.
 
     Attributes:
-        restarts: number of restarts.
-        exits: number of processes that exited by themselves outside a job.
-        losses: number of the other processes that ended: killed, or in a job.
-        deaths: of the processes that their jobs crashed.
+        slot: slot of the process.
+        process: the running one; None: it is to be started.
+        started_s: when the last one was started [s].
+        due_s: when the next one is to be started [s].
+        pause_s: of the next one that exits by itself [s].
+        code: exit code of the last one if it exited by itself.
     """
 
+    slot: ProcessSlot
+    process: SpawnProcess | None = None
+    started_s: float = -math.inf
+    due_s: float = -math.inf
+    pause_s: float = _BETWEEN_STARTS_S
+    code: int | None = None
+
+
+class ProcessPool:
+    """Processes that all run ``body(*arguments, slot)``; use it in a ``with``."""
+
     def __init__(
-        self, body: Callable[..., None], arguments: tuple[Any, ...], *, size: int
+        self,
+        body: Callable[..., None],
+        arguments: tuple[Any, ...],
+        *,
+        size: int,
+        role: str = "worker",
     ) -> None:
         self._body = body
         self._arguments = arguments
+        self._what = f"a{'n' * (role[0] in 'aeiou')} {role} process ended"
         self._context = get_context("spawn")
-        self._processes: list[SpawnProcess | None] = [None] * size
-        self._started_s = [-1.0] * size
-        self._due_s = [0.0] * size
-        self._pauses_s = [_BETWEEN_STARTS_S] * size
-        self._slots = [ProcessSlot(index, CurrentJob()) for index in range(size)]
-        self._codes: list[int | None] = [None] * size
+        slots = (ProcessSlot(index, CurrentJob()) for index in range(size))
+        self._places = [_Place(slot) for slot in slots]
         self._until_s: float | None = None
-        self.restarts = 0
-        self.exits = self.losses = 0
-        self.deaths: list[Death] = []
 
     def __enter__(self) -> Self:
         try:
@@ -158,67 +172,73 @@ class ProcessPool:
     @property
     def pids(self) -> list[int]:
         """Process ids of the running processes."""
-        return [p.pid for p in self._processes if p and p.is_alive() and p.pid]
+        return [p.pid for p in self._processes if p.is_alive() and p.pid]
 
     @property
     def exit_codes(self) -> list[int]:
         """Exit codes of processes that exited by themselves and await restart."""
-        return [code for code in self._codes if code is not None]
+        return [place.code for place in self._places if place.code is not None]
 
-    def look_after(self) -> None:
-        """Start missing processes; each at most once a second."""
+    @property
+    def _processes(self) -> list[SpawnProcess]:
+        return [place.process for place in self._places if place.process]
+
+    def look_after(self) -> list[str]:
+        """Start missing processes, each at most once a second.
+
+        Returns:
+            A line about each process that has ended, for the user.
+        """
         now_s = time.monotonic()
-        for index, process in enumerate(self._processes):
-            if process is not None and process.exitcode is not None:
-                self._note_end(index, process.exitcode, now_s)
-            if self._processes[index] is None and now_s >= self._due_s[index]:
-                self.restarts += self._started_s[index] >= 0.0
-                self._started_s[index] = now_s
-                self._codes[index] = None
-                self._processes[index] = self._start(index)
+        lines = []
+        for place in self._places:
+            if place.process is not None and place.process.exitcode is not None:
+                why = self._note_end(place, place.process.exitcode, now_s)
+                lines.append(f"{self._what}{why}; it is restarted")
+            if place.process is None and now_s >= place.due_s:
+                place.started_s, place.code = now_s, None
+                place.process = self._start(place.slot)
+        return lines
 
-    def _note_end(self, index: int, code: int, now_s: float) -> None:
-        """Note how a process ended, and when it is to be restarted."""
-        self._processes[index] = None
-        self._due_s[index] = self._started_s[index] + _BETWEEN_STARTS_S
-        slot = self._slots[index]
+    def _note_end(self, place: _Place, code: int, now_s: float) -> str:
+        """Note how a process ended, and when it is to be restarted; return why."""
+        place.process = None
+        place.due_s = place.started_s + _BETWEEN_STARTS_S
+        slot = place.slot
         assert slot.note is not None
         task = slot.note.read()
         slot.note.end()
         if task is None and code >= 0:
-            self._codes[index] = code
-            self.exits += 1
-            if now_s - self._started_s[index] > _LONGEST_PAUSE_S:
-                self._pauses_s[index] = _BETWEEN_STARTS_S
-            self._due_s[index] = now_s + self._pauses_s[index]
-            self._pauses_s[index] = min(2.0 * self._pauses_s[index], _LONGEST_PAUSE_S)
-            return
-        self.losses += 1
-        if task is not None and (cause := crash_cause(code)):
-            death = Death(task, cause)
-            self.deaths.append(death)
-            deaths = (*slot.deaths, death)[-LAST_DEATHS:]
-            self._slots[index] = replace(slot, deaths=deaths)
+            place.code = code
+            if now_s - place.started_s > _LONGEST_PAUSE_S:
+                place.pause_s = _BETWEEN_STARTS_S
+            place.due_s = now_s + place.pause_s
+            place.pause_s = min(2.0 * place.pause_s, _LONGEST_PAUSE_S)
+            return " outside a job, for the reason that it wrote above"
+        cause = crash_cause(code)
+        if task is None or not cause:
+            return ""
+        deaths = (*slot.deaths, Death(task, cause))[-LAST_DEATHS:]
+        place.slot = replace(slot, deaths=deaths)
+        return f": {task.agent} died of job {task.number} of {task.run}: {cause}"
 
-    def _start(self, index: int) -> SpawnProcess:
+    def _start(self, slot: ProcessSlot) -> SpawnProcess:
         process = self._context.Process(
-            target=self._body, args=(*self._arguments, self._slots[index])
+            target=self._body, args=(*self._arguments, slot)
         )
         # A Ctrl-C of the terminal reaches all; only this process may act on it. The
         # tracker first: starting it unblocks SIGINT.
-        with safe_import_path():
-            resource_tracker.ensure_running()
+        resource_tracker.ensure_running()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            with safe_import_path():
-                process.start()
+            process.start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return process
 
     def wait(self, timeout_s: float) -> None:
         """Wait until a process ends or time is up [s]."""
-        alive = [p.sentinel for p in self._processes if p and p.is_alive()]
+        alive = [p.sentinel for p in self._processes if p.is_alive()]
         if alive:
             connection.wait(alive, timeout_s)
         else:
@@ -229,14 +249,13 @@ class ProcessPool:
         if self._until_s is None:
             self._until_s = time.monotonic() + GRACE_S
         for process in self._processes:
-            if process:
-                process.terminate()
+            process.terminate()
 
     def end(self) -> None:
         """Terminate all processes; kill those that remain after the grace time."""
         self.terminate()
         assert self._until_s is not None
-        there = [process for process in self._processes if process]
+        there = self._processes
         try:
             for process in there:
                 process.join(max(0.0, self._until_s - time.monotonic()))

@@ -55,7 +55,7 @@ def test_search_of_another_library_improves_fitness(
 def test_own_loop_survives_a_killed_worker(tmp_path: Path) -> None:
     done = _run(TOP / "docs" / "examples" / "own_loop.py", tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "a worker process ended and is restarted" in done.stderr
+    assert "a worker process ended; it is restarted" in done.stderr
     steps = re.findall(
         r"step (\d): (\d+) results, best fitness (\S+)$", done.stdout, re.MULTILINE
     )

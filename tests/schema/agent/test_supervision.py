@@ -13,7 +13,6 @@ import pytest
 
 from schema.agent.supervision import (
     CurrentJob,
-    Death,
     JobWatch,
     ProcessSlot,
     Task,
@@ -115,12 +114,15 @@ def _kill(signal_number: int) -> bytes:
     return b""
 
 
-def until(process_pool: ProcessPool, is_enough: Callable[[], bool]) -> None:
+def until(process_pool: ProcessPool, is_enough: Callable[[], bool]) -> list[str]:
+    """Look after a pool until a condition holds; return its lines."""
     end_s = time.monotonic() + PATIENCE_S
+    lines: list[str] = []
     while not is_enough():
         assert time.monotonic() < end_s
-        process_pool.look_after()
+        lines += process_pool.look_after()
         process_pool.wait(0.1)
+    return lines
 
 
 @pytest.mark.slow
@@ -128,18 +130,24 @@ def until(process_pool: ProcessPool, is_enough: Callable[[], bool]) -> None:
 def test_successor_is_told_which_jobs_crashed_its_slot(tmp_path: Path) -> None:
     log = tmp_path / "log"
     with ProcessPool(die, (signal.SIGSEGV, str(log)), size=1) as process_pool:
-        until(process_pool, lambda: process_pool.exit_codes == [0])
-        assert process_pool.deaths == [Death(TASK, "SIGSEGV")] * 2
-        assert process_pool.restarts == 2
+        told = until(process_pool, lambda: process_pool.exit_codes == [0])
+    assert "SIGSEGV; it is restarted" in told[0]
+    assert [f"died of job {TASK.number}" in line for line in told] == [
+        True,
+        True,
+        False,
+    ]
     lines = log.read_text().splitlines()
     assert lines == ["[]", "['SIGSEGV']", "['SIGSEGV', 'SIGSEGV']"]
 
 
 def leave(how: str, slot: ProcessSlot) -> None:
-    """End between two jobs."""
+    """End between two jobs, or wait to be killed."""
     assert slot.note is not None
     if how == "by an error":
         raise RuntimeError("the network's, not a job's")
+    if how == "killed":
+        time.sleep(PATIENCE_S)
 
 
 @pytest.mark.slow
@@ -149,14 +157,23 @@ def test_process_that_exits_by_itself_is_restarted_later_each_time(
 ) -> None:
     """Restarts after 1 s, then 2 s: the cause may recur."""
     began_s = time.monotonic()
-    with ProcessPool(leave, (how,), size=1) as process_pool:
-        until(process_pool, lambda: process_pool.exit_codes == [code])
-        assert process_pool.restarts == 0
-        assert process_pool.exits == 1
-        until(process_pool, lambda: process_pool.restarts == 2)
-        assert process_pool.exit_codes == []
+    with ProcessPool(leave, (how,), size=1, role="analyzer") as process_pool:
+        for _ in range(2):
+            (line,) = until(process_pool, lambda: process_pool.exit_codes == [code])
+            assert line.startswith("an analyzer process ended outside a job, ")
+            assert until(process_pool, lambda: process_pool.exit_codes == []) == []
         assert time.monotonic() - began_s > 3.0
-    assert process_pool.deaths == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_the_user_is_told_once_of_a_process_that_was_killed() -> None:
+    with ProcessPool(leave, ("killed",), size=1) as process_pool:
+        (pid,) = process_pool.pids
+        os.kill(pid, signal.SIGKILL)
+        told = until(process_pool, lambda: process_pool.pids not in ([], [pid]))
+        assert told == ["a worker process ended; it is restarted"]
+        assert process_pool.look_after() == []
 
 
 class Clocks:

@@ -5,50 +5,60 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from multiprocessing import spawn
 from pathlib import Path
 
 import pytest
 
-from schema.agent.import_path import safe_import_path
 from schema.agent.supervisor import stop_on_signals
 
-_ASK = "import os; print(os.sched_getscheduler(0) == os.SCHED_{policy})"
-_START = (
-    "import subprocess, sys\n"
-    "from schema.agent.supervisor import prepare_process\n"
-    "{before}\n"
-    "prepare_process()\n"
-    "{ask}\n"
-    "subprocess.run([sys.executable, '-c', {ask!r}], check=True)\n"
-)
+_ASK = "import os; print(os.sched_getscheduler(0) == os.SCHED_{})"
+_CHILD = "import subprocess; subprocess.run([sys.executable, '-c', {!r}], check=True)"
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="other systems have no such policies"
 )
 
 
-def _said(policy: str, before: str = "") -> list[str]:
-    """Return whether a process and its child have a policy, in their words."""
-    text = _START.format(before=before, ask=_ASK.format(policy=policy))
+def said(after: str, before: str = "", **environment: str | None) -> list[str]:
+    """Return the words that a process writes after ``prepare_process``.
+
+    Args:
+        after: program of the process.
+        before: program before that.
+        environment: variables that it has, or has not if they are None.
+    """
+    preparation = (
+        "from schema.agent.supervisor import prepare_process\nprepare_process()"
+    )
+    variables = {**os.environ, **environment}
     done = subprocess.run(
-        [sys.executable, "-c", text], check=True, capture_output=True, text=True
+        [sys.executable, "-c", f"import sys\n{before}\n{preparation}\n{after}\n"],
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={name: value for name, value in variables.items() if value is not None},
     )
     return done.stdout.split()
 
 
-def test_processes_use_the_batch_policy() -> None:
-    assert _said("BATCH") == ["True", "True"]
-
-
-def test_policy_set_by_the_user_is_kept() -> None:
-    idle = "import os; os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))"
-    assert _said("IDLE", idle) == ["True", "True"]
-
-
-_IN_CHILD = (
-    "import subprocess, sys\nsubprocess.run([sys.executable, '-c', {!r}], check=True)"
+@pytest.mark.parametrize(
+    ("policy", "before"),
+    [
+        ("BATCH", ""),
+        # Set by the user, and kept.
+        (
+            "IDLE",
+            "import os; os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))",
+        ),
+    ],
 )
+def test_a_process_and_its_child_have_the_batch_policy_or_that_of_the_user(
+    policy: str, before: str
+) -> None:
+    ask = _ASK.format(policy)
+    assert said(f"{ask}\n{_CHILD.format(ask)}", before) == ["True", "True"]
+
+
 _FORGET = """
 import ctypes, os
 libc = ctypes.CDLL(None)
@@ -73,22 +83,17 @@ print((resident() - before) >> 20)
 """
 
 
-@pytest.mark.parametrize("ask", ["exec({!r})", _IN_CHILD])
+@pytest.mark.parametrize("ask", ["exec({!r})", _CHILD])
 def test_a_process_and_its_child_return_unused_memory(ask: str) -> None:
     """Memory is returned: 50 MiB of models are freed, small objects in between stay.
 
     Measured with and without the setting: where a C library returns the memory in both
     cases, the setting has no effect to test.
     """
-    start = (
-        "from schema.agent.supervisor import prepare_process\n"
-        "prepare_process()\n" + ask.format(_FORGET)
-    )
-    bare = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_")}
-    alone_mib, helped_mib = (
-        int(subprocess.check_output([sys.executable, "-c", text], env=bare))
-        for text in (_FORGET, start)
-    )
+    bare = {name: None for name in os.environ if name.startswith("MALLOC_")}
+    left = {k: v for k, v in os.environ.items() if k not in bare}
+    alone_mib = int(subprocess.check_output([sys.executable, "-c", _FORGET], env=left))
+    (helped_mib,) = map(int, said(ask.format(_FORGET), **bare))
     assert helped_mib < 5
     if alone_mib < 5:
         pytest.skip("this C library returns freed memory without the setting")
@@ -96,38 +101,25 @@ def test_a_process_and_its_child_return_unused_memory(ask: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "expected"), [("", "system"), ("mimalloc", "mimalloc")]
+    ("before", "expected"), [(None, "system"), ("mimalloc", "mimalloc")]
 )
 def test_arrow_returns_unused_memory_unless_the_user_chose_its_allocator(
-    before: str, expected: str
+    before: str | None, expected: str
 ) -> None:
-    chosen = "ARROW_DEFAULT_MEMORY_POOL"
-    clean = {name: value for name, value in os.environ.items() if name != chosen}
-    text = (
-        "from schema.agent.supervisor import prepare_process\n"
-        "prepare_process()\n"
-        "import pyarrow as pa\n"
-        "print(pa.default_memory_pool().backend_name)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", text],
-        check=True,
-        capture_output=True,
-        text=True,
-        env=clean | ({chosen: before} if before else {}),
-    )
-    assert done.stdout.strip() == expected
+    ask = "import pyarrow as pa; print(pa.default_memory_pool().backend_name)"
+    assert said(ask, ARROW_DEFAULT_MEMORY_POOL=before) == [expected]
 
 
 _SHIELDED = """
 import pathlib, signal, sys
-from schema.agent.supervisor import ProcessPool
+from schema.agent.supervisor import ProcessPool, prepare_process
 
 def body(folder, slot):
     masked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
     pathlib.Path(folder, str(slot.index)).write_text(str(signal.SIGINT in masked))
 
 if __name__ == "__main__":
+    prepare_process()
     with ProcessPool(body, (sys.argv[1],), size=2) as pool:
         while len(pool.exit_codes) < 2:
             pool.wait(1.0)
@@ -178,49 +170,20 @@ def test_second_ctrl_c_at_once_does_not_count(
         signal.raise_signal(signal.SIGINT)
 
 
-def test_a_process_that_draws_nothing_needs_no_graphics() -> None:
+def test_a_process_that_draws_nothing_needs_no_graphics(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     """MuJoCo would refuse the value when it is imported."""
-    script = (
-        "from schema.agent.supervisor import prepare_process\n"
-        "prepare_process()\n"
-        "import mujoco, os\n"
-        "print(mujoco.MjModel.__name__, os.environ['MUJOCO_GL'])\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "MUJOCO_GL": "bogus"},
-    )
-    assert done.stdout == "MjModel disable\n", done.stderr
-    assert "MUJOCO_GL=bogus does not work: invalid value" in done.stderr
+    ask = "import mujoco, os; print(mujoco.MjModel.__name__, os.environ['MUJOCO_GL'])"
+    assert said(ask, MUJOCO_GL="bogus") == ["MjModel", "disable"]
+    assert "MUJOCO_GL=bogus does not work: invalid value" in capfd.readouterr().err
 
 
 def test_a_process_may_open_as_many_files_as_the_system_allows() -> None:
-    script = (
-        "import resource\n"
-        "files = resource.RLIMIT_NOFILE\n"
-        "_, most = resource.getrlimit(files)\n"
-        "resource.setrlimit(files, (64, most))\n"
-        "from schema.agent.supervisor import prepare_process\n"
-        "prepare_process()\n"
-        "print(resource.getrlimit(files) == (most, most))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout == "True\n"
-
-
-def test_a_child_whose_parent_dies_while_it_starts_is_silent() -> None:
-    """It finds the end of the pipe that was to say what it has to do."""
-    reader, writer = os.pipe()
-    with safe_import_path():
-        words = spawn.get_command_line(tracker_fd=reader, pipe_handle=reader)
-    os.close(writer)
-    with os.fdopen(reader):
-        files = [reader]
-        child = subprocess.run(words, pass_fds=files, capture_output=True, check=True)
-    assert (child.stdout, child.stderr) == (b"", b"")
-    assert "except" not in spawn.get_command_line(pipe_handle=0)[-2]
+    before = """
+import resource
+files = resource.RLIMIT_NOFILE
+_, most = resource.getrlimit(files)
+resource.setrlimit(files, (64, most))
+"""
+    assert said("print(resource.getrlimit(files) == (most, most))", before) == ["True"]
