@@ -23,9 +23,42 @@ from schema.agent.supervision import crash_cause
 from schema.errors import RevolveError
 from schema.plugins.source import forget_digests, plugins_of
 
-_GRACE_S = 5.0
+_GRACE_S = 6.0
+"""Longer than a command waits for the processes that it has started [s]."""
 _OUTCOMES = msgspec.msgpack.Decoder(Outcome)
 _PROBLEMS = msgspec.msgpack.Decoder(Problem)
+
+
+def start(
+    module: str, *words: str, is_quiet: bool = False, files: Sequence[int] = ()
+) -> "subprocess.Popen[bytes]":
+    """Start a module of ours in a process that ends when its input is closed.
+
+    Args:
+        module: name of the module.
+        words: of its command line.
+        is_quiet: drop its standard output.
+        files: descriptors that it inherits.
+    """
+    return subprocess.Popen(
+        [*python_command(module), *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL if is_quiet else None,
+        pass_fds=files,
+        env=environment(),
+        start_new_session=True,
+    )
+
+
+def end(process: "subprocess.Popen[bytes]") -> None:
+    """Close a process's input, so that it ends; kill its session after a grace time."""
+    assert process.stdin is not None
+    process.stdin.close()
+    try:
+        process.wait(_GRACE_S)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 class Child:
@@ -40,25 +73,15 @@ class Child:
         """
         self.connection, theirs = Pipe()
         with theirs:
-            self.process = subprocess.Popen(
-                [*python_command("revolve.child"), str(theirs.fileno()), *words],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL if is_quiet else None,
-                pass_fds=[theirs.fileno()],
-                env=environment(),
-                start_new_session=True,
+            file = theirs.fileno()
+            self.process = start(
+                "revolve.child", str(file), *words, is_quiet=is_quiet, files=[file]
             )
 
     def end(self) -> None:
-        """Close the process's input, so that it ends; kill it after a grace time."""
-        assert self.process.stdin is not None
-        self.process.stdin.close()
+        """Let the process end; kill it after a grace time."""
         self.connection.close()
-        try:
-            self.process.wait(_GRACE_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
+        end(self.process)
 
 
 def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:

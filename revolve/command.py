@@ -38,7 +38,6 @@ def main(
     if problem:
         print(f"revolve: {problem}", file=sys.stderr)
         return 2
-    _ensure_buffer()
     stopping = None
     if arguments is None:
         _accept_all_text()
@@ -164,19 +163,6 @@ def _is_interrupted(error: BaseException | None) -> bool:
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
-
-
-def _ensure_buffer() -> None:
-    """Give standard output a buffer, so that a failed write can be repeated."""
-    if isinstance(getattr(sys.stdout, "buffer", None), io.RawIOBase):
-        sys.stdout = open(  # noqa: SIM115 - open until the process ends
-            sys.stdout.fileno(),
-            "w",
-            buffering=1,
-            encoding=sys.stdout.encoding,
-            errors=sys.stdout.errors,
-            closefd=False,
-        )
 
 
 def _accept_all_text() -> None:

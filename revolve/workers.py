@@ -1,14 +1,8 @@
 """Worker processes of a fleet on this machine: the command ``revolve worker``."""
 
-import os
-import signal
-import subprocess
 from collections.abc import Sequence
 
-from schema.agent.import_path import environment, python_command
-
-_GRACE_S = 6.0
-"""Longer than the command itself waits for its processes."""
+from revolve.children import end, start
 
 
 class Workers:
@@ -31,16 +25,8 @@ class Workers:
         """
         self.plugins = tuple(plugins)
         words = [word for entry in plugins for word in ("--plugins", entry)]
-        self._process = subprocess.Popen(
-            [
-                *(*python_command("revolve"), "worker", "--connect", address),
-                *("--processes", str(count), "--until-closed"),
-                *words,
-            ],
-            stdin=subprocess.PIPE,
-            env=environment(),
-            start_new_session=True,
-        )
+        given = ["--connect", address, "--processes", str(count), "--until-closed"]
+        self._process = start("revolve", "worker", *given, *words)
 
     @property
     def exit_code(self) -> int | None:
@@ -54,9 +40,4 @@ class Workers:
 
     def end(self) -> None:
         """Wait for its end; kill it and its processes after a grace time."""
-        self.close()
-        try:
-            self._process.wait(_GRACE_S)
-        except subprocess.TimeoutExpired:
-            os.killpg(self._process.pid, signal.SIGKILL)
-            self._process.wait()
+        end(self._process)

@@ -4,7 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
-from schema.agent.command import add_connect, add_network_flags
+from schema.agent.command import NETWORK, add_shared
 from schema.agent.flags import Flags, add_plugins, number
 from schema.robot.ids import BirthId
 
@@ -36,7 +36,7 @@ def parser(_command: str = "view") -> Flags:
         metavar="RUN",
         help="run folder, to be replayed (default: the live run at the hub)",
     )
-    add_connect(flags)
+    add_shared(flags, "--connect")
     flags.add_argument(
         "--save", type=Path, metavar="FILE",
         help="write a recording (.rrd), or a film of an arena (.gif, without a "
@@ -68,7 +68,7 @@ def parser(_command: str = "view") -> Flags:
     flags.add_argument(
         "--until", type=number, metavar="S", help="replay poses up to this time [s]"
     )
-    add_network_flags(flags)
+    add_shared(flags, *NETWORK)
     add_plugins(flags)
     return flags
 

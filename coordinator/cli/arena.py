@@ -6,7 +6,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from coordinator.cli.status import ask, ask_status
-from schema.agent.command import add_connect, add_network_flags
+from schema.agent.command import NETWORK, add_shared
 from schema.agent.flags import Flags, add_count, birth_name, number
 from schema.agent.log import tell_user
 from schema.errors import NetworkError
@@ -177,12 +177,12 @@ def parser(_command: str = "arena") -> Flags:
                 "--place", type=number, nargs=2, metavar=("X", "Y"),
                 help="position [m] (default: drawn as for a birth)",
             )  # fmt: skip
-        add_connect(action)
+        add_shared(action, "--connect")
         action.add_argument(
             "--run", default="", metavar="NAME",
             help="run whose folder is named NAME, else whose folder name ends with "
             "NAME (default: the only run)",
         )  # fmt: skip
         add_count(action, "--island", 0, "island number", least=0)
-        add_network_flags(action)
+        add_shared(action, *NETWORK)
     return flags

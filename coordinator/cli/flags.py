@@ -1,20 +1,11 @@
 """Command line flags of the coordinator's commands."""
 
 import argparse
-import math
 import re
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS, HUB
-from schema.agent.command import (
-    add_access,
-    add_give_up,
-    add_job_limits,
-    add_log,
-    add_network_flags,
-    add_oversubscribe,
-    tls_files,
-)
+from schema.agent.command import LIMITS, NETWORK, add_shared, tls_files
 from schema.agent.flags import (
     Flags,
     add_count,
@@ -23,8 +14,6 @@ from schema.agent.flags import (
     positive_number,
     share,
 )
-from schema.agent.network import DEFAULT_FLEET
-from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S
 from schema.experiment.file import shipped_experiments
 
 _COMMANDS = {
@@ -63,6 +52,13 @@ _COMMANDS = {
 """Description and examples of each command."""
 
 
+_KEPT = (
+    *("--workers", "--listen", "--connect", "--fleet", "--access"),
+    *("--tls-ca", "--tls-certificate", "--tls-key", "--speed", "--threads"),
+    *("--cpu-limit", "--wait-limit", "--give-up-after", "--audit", "--on-quarantine"),
+    *("--in-process", "--allow-drift", "--fsync", "--oversubscribe"),
+)
+"""Flags of agents, limits and checks, in the order in which they are advised."""
 _ADDRESS = re.compile(r"(?:(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):)?([0-9]{1,5})")
 _LAST_PORT = 65535
 _LOOPBACK = "127.0.0.1"
@@ -97,40 +93,25 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
     Args:
         options: of ``run``, ``coordinator`` or ``resume``.
     """
-    given: dict[str, object] = {
-        "--workers": options.workers,
-        "--listen": options.listen,
-        "--connect": options.connect,
-        "--fleet": None if options.fleet == DEFAULT_FLEET else options.fleet,
-        "--access": options.access,
-        **({} if options.in_process else tls_files(options)),
-        "--speed": None if options.speed is None else f"{options.speed:g}",
-        "--threads": options.threads,
-        "--cpu-limit": _changed(options.cpu_limit, CPU_LIMIT_S),
-        "--wait-limit": _changed(options.wait_limit, WAIT_LIMIT_S),
-        "--give-up-after": _changed(options.give_up_after, math.inf),
-        "--audit": _changed(options.audit, 0.0),
-        "--on-quarantine": "pause" if options.on_quarantine == "pause" else None,
-    }
-    switches = {
-        "--in-process": options.in_process,
-        "--allow-drift": options.allow_drift,
-        "--fsync": options.fsync,
-    }
+    named = vars(options).items()
+    values: dict[str, object] = {f"--{k.replace('_', '-')}": v for k, v in named}
+    if not options.in_process:
+        values |= tls_files(options)
     if options.command == "coordinator":
         # It starts no workers and has no flags for them.
-        given["--threads"] = None
+        values["--threads"] = None
         if not options.connect:
-            given["--listen"] = options.listen or HUB
-    else:
-        switches["--oversubscribe"] = options.oversubscribe
-    words = [
-        str(word)
-        for flag, value in given.items()
-        if value is not None
-        for word in (flag, value)
-    ]
-    return [*words, *(flag for flag, is_on in switches.items() if is_on)]
+            values["--listen"] = options.listen or HUB
+    resume = parser("resume")
+    words: list[str] = []
+    for flag in _KEPT:
+        value = values.get(flag)
+        if value is True:
+            words.append(flag)
+        elif value not in (None, resume.get_default(flag[2:].replace("-", "_"))):
+            is_real = isinstance(value, float)
+            words += [flag, f"{value:.12g}" if is_real else str(value)]
+    return words
 
 
 def _host_and_port(text: str) -> tuple[str, int]:
@@ -141,11 +122,6 @@ def _host_and_port(text: str) -> tuple[str, int]:
             f"must be PORT or HOST:PORT, got {text[:200]!r}"
         )
     return match[1] or _LOOPBACK, int(match[2])
-
-
-def _changed(value: float, default: float) -> str | None:
-    """Return the text of a number; None if it is the default."""
-    return None if value == default else f"{value:.12g}"
 
 
 def _add_experiments(flags: argparse.ArgumentParser) -> None:
@@ -189,7 +165,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             "with --connect)",
             least=0,
         )
-        add_oversubscribe(flags)
+        add_shared(flags, "--oversubscribe")
         add_count(
             flags,
             "--threads",
@@ -214,8 +190,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         help=f"address of the hub, {FORMS}, or the folder of an active run; the "
         "workers of that hub are shared (default: start a hub)",
     )
-    add_access(flags)
-    add_network_flags(flags)
+    add_shared(flags, "--access", *NETWORK)
     flags.add_argument(
         "--speed",
         type=positive_number,
@@ -226,9 +201,9 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     flags.add_argument(
         "--view", action="store_true", help="open a viewer, as revolve view does"
     )
-    add_job_limits(flags)
+    add_shared(flags, *LIMITS)
     add_plugins(flags)
-    add_give_up(flags)
+    add_shared(flags, "--give-up-after")
     flags.add_argument(
         "--audit",
         type=share,
@@ -252,7 +227,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "the results",
     )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
-    add_log(flags)
+    add_shared(flags, "--log-json")
     flags.add_argument(
         "--metrics",
         type=_host_and_port,

@@ -6,10 +6,9 @@ Coordinators connect to it like workers, and may come and go.
 from coordinator.network.hub_service import serve_hub
 from schema.agent.address import FORMS, HUB, parse_address
 from schema.agent.command import (
+    NETWORK,
     access_of,
-    add_access,
-    add_log,
-    add_network_flags,
+    add_shared,
     listen_of,
     tls_of,
 )
@@ -61,9 +60,7 @@ def parser(_command: str = "hub") -> Flags:
         help=f"address to listen on, {FORMS}; may be repeated (default: this user's "
         "hub)",
     )
-    add_access(flags)
-    add_network_flags(flags)
-    add_log(flags)
+    add_shared(flags, "--access", *NETWORK, "--log-json")
     flags.add_argument(
         "--print-config",
         action="store_true",

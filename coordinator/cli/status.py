@@ -27,7 +27,7 @@ from coordinator.storage.folder_status import status_below
 from coordinator.storage.hints import command, resume_command
 from coordinator.storage.lock import read_holder
 from schema.agent.address import read_address
-from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
+from schema.agent.command import NETWORK, add_shared, connect_of, tls_of
 from schema.agent.flags import Flags
 from schema.agent.log import tell_user
 from schema.errors import NetworkError, counted
@@ -246,6 +246,5 @@ def parser(_command: str = "status") -> Flags:
     flags.add_argument(
         "--json", action="store_true", help="print JSON, one document for programs"
     )
-    add_connect(flags)
-    add_network_flags(flags)
+    add_shared(flags, "--connect", *NETWORK)
     return flags

@@ -15,10 +15,9 @@ from coordinator.doctor import machine, system
 from coordinator.doctor.finding import Finding
 from schema.agent.address import CONNECT_VARIABLE, can_lock, runtime_directory
 from schema.agent.command import (
+    NETWORK,
     access_of,
-    add_access,
-    add_connect,
-    add_network_flags,
+    add_shared,
     connect_of,
     host_name,
     tls_of,
@@ -128,7 +127,5 @@ def parser(_command: str = "doctor") -> Flags:
             "revolve doctor --connect tls/hub.example:7447",
         ),
     )
-    add_connect(flags)
-    add_access(flags)
-    add_network_flags(flags)
+    add_shared(flags, "--connect", "--access", *NETWORK)
     return flags

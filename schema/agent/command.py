@@ -12,6 +12,7 @@ import re
 import socket
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from schema.agent.access import Certificate, read_certificates
 from schema.agent.address import (
@@ -52,16 +53,6 @@ def _variable(flag: str) -> str:
     return f"REVOLVE{flag[1:].replace('-', '_').upper()}"
 
 
-def add_connect(flags: argparse.ArgumentParser) -> None:
-    """Add ``--connect`` to a command that always needs a hub; see ``connect_of``."""
-    flags.add_argument(
-        "--connect",
-        metavar="ADDRESS",
-        help=f"address of the hub, {FORMS}, or the folder of an active run (default: "
-        f"${CONNECT_VARIABLE}, else this user's hub on this machine)",
-    )
-
-
 def connect_of(options: argparse.Namespace) -> str:
     """Return the address of the hub that ``--connect`` or its default means.
 
@@ -90,40 +81,67 @@ def listen_of(places: Iterable[str], tls: Tls | None) -> tuple[str, ...]:
     return addresses
 
 
-def add_network_flags(flags: argparse.ArgumentParser) -> None:
-    """Add the flags for the fleet and its certificates."""
-    flags.add_argument(
-        "--fleet",
-        default=DEFAULT_FLEET,
-        metavar="NAME",
-        help=f"name of the fleet (default: {DEFAULT_FLEET})",
-    )
-    for flag, what in _TLS_FILES.items():
-        flags.add_argument(
-            flag, metavar="FILE", help=f"{what} (default: ${_variable(flag)})"
-        )
-
-
-def add_log(flags: argparse.ArgumentParser) -> None:
-    """Add the flag for the form of log lines, for ``start_log``."""
-    flags.add_argument(
-        "--log-json",
-        action="store_true",
-        help="write each log line as a JSON object (default: the form in "
+SHARED: dict[str, dict[str, Any]] = {
+    "--connect": {
+        "metavar": "ADDRESS",
+        "help": f"address of the hub, {FORMS}, or the folder of an active run "
+        f"(default: ${CONNECT_VARIABLE}, else this user's hub on this machine)",
+    },
+    "--fleet": {
+        "default": DEFAULT_FLEET,
+        "metavar": "NAME",
+        "help": f"name of the fleet (default: {DEFAULT_FLEET})",
+    },
+    **{
+        flag: {"metavar": "FILE", "help": f"{what} (default: ${_variable(flag)})"}
+        for flag, what in _TLS_FILES.items()
+    },
+    "--log-json": {
+        "action": "store_true",
+        "help": "write each log line as a JSON object (default: the form in "
         f"${LOG_VARIABLE}; without it plain text, with time and level unless standard "
         "error is a terminal)",
-    )
-
-
-def add_access(flags: argparse.ArgumentParser) -> None:
-    """Add the flag for the rights of certificates at a hub."""
-    flags.add_argument(
-        "--access",
-        metavar="FILE",
-        help="file that lists the certificates that may connect and their roles: "
+    },
+    "--access": {
+        "metavar": "FILE",
+        "help": "file that lists the certificates that may connect and their roles: "
         "access.json of a 'revolve cluster' kit (default: any certificate of the "
         "authority may do anything)",
-    )
+    },
+    "--cpu-limit": {
+        "type": positive_number,
+        "default": CPU_LIMIT_S,
+        "metavar": "S",
+        "help": f"CPU time limit of a job in seconds (default: {CPU_LIMIT_S:.0f})",
+    },
+    "--wait-limit": {
+        "type": positive_number,
+        "default": WAIT_LIMIT_S,
+        "metavar": "S",
+        "help": "time in seconds that a job may wait without using CPU time (default: "
+        f"{WAIT_LIMIT_S:.0f})",
+    },
+    "--give-up-after": {
+        "type": positive_number,
+        "default": math.inf,
+        "metavar": "S",
+        "help": "stop with exit code 1 when no hub has answered for S seconds "
+        "(default: retry for ever)",
+    },
+    "--oversubscribe": {
+        "action": "store_true",
+        "help": f"allow more than {MOST_PER_CORE} processes per core",
+    },
+}
+"""Flags that several commands have, as argparse takes them."""
+NETWORK = ("--fleet", *_TLS_FILES)
+LIMITS = ("--cpu-limit", "--wait-limit")
+
+
+def add_shared(flags: argparse.ArgumentParser, *names: str) -> None:
+    """Add flags of ``SHARED``."""
+    for name in names:
+        flags.add_argument(name, **SHARED[name])
 
 
 def access_of(options: argparse.Namespace) -> tuple[Certificate, ...] | None:
@@ -133,46 +151,6 @@ def access_of(options: argparse.Namespace) -> tuple[Certificate, ...] | None:
         NetworkError: the file cannot be read or is invalid.
     """
     return tuple(read_certificates(Path(options.access))) if options.access else None
-
-
-def add_job_limits(flags: argparse.ArgumentParser) -> None:
-    """Add the flags for the time limits of a job."""
-    flags.add_argument(
-        "--cpu-limit",
-        type=positive_number,
-        default=CPU_LIMIT_S,
-        metavar="S",
-        help=f"CPU time limit of a job in seconds (default: {CPU_LIMIT_S:.0f})",
-    )
-    flags.add_argument(
-        "--wait-limit",
-        type=positive_number,
-        default=WAIT_LIMIT_S,
-        metavar="S",
-        help="time in seconds that a job may wait without using CPU time (default: "
-        f"{WAIT_LIMIT_S:.0f})",
-    )
-
-
-def add_give_up(flags: argparse.ArgumentParser) -> None:
-    """Add the flag for the time without a hub after which a command ends."""
-    flags.add_argument(
-        "--give-up-after",
-        type=positive_number,
-        default=math.inf,
-        metavar="S",
-        help="stop with exit code 1 when no hub has answered for S seconds (default: "
-        "retry for ever)",
-    )
-
-
-def add_oversubscribe(flags: argparse.ArgumentParser) -> None:
-    """Add the flag that allows more processes than ``check_load`` does."""
-    flags.add_argument(
-        "--oversubscribe",
-        action="store_true",
-        help=f"allow more than {MOST_PER_CORE} processes per core",
-    )
 
 
 def check_load(
@@ -331,7 +309,7 @@ def parser(role: Role, processes: int) -> Flags:
             f"revolve {role} --connect runs/scenario1-seed1",
         ),
     )
-    add_connect(flags)
+    add_shared(flags, "--connect")
     flags.add_argument(
         "--processes",
         type=whole_number(),
@@ -350,11 +328,9 @@ def parser(role: Role, processes: int) -> Flags:
         action="store_true",
         help="also stop when standard input is closed",
     )
-    add_job_limits(flags)
-    add_log(flags)
+    add_shared(flags, *LIMITS, "--log-json")
     add_plugins(flags)
-    add_give_up(flags)
-    add_oversubscribe(flags)
+    add_shared(flags, "--give-up-after", "--oversubscribe")
     flags.set_defaults(threads=1)
     if role == "worker":
         flags.add_argument(
@@ -364,5 +340,5 @@ def parser(role: Role, processes: int) -> Flags:
             help="number of threads that advance one arena together, in each process "
             "(default: 1)",
         )
-    add_network_flags(flags)
+    add_shared(flags, *NETWORK)
     return flags

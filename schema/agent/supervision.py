@@ -16,6 +16,8 @@ from ctypes import Array, c_char
 from dataclasses import dataclass
 from multiprocessing import get_context, heap
 
+import msgspec
+
 CPU_LIMIT_S = 3600.0
 """CPU time limit of one job [s]: far above that of any job that ends."""
 WAIT_LIMIT_S = 600.0
@@ -30,8 +32,8 @@ _LEAST_SHARE = 0.002
 _LONGEST_TIMER_S = 1e9
 """Thirty years: a timer takes no time that its system cannot represent."""
 
-_SIZE = 2048
-_HEAD = struct.Struct("<HHQQ8s")
+_SIZE = 8192
+_LENGTH = struct.Struct("<H")
 _OUT_OF_TIME = signal.SIGPROF
 _WAITED = signal.SIGVTALRM
 # Signals that a process causes itself.
@@ -47,8 +49,7 @@ _OWN_DOING = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
+class Task(msgspec.Struct, frozen=True):
     """A process and its current job.
 
     Attributes:
@@ -87,34 +88,22 @@ class CurrentJob:
         return memoryview(self._memory).cast("B")
 
     def begin(self, task: Task) -> None:
-        """Note a job before it starts."""
-        name = task.agent.encode()[:255]
-        run = task.run.encode()[: _SIZE - _HEAD.size - len(name)]
-        end = _HEAD.size + len(name) + len(run)
-        # The lengths come last: half a note does not count.
-        view = self._view
-        view[_HEAD.size : end] = name + run
-        numbers = (len(name), len(run), task.epoch, task.number)
-        _HEAD.pack_into(view, 0, *numbers, task.request)
+        """Note a job before it starts; names longer than those of ours are cut."""
+        cut = msgspec.structs.replace(task, agent=task.agent[:255], run=task.run[:1000])
+        data = msgspec.msgpack.encode(cut)
+        # The length comes last: half a note does not count.
+        self._view[_LENGTH.size :][: len(data)] = data
+        _LENGTH.pack_into(self._view, 0, len(data))
 
     def end(self) -> None:
         """Note that the job is done."""
-        self._view[:2] = b"\0\0"
+        _LENGTH.pack_into(self._view, 0, 0)
 
     def read(self) -> Task | None:
         """Return the job that was started and has not ended, if there is one."""
-        view = self._view
-        name, run, epoch, number, request = _HEAD.unpack_from(view)
-        if not name:
-            return None
-        text = bytes(view[_HEAD.size : _HEAD.size + name + run])
-        return Task(
-            text[:name].decode(errors="replace"),
-            text[name:].decode(errors="replace"),
-            epoch,
-            number,
-            request,
-        )
+        (length,) = _LENGTH.unpack_from(self._view)
+        data = self._view[_LENGTH.size :][:length]
+        return msgspec.msgpack.decode(data, type=Task) if length else None
 
 
 def crash_cause(exit_code: int) -> str:

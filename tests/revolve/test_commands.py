@@ -115,7 +115,6 @@ def test_help_of_a_command_is_that_of_its_flag(
         (["help", "statsu"], "no command 'statsu'; did you mean 'status'?"),
         (["vew"], "no command 'vew'; did you mean 'view'?"),
         (["robot", "rander"], "no action 'rander'; did you mean 'render'?"),
-        (["bench", "dispath"], "no action 'dispath'; did you mean 'dispatch'?"),
     ],
 )
 def test_a_misspelt_command_is_named_with_the_nearest(

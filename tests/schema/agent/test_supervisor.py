@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -19,7 +19,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def said(after: str, before: str = "", **environment: str | None) -> list[str]:
+def said(
+    after: str, before: str = "", environment: Mapping[str, str | None] = {}
+) -> list[str]:
     """Return the words that a process writes after ``prepare_process``.
 
     Args:
@@ -90,10 +92,12 @@ def test_a_process_and_its_child_return_unused_memory(ask: str) -> None:
     Measured with and without the setting: where a C library returns the memory in both
     cases, the setting has no effect to test.
     """
-    bare = {name: None for name in os.environ if name.startswith("MALLOC_")}
+    bare: dict[str, str | None] = {
+        name: None for name in os.environ if name.startswith("MALLOC_")
+    }
     left = {k: v for k, v in os.environ.items() if k not in bare}
     alone_mib = int(subprocess.check_output([sys.executable, "-c", _FORGET], env=left))
-    (helped_mib,) = map(int, said(ask.format(_FORGET), **bare))
+    (helped_mib,) = map(int, said(ask.format(_FORGET), environment=bare))
     assert helped_mib < 5
     if alone_mib < 5:
         pytest.skip("this C library returns freed memory without the setting")
@@ -107,7 +111,7 @@ def test_arrow_returns_unused_memory_unless_the_user_chose_its_allocator(
     before: str | None, expected: str
 ) -> None:
     ask = "import pyarrow as pa; print(pa.default_memory_pool().backend_name)"
-    assert said(ask, ARROW_DEFAULT_MEMORY_POOL=before) == [expected]
+    assert said(ask, environment={"ARROW_DEFAULT_MEMORY_POOL": before}) == [expected]
 
 
 _SHIELDED = """
@@ -175,7 +179,7 @@ def test_a_process_that_draws_nothing_needs_no_graphics(
 ) -> None:
     """MuJoCo would refuse the value when it is imported."""
     ask = "import mujoco, os; print(mujoco.MjModel.__name__, os.environ['MUJOCO_GL'])"
-    assert said(ask, MUJOCO_GL="bogus") == ["MjModel", "disable"]
+    assert said(ask, environment={"MUJOCO_GL": "bogus"}) == ["MjModel", "disable"]
     assert "MUJOCO_GL=bogus does not work: invalid value" in capfd.readouterr().err
 
 
