@@ -38,13 +38,13 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode
 from schema.wire.messages import Evaluate, Request
+from tests import null_workers
 from tests.benchmarks.fleet_model import (
     LEAST_UTILISATION,
     FleetModel,
     Setting,
     most_workers,
 )
-from worker.serve import null
 
 Body = Callable[[Agent, ProcessSlot], None]
 """Function that a process of a pool runs."""
@@ -171,7 +171,7 @@ def measure(stream: Stream, seconds: float) -> Rate:
 
 def null_rate(seconds: float) -> Rate:
     """Measure null evaluations over the network."""
-    with real_fleet({"worker": (null.process, 1)}) as fleet:
+    with real_fleet({"worker": (null_workers.process, 1)}) as fleet:
         return measure(Stream(fleet, _IN_FLIGHT), seconds)
 
 
@@ -179,7 +179,10 @@ def birth_cost(births: int) -> Rate:
     """Measure whole births without physics, journal and tables included."""
     shipped = read_experiment("scenario1")
     experiment = msgspec.structs.replace(shipped, births=births)
-    bodies = {"worker": (null.process, 1), "analyzer": (analyzer.service.process, 1)}
+    bodies = {
+        "worker": (null_workers.process, 1),
+        "analyzer": (analyzer.service.process, 1),
+    }
     with (
         tempfile.TemporaryDirectory() as folder,
         real_fleet(bodies) as fleet,  # type: ignore[arg-type]
@@ -211,7 +214,7 @@ def main(seconds: float, workers: int, births: int) -> None:
         f"(required: {LEAST_NULL_PER_S}), coordinator {1e3 * rate.cpu_s:.3f} ms CPU "
         f"each (required: {1e3 * MOST_NULL_CPU_S:.1f})"
     )
-    with real_fleet({"worker": (null.timed_process, workers)}) as fleet:
+    with real_fleet({"worker": (null_workers.timed_process, workers)}) as fleet:
         slow = measure(Stream(fleet, 3 * workers), seconds)
     _say(
         f"evaluations of 40 ms, real network, {workers} workers: "

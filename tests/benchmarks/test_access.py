@@ -9,7 +9,7 @@ from statistics import mean, stdev
 import numpy as np
 import pytest
 
-import worker.serve.null
+import tests.null_workers
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from schema.agent.access import Certificate
@@ -82,7 +82,7 @@ def test_access_rules_and_tls_cost_little_throughput(tmp_path: Path) -> None:
                 "worker", "box", network.address, tls=box if name == "tls" else None
             )
             stack.enter_context(
-                ProcessPool(worker.serve.null.process, (agent,), size=1)
+                ProcessPool(tests.null_workers.process, (agent,), size=1)
             )
             fleets[name] = Turns(Fleet(network), 0)
         for turn in range(2 * PAIRS):

@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 import analyzer.service
-import worker.serve.null
+import tests.null_workers
 import worker.serve.service
 from coordinator.dispatch.events import Joined, Left
 from coordinator.dispatch.fleet import Fleet
@@ -212,7 +212,7 @@ def test_cpu_per_birth(tmp_path: Path, parts: float) -> None:
     experiment = replace(experiment, generation=generation)
     island = Island(experiment, 1, 0)
     found = measure_run(
-        tmp_path / "run", island, experiment, 1, worker.serve.null.process
+        tmp_path / "run", island, experiment, 1, tests.null_workers.process
     )
     print(
         f"\nwhole births without physics: {found.per_s:.0f}/s, "
@@ -232,7 +232,7 @@ def test_null_evaluations_per_second(tmp_path: Path) -> None:
     ]
     island = EvaluationIsland(experiment, robots)
     found = measure_run(
-        tmp_path / "run", island, experiment, 1, worker.serve.null.process
+        tmp_path / "run", island, experiment, 1, tests.null_workers.process
     )
     print(
         f"\nnull evaluations, journal and tables on: {found.per_s:.0f}/s, "

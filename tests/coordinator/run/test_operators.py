@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 import analyzer.report
-import worker.serve.null
+import tests.null_workers
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Commanded, Remove, ReplaceBrain
@@ -54,7 +54,7 @@ def planned(path: Path, *, is_finished: bool = False) -> Planned:
 @contextmanager
 def started(*runs: Planned) -> Iterator[RunScheduler]:
     """Start runs; a run starts when few requests of those before it are open."""
-    answers = {"analyzer": analyzer.report.answer, "worker": worker.serve.null.answer}
+    answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
     fleet = Fleet(LocalAgents(answers, "any"))  # type: ignore[arg-type]
     scheduler = RunScheduler(
         runs,

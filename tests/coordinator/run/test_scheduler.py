@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 import analyzer.report
-import worker.serve.null
+import tests.null_workers
 from coordinator.dispatch.events import DispatchEvent, Joined, Returned
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
@@ -34,7 +34,7 @@ CAMPAIGN = Campaign(EXPERIMENTS, 2, 3)
 
 
 def local() -> LocalAgents:
-    answers = {"analyzer": analyzer.report.answer, "worker": worker.serve.null.answer}
+    answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
     return LocalAgents(answers, "any")  # type: ignore[arg-type]
 
 
@@ -155,7 +155,7 @@ class Fencing(LocalAgents):
 
 
 def fencing() -> Fencing:
-    answers = {"analyzer": analyzer.report.answer, "worker": worker.serve.null.answer}
+    answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
     return Fencing(answers, "any")  # type: ignore[arg-type]
 
 
