@@ -1,7 +1,6 @@
-"""Checks that user errors are reported in one line with a nonzero exit code."""
+"""Errors of users and systems that need a process of its own, or a small disk."""
 
 import os
-import re
 import shutil
 import signal
 import socket
@@ -10,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-from revolve.command import main
 
 pytestmark = pytest.mark.system
 
@@ -24,68 +21,6 @@ def _refused(workspace: Workspace, *words: str) -> str:
     return output
 
 
-def _document(workspace: Workspace, text: str) -> str:
-    (workspace.folder / "mine.toml").write_text(text)
-    return "mine.toml"
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('name = "a"\nbirth = 3', "'births'"),
-        ('name = "a"\n[selection]\npopulaton = 3', "selection.populaton"),
-        ('name = "a"\nbirths = "many"', "births"),
-        ('name = "a"\n[space]\nmin_parts = 9\nmax_parts = 8', "space.min_parts"),
-        (
-            'name = "a"\n[space]\npart_types = ["schema.parts:CROE"]',
-            "schema.parts:CORE",
-        ),
-        ('name = "a"\n[fitness]\nfunction = "worker.fitness:thesiss"', "thesis"),
-        ("name = ", "not valid TOML"),
-    ],
-)
-def test_invalid_experiment_is_refused(
-    workspace: Workspace, text: str, message: str
-) -> None:
-    output = _refused(
-        workspace, "run", _document(workspace, text), "--out", "x", "--quiet"
-    )
-    assert "mine.toml" in output
-    assert message in output
-    assert not (workspace.folder / "x").exists()
-
-
-def test_restriction_that_no_robot_satisfies_ends_the_run_with_the_reason(
-    workspace: Workspace,
-) -> None:
-    text = 'name = "a"\n[space]\npart_types = ["schema.parts:CORE", '
-    text += '"schema.parts:ACTIVE_HINGE"]\nmin_parts = 29\nmax_parts = 30'
-    words = ("--out", "x", "--quiet", "--in-process", "--births", "15")
-    assert "space" in _refused(workspace, "run", _document(workspace, text), *words)
-
-
-def test_a_seed_above_64_bits_is_refused(workspace: Workspace) -> None:
-    words = ("scenario1", "--seed", str(2**64), "--out", "x", "--quiet")
-    limits = "--seed: must be a whole number in 0..18446744073709551615, got"
-    assert limits in _refused(workspace, "run", *words)
-
-
-@pytest.mark.parametrize(
-    "flag",
-    [
-        *("--access", "--connect", "--fleet", "--listen"),
-        *("--tls-ca", "--tls-certificate", "--tls-key"),
-    ],
-)
-def test_a_flag_of_the_network_is_refused_where_nothing_is_sent(
-    workspace: Workspace, flag: str
-) -> None:
-    words = ("scenario1", flag, "tcp/127.0.0.1:1", "--in-process", "--out", "x")
-    message = f"{flag} has no effect with --in-process"
-    assert message in _refused(workspace, "run", *words)
-    assert not (workspace.folder / "x").exists()
-
-
 def test_certificates_of_the_environment_are_not_those_of_a_run_in_one_process(
     workspace: Workspace,
 ) -> None:
@@ -95,106 +30,11 @@ def test_certificates_of_the_environment_are_not_those_of_a_run_in_one_process(
     assert process.wait(60) == 0
 
 
-def test_misspelt_names_are_reported_with_the_nearest_name(
-    workspace: Workspace,
-) -> None:
-    assert "'resume'" in _refused(workspace, "resum", "x")
-    assert "'scenario1'" in _refused(workspace, "run", "senario1")
-    output = _refused(workspace, "run", "thesys")
-    assert "; did you mean 'thesis'?" in output
-    assert re.search("scenario3, .*thesis, .*or give a path", output)
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("exp.yaml", "exp.yaml: the file of an experiment must end in .toml, got"),
-        ("gone.yaml", "got '.yaml', and there is no such file"),
-        ("gone.toml", "gone.toml: cannot be read: No such file"),
-        ("scenario1.toml", "; did you mean 'scenario1', which is shipped?"),
-        ("mine", "mine: no such experiment; did you mean 'mine.toml'?"),
-        ("sub", "sub: is a folder; an experiment is a .toml file or a shipped name"),
-    ],
-)
-def test_what_is_no_experiment_is_told_apart(
-    name: str,
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "sub").mkdir()
-    for file in ("exp.yaml", "mine.toml"):
-        (tmp_path / file).write_text('name = "a"')
-    assert main(["run", name, "--out", "x"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert message in said
-
-
-def test_a_viewer_needs_a_screen_before_the_run_starts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(variable, raising=False)
-    assert main(["run", "scenario1", "--view", "--out", "x"]) == 2
-    said = capsys.readouterr().err
-    assert "no screen here" in said
-    assert said.endswith("beside it: revolve view --connect x --serve\n")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_limit_of_speed_needs_an_arena(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "scenario1", "--speed", "2"]) == 2
-    message = "revolve: --speed: limits arenas, and there is none in scenario1\n"
-    assert capsys.readouterr().err.endswith(message)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("robot.yaml", "body: {type: Cor, id: c}\n", "Core"),
-        ("robot.yaml", "body: [\n", "robot.yaml"),
-        ("robot.pb", "\x01\x02\x03", "robot.pb"),
-    ],
-)
-def test_invalid_robot_file_is_refused(
-    workspace: Workspace, name: str, content: str, message: str
-) -> None:
-    (workspace.folder / name).write_text(content)
-    assert message in _refused(workspace, "robot", "check", name)
-
-
-def test_folder_with_other_files_is_refused_and_unchanged(workspace: Workspace) -> None:
-    (workspace.folder / "used").mkdir()
-    (workspace.folder / "used" / "thesis.pdf").write_text("mine")
-    assert "thesis.pdf" in _refused(workspace, "run", "scenario1", "--out", "used")
-    assert (workspace.folder / "used" / "thesis.pdf").read_text() == "mine"
-
-
-def test_folder_without_a_run_is_refused(workspace: Workspace) -> None:
-    assert "nowhere" in _refused(workspace, "resume", "nowhere")
-    assert "nowhere" in _refused(workspace, "compare", "nowhere", "nowhere")
-
-
 def test_port_in_use_is_refused(workspace: Workspace) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
         words = ("coordinator", "scenario1", "--out", "x", "--listen", address)
         assert "in use" in _refused(workspace, *words)
-
-
-def test_listening_on_the_network_needs_certificates(
-    workspace: Workspace,
-) -> None:
-    words = ("coordinator", "scenario1", "--out", "x", "--listen", "tcp/0.0.0.0:0")
-    assert "tls/" in _refused(workspace, *words)
 
 
 def test_worker_without_a_coordinator_reports_it_and_retries(
@@ -208,13 +48,6 @@ def test_worker_without_a_coordinator_reports_it_and_retries(
     assert worker.poll() is None
     worker.send_signal(signal.SIGINT)
     assert worker.wait(30) == 0
-
-
-def test_workers_of_a_run_in_one_process_are_refused(workspace: Workspace) -> None:
-    words = ("run", "scenario1", "--in-process", "--workers", "3")
-    output = workspace.run(*words, code=2)
-    line = "error: revolve: --workers: --in-process starts no other processes\n"
-    assert output.endswith(line)
 
 
 def _fill_the_disk(workspace: Workspace, *words: str, kilobytes: int) -> None:

@@ -1,6 +1,6 @@
 """Mistakes of a careless user: each one clear line, and an exit code that tells.
 
-All in this process; tests/system/test_bad_input.py has those that need another one.
+All in this process; tests/system/test_bad_input.py has what needs another one.
 """
 
 import os
@@ -17,168 +17,143 @@ from schema.tables.description import Description, description_text
 
 pytestmark = pytest.mark.system
 
-KEY = 'name = "a"\nbirth = 3\n'
-TYPE = 'name = "a"\nbirths = "many"\n'
-RANGE = 'name = "a"\n[variation]\nbody_epsilon = 1.5\n'
-
-# Command line, words of the only line, exit code.
-MISTAKES = {
-    "command misspelt": ("runn scenario1", "no command 'runn'; did you mean 'run'?", 2),
-    "help misspelt": ("help statsu", "no command 'statsu'; did you mean 'status'?", 2),
-    "flag misspelt": (
+TLS = ("--tls-ca", "--tls-certificate", "--tls-key")
+DOCUMENTS = {
+    "key": "birth = 3",
+    "type": 'births = "many"',
+    "range": "[variation]\nbody_epsilon = 1.5",
+    "section": "[selection]\npopulaton = 3",
+    "parts": "[space]\nmin_parts = 9\nmax_parts = 8",
+    "part": '[space]\npart_types = ["schema.parts:CROE"]',
+    "function": '[fitness]\nfunction = "worker.fitness:thesiss"',
+    "toml": "births = ",
+}
+"""Files of experiments, without their names."""
+FILES = {
+    "file": "mine",
+    "exp.yaml": 'name: "a"\n',
+    "mine.toml": 'name = "a"\n',
+    "cor.yaml": "body: {type: Cor, id: c}\n",
+    "open.yaml": "body: [\n",
+    "robot.pb": "\x01\x02\x03",
+    **{f"{name}.toml": f'name = "a"\n{text}\n' for name, text in DOCUMENTS.items()},
+}
+# Command line, and words of the only line.
+MISTAKES = [
+    ("runn scenario1", "no command 'runn'; did you mean 'run'?"),
+    ("help statsu", "no command 'statsu'; did you mean 'status'?"),
+    ("robot chek a.yaml", "did you mean 'check'?; allowed: "),
+    (
         "run scenario1 --birth 3",
         "revolve run: no flag '--birth'; did you mean '--births'?",
-        2,
     ),
-    "flag without value": ("run scenario1 --out", "--out: expected one argument", 2),
-    "negative number": (
-        "run scenario1 --births -5",
-        "--births: must be a whole number >= 1, got '-5'",
-        2,
-    ),
-    "fraction": (
+    ("run scenario1 --out", "--out: expected one argument"),
+    ("run scenario1 --births -5", "--births: must be a whole number >= 1, got '-5'"),
+    (
         "run scenario1 --workers 1.5",
         "--workers: must be a whole number >= 0, got '1.5'",
-        2,
     ),
-    "experiment misspelt": (
+    (
+        f"run scenario1 --seed {2**64}",
+        f"--seed: must be a whole number in 0..{2**64 - 1}",
+    ),
+    # Experiments
+    (
         "run senario1",
-        "senario1: no such experiment; did you mean 'scenario1'?; shipped are ",
-        2,
+        "senario1: no such experiment; did you mean 'scenario1'?; shipped",
     ),
-    "other file": (
+    ("run thesys", "; did you mean 'thesis'?"),
+    ("run mine", "mine: no such experiment; did you mean 'mine.toml'?"),
+    ("run scenario1.toml", "; did you mean 'scenario1', which is shipped?"),
+    (
         "run exp.yaml",
         "exp.yaml: the file of an experiment must end in .toml, got '.yaml'",
-        2,
     ),
-    "missing file": ("run gone.toml", "gone.toml: cannot be read: No such file", 2),
-    "wrong key": (
-        "run key.toml --out x",
-        "key.toml: birth: no such key; did you mean 'births'?; allowed: name, births",
-        2,
+    ("run gone.yaml", "got '.yaml', and there is no such file"),
+    ("run gone.toml", "gone.toml: cannot be read: No such file"),
+    (
+        "run other",
+        "other: is a folder; an experiment is a .toml file or a shipped name",
     ),
-    "wrong type": (
-        "run type.toml --out x",
-        "type.toml: births: must be a whole number, got 'many'",
-        2,
+    (
+        "run key.toml",
+        "key.toml: birth: no such key; did you mean 'births'?; allowed: name,",
     ),
-    "out of range": (
-        "run range.toml --out x",
-        "range.toml: variation.body_epsilon: must be a number <= 1.0, got 1.5",
-        2,
-    ),
-    "missing folder": ("resume nowhere", "nowhere: no such folder", 2),
-    "folder without run": (
-        "resume other",
-        "other: no run is there (run.json is missing)",
-        2,
-    ),
-    "file, not folder": ("status file", "file: must be a folder, got a file", 2),
-    "file as output": (
-        "run scenario1 --out file",
-        "file: must be a folder, got a file",
-        2,
-    ),
-    "folder of others": ("run scenario1 --out other", "notes.txt", 2),
-    "used folder": (
+    ("run type.toml", "type.toml: births: must be a whole number, got 'many'"),
+    ("run range.toml", "range.toml: variation.body_epsilon: must be a number <= 1.0"),
+    ("run section.toml", "section.toml: selection.populaton: no such key"),
+    ("run parts.toml", "parts.toml: space.min_parts: "),
+    ("run part.toml", "did you mean 'schema.parts:CORE'"),
+    ("run function.toml", "function.toml: fitness.function: "),
+    ("run toml.toml", "toml.toml: not valid TOML"),
+    # Folders
+    ("resume nowhere", "nowhere: no such folder"),
+    ("compare nowhere nowhere", "nowhere: no such folder"),
+    ("resume other", "other: no run is there (run.json is missing)"),
+    ("status file", "file: must be a folder, got a file"),
+    ("run scenario1 --out file", "file: must be a folder, got a file"),
+    ("run scenario1 --out other", "not empty (contains 'notes.txt')"),
+    (
         "run scenario1 --out run",
-        "run: already holds a run with other settings; to resume it: revolve resume",
-        2,
+        "run: already holds a run with other settings; to resume",
     ),
-    "resume of a finished run": ("resume run", "run: already finished", 0),
-    "analyze of an empty folder": ("analyze empty", "empty: no run in or below", 2),
-    "analyze of a missing folder": ("analyze nowhere", "nowhere: no such folder", 2),
-    "robot that does not exist": (
-        "view run --robot 0:9999 --save a.rrd",
-        "--robot 0:9999: no robot of that name was born",
-        2,
-    ),
-    "other ending": ("view run --save a.mp4", "--save a.mp4: must end in .rrd", 2),
-    "film of a time without robots": (
+    ("resume run", "run: already finished"),
+    ("compare later later", "was written by another version of Revolve"),
+    ("analyze empty", "empty: no run in or below"),
+    ("analyze nowhere", "nowhere: no such folder"),
+    # Views
+    ("view nowhere --save a.rrd", "nowhere: no such folder"),
+    ("view run --robot 0:9999 --save a.rrd", "0:9999: no robot of that name was born"),
+    ("view run --save a.mp4", "--save a.mp4: must end in .rrd"),
+    ("view run --save nowhere/a.gif", "--save nowhere/a.gif: no such folder: nowhere"),
+    ("view run --robot best --save a.gif", "--save a.gif: a film takes no --robot"),
+    (
         "view run --save a.gif --from 1e5 --until 1.1e5",
         "run: no poses of an arena between 100000 and 110000 s; the run ends at ",
-        2,
     ),
-    "film of one robot": (
-        "view run --robot best --save a.gif",
-        "--save a.gif: a film takes no --robot",
-        2,
-    ),
-    "film in a missing folder": (
-        "view run --save nowhere/a.gif",
-        "--save nowhere/a.gif: no such folder: nowhere",
-        2,
-    ),
-    "run to view is missing": (
-        "view nowhere --save a.rrd",
-        "nowhere: no such folder",
-        2,
-    ),
-    "no robot file": ("robot check nowhere.yaml", "nowhere.yaml: cannot be read", 2),
-    "no robot file to simulate": (
-        "robot simulate nowhere.yaml",
-        "nowhere.yaml: cannot be read: No such file",
-        2,
-    ),
-    "folder to simulate": (
+    # Robots
+    ("robot check nowhere.yaml", "nowhere.yaml: cannot be read"),
+    ("robot check exp.yaml", "exp.yaml"),
+    ("robot check cor.yaml", "'Core'"),
+    ("robot check open.yaml", "open.yaml"),
+    ("robot check robot.pb", "robot.pb"),
+    ("robot simulate nowhere.yaml", "nowhere.yaml: cannot be read: No such file"),
+    (
         "robot simulate run",
-        "run: must be the file of a robot, got a folder; the best robot of its last ",
-        2,
+        "run: must be the file of a robot, got a folder; the best robot",
     ),
-    "other file to simulate": (
-        "robot simulate key.toml",
-        "key.toml: must end in one of .yaml, .yml, ",
-        2,
-    ),
-    "not a robot": ("robot check exp.yaml", "exp.yaml", 2),
-    "action misspelt": ("robot chek a.yaml", "did you mean 'check'?; allowed: ", 2),
-    "address": (
-        "worker --connect nowhere",
-        "--connect: must be tcp/HOST:PORT, tls/HOST:PORT, ",
-        2,
-    ),
-    "no coordinator": (
-        "status --connect tcp/127.0.0.1:1",
-        "no hub at tcp/127.0.0.1:1",
-        2,
-    ),
-    "no hub": (
+    ("robot simulate key.toml", "key.toml: must end in one of .yaml, .yml, "),
+    # Network
+    ("worker --connect nowhere", "--connect: must be tcp/HOST:PORT, tls/HOST:PORT, "),
+    ("status --connect tcp/127.0.0.1:1", "no hub at tcp/127.0.0.1:1"),
+    (
         "status",
-        "tcp/127.0.0.1:1; of a run without a hub, name the folder (revolve status ",
-        2,
+        "tcp/127.0.0.1:1; of a run without a hub, name the folder (revolve status",
     ),
-    "table of another version": (
-        "compare later later",
-        "was written by another version of Revolve",
-        2,
-    ),
-    "listen": (
-        "run scenario1 --listen here --out x",
-        "--listen: an address must be tcp/HOST:PORT, tls/HOST:PORT, ",
-        2,
-    ),
-    "listen beyond this machine": (
-        "run scenario1 --listen tcp/0.0.0.0:1 --out x",
-        "--listen: tcp/0.0.0.0:1 would listen beyond this machine",
-        2,
-    ),
-    "listen as hub": ("hub --listen here", "--listen: an address must be tcp/", 2),
-    "metrics": (
-        "run scenario1 --metrics here --out x",
+    ("hub --listen here", "--listen: an address must be tcp/"),
+    ("run scenario1 --listen here", "--listen: an address must be tcp/HOST:PORT, "),
+    ("run scenario1 --listen tcp/0.0.0.0:1", "tcp/0.0.0.0:1 would listen beyond this"),
+    (
+        "run scenario1 --metrics here",
         "--metrics: must be PORT or HOST:PORT, got 'here'",
-        2,
     ),
-    "fleet": (
-        "run scenario1 --fleet a/b --out x",
-        "--fleet: must be 1 to 96 letters, digits",
-        2,
-    ),
-    "speed without arena": (
+    ("run scenario1 --fleet a/b", "--fleet: must be 1 to 96 letters, digits"),
+    (
         "run scenario1 --speed 2",
         "--speed: limits arenas, and there is none in scenario1",
-        2,
     ),
-}
+    (
+        "run scenario1 --in-process --workers 3",
+        "--in-process starts no other processes",
+    ),
+    *(
+        (
+            f"run scenario1 --in-process {flag} hub",
+            f"{flag} has no effect with --in-proc",
+        )
+        for flag in ("--access", "--connect", "--fleet", "--listen", *TLS)
+    ),
+]
 
 
 @pytest.fixture(scope="module")
@@ -189,10 +164,8 @@ def folder(small_arena_run: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     (folder / "empty").mkdir()
     (folder / "other").mkdir()
     (folder / "other" / "notes.txt").write_text("mine")
-    (folder / "file").write_text("mine")
-    (folder / "exp.yaml").write_text('name: "a"\n')
-    for name, text in (("key", KEY), ("type", TYPE), ("range", RANGE)):
-        (folder / f"{name}.toml").write_text(text)
+    for name, text in FILES.items():
+        (folder / name).write_text(text)
     _write_later_version(folder / "later")
     return folder
 
@@ -213,29 +186,56 @@ def _write_later_version(folder: Path) -> None:
         stream.write_table(later.empty_table())
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize(("words", "message"), MISTAKES)
 def test_each_mistake_gives_one_line(
-    mistake: str,
+    words: str,
+    message: str,
     folder: Path,
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    words, message, code = MISTAKES[mistake]
     monkeypatch.chdir(folder)
     monkeypatch.setenv("REVOLVE_CONNECT", "tcp/127.0.0.1:1")
     before = sorted(Path().iterdir())
     try:
-        found = main(words.split())
+        code = main(words.split())
     except SystemExit as end:  # argparse ends the process
-        found = int(str(end.code))
+        code = int(str(end.code))
     said = capfd.readouterr()
     assert said.out == ""
     # Written once, about the first run of an earlier version.
     lines = [line for line in said.err.splitlines() if "has no checksums" not in line]
     assert len(lines) == 1, said.err
     assert message in lines[0]
-    assert found == code
+    # To resume a finished run is no error.
+    assert code == (0 if words == "resume run" else 2)
     assert sorted(Path().iterdir()) == before
+
+
+def test_a_viewer_needs_a_screen_before_the_run_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    assert main(["run", "scenario1", "--view", "--out", "x"]) == 2
+    said = capsys.readouterr().err
+    assert "no screen here" in said
+    assert said.endswith("beside it: revolve view --connect x --serve\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_restriction_that_no_robot_satisfies_ends_the_run_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    parts = 'part_types = ["schema.parts:CORE", "schema.parts:ACTIVE_HINGE"]'
+    limits = "min_parts = 29\nmax_parts = 30"
+    Path("rare.toml").write_text(f'name = "a"\n[space]\n{parts}\n{limits}\n')
+    words = ["run", "rare.toml", "--quiet", "--in-process", "--births", "15"]
+    assert main([*words, "--out", "x"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "space" in line
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
