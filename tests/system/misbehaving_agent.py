@@ -17,11 +17,10 @@ import zenoh
 
 from schema.agent.inbox import Inbox
 from schema.agent.network import client_config
-from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.service import session_config
 from schema.agent.supervisor import prepare_process
 from schema.agent.topics import Member, unique_name
-from schema.wire import revolve_pb2 as pb
+from tests.system.silent_agents import own_info
 
 GONE_S = 0.3
 GOOD_ANSWERS = 3
@@ -40,17 +39,8 @@ def main(address: str, behaviour: str) -> None:
 
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
-    name = unique_name("odd")
-    member = Member("default", "worker", name)
-    info = pb.AgentInfo(
-        agent=name,
-        kind="worker",
-        slots=1,
-        platform=platform_tag(),
-        version=wire_version(),
-        shards=8,
-        cores=1,
-    ).SerializeToString()
+    member = Member("default", "worker", unique_name("odd"))
+    info = own_info(member)
     inbox: Inbox[zenoh.Query] = Inbox()
     count = held_back = 0
     is_cancelled = threading.Event()

@@ -13,6 +13,19 @@ from schema.agent.topics import Member
 from schema.wire import revolve_pb2 as pb
 
 
+def own_info(member: Member) -> bytes:
+    """Return the properties of an agent on this machine, as it replies with them."""
+    return pb.AgentInfo(
+        agent=member.name,
+        kind=member.role,
+        slots=1,
+        platform=platform_tag(),
+        version=wire_version(),
+        shards=8,
+        cores=1,
+    ).SerializeToString()
+
+
 @contextmanager
 def silent_agents(
     address: str, count: int, role: Literal["worker", "analyzer"] = "worker"
@@ -28,15 +41,7 @@ def silent_agents(
             member = Member("default", role, f"a-silent-{role}-{number}")
             config = session_config(client_config(address), member)
             session = stack.enter_context(zenoh.open(config))
-            info = pb.AgentInfo(
-                agent=member.name,
-                kind=role,
-                slots=1,
-                platform=platform_tag(),
-                version=wire_version(),
-                shards=8,
-                cores=1,
-            ).SerializeToString()
+            info = own_info(member)
 
             def tell(
                 query: zenoh.Query, key: str = member.info, info: bytes = info

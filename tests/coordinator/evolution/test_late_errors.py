@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -95,55 +96,54 @@ def learner(experiment: Experiment) -> None:
     Learners({3: experiment}, Origin(seed=1, run=0)).answer(ask)
 
 
-Case = tuple[Callable[[Experiment], None], Callable[[str], Experiment], str]
+Case = tuple[Callable[[Experiment], None], str, str, Callable[[str], Any]]
+# What is done, the key that the error names, the section and its content.
 CASES: dict[str, Case] = {
     "parents": (
         parents,
-        lambda lab: Experiment(name="x", selection=Selection(parents=f"{lab}:fails")),
         "selection.parents",
+        "selection",
+        lambda lab: Selection(parents=f"{lab}:fails"),
     ),
     "parents that end": (
         parents,
-        lambda lab: Experiment(name="x", selection=Selection(parents=f"{lab}:ends")),
         "selection.parents",
+        "selection",
+        lambda lab: Selection(parents=f"{lab}:ends"),
     ),
     "survivors": (
         survivors,
-        lambda lab: Experiment(
-            name="x", selection=Selection(population=4, survivors=f"{lab}:fails")
-        ),
         "selection.survivors",
+        "selection",
+        lambda lab: Selection(population=4, survivors=f"{lab}:fails"),
     ),
     "encoding": (
         parents,
-        lambda lab: Experiment(name="x", encoding=Encoding(type=f"{lab}:Crossing")),
         "encoding.type",
+        "encoding",
+        lambda lab: Encoding(type=f"{lab}:Crossing"),
     ),
     "genome": (
         row,
-        lambda lab: Experiment(name="x", encoding=Encoding(type=f"{lab}:Writing")),
         "encoding.type",
+        "encoding",
+        lambda lab: Encoding(type=f"{lab}:Writing"),
     ),
-    "brain": (
-        parents,
-        lambda lab: Experiment(name="x", brain=BrainSection(type=f"{lab}:Wave")),
-        "",
-    ),
+    "brain": (parents, "", "brain", lambda lab: BrainSection(type=f"{lab}:Wave")),
     "learner": (
         learner,
-        lambda lab: Experiment(
-            name="x", learning=Learning(learner=f"{lab}:Asking", budget=4)
-        ),
         "learning.learner",
+        "learning",
+        lambda lab: Learning(learner=f"{lab}:Asking", budget=4),
     ),
 }
 
 
 @pytest.mark.parametrize("name", list(CASES))
 def test_an_error_names_birth_and_island(name: str, lab: str) -> None:
-    act, experiment, key = CASES[name]
+    act, key, section, content = CASES[name]
     with pytest.raises(ExperimentError) as caught:
-        act(experiment(lab))
+        act(Experiment(name="x", **{section: content(lab)}))
     message = str(caught.value)
     assert message.startswith(f"birth 200 of island 3: {key}")
     assert f"{lab}.py" in message
