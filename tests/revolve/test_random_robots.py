@@ -71,27 +71,3 @@ def test_a_search_without_viable_robots_ends(tmp_path: Path) -> None:
     )
     with pytest.raises(rv.ExperimentError, match=r"= 3 attempts, .* intersect"):
         robots_of(tmp_path, 1, "--experiment", str(strict))
-
-
-@pytest.mark.parametrize(
-    ("flag", "value", "limits"),
-    [
-        ("--seed", "-1", "in 0..18446744073709551615"),
-        ("--seed", str(2**64), "in 0..18446744073709551615"),
-        ("--count", "1.5", ">= 1"),
-        ("--count", "0", ">= 1"),
-    ],
-)
-def test_invalid_numbers_are_refused(
-    flag: str,
-    value: str,
-    limits: str,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["robot random", str(tmp_path / "r.yaml"), flag, value])
-    assert end.value.code == 2
-    message = f"{flag}: must be a whole number {limits}, got '{value}'"
-    assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())

@@ -1,15 +1,9 @@
-"""``revolve log`` on journals made here, and on killed runs of an older version."""
+"""``revolve log`` on journals made here."""
 
 import json
 import os
-import subprocess
-import sys
-import threading
-import time
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -32,8 +26,6 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
 
-ROOT = Path(__file__).parents[3]
-OLD = ROOT / "tests" / "data" / "runs-3063df1"
 ZERO = (0.0, 0.0, 0.0)
 VIABLE = Report(
     is_viable=True, reason="", intersections=(), lower=ZERO, upper=ZERO, mass=0.5,
@@ -171,23 +163,6 @@ def test_json_is_one_object_per_line(
     assert rows[8]["outcomes"] == ["diverged\nat 3.2 s", 0.125]
 
 
-@pytest.mark.parametrize(
-    ("flag", "complaint"),
-    [
-        (["--birth", "x:1"], "--birth: must be N or ISLAND:N"),
-        (["--birth", "1:"], "--birth: must be N or ISLAND:N"),
-        (["--island", "-1"], "--island: must be a whole number >= 0"),
-    ],
-)
-def test_wrong_flags_are_refused(
-    flag: list[str], complaint: str, capsys: pytest.CaptureFixture[str], run: Path
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["log", str(run), *flag])
-    assert end.value.code == 2
-    assert complaint in capsys.readouterr().err
-
-
 def test_damage_ends_the_log_with_one_line(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -256,28 +231,6 @@ def test_folders_without_a_journal_are_refused_in_one_line(
     assert "not a journal" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["off-line", "arena", "archipelago"])
-def test_killed_runs_of_an_older_version_are_printed(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with zipfile.ZipFile(OLD / f"{name}.zip") as archive:
-        archive.extractall(tmp_path)
-    folder = tmp_path / "killed"
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    assert main(["log", str(folder), "--json"]) == 0
-    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    assert after == before
-    with Journal.open(folder) as journal:
-        assert len(rows) == len(journal.replay())
-    wanted = {
-        "off-line": {"vetted", "evaluated", "audited"},
-        "arena": {"vetted", "advanced"},
-        "archipelago": {"vetted", "evaluated", "advanced"},
-    }[name]
-    assert {row["event"] for row in rows} == wanted
-
-
 def test_follow_prints_what_another_process_appends_until_the_run_is_finished(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,46 +284,3 @@ def test_follow_warns_of_printed_records_that_become_void(
     out, err = capsys.readouterr()
     assert out.splitlines()[1:] == [*LINES[:2], LINES[0]]
     assert "records from 0 on are void" in err
-
-
-def _command(*words: str, **more: Any) -> subprocess.Popen[str]:  # noqa: ANN401
-    return subprocess.Popen(
-        [sys.executable, "-m", "revolve", *words],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        **more,
-    )
-
-
-def test_a_closed_pipe_ends_the_command_quietly(run: Path) -> None:
-    reader, writer = os.pipe()
-    os.close(reader)
-    done = subprocess.run(
-        [sys.executable, "-m", "revolve", "log", str(run)],
-        cwd=ROOT,
-        stdout=writer,
-        stderr=subprocess.PIPE,
-        check=False,
-    )
-    os.close(writer)
-    assert (done.returncode, done.stderr) == (1, b"")
-
-
-def test_follow_reads_beside_a_writing_process(tmp_path: Path) -> None:
-    with Journal.open(tmp_path, epoch=1) as journal:
-        process = _command("log", str(tmp_path), "--follow")
-        assert process.stdout is not None
-        with process:
-            process.stdout.readline()
-            journal.append(EVENTS[:1])
-            assert process.stdout.readline() == f"{LINES[0]}\n"
-            journal.append(EVENTS[1:])
-            end = threading.Timer(0.2, (tmp_path / "state").write_text, ["finished"])
-            end.start()
-            began_s = time.monotonic()
-            assert process.stdout.read().splitlines() == LINES[1:]
-            assert process.wait(30) == 0
-            assert time.monotonic() - began_s < 20
-            end.join()

@@ -1,0 +1,19 @@
+"""Whole numbers that the Python API takes."""
+
+import numpy as np
+import pytest
+
+from revolve.arguments import whole_number
+from schema.errors import RevolveError
+
+
+@pytest.mark.parametrize("value", [0, 7, np.int64(3)])
+def test_whole_numbers_in_the_range_are_taken(value: int) -> None:
+    assert whole_number("seed", value, most=7) == value
+
+
+@pytest.mark.parametrize("value", [-1, 8, 2.5, True, "3", None])
+def test_anything_else_is_refused_with_the_range(value: object) -> None:
+    expected = rf"^seed: must be a whole number from 0 to 7, got '?{value}'?$"
+    with pytest.raises(RevolveError, match=expected):
+        whole_number("seed", value, most=7)
