@@ -127,45 +127,6 @@ def test_agents_do_not_outlive_their_command() -> None:
             assert all(isinstance(event, Left) for event in until(network, 2))
 
 
-@pytest.mark.parametrize("role", ROLES)
-@pytest.mark.parametrize(
-    ("flags", "complaint"),
-    [
-        ("--connect here", "active run; no such folder: 'here'"),
-        ("--connect tls/h:1", "needs --tls-ca, --tls-certificate and --tls-key"),
-        ("--connect tls/h:1 --tls-ca x", "--tls-ca: no such file: x"),
-        ("--connect tcp/h:1 --processes 0", "must be a whole number >= 1, got '0'"),
-        ("--connect tcp/h:1 --name a/b", "--name: must be 1 to 96 letters"),
-        ("--connect tcp/h:1 --fleet *", "--fleet: must be 1 to 96 letters"),
-        ("--connect tcp/h:1 --slots 2", "no flag '--slots' (see revolve "),
-    ],
-)
-def test_wrong_flag_is_reported_in_one_line(
-    role: str, flags: str, complaint: str
-) -> None:
-    result = subprocess.run(
-        [sys.executable, "-m", "revolve", role, *flags.split()],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert result.returncode == 2
-    assert complaint in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
-def test_help_shows_an_example() -> None:
-    result = subprocess.run(
-        [sys.executable, "-m", "revolve", "worker", "--help"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "examples:\n  revolve worker" in result.stdout
-
-
 @pytest.mark.skipif(not shutil.which("openssl"), reason="makes certificates")
 def test_only_agents_with_a_certificate_connect(
     tmp_path: Path, certify: Callable[[Path, str, str, str], Tls]

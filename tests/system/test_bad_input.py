@@ -90,15 +90,6 @@ def test_arena_resumes_after_a_full_disk(
     assert "equal" in output
 
 
-def test_closed_pipe_prints_no_error(workspace: Workspace) -> None:
-    workspace.run("robot", "random", "some.yaml")
-    process = workspace.start("robot", "show", "some.yaml")
-    process.stdout.close()
-    process.stdout = None
-    _, errors = process.communicate(timeout=60)
-    assert (process.returncode, errors) == (1, "")
-
-
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 
 

@@ -195,26 +195,6 @@ def test_status_of_all_coordinators_of_a_hub(
     assert first.poll() is None
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (("status", "x", "--connect", HUB), "either a folder or --connect"),
-        (("status", "nowhere"), "nowhere: no such folder"),
-        (("run", "thesis", "scenario1"), "must have different names"),
-        (("run", "scenario1", "--repeats", "0"), "must be a whole number >= 1"),
-        (("run", "scenario1", "--first-repeat", "100000"), "must be <= 100000"),
-        (("run", "scenario1", "--connect", HUB, "--listen", HUB), "exclude each other"),
-        (("run", "scenario1", "--connect", "tcp/127.0.0.1:9"), "no hub"),
-    ],
-)
-def test_errors_are_reported_in_one_line(
-    workspace: Workspace, words: tuple[str, ...], complaint: str
-) -> None:
-    output = workspace.run(*words, code=2)
-    assert complaint in output
-    assert len(output.strip().splitlines()) == 1
-
-
 def test_killed_sweep_resumes(workspace: Workspace, until: Until) -> None:
     text = SHORT.format(name="sizes", children=1)
     settings = 'settings."selection.population" = [5, 8]'

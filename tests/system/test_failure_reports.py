@@ -345,17 +345,6 @@ def test_wrong_address_leaves_the_folder_usable(
     workspace.run(*words, "--in-process")
 
 
-def test_no_lock_is_created_in_a_folder_with_other_files(workspace: Workspace) -> None:
-    (workspace.folder / "mine").mkdir()
-    (workspace.folder / "mine" / "thesis.tex").write_text("years of work")
-    source = _write(workspace, "seeing", "worker.fitness:thesis")
-    output = workspace.run("run", source, "--out", "mine", code=2)
-    assert "not empty (contains 'thesis.tex')" in output
-    assert [path.name for path in (workspace.folder / "mine").iterdir()] == [
-        "thesis.tex"
-    ]
-
-
 def test_moved_folder_is_reported(workspace: Workspace, until: Until) -> None:
     words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
     process = workspace.start("run", *words, "--quiet")

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pytest
 
 from revolve.command import main
+from schema.agent.supervisor import cores
 from schema.tables.columns import TABLES
 from schema.tables.description import Description, description_text
 
@@ -123,7 +124,32 @@ MISTAKES = [
         "run: must be the file of a robot, got a folder; the best robot",
     ),
     ("robot simulate key.toml", "key.toml: must end in one of .yaml, .yml, "),
+    ("run thesis scenario1", "must have different names"),
+    ("run scenario1 --repeats 0", "--repeats: must be a whole number >= 1"),
+    ("run scenario1 --first-repeat 100000", "--repeats: must be <= 100000"),
+    ("status run --connect hub", "give either a folder or --connect"),
     # Network
+    ("run scenario1 --listen hub --connect tcp/h:1", "exclude each other"),
+    *(
+        (f"{command} 5000", f"must be <= {4 * cores()}, 4 for each of {cores()} cores")
+        for command in (
+            "worker --processes",
+            "analyzer --processes",
+            "run scenario1 --workers",
+        )
+    ),
+    *(
+        (f"{role} --connect {flags}", message)
+        for role in ("worker", "analyzer")
+        for flags, message in (
+            ("tls/h:1", "needs --tls-ca, --tls-certificate and --tls-key"),
+            ("tls/h:1 --tls-ca x", "--tls-ca: no such file: x"),
+            ("tcp/h:1 --processes 0", "must be a whole number >= 1, got '0'"),
+            ("tcp/h:1 --name a/b", "--name: must be 1 to 96 letters"),
+            ("tcp/h:1 --fleet *", "--fleet: must be 1 to 96 letters"),
+            ("tcp/h:1 --slots 2", "no flag '--slots' (see revolve "),
+        )
+    ),
     ("worker --connect nowhere", "--connect: must be tcp/HOST:PORT, tls/HOST:PORT, "),
     ("status --connect tcp/127.0.0.1:1", "no hub at tcp/127.0.0.1:1"),
     (
@@ -196,7 +222,7 @@ def test_each_mistake_gives_one_line(
 ) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.setenv("REVOLVE_CONNECT", "tcp/127.0.0.1:1")
-    before = sorted(Path().iterdir())
+    before = sorted(Path().rglob("*"))
     try:
         code = main(words.split())
     except SystemExit as end:  # argparse ends the process
@@ -209,7 +235,7 @@ def test_each_mistake_gives_one_line(
     assert message in lines[0]
     # To resume a finished run is no error.
     assert code == (0 if words == "resume run" else 2)
-    assert sorted(Path().iterdir()) == before
+    assert sorted(Path().rglob("*")) == before
 
 
 def test_a_viewer_needs_a_screen_before_the_run_starts(

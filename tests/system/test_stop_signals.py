@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from schema.agent.supervisor import cores
 from tests.system.workspace import Until, runtime_directory, said
 
 pytestmark = [
@@ -189,25 +188,6 @@ def test_a_command_under_nohup_ignores_hangups(tmp_path: Path, until: Until) -> 
     taken_s, told = stop(process, signal.SIGTERM, processes)
     assert taken_s < LIMIT_S
     assert "a worker process ended" not in told
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("worker", "--processes", "5000", "--connect", NOWHERE),
-        ("analyzer", "--processes", "5000", "--connect", NOWHERE),
-        ("run", "scenario1", "--workers", "5000"),
-    ],
-)
-def test_too_many_processes_need_a_flag(
-    workspace: Workspace, words: tuple[str, ...]
-) -> None:
-    output = workspace.run(*words, code=2)
-    assert (
-        f"must be <= {4 * cores()}, 4 for each of {cores()} cores, got 5000" in output
-    )
-    assert len(output.splitlines()) == 1
-    assert not (workspace.folder / "runs").exists()
 
 
 @pytest.mark.parametrize("role", ["worker", "analyzer"])
