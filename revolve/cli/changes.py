@@ -10,7 +10,7 @@ from analysis.figures.ablation import ablation as ablation_figure
 from analysis.figures.robustness import robustness as robustness_figure
 from coordinator.evolution.generation import random_brain
 from coordinator.evolution.random_streams import Purpose, stream
-from revolve.cli.reevaluation import Job, write_results
+from revolve.cli.reevaluation import Job, Study
 from revolve.cli.winners import Chosen, chosen_robots
 from revolve.robot import plain
 from schema.experiment.document import REVOLVE_ANGLE, body_space
@@ -19,36 +19,30 @@ from worker.filters.ablation import all_ablations
 from worker.robot.robustness import all_changes
 
 
-def change_runs(options: Namespace) -> None:
-    """Re-evaluate robots of runs under changes of the simulation; write the results.
-
-    Args:
-        options: of ``revolve robustness``.
-
-    Raises:
-        RunFolderError: no run, an unfinished one, or a folder that cannot be written.
-        RevolveError: no worker is left.
-    """
-    jobs = [job for one in chosen_robots(options.runs) for job in _changes(one)]
-    write_results(
-        options,
-        "robustness",
-        jobs,
-        columns=robustness.COLUMNS,
-        summary=robustness.summary,
-        figure=robustness_figure,
+def study_of(command: str) -> Study:
+    """Return what ``robustness`` or ``ablate`` evaluates and writes."""
+    if command == "robustness":
+        return Study(
+            "robustness",
+            robustness.COLUMNS,
+            robustness.summary,
+            robustness_figure,
+            _change_jobs,
+        )
+    return Study(
+        "ablation",
+        ablation.COLUMNS,
+        ablation.summary,
+        ablation_figure,
+        _ablation_jobs,
     )
 
 
-def ablate_runs(options: Namespace) -> None:
-    """Re-evaluate robots of runs without some sensors and motors; write the results.
+def _change_jobs(options: Namespace) -> list[Job]:
+    return [job for one in chosen_robots(options.runs) for job in _changes(one)]
 
-    Args:
-        options: of ``revolve ablate``.
 
-    Raises:
-        RunFolderError, RevolveError: as of ``change_runs``.
-    """
+def _ablation_jobs(options: Namespace) -> list[Job]:
     chosen = chosen_robots(options.runs, options.robots)
     for name in dict.fromkeys(one.document.encoding.type for one in chosen):
         if options.brains and name != REVOLVE_ANGLE:
@@ -56,15 +50,7 @@ def ablate_runs(options: Namespace) -> None:
                 f"left out: random brains: encoding {name!r} makes body and brain of "
                 "one genome"
             )
-    jobs = [job for one in chosen for job in _ablations(one, options.brains)]
-    write_results(
-        options,
-        "ablation",
-        jobs,
-        columns=ablation.COLUMNS,
-        summary=ablation.summary,
-        figure=ablation_figure,
-    )
+    return [job for one in chosen for job in _ablations(one, options.brains)]
 
 
 def _changes(one: Chosen) -> Iterator[Job]:

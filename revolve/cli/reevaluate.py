@@ -41,11 +41,9 @@ def main(arguments: list[str]) -> int:
     # Before matplotlib is imported: it refuses backends of other programs.
     os.environ["MPLBACKEND"] = "agg"
     with extra(f"{command} needs", "analysis"):
-        from revolve.cli.changes import ablate_runs, change_runs
-    if command == _ABLATE:
-        ablate_runs(options)
-    else:
-        change_runs(options)
+        from revolve.cli.changes import study_of
+        from revolve.cli.reevaluation import write_results
+    write_results(options, study_of(command))
     return 0
 
 

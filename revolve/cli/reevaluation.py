@@ -78,44 +78,51 @@ def _reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
             }
 
 
-def write_results(
-    options: Namespace,
-    name: str,
-    jobs: Sequence[Job],
-    *,
-    columns: Columns,
-    summary: Callable[[pa.Table], str],
-    figure: Callable[[pa.Table], Any],
-) -> None:
+class Study(NamedTuple):
+    """What a command evaluates and writes.
+
+    Attributes:
+        name: of its files, without ending.
+        columns: of the table.
+        summary: returns the line about a run, from its rows.
+        figure: returns the figure of the table.
+        jobs: returns the evaluations for the command's options.
+    """
+
+    name: str
+    columns: Columns
+    summary: Callable[[pa.Table], str]
+    figure: Callable[[pa.Table], Any]
+    jobs: Callable[[Namespace], list[Job]]
+
+
+def write_results(options: Namespace, study: Study) -> None:
     """Evaluate; write a table and its figure; print a line about each run and file.
 
     An earlier table in the folder is replaced, as the report of ``analyze`` is.
 
     Args:
         options: of the command: runs, output folder and workers.
-        name: of the files, without ending.
-        jobs: as of ``_reevaluated``.
-        columns: of the table.
-        summary: returns the line about a run, from its rows.
-        figure: returns the figure of the table.
+        study: what to evaluate and write.
 
     Raises:
-        RunFolderError: the folder cannot be written.
+        RunFolderError: no run, an unfinished one, or a folder that cannot be written.
         RevolveError: no worker is left.
     """
-    stem: Path = options.out / name
+    jobs = study.jobs(options)
+    stem: Path = options.out / study.name
     make_folder(stem.parent)
     path = stem.with_suffix(".parquet")
     for line in replaced(path, "the table", "its runs and its figure"):
         print(line, flush=True)
-    table = table_of(_reevaluated(jobs, options.workers), columns)
+    table = table_of(_reevaluated(jobs, options.workers), study.columns)
     pq.write_table(table, path)
     for folder in options.runs:
         own = table.filter(pc.field("folder") == str(folder))
-        print(f"{folder}: {summary(own)}")
+        print(f"{folder}: {study.summary(own)}")
     print(f"{path}: {table.num_rows} evaluations under changes")
     try:
-        save(figure(table), stem)
+        save(study.figure(table), stem)
     except NothingToDraw as error:
         print(f"left out: figure: {error}")
     else:

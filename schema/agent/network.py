@@ -144,16 +144,7 @@ def hub_config(
     has_open_port = any(each.protocol != UNIX and each.port == 0 for each in places)
     if "tls" in protocols and has_open_port:
         raise NetworkError("with a tls/ address each address needs a port, got 0")
-    link = _link(protocols)
-    if tls and "tls" in protocols:
-        link["tls"] = {
-            "root_ca_certificate": tls.ca,
-            "listen_certificate": tls.certificate,
-            "listen_private_key": tls.key,
-            "enable_mtls": True,
-            "close_link_on_expiration": True,
-        }
-    config = _common(link)
+    config = _common(protocols, tls, "listen", close_link_on_expiration=True)
     config["mode"] = "router"
     config["listen"] = {"endpoints": list(listen), "exit_on_failure": True}
     config["connect"] = {"endpoints": []}
@@ -191,16 +182,7 @@ def client_config(connect: str, tls: Tls | None = None) -> str:
     """
     protocol, _, _ = parse_address(connect)
     _check_tls(connect, protocol, tls)
-    link = _link({protocol})
-    if tls and protocol == "tls":
-        link["tls"] = {
-            "root_ca_certificate": tls.ca,
-            "connect_certificate": tls.certificate,
-            "connect_private_key": tls.key,
-            "enable_mtls": True,
-            "verify_name_on_connect": True,
-        }
-    config = _common(link)
+    config = _common({protocol}, tls, "connect", verify_name_on_connect=True)
     config["mode"] = "client"
     config["listen"] = {"endpoints": []}
     config["connect"] = {
@@ -215,15 +197,29 @@ def client_config(connect: str, tls: Tls | None = None) -> str:
     return json.dumps(config)
 
 
-def _link(protocols: set[str]) -> dict[str, Any]:
-    return {
+def _common(
+    protocols: set[str], tls: Tls | None, side: str, **checks: bool
+) -> dict[str, Any]:
+    """Return the settings of hub and clients: no discovery, no shared memory.
+
+    Args:
+        protocols: of the addresses.
+        tls: files for a ``tls/`` address.
+        side: "listen" or "connect".
+        checks: settings of TLS on that side.
+    """
+    link: dict[str, Any] = {
         "protocols": sorted(protocols),
         "tx": {"lease": LEASE_MS, "keep_alive": 4, "queue": _QUEUE},
     }
-
-
-def _common(link: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings of hub and clients: no discovery, no shared memory."""
+    if tls and "tls" in protocols:
+        link["tls"] = {
+            "root_ca_certificate": tls.ca,
+            f"{side}_certificate": tls.certificate,
+            f"{side}_private_key": tls.key,
+            "enable_mtls": True,
+            **checks,
+        }
     return {
         "scouting": {
             "multicast": {"enabled": False},
