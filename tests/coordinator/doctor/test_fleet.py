@@ -20,10 +20,6 @@ LISTED = (Certificate("b", "viewer"), Certificate("a", "worker"))
 SEEN = HubProbe("", 0.001, ("boss.1",), offset_s=0.1, roles=("worker",))
 
 
-def levels(probe: HubProbe) -> dict[str, str]:
-    return {each.subject: each.level for each in check_hub(probe, "tls/h:1")}
-
-
 @pytest.mark.parametrize(
     ("change", "level", "text"),
     [
@@ -55,34 +51,47 @@ def test_a_key_that_others_read_fails(mode: int) -> None:
     assert f"{mode:o}" in key.text
 
 
-def test_all_is_well_at_a_hub() -> None:
-    assert set(levels(SEEN).values()) == {"ok"}
-    assert set(levels(SEEN)) == {"hub", "rights", "coordinators", "its clock"}
-    assert "its clock" not in levels(replace(SEEN, offset_s=None))
-
-
-def test_what_is_wrong_at_a_hub() -> None:
-    assert levels(replace(SEEN, round_trip_s=None)) == {"hub": "fail"}
-    assert levels(replace(SEEN, round_trip_s=0.5))["hub"] == "warn"
-    assert levels(replace(SEEN, roles=ROLES))["rights"] == "warn"
-    alone = replace(SEEN, roles=(), coordinators=())
-    assert levels(alone)["rights"] == "warn"
-    assert levels(replace(SEEN, malformed=("boss.1",)))["coordinators"] == "warn"
-    assert levels(replace(SEEN, offset_s=-6.0))["its clock"] == "warn"
-
-
 @pytest.mark.parametrize(
-    ("change", "text"),
+    ("change", "subject", "level", "text"),
     [
-        ({}, "those of worker"),
-        ({"roles": None}, "all: no certificates at this address"),
-        ({"roles": ()}, "those of viewer"),
-        ({"roles": (), "replies": {"boss.1": OperatorReply("")}}, "those of operator"),
+        ({}, "hub", "ok", "tls/h:1, round trip 1.0 ms"),
+        ({"round_trip_s": None}, "hub", "fail", "does not reply"),
+        ({"round_trip_s": 0.5}, "hub", "warn", "a slow link"),
+        ({}, "rights", "ok", "those of worker"),
+        ({"roles": None}, "rights", "ok", "all: no certificates at this address"),
+        ({"roles": ()}, "rights", "ok", "those of viewer"),
+        (
+            {"roles": (), "replies": {"boss.1": OperatorReply("")}},
+            "rights",
+            "ok",
+            "those of operator",
+        ),
+        ({"roles": ROLES}, "rights", "warn", "start it with --access"),
+        ({"roles": (), "coordinators": ()}, "rights", "warn", "was revoked"),
+        ({}, "coordinators", "ok", "boss.1"),
+        ({"malformed": ("boss.1",)}, "coordinators", "warn", "another version"),
+        ({}, "its clock", "ok", "+0.10 s"),
+        ({"offset_s": -6.0}, "its clock", "warn", "set both clocks"),
     ],
 )
-def test_rights(change: dict[str, Any], text: str) -> None:
-    _, rights, *_ = check_hub(replace(SEEN, **change), "tls/h:1")
-    assert (rights.level, rights.text) == ("ok", text)
+def test_what_is_seen_at_a_hub(
+    change: dict[str, Any], subject: str, level: str, text: str
+) -> None:
+    found = {
+        each.subject: each for each in check_hub(replace(SEEN, **change), "tls/h:1")
+    }
+    assert found[subject].level == level
+    assert text in str(found[subject])
+
+
+def test_only_what_was_seen_is_told() -> None:
+    def subjects(**change: object) -> list[str]:
+        found = check_hub(replace(SEEN, **change), "tls/h:1")  # type: ignore[arg-type]
+        return [each.subject for each in found]
+
+    assert subjects() == ["hub", "rights", "coordinators", "its clock"]
+    assert subjects(offset_s=None) == ["hub", "rights", "coordinators"]
+    assert subjects(round_trip_s=None) == ["hub"]
 
 
 def test_names_are_limited() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from coordinator.doctor import command, machine
+from coordinator.doctor.finding import Finding
 from coordinator.doctor.machine import GIB, MIB
 from coordinator.doctor.system import (
     available_bytes,
@@ -20,74 +21,49 @@ V3 = (
 )
 
 
-def test_a_finding_is_one_line_with_the_advice_at_its_end() -> None:
-    line = str(machine.check_memory(800 * MIB, None, 8))
-    assert line.startswith("warn  memory ")
-    assert line.endswith("0.8 GiB free; --workers 2: a worker needs about 300 MiB")
-
-
-def test_versions_name_what_is_missing() -> None:
-    assert machine.check_versions({"A": "1", "B": "2"}).level == "ok"
-    found = machine.check_versions({"A": "1", "B": None})
-    assert (found.level, "B missing" in found.text) == ("fail", True)
-    assert None not in versions().values()
+PLACE = Path("/x")
 
 
 @pytest.mark.parametrize(
-    ("architecture", "flags", "level"),
+    ("found", "level", "text"),
     [
-        ("x86_64", V3, "ok"),
-        ("x86_64", "cx16 popcnt", "warn"),
-        ("x86_64", "", "warn"),
-        ("aarch64", "asimd", "ok"),
+        (machine.check_versions({"A": "1", "B": "2"}), "ok", "A 1, B 2"),
+        (machine.check_versions({"A": "1", "B": None}), "fail", "B missing"),
+        (machine.check_cpu("x86_64", V3.split(), "tag"), "ok", "tag"),
+        (machine.check_cpu("x86_64", ["cx16", "popcnt"], "tag"), "warn", "no AVX2"),
+        (machine.check_cpu("x86_64", [], "tag"), "warn", "does not list"),
+        (machine.check_cpu("aarch64", ["asimd"], "tag"), "ok", "tag"),
+        (machine.check_memory(8 * GIB, None, 4), "ok", "8.0 GiB free"),
+        (machine.check_memory(8 * GIB, 700 * MIB, 4), "warn", "--workers 2: a worker"),
+        (machine.check_memory(100 * MIB, None, 4), "fail", "0.1 GiB free"),
+        (machine.check_memory(None, 10 * MIB, 4), "fail", "in this control group"),
+        (machine.check_memory(None, None, 4), "ok", "unknown"),
+        (machine.check_clock(2000.0, 1000.0), "ok", "1970-01-01 00:33:20 UTC"),
+        (machine.check_clock(999.0, 1000.0), "fail", "before this package"),
+        (machine.check_viewer(has_package=True, display=":0"), "ok", ":0"),
+        (machine.check_viewer(has_package=True, display=""), "warn", "no display"),
+        (machine.check_viewer(has_package=False, display=":0"), "warn", "[view]"),
+        (machine.check_pictures(0, "egl"), "ok", "egl"),
+        (machine.check_pictures(1, "NoPictures: none"), "warn", "NoPictures"),
+        (machine.check_pictures(-11, ""), "warn", "signal 11"),
+        (machine.check_pictures(None, ""), "warn", "in time"),
+        (machine.check_disk(PLACE, 9 * GIB, is_writable=True), "ok", "9.0 GiB free"),
+        (machine.check_disk(PLACE, GIB, is_writable=True), "warn", "gigabytes"),
+        (machine.check_disk(PLACE, MIB, is_writable=True), "fail", "free some space"),
+        (machine.check_disk(PLACE, 9 * GIB, is_writable=False), "warn", "written"),
+        (machine.check_runtime("/run/x", ""), "ok", "/run/x, for this user only"),
+        (machine.check_runtime("", "others could join"), "fail", "others could join"),
+        (machine.check_plugins({}), "ok", "none installed"),
+        (machine.check_plugins({"a": True, "b": True}), "ok", "a, b"),
+        (machine.check_plugins({"a": True, "b": False}), "fail", "no module b"),
     ],
 )
-def test_cpu(architecture: str, flags: str, level: str) -> None:
-    assert machine.check_cpu(architecture, flags.split(), "tag").level == level
-
-
-@pytest.mark.parametrize(
-    ("available", "limit", "level"),
-    [
-        (8 * GIB, None, "ok"),
-        (8 * GIB, 700 * MIB, "warn"),
-        (100 * MIB, None, "fail"),
-        (None, 10 * MIB, "fail"),
-        (None, None, "ok"),
-    ],
-)
-def test_memory(available: int | None, limit: int | None, level: str) -> None:
-    assert machine.check_memory(available, limit, 4).level == level
-
-
-def test_the_advice_about_memory_is_a_number_of_workers_that_fits() -> None:
-    assert "--workers 2" in machine.check_memory(700 * MIB, None, 4).advice
-
-
-def test_a_clock_before_the_package_is_wrong() -> None:
-    assert machine.check_clock(2000.0, 1000.0).level == "ok"
-    assert machine.check_clock(999.0, 1000.0).level == "fail"
-
-
-def test_viewer() -> None:
-    assert machine.check_viewer(has_package=True, display=":0").level == "ok"
-    assert machine.check_viewer(has_package=True, display="").level == "warn"
-    assert "[view]" in machine.check_viewer(has_package=False, display=":0").advice
-
-
-@pytest.mark.parametrize(
-    ("code", "output", "level", "text"),
-    [
-        (0, "egl", "ok", "egl"),
-        (1, "NoPictures: none", "warn", "NoPictures"),
-        (-11, "", "warn", "signal 11"),
-        (None, "", "warn", "in time"),
-    ],
-)
-def test_pictures(code: int | None, output: str, level: str, text: str) -> None:
-    found = machine.check_pictures(code, output)
+def test_a_reading_has_a_level_and_a_line(
+    found: Finding, level: str, text: str
+) -> None:
     assert found.level == level
-    assert text in found.text
+    assert str(found).startswith(f"{level:4}  {found.subject} ")
+    assert text in str(found)
 
 
 def test_a_renderer_that_crashes_or_hangs_is_a_result(
@@ -102,20 +78,6 @@ def test_a_renderer_that_crashes_or_hangs_is_a_result(
         "coordinator.doctor.system._RENDER", "import time; time.sleep(600)"
     )
     assert end_rendering(start_rendering(), 0.2) == (None, "")
-
-
-@pytest.mark.parametrize(
-    ("free", "is_writable", "level"),
-    [
-        (9 * GIB, True, "ok"),
-        (GIB, True, "warn"),
-        (MIB, True, "fail"),
-        (9 * GIB, False, "warn"),
-    ],
-)
-def test_disk(free: int, level: str, *, is_writable: bool) -> None:
-    found = machine.check_disk(Path("/x"), free, is_writable=is_writable)
-    assert found.level == level
 
 
 @pytest.mark.parametrize("has_locks", [True, False])
@@ -134,12 +96,8 @@ def test_output_folder_without_locks_is_named(
     assert all(f"no file locks in {tmp_path / 'runs'}; do" in line for line in told)
 
 
-def test_sockets_and_plugins() -> None:
-    assert machine.check_runtime("/run/x", "").level == "ok"
-    assert machine.check_runtime("", "others could join").level == "fail"
-    assert machine.check_plugins({}).level == "ok"
-    assert machine.check_plugins({"a": True, "b": True}).text == "a, b"
-    assert "no module b" in machine.check_plugins({"a": True, "b": False}).text
+def test_all_packages_are_installed_here() -> None:
+    assert None not in versions().values()
 
 
 def test_available_memory_is_read(tmp_path: Path) -> None:
