@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -37,6 +38,7 @@ from schema.agent.address import HUB
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import (
     access_of,
+    agent_of,
     check_load,
     connect_of,
     listen_of,
@@ -50,7 +52,6 @@ from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.agent.terminal.screen import missing_screen
-from schema.agent.topics import check_name
 from schema.errors import ExperimentError, NetworkError
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.kinds import Kind
@@ -227,7 +228,9 @@ def _deployment(
         "analyzer": analyzer.report.answer,
         "worker": Jobs(shards).answer,
     }
+    agent = agent_of(options, "worker", "own-worker", tls=tls)
     return Deployment(
+        replace(agent, threads=threads),
         workers=workers,
         bodies={
             "analyzer": analyzer.service.process,
@@ -236,17 +239,11 @@ def _deployment(
         answers=answers if options.in_process else None,
         listen=listen_of([listen], tls)[0] if listen else None,
         connect=connect_of(options) if options.connect else None,
-        fleet=check_name(options.fleet, "--fleet"),
-        tls=tls,
         certificates=access_of(options),
         quiet=options.quiet,
         fsync=options.fsync,
-        threads=threads,
         speed=options.speed,
         view=options.view,
-        cpu_limit_s=options.cpu_limit,
-        wait_limit_s=options.wait_limit,
-        give_up_after_s=options.give_up_after,
         checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
         metrics=options.metrics,

@@ -1,10 +1,9 @@
 """Deployment of a run: its network, its own processes, its viewer."""
 
 import contextlib
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from coordinator.dispatch.events import AgentKind
@@ -18,13 +17,12 @@ from schema.agent.access import Certificate
 from schema.agent.address import ADDRESS
 from schema.agent.command import name_at
 from schema.agent.log import tell_user
-from schema.agent.network import Agent, Tls
+from schema.agent.network import Agent
 from schema.agent.platform_tag import platform_tag
 from schema.agent.request_handler import Compute
-from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
+from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
-from schema.plugins.permission import allowed
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,46 +30,37 @@ class Deployment:
     """Processes and network of a run; none of these settings changes a birth.
 
     Attributes:
+        agent: fleet, certificate files, threads and limits of the processes here; each
+            has its own role, name and hub.
         workers: worker processes to start here; one analyzer starts with them.
         bodies: function that a process of each kind runs.
         answers: functions that replace processes and network, or None.
         listen: address of the hub beside its own Unix socket; None: only that socket.
         connect: address of an existing hub; None: this process is the hub.
-        fleet: name of the fleet whose agents do the work.
-        tls: certificate files for a ``tls/`` address.
         certificates: those that may connect to this hub; None: all of the authority.
         quiet: show no progress.
         fsync: survive power loss, too.
-        threads: threads of a worker process that advance one arena together.
         speed: limit of simulated seconds per second for arenas; None: no limit.
         view: open a viewer; the run does not wait for it.
-        cpu_limit_s: CPU time of a job after which its process here is ended [s].
-        wait_limit_s: time that a job here may wait without using CPU time [s].
         checks: cross-checks of workers, and the reaction to quarantined robots.
-        give_up_after_s: time without the hub at ``connect`` after which to stop [s].
         allows_drift: an arena may continue on another platform if its own is gone.
         metrics: host and port at which to serve metrics; None: nowhere.
         resume_flags: with which ``revolve resume`` has the same agents again.
     """
 
+    agent: Agent
     workers: int
     bodies: Mapping[AgentKind, Callable[[Agent, ProcessSlot], None]]
     answers: Mapping[AgentKind, Compute] | None
     listen: str | None
     connect: str | None
-    fleet: str
-    tls: Tls | None
     quiet: bool
     fsync: bool
-    threads: int = 1
     speed: float | None = None
     view: bool = False
-    cpu_limit_s: float = CPU_LIMIT_S
-    wait_limit_s: float = WAIT_LIMIT_S
     checks: Checks = NO_CHECKS
     certificates: tuple[Certificate, ...] | None = None
     allows_drift: bool = False
-    give_up_after_s: float = math.inf
     metrics: tuple[str, int] | None = None
     resume_flags: tuple[str, ...] = ()
 
@@ -93,17 +82,18 @@ def connected_agents(
         keep_flags(folder, deployment.resume_flags)
         yield LocalAgents(deployment.answers, platform_tag()), []
         return
+    fleet, tls = deployment.agent.fleet, deployment.agent.tls
     with ExitStack() as stack:
         hub = deployment.connect or ""
         network = stack.enter_context(
             Network(
-                name=unique_name(name_at(hub, deployment.tls, "coordinator")),
-                fleet=deployment.fleet,
+                name=unique_name(name_at(hub, tls, "coordinator")),
+                fleet=fleet,
                 listen=(deployment.listen,) if deployment.listen else (),
                 connect=hub,
-                tls=deployment.tls,
+                tls=tls,
                 certificates=deployment.certificates,
-                give_up_after_s=deployment.give_up_after_s,
+                give_up_after_s=deployment.agent.give_up_after_s,
             )
         )
         # The folder of a run that finds no hub stays empty.
@@ -114,17 +104,17 @@ def connected_agents(
         replace_text(file, text)
         stack.callback(_remove, file, text)
         if deployment.view:
-            open_viewer(network.own_address, deployment.fleet, deployment.tls)
+            open_viewer(network.own_address, fleet, tls)
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
         pools: list[ProcessPool] = []
         for kind, size in sizes.items() if deployment.workers else ():
-            agent = Agent(
-                kind, f"own-{kind}", network.own_address, deployment.fleet,
-                tls=deployment.tls, threads=deployment.threads,
-                cpu_limit_s=deployment.cpu_limit_s,
-                wait_limit_s=deployment.wait_limit_s, processes=size,
-                plugins=allowed(),
-            )  # fmt: skip
+            agent = replace(
+                deployment.agent,
+                role=kind,
+                name=f"own-{kind}",
+                connect=network.own_address,
+                processes=size,
+            )
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size, role=kind)
             pools.append(stack.enter_context(pool))
         if deployment.listen is not None:

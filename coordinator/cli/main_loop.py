@@ -119,7 +119,7 @@ def _place_to_join(folder: Path, deployment: Deployment) -> str:
 
     Agents of a hub with TLS need files that this process does not know.
     """
-    if deployment.workers or deployment.answers is not None or deployment.tls:
+    if deployment.workers or deployment.answers is not None or deployment.agent.tls:
         return ""
     return deployment.connect or str(folder)
 

@@ -27,6 +27,7 @@ from schema.agent.network import Tls
 from schema.agent.platform_tag import cpu_flags, platform_tag
 from schema.agent.service import why_no_hub
 from schema.agent.supervisor import cores
+from schema.agent.terminal.screen import missing_screen
 from schema.errors import NetworkError
 
 _REACH_S = 1.0
@@ -78,7 +79,7 @@ def _machine() -> Iterator[Finding]:
         yield machine.check_runtime("", str(error))
     yield machine.check_plugins(system.plugin_modules())
     yield machine.check_viewer(
-        has_package=find_spec("rerun") is not None, display=system.display()
+        has_package=find_spec("rerun") is not None, no_screen=missing_screen()
     )
 
 

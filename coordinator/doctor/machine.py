@@ -84,14 +84,14 @@ def check_clock(now_s: float, built_s: float) -> Finding:
     return judged("clock", text, (now_s < built_s, "fail", why, advice))
 
 
-def check_viewer(*, has_package: bool, display: str) -> Finding:
-    """Check that the viewer can show a run; the display is empty without a screen."""
+def check_viewer(*, has_package: bool, no_screen: str) -> Finding:
+    """Check that the viewer can show a run; ``no_screen`` is why it has no window."""
     remote = "use revolve view --serve here, and rerun --connect where one is"
     return judged(
         "viewer",
-        f"installed, display {display}",
+        "installed",
         (not has_package, "warn", "not installed", install_advice("view")),
-        (not display, "warn", "installed, but there is no display", remote),
+        (bool(no_screen), "warn", f"installed, but {no_screen}", remote),
     )
 
 

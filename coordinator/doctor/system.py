@@ -1,6 +1,5 @@
 """What the checks need to know of this machine, read from it."""
 
-import os
 import platform
 import subprocess
 import sys
@@ -64,13 +63,6 @@ def group_bytes() -> int | None:
     known = group_numbers("memory.max", "memory.current")
     known += group_numbers("memory.limit_in_bytes", "memory.usage_in_bytes")
     return min((max(0, limit - used) for limit, used in known), default=None)
-
-
-def display() -> str:
-    """Return the name of the screen, empty without one."""
-    if sys.platform in {"darwin", "win32"}:
-        return sys.platform
-    return os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY") or ""
 
 
 def plugin_modules() -> dict[str, bool]:

@@ -11,6 +11,7 @@ import os
 import re
 import socket
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,28 @@ def host_name() -> str:
     return re.sub(r"[^A-Za-z0-9-]", "-", socket.gethostname()).strip("-")[:40] or "host"
 
 
+def agent_of(
+    options: argparse.Namespace, role: Role, name: str, *, tls: Tls | None
+) -> Agent:
+    """Return an agent with the fleet, limits and plug-ins of a command line.
+
+    Raises:
+        NetworkError: an invalid name of a fleet.
+    """
+    return Agent(
+        role,
+        name,
+        connect="",
+        fleet=check_name(options.fleet, "--fleet"),
+        tls=tls,
+        threads=options.threads,
+        cpu_limit_s=options.cpu_limit,
+        wait_limit_s=options.wait_limit,
+        plugins=allowed(),
+        give_up_after_s=options.give_up_after,
+    )
+
+
 def run_pool(
     role: Role,
     body: Callable[[Agent, ProcessSlot], None],
@@ -226,18 +249,11 @@ def run_pool(
         start_log(role, as_json=options.log_json)
         allow(options.plugins)
         connect, tls = connect_of(options), tls_of(options)
-        agent = Agent(
-            role,
-            _name(options.name, connect, tls),
-            connect,
-            check_name(options.fleet, "--fleet"),
-            tls=tls,
-            threads=options.threads,
-            cpu_limit_s=options.cpu_limit,
-            wait_limit_s=options.wait_limit,
+        name = _name(options.name, connect, tls)
+        agent = replace(
+            agent_of(options, role, name, tls=tls),
+            connect=connect,
             processes=options.processes,
-            plugins=allowed(),
-            give_up_after_s=options.give_up_after,
             tells_hub=not options.until_closed,
         )
         client_config(connect, tls)
