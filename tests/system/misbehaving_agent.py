@@ -17,14 +17,22 @@ import zenoh
 
 from schema.agent.inbox import Inbox
 from schema.agent.network import client_config
+from schema.agent.request_handler import answer
 from schema.agent.service import session_config
 from schema.agent.supervisor import prepare_process
 from schema.agent.topics import Member, unique_name
+from schema.limits import ADVANCE_REQUEST_BYTES
+from schema.wire.codec import decode
+from schema.wire.messages import Request
 from tests.system.silent_agents import own_info
 
 GONE_S = 0.3
 GOOD_ANSWERS = 3
 """Answers of a silent worker before it falls silent."""
+
+
+def request_of(data: bytes) -> Request:
+    return decode(Request, data, ADVANCE_REQUEST_BYTES)
 
 
 def main(address: str, behaviour: str) -> None:
@@ -35,7 +43,7 @@ def main(address: str, behaviour: str) -> None:
     from worker.serve.jobs import Jobs  # noqa: PLC0415
     from worker.serve.shards import Shards  # noqa: PLC0415
 
-    answer = Jobs(Shards(World)).answer
+    compute = Jobs(Shards(World)).answer
 
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
@@ -66,7 +74,7 @@ def main(address: str, behaviour: str) -> None:
                 continue
             with query:
                 assert query.payload is not None
-                data = answer(query.payload.to_bytes())
+                data = answer(compute, request_of(query.payload.to_bytes()))
                 count += 1
                 if behaviour == "late":
                     token.undeclare()  # type: ignore[no-untyped-call]

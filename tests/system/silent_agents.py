@@ -10,12 +10,13 @@ from schema.agent.network import client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.service import session_config
 from schema.agent.topics import Member
-from schema.wire import revolve_pb2 as pb
+from schema.wire.codec import encode
+from schema.wire.messages import AgentInfo
 
 
 def own_info(member: Member) -> bytes:
     """Return the properties of an agent on this machine, as it replies with them."""
-    return pb.AgentInfo(
+    info = AgentInfo(
         agent=member.name,
         kind=member.role,
         slots=1,
@@ -23,7 +24,8 @@ def own_info(member: Member) -> bytes:
         version=wire_version(),
         shards=8,
         cores=1,
-    ).SerializeToString()
+    )
+    return encode(info)
 
 
 @contextmanager

@@ -22,8 +22,10 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import Journal
 from schema.experiment.file import experiment_text, read_experiment
-from schema.wire.arena_codec import decode_advance_request
-from schema.wire.codec import request_kind
+from schema.limits import ADVANCE_REQUEST_BYTES
+from schema.wire.arena import AdvanceShard
+from schema.wire.codec import decode
+from schema.wire.messages import Request
 from tests.benchmarks.dispatch_bench import Body, real_fleet
 from tests.system.fleet import Fleets
 from tests.system.silent_agents import silent_agents
@@ -163,9 +165,9 @@ class Counting:
         fleet._agents = self
 
     def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
-        if request_kind(payload) == "advance":
-            request = decode_advance_request(payload)
-            self.rebuilt += request.rebuild is not None and request.from_step > 0
+        work = decode(Request, payload, ADVANCE_REQUEST_BYTES).work
+        if isinstance(work, AdvanceShard):
+            self.rebuilt += work.rebuild is not None and work.from_step > 0
         self._agents.send(number, agent, payload, wait_s)
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - of the real one

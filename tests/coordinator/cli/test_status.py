@@ -12,10 +12,10 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from schema.errors import MalformedMessage
 from schema.experiment.file import experiment_text, read_experiment
 from schema.limits import MOST_SHOWN
+from schema.wire.codec import encode
 from schema.wire.operator import (
     OperatorReply,
     decode_operator_reply,
-    encode_operator_reply,
 )
 from schema.wire.status import IslandStatus, PeerFault, Queue, RunStatus, Status
 
@@ -213,6 +213,6 @@ def test_a_run_without_agents_waits_for_them_if_its_coordinator_says_so() -> Non
 
 def test_a_status_with_a_long_name_is_malformed() -> None:
     status = Status((), 1, 1, 0.0, (PeerFault("late", "x" * (MOST_SHOWN + 1), 1),))
-    data = encode_operator_reply(OperatorReply("", status=status))
+    data = encode(OperatorReply("", status=status))
     with pytest.raises(MalformedMessage):
         decode_operator_reply(data)
