@@ -6,6 +6,7 @@ import schema.errors
 from revolve.trace import PackedTrace
 from schema.errors import RevolveError, error_text
 from schema.robot.results import Evaluation
+from schema.robot.robot import Robot
 
 
 class Problem(msgspec.Struct, frozen=True):
@@ -20,14 +21,14 @@ class Task(msgspec.Struct, frozen=True):
 
     Attributes:
         settings: JSON of ``EvaluationSettings``.
-        robot: encoded.
+        robot: to simulate or to draw.
         plugins: modules that may be imported.
         is_judged: compute the fitness, too.
         size: width and height of a picture [pixels], instead of a simulation.
     """
 
     settings: bytes
-    robot: bytes
+    robot: Robot
     plugins: tuple[str, ...]
     is_judged: bool = False
     size: tuple[int, int] | None = None

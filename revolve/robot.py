@@ -33,7 +33,6 @@ from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
-from schema.wire.protobuf import encode_robot
 
 DEFAULT = "scenario1"
 """Experiment of a robot that has no other one."""
@@ -253,9 +252,9 @@ def task_of(
     """
     # A picture needs no brain: a robot without experiment may have any built-in one.
     types = types_for(settings) if size else types_of(settings)
-    encoded = encode_robot(checked(robot, types))
+    plainly = checked(robot, types)
     data = msgspec.json.encode(settings)
-    return Task(data, encoded, allowed(), is_judged, size)
+    return Task(data, plainly, allowed(), is_judged, size)
 
 
 def _settings(experiment: Experiment | None) -> EvaluationSettings:

@@ -17,7 +17,6 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot, check_types
-from schema.wire.protobuf import decode_robot
 
 _TASKS = msgspec.msgpack.Decoder(Task)
 
@@ -43,7 +42,7 @@ def _done(task: Task) -> Outcome:
 
     # Before the robot, whose neurons may be those of a plug-in.
     settings = checked_evaluation(task.settings)
-    robot = decode_robot(task.robot)
+    robot = task.robot
     check_types(robot, body_space(settings.space))
     if task.size is not None:
         return Outcome(picture=_picture(robot, settings, task.size))
