@@ -5,7 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -49,6 +49,17 @@ def _python(
         text=True,
         check=False,
     )
+
+
+def _follow(
+    lines: Iterable[str], folder: Path, *paths: Path
+) -> list[subprocess.CompletedProcess[str]]:
+    """Run commands one after the other; each has to succeed."""
+    done = [_python(("-m", *line.partition("#")[0].split()), folder, *paths)
+            for line in lines]  # fmt: skip
+    for each in done:
+        assert each.returncode == 0, f"{each.args}\n{each.stdout}{each.stderr}"
+    return done
 
 
 @pytest.mark.parametrize(
@@ -119,9 +130,7 @@ def test_measures_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
     (tmp_path / "gaits.py").write_text(module)
     (tmp_path / "gaits.toml").write_text(own)
     (block,) = _blocks(page, "sh")
-    for line in block.splitlines():
-        done = _python(("-m", *line.split()), tmp_path)
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    _follow(block.splitlines(), tmp_path)
     for reader in readers:
         done = _python(("-W", "error", "-c", reader), tmp_path)
         assert done.returncode == 0, f"{reader}\n{done.stderr}"
@@ -160,13 +169,8 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
     assert len(documents) >= 3
     for document in documents:
         (tmp_path / "mine.toml").write_text(document)
-        done = _python(
-            ("-m", "revolve", "run", "mine.toml", "--births", "20",
-             "--in-process", "--quiet", "--out", f"out-{len(document)}"),
-            tmp_path,
-            tmp_path,
-        )  # fmt: skip
-        assert done.returncode == 0, f"{document}\n{done.stderr}"
+        words = f"--births 20 --in-process --quiet --out out-{len(document)}"
+        _follow([f"revolve run mine.toml {words}"], tmp_path, tmp_path)
         if "my_parts" not in document:
             parse_experiment(document, str(tmp_path / page.name))
 
@@ -176,17 +180,13 @@ def test_experiments_of_the_brains_page_run(tmp_path: Path) -> None:
     write_module(tmp_path)
     for document in _blocks(TOP / "docs" / "brains.md", "toml"):
         (tmp_path / "mine.toml").write_text(document)
-        runs = []
-        for how in (["--in-process"], ["--workers", "2"]):
-            runs.append(f"out-{len(document)}-{len(how)}")
-            done = _python(
-                ("-m", "revolve", "run", "mine.toml", "--births", "17",
-                 *how, "--quiet", "--out", runs[-1]),
-                tmp_path,
-            )  # fmt: skip
-            assert done.returncode == 0, f"{document}\n{done.stderr}"
-        done = _python(("-m", "revolve", "compare", *runs), tmp_path)
-        assert done.returncode == 0, done.stdout
+        runs = [f"out-{len(document)}-{number}" for number in range(2)]
+        hows = ("--in-process", "--workers 2")
+        words = "revolve run mine.toml --births 17 --quiet"
+        commands = [
+            f"{words} {how} --out {run}" for how, run in zip(hows, runs, strict=True)
+        ]
+        _follow([*commands, f"revolve compare {' '.join(runs)}"], tmp_path)
 
 
 def test_parts_page_runs(tmp_path: Path) -> None:
@@ -203,9 +203,7 @@ def test_parts_page_runs(tmp_path: Path) -> None:
     ):
         (tmp_path / name).write_text(text)
     (block,) = _blocks(page, "sh")
-    for line in block.splitlines():
-        done = _python(("-m", *line.split()), tmp_path)
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    for done in _follow(block.splitlines(), tmp_path):
         printed = re.search(r"^fitness: +(\S+)", done.stdout, re.MULTILINE)
         assert not printed or 0.025 < float(printed[1]) < 0.035
     # The page gives the numbers of the built-in hinge.
@@ -215,8 +213,7 @@ def test_parts_page_runs(tmp_path: Path) -> None:
     assert knee.shape(()) == ACTIVE_HINGE.shape(())
     assert knee.motor == ACTIVE_HINGE.motor
     words = "run mine.toml --births 20 --in-process --quiet --out out"
-    done = _python(("-m", "revolve", *words.split()), tmp_path)
-    assert done.returncode == 0, done.stderr
+    _follow([f"revolve {words}"], tmp_path)
     # The message that the page quotes.
     wrong = module.replace(
         "length, 0.0, 0.0), (1.0, 0.0, 0.0), (", "length, 0.0, 0.0), (2.0, 0.0, 0.0), ("
@@ -253,12 +250,8 @@ def test_commands_of_the_robots_page_run(tmp_path: Path) -> None:
     (tmp_path / "robogen.toml").write_text(document)
     (block,) = _blocks(page, "sh")
     own = "revolve robot simulate some.yaml --experiment robogen.toml"
-    printed: list[str] = []
-    for line in (*block.splitlines(), own):
-        words = line.partition("#")[0].split()
-        done = _python(("-m", *words), tmp_path)
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
-        printed += [done.stdout] if "simulate" in words else []
+    done = _follow([*block.splitlines(), own], tmp_path)
+    printed = [each.stdout for each in done if "simulate" in each.args]
     assert printed[0] == printed[1]
     assert printed[2] != printed[0]
     some, again = (tmp_path / name for name in ("some.yaml", "again.yaml"))
@@ -271,18 +264,13 @@ def test_archipelagos_of_the_islands_page_run(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(document)
     (block,) = _blocks(page, "sh")
     own = "revolve run mine.toml --births 24 --out mine"
-    for line in (own, *block.splitlines()):
-        words = line.split()
-        done = _python(("-m", *words), tmp_path)
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    _follow([own, *block.splitlines()], tmp_path)
 
 
 def test_campaign_of_the_campaigns_page_runs(tmp_path: Path) -> None:
     (block,) = _blocks(TOP / "docs" / "campaigns.md", "sh")
-    for line in block.splitlines():
-        done = _python(("-m", *line.split()), tmp_path)
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
-    assert "4 of 4 runs already finished" in done.stderr
+    *_, last = _follow(block.splitlines(), tmp_path)
+    assert "4 of 4 runs already finished" in last.stderr
 
 
 def test_every_command_on_the_pages_exists() -> None:

@@ -220,15 +220,15 @@ def test_missing_file_of_the_best_robot_is_written_again(
     shutil.copytree(campaign_folder / "twice", workspace.folder / "twice")
     file = workspace.folder / "twice" / "seeing-1" / "best.yaml"
     sound = file.read_bytes()
+    said = "best.yaml was missing; best robot of the last population: its file: "
     for folder in ("twice/seeing-1", "twice"):
         file.unlink()
         output = workspace.run("resume", folder, "--in-process", "--quiet")
         assert "already finished" in output
-        said = "best.yaml was missing; best robot of the last population: its file: "
         assert f"{said}twice/seeing-1" in output
         assert file.read_bytes() == sound
-        output = workspace.run("resume", folder, "--in-process", "--quiet")
-        assert "was missing" not in output
+    output = workspace.run("resume", "twice", "--in-process", "--quiet")
+    assert "was missing" not in output
 
 
 def test_damaged_tables_of_a_campaign_are_written_again(

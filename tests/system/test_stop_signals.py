@@ -115,7 +115,7 @@ def wait_until_begun(folder: Path, name: str, process: Any, until: Until) -> str
             return is_vetted and (size >= 4 or name == "in-process")
         if name == "coordinator":
             return (folder / "run" / "address").exists()
-        return _cpu_s(process.pid) > 3.0
+        return _cpu_s(process.pid) > 2.0
 
     told: str = ""
     if name in ("worker", "analyzer", "hub"):
