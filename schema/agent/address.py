@@ -114,15 +114,6 @@ def _remove_unused(place: Path) -> None:
                 lock.unlink()
 
 
-def default_connect() -> str:
-    """Return the default of ``--connect``: the environment's, else the user's hub.
-
-    Raises:
-        NetworkError: there is no directory that only this user can enter.
-    """
-    return os.environ.get(CONNECT_VARIABLE) or user_hub()
-
-
 def runtime_directory() -> Path:
     """Return the directory of this user's sockets; create it if it is missing.
 
@@ -187,18 +178,6 @@ def _make_private(place: Path) -> None:
             f"{place}: must be a directory of this user with mode 0700, or others "
             "could join the fleet: remove it, or set XDG_RUNTIME_DIR"
         )
-
-
-def listen_address(place: str) -> str:
-    """Return the address that a user wants to listen on.
-
-    Args:
-        place: an address, or "hub" for this user's hub.
-
-    Raises:
-        NetworkError: there is no directory that only this user can enter.
-    """
-    return user_hub() if place == HUB else place
 
 
 def hub_of(place: str) -> str:

@@ -19,9 +19,9 @@ from schema.agent.access import Certificate, read_certificates
 from schema.agent.address import (
     CONNECT_VARIABLE,
     FORMS,
-    default_connect,
+    HUB,
     hub_of,
-    listen_address,
+    user_hub,
 )
 from schema.agent.flags import Flags, add_plugins, positive_number, whole_number
 from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
@@ -62,7 +62,7 @@ def connect_of(options: argparse.Namespace) -> str:
     """
     given = options.connect
     try:
-        return hub_of(given or default_connect())
+        return hub_of(given or os.environ.get(CONNECT_VARIABLE) or HUB)
     except NetworkError as error:
         where = "--connect" if given else f"${CONNECT_VARIABLE}"
         raise NetworkError(f"{where}: {error}") from None
@@ -74,7 +74,7 @@ def listen_of(places: Iterable[str], tls: Tls | None) -> tuple[str, ...]:
     Raises:
         NetworkError: an address of no allowed form, or that must not be listened on.
     """
-    addresses = tuple(map(listen_address, places))
+    addresses = tuple(user_hub() if place == HUB else place for place in places)
     try:
         hub_config(addresses, tls)
     except NetworkError as error:

@@ -6,6 +6,7 @@ import os
 import socket
 import tempfile
 import time
+from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
@@ -13,7 +14,6 @@ from typing import IO
 import pytest
 
 from schema.agent.address import (
-    default_connect,
     hub_of,
     new_socket,
     parse_address,
@@ -21,6 +21,7 @@ from schema.agent.address import (
     runtime_directory,
     user_hub,
 )
+from schema.agent.command import connect_of
 from schema.errors import NetworkError
 
 
@@ -186,9 +187,10 @@ def test_default_address_comes_from_the_environment(
     runtime: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("REVOLVE_CONNECT", raising=False)
-    assert default_connect() == f"unixsock-stream/{runtime}/revolve/hub.sock"
+    default = Namespace(connect=None)
+    assert connect_of(default) == f"unixsock-stream/{runtime}/revolve/hub.sock"
     monkeypatch.setenv("REVOLVE_CONNECT", "tls/hub.example:7447")
-    assert default_connect() == "tls/hub.example:7447"
+    assert connect_of(default) == "tls/hub.example:7447"
 
 
 def test_folder_of_a_run_gives_its_hubs_address(tmp_path: Path) -> None:
