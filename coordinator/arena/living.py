@@ -10,6 +10,8 @@ from math import cos, dist, isfinite, sin, tau
 from types import MappingProxyType
 from typing import NamedTuple
 
+from msgspec import structs
+
 from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
@@ -185,10 +187,10 @@ class LivingRobots:
         robot.robot, birth = changed, robot.birth
         inserted = self._insertions.get(birth)
         if inserted is not None:
-            self._insertions[birth] = replace(inserted, robot=changed)
+            self._insertions[birth] = structs.replace(inserted, robot=changed)
             return
         if restarts_window and robot.judgement is not None:
-            robot.judgement = replace(robot.judgement, is_mature=False)
+            robot.judgement = structs.replace(robot.judgement, is_mature=False)
         if (before := self._brains.get(birth)) is not None:
             restarts_window = restarts_window or before.restarts_window
         self._brains[birth] = BrainChange(birth, changed.brain, restarts_window)

@@ -1,7 +1,8 @@
 """Orders of operators: checks, and the queue until they are carried out."""
 
-from dataclasses import replace
 from math import isfinite
+
+from msgspec.structs import replace
 
 from coordinator.arena.infancy import Infancy
 from coordinator.arena.living import LivingRobots, Moment, death_record

@@ -1,5 +1,7 @@
 """Requests about single robots, whose jobs are recorded."""
 
+from msgspec.structs import replace
+
 from coordinator.dispatch.events import (
     Client,
     Deliver,
@@ -14,13 +16,14 @@ from coordinator.run.requests import Requests
 from coordinator.run.run_context import RunContext
 from schema.experiment.document import Experiment
 from schema.experiment.identity import Origin
+from schema.limits import REQUEST_BYTES
 from schema.parts import BUILT_IN
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Part, Robot
-from schema.wire.codec import decode_body, decode_request, encode_answer
-from schema.wire.messages import Answer
+from schema.wire.codec import decode, encode
+from schema.wire.messages import Answer, Failure, Request, Result
 
 EPOCH = 3
 CLIENT = Client("run", EPOCH)
@@ -42,6 +45,11 @@ ROBOT = Robot(
 )
 JUDGED = Evaluation(0.25, 0.06, 0.05, 12.0)
 VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
+
+
+def request_of(payload: bytes) -> Request:
+    """Return the request of a job."""
+    return decode(Request, payload, REQUEST_BYTES)
 
 
 class SentRequests:
@@ -72,8 +80,7 @@ class SentRequests:
         self.sent.append((number, agent, payload))
 
     def cancel(self, agent: str, payload: bytes) -> None:
-        asked = decode_request(payload, decode_body)
-        self.cancelled.append((asked.number, agent))
+        self.cancelled.append((request_of(payload).number, agent))
 
     def ask(self, _agent: str) -> None:
         """No agent reports progress."""
@@ -98,9 +105,9 @@ class SentRequests:
         self.now_s += seconds
         self.tell(Ticked(self.now_s))
 
-    def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
-        """Return the answer to the newest job."""
+    def reply(self, result: Result | str, **changes: float) -> Returned:
+        """Return the answer to the newest job; a text is the reason of a failure."""
         number, agent, _ = self.sent[-1]
-        fields = {"epoch": EPOCH, "number": number, **changes}
-        data = encode_answer(Answer(**fields, wall_s=0.5, result=result))
-        return Returned(number, agent, "ok", data)
+        done = Failure(result) if isinstance(result, str) else result
+        answer = replace(Answer(EPOCH, number, 0.5, done), **changes)
+        return Returned(number, agent, "ok", encode(answer))

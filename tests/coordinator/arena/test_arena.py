@@ -1,10 +1,9 @@
 """Rules of an arena, each tested once by hand: births, culls, samples, ends."""
 
-from dataclasses import replace
 from typing import Any
 
-import msgspec
 import pytest
+from msgspec.structs import replace
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
@@ -267,13 +266,11 @@ def test_a_wrong_advance_raises_and_changes_nothing(change: dict[str, Any]) -> N
     advance = right.advance
     if "fitness" in change:
         judged = tuple(replace(one, **change) for one in advance.judgements)
-        wrong = msgspec.structs.replace(
-            right, advance=replace(advance, judgements=judged)
-        )
+        wrong = replace(right, advance=replace(advance, judgements=judged))
     elif "step" in change or "judgements" in change:
-        wrong = msgspec.structs.replace(right, advance=replace(advance, **change))
+        wrong = replace(right, advance=replace(advance, **change))
     else:
-        wrong = msgspec.structs.replace(right, **change)
+        wrong = replace(right, **change)
     with pytest.raises(UnexpectedEvent, match=r"arena 0 at step .* born"):
         lived.arena.handle(wrong)
     lived.waiting.clear()
@@ -317,8 +314,8 @@ def test_an_off_line_experiment_has_no_arena() -> None:
 
 def without_reproduction() -> Experiment:
     base = experiment(20)
-    selection = msgspec.structs.replace(base.selection, parents="none")
-    return msgspec.structs.replace(base, selection=selection)
+    selection = replace(base.selection, parents="none")
+    return replace(base, selection=selection)
 
 
 def test_children_may_be_random_robots() -> None:

@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Iterator
+from pathlib import Path
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,7 +21,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.storage.journal import decode_entry, encode_entry
+from coordinator.storage.journal import decode_record, encode_event
 from schema.robot.ids import BirthId
 from schema.wire.arena import AdvanceShard
 from tests.coordinator.arena_world import (
@@ -117,11 +118,11 @@ def test_a_replayed_journal_gives_the_same_commands_and_rows() -> None:
             lived.turn()
     lived.live()
     kept = Advanced | Commanded | Vetted | VettingFailed
-    journal = [encode_entry(one) for one in lived.events if isinstance(one, kept)]
+    journal = [encode_event(one) for one in lived.events if isinstance(one, kept)]
     again = Arena(experiment(40), 7, 0)
     commands = again.handle(Started())
     for entry in journal:
-        event = decode_entry(entry)
+        event = decode_record(Path("journal"), entry)
         assert isinstance(event, kept)
         commands += again.handle(event)
     assert len(commands) == len(lived.commands)

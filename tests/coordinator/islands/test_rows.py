@@ -1,9 +1,8 @@
 """Counts of the births table, and the column ``measures`` of evaluations."""
 
-from dataclasses import replace
-
 import pyarrow as pa
 import pytest
+from msgspec.structs import replace
 
 from coordinator.islands.events import Evaluated, EvaluationFailed
 from coordinator.islands.rows import evaluation_record, named_measures, sizes

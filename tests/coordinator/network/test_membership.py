@@ -1,8 +1,11 @@
 """Membership of agents: tokens and introductions in, events out; order of asking."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coordinator.dispatch.events import Died, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
@@ -18,33 +21,24 @@ from schema.limits import (
     INFO_BYTES,
     LONGEST_QUIET_S,
     MOST_CORES,
+    MOST_DEATHS,
     MOST_MEMBERS,
     MOST_PEERS,
     MOST_SHARDS,
     MOST_SLOTS,
 )
-from schema.wire import revolve_pb2 as pb
+from schema.wire.codec import encode
+from schema.wire.messages import AgentInfo, Crash
 
 WORKER = Member("f", "worker", "host-0.w")
 NAME = WORKER.name
 
 
-def info(
-    agent: str = NAME,
-    kind: str = "worker",
-    slots: int = 2,
-    version: str = "1",
-    *,
-    platform: str = "p",
-    shards: int = 3,
-    cores: int = 4,
-    quiet_s: float | None = None,
-) -> bytes:
-    message = pb.AgentInfo(
-        agent=agent, kind=kind, slots=slots, platform=platform, version=version,
-        shards=shards, cores=cores, quiet_s=quiet_s,
-    )  # fmt: skip
-    return message.SerializeToString()
+INFO = AgentInfo(NAME, "worker", 2, "p", "1", shards=3, cores=4)
+
+
+def info(**changes: Any) -> bytes:  # noqa: ANN401 - of any field
+    return encode(replace(INFO, **changes))
 
 
 def joined(name: str) -> Joined:
@@ -91,9 +85,8 @@ def test_agent_of_another_version_is_refused_until_it_vanishes(
 
 
 def with_death(member: Member, of: str, cause: str = "SIGSEGV") -> bytes:
-    message = pb.AgentInfo.FromString(info(agent=member.name, kind=member.role))
-    message.deaths.add(agent=of, run="r", epoch=3, number=7, cause=cause)
-    return message.SerializeToString()
+    crash = Crash(of, "r", 3, 7, cause, bytes(8))
+    return info(agent=member.name, kind=member.role, deaths=(crash,))
 
 
 def successor(member: Member, letter: str) -> Member:
@@ -202,12 +195,11 @@ def test_an_agent_that_stops_answering_leaves_and_may_join_again(
         info(cores=0),
         info(cores=MOST_CORES + 1),
         info(slots=2**32 - 1),
-        info() + b"\x0a\x00" * INFO_BYTES,
+        info() + b"\0",
+        info(version="1" * INFO_BYTES),
         info(platform="p" * 1000),
         info(platform="\x1b[2J"),
-        pb.AgentInfo(
-            agent=NAME, kind="worker", slots=1, version="1", deaths=[pb.Death()] * 9
-        ).SerializeToString(),
+        info(deaths=(Crash(NAME, "r", 1, 1, "SIGSEGV", b""),) * (MOST_DEATHS + 1)),
     ],
 )
 def test_false_info_is_malformed_and_changes_nothing(

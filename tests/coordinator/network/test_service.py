@@ -38,10 +38,16 @@ from schema.agent.network import client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member
 from schema.errors import NetworkError
-from schema.limits import LONGEST_QUIET_S, OPERATOR_REQUEST_BYTES
-from schema.wire import revolve_pb2 as pb
-from schema.wire.codec import decode_answer
-from schema.wire.messages import Answer
+from schema.limits import (
+    ANSWER_BYTES,
+    INFO_BYTES,
+    LONGEST_QUIET_S,
+    OPERATOR_REQUEST_BYTES,
+)
+from schema.robot.ids import BirthId
+from schema.robot.robot import Part, Robot
+from schema.wire.codec import decode, encode
+from schema.wire.messages import AgentInfo, Answer, Evaluate, Request
 
 pytestmark = pytest.mark.system
 
@@ -52,9 +58,17 @@ WAIT_S = 3600.0
 """Longer than any job here [s]."""
 
 
-def request(number: int, *, settings: bytes = b"", epoch: int = 1) -> bytes:
-    message = pb.Request(run="r", epoch=epoch, number=number, settings=settings)
-    return message.SerializeToString()
+WORK = Evaluate(BirthId(0, 0), Robot((Part("Core", -1, -1, -1, 0, ()),)))
+
+
+def request(
+    number: int, *, settings: bytes = b"", epoch: int = 1, plugins: str = ""
+) -> bytes:
+    return encode(Request("r", epoch, number, WORK, settings, plugins))
+
+
+def read_answer(data: bytes) -> Answer:
+    return decode(Answer, data, ANSWER_BYTES)
 
 
 @pytest.fixture
@@ -128,7 +142,7 @@ class Driver:
     def ask(self, *numbers: int) -> None:
         for number in numbers:
             payload = request(number)
-            job = Job(number, "evaluate", payload, read=decode_answer)
+            job = Job(number, "evaluate", payload, read=read_answer)
             self.tell(Requested(job))
 
     def run(self, is_enough: Callable[[], bool]) -> None:
@@ -195,8 +209,9 @@ def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
             def quiet_s(name: str) -> float:
                 (reply,) = session.get(Member("default", "worker", name).info)
                 assert reply.ok is not None
-                info = pb.AgentInfo.FromString(reply.ok.payload.to_bytes())
-                return info.quiet_s if info.HasField("quiet_s") else -1.0
+                data = reply.ok.payload.to_bytes()
+                quiet_s = decode(AgentInfo, data, INFO_BYTES).quiet_s
+                return -1.0 if quiet_s is None else quiet_s
 
             assert quiet_s("busy") == quiet_s("stuck") == -1.0
             for process, name in ((busy, "busy"), (it, "stuck")):
@@ -319,8 +334,7 @@ def test_cancelled_job_is_not_done(
 def test_agent_without_a_plugin_is_unfit_for_the_run(network: Network) -> None:
     with agent(network, "w"):
         until(network, has(1))
-        message = pb.Request(run="r", epoch=1, number=4, plugins="not_here=abc")
-        network.send(4, "w", message.SerializeToString(), WAIT_S)
+        network.send(4, "w", request(4, plugins="not_here=abc"), WAIT_S)
         (unfit,) = until(network, has(1))
         assert isinstance(unfit, Returned)
         assert (unfit.number, unfit.outcome) == (4, "unfit")
@@ -338,8 +352,8 @@ def test_workers_connect_to_a_new_coordinator() -> None:
 @pytest.mark.parametrize(
     ("payload", "reason"),
     [
-        (b"\xff\xff", "not the bytes of a Request"),
-        (b"", "names no run"),
+        (b"\xff\xff", "damaged, or of another version"),
+        (b"", "damaged, or of another version"),
         (request(0, settings=b"bad"), "settings: bad"),
         (request(0, settings=b"bug"), "ZeroDivisionError: a plug-in's own"),
     ],
@@ -357,7 +371,7 @@ def test_a_bad_request_is_refused_and_the_next_one_served(
     assert refusal.outcome == "error"
     assert reason in refusal.reason
     assert isinstance(answer, Returned)
-    assert decode_answer(answer.answer).number == 1
+    assert read_answer(answer.answer).number == 1
 
 
 def test_an_older_coordinator_is_told_once_that_it_is_fenced(network: Network) -> None:
@@ -404,8 +418,8 @@ def test_an_agent_of_another_version_is_refused(network: Network) -> None:
     [
         b"\xff\xff",
         b"",
-        pb.AgentInfo(agent="x", kind="worker", slots=0).SerializeToString(),
-        pb.AgentInfo(agent="y", kind="worker", slots=1).SerializeToString(),
+        encode(AgentInfo("x", "worker", 0, "p", "1")),
+        encode(AgentInfo("y", "worker", 1, "p", "1")),
     ],
 )
 def test_a_malformed_message_is_counted_and_dropped(

@@ -47,9 +47,9 @@ from schema.wire.operator import (
     SaveSnapshot,
     SetBrain,
 )
-from schema.wire.protobuf import encode_robot
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
+from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards
 
 EXPERIMENT = experiment(30, snapshot_interval_s=20.0, wall_diameter_m=20.0)
@@ -117,7 +117,7 @@ class Run:
         self.rows = Recorder(path, DETAILS)
         stack.callback(self.rows.close)
         shards = other.pop("shards", None) or Shards(FakeWorld)
-        agents = {"analyzer": analyzer.report.answer, "worker": shards.answer}
+        agents = {"analyzer": analyzer.report.answer, "worker": Jobs(shards).answer}
         document = other.pop("document", EXPERIMENT)
         self.arena = Arena(document, DETAILS.seed, DETAILS.run)
         platform = other.pop("platform", "any")
@@ -238,7 +238,7 @@ class Mortal(LocalAgents):
                 self.left -= 1
                 if self.left == 0:
                     self.left = 5
-                    self._answers["local-worker"] = Shards(FakeWorld).answer
+                    self._agents["local-worker"] = Jobs(Shards(FakeWorld)).answer
                     news.append(Returned(event.number, event.agent, "lost"))
                     continue
             news.append(event)
@@ -293,9 +293,7 @@ def ordered(path: Path, point: Point) -> list[str]:
                     genome = one.arena.population[1].genome
                     guest = one.arena.encoding.develop(genome)
                     said.append(one.ask(RemoveRobot(living[0]), "remove"))
-                    said.append(
-                        one.ask(InsertRobot(encode_robot(guest), (0.5, 1.5)), "insert")
-                    )
+                    said.append(one.ask(InsertRobot(guest, (0.5, 1.5)), "insert"))
                     said.append(one.ask(PauseArena(), "pause"))
                     said.append(one.ask(SaveSnapshot()))
                 elif one.arena.is_paused:
@@ -333,13 +331,11 @@ def test_orders_are_repeated_in_a_replay(tmp_path: Path, calm: Path) -> None:
     [
         (RemoveRobot(BirthId(0, 999)), "birth 999: is not alive"),
         (
-            InsertRobot(encode_robot(Robot((Part("Barrow", -1, -1, -1, 0, ()),)))),
+            InsertRobot(Robot((Part("Barrow", -1, -1, -1, 0, ()),))),
             "Barrow",
         ),
         (
-            InsertRobot(
-                encode_robot(Robot((Part("Core", -1, -1, -1, 0, ()),))), (8, 6)
-            ),
+            InsertRobot(Robot((Part("Core", -1, -1, -1, 0, ()),)), (8, 6)),
             "place: must be inside the wall, < 10 m from the centre, got 8 6",
         ),
     ],
@@ -375,16 +371,16 @@ def test_orders_that_stop_the_run_or_have_no_effect_are_refused(
         fat = Robot(first.parts, Brain((*least, *[hidden] * 11)))
         before = (tmp_path / "run" / NAME).stat().st_size
         most = "refused: robot: the robot has 11 hidden, outside space.max_hidden = 10"
-        assert one.ask(InsertRobot(encode_robot(fat))) == most
-        assert one.ask(SetBrain(births[0], encode_robot(fat))) == most
+        assert one.ask(InsertRobot(fat)) == most
+        assert one.ask(SetBrain(births[0], fat)) == most
         far = "refused: place: must be < 1e+06 m from the centre, got 1e+11 0"
-        assert one.ask(InsertRobot(encode_robot(first), (1e11, 0.0))) == far
-        misfit = one.ask(SetBrain(births[0], encode_robot(other)))
+        assert one.ask(InsertRobot(first, (1e11, 0.0))) == far
+        misfit = one.ask(SetBrain(births[0], other))
         assert misfit.startswith("refused: brain: ")
         assert (tmp_path / "run" / NAME).stat().st_size == before
-        near = InsertRobot(encode_robot(first), (9e5, 0.0))
+        near = InsertRobot(first, (9e5, 0.0))
         assert one.ask(near, "near").startswith("takes effect")
-        brain = SetBrain(births[0], encode_robot(first))
+        brain = SetBrain(births[0], first)
         assert one.ask(brain, "brain").startswith("takes effect")
 
 

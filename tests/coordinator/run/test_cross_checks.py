@@ -1,6 +1,6 @@
 """Audits: which evaluations are done twice, and what happens to the pair."""
 
-import dataclasses
+from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
@@ -13,7 +13,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.run.cross_checks import CrossChecks, audit_records, describe
-from coordinator.storage.journal import decode_entry, encode_entry
+from coordinator.storage.journal import decode_record, encode_event
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from schema.robot.robot import Part, Robot
@@ -24,9 +24,7 @@ ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
 BIRTH = BirthId(2, 7)
 ONE = Evaluated(BIRTH, Evaluation(0.25, 0.0, 0.05, 12.0), Provenance("a", "p", 0.1))
 OTHER = replace(ONE, provenance=Provenance("b", "q", 0.7))
-DIFFERENT = replace(
-    OTHER, evaluation=dataclasses.replace(ONE.evaluation, fitness=0.25 + 1e-16)
-)
+DIFFERENT = replace(OTHER, evaluation=replace(ONE.evaluation, fitness=0.25 + 1e-16))
 FAILED = EvaluationFailed(BIRTH, "flew away", Provenance("c", "p", 0.1))
 
 
@@ -72,7 +70,7 @@ def test_different_answers_give_no_result(other: Evaluated | EvaluationFailed) -
 
 
 def _far() -> Evaluation:
-    return dataclasses.replace(ONE.evaluation, fitness=9.5)
+    return replace(ONE.evaluation, fitness=9.5)
 
 
 def test_equal_failures_agree() -> None:
@@ -104,7 +102,7 @@ def test_outcome_of_a_single_job_passes_unchanged() -> None:
 
 @pytest.mark.parametrize("event", [Audited(ONE, OTHER), Audited(FAILED, DIFFERENT)])
 def test_journal_keeps_both_outcomes(event: Audited) -> None:
-    assert decode_entry(encode_entry(event)) == event
+    assert decode_record(Path("journal"), encode_event(event)) == event
 
 
 def test_rows_have_the_columns_of_their_table() -> None:

@@ -7,20 +7,15 @@ from coordinator.islands.events import Record
 from coordinator.islands.rows import body_rows
 from coordinator.run.feed import Feed
 from coordinator.storage.folder import RunDetails
+from schema.limits import UPDATE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row
-from schema.wire.codec import encode_body
-from schema.wire.updates import (
-    Birth,
-    Update,
-    WorkerInfo,
-    decode_update,
-    encode_update,
-)
+from schema.wire.codec import decode, encode
+from schema.wire.updates import Birth, Update, WorkerInfo
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
-BODY = encode_body(CORE)
+BODY = CORE.parts
 WORKERS = (WorkerInfo("w", "x", (0,)),)
 
 
@@ -62,7 +57,7 @@ def _feed(*records: Record) -> Feed:
 
 def whole(feed: Feed) -> Update:
     """Return the state as a viewer reads it."""
-    return decode_update(encode_update(feed.whole()))
+    return decode(Update, encode(feed.whole()), UPDATE_BYTES)
 
 
 def _sent(update: Update | None) -> Update:

@@ -14,16 +14,10 @@ from coordinator.run import live_server
 from coordinator.run.feed import Feed
 from coordinator.run.live_server import LiveServer
 from coordinator.storage.folder import RunDetails
-from schema.limits import MOST_QUERIES
+from schema.limits import MOST_QUERIES, UPDATE_BYTES
 from schema.robot.robot import Part, Robot
-from schema.wire.updates import (
-    Page,
-    Update,
-    decode_page,
-    decode_update,
-    encode_update,
-    pages_of,
-)
+from schema.wire.codec import decode, encode
+from schema.wire.updates import Page, Update, decode_page, pages_of
 
 DETAILS = RunDetails("live", 0, 1, "{}")
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
@@ -111,20 +105,21 @@ class Live:
         while not pages or len(pages) < pages[0].pages:
             sequence = pages[0].sequence if pages else 0
             request = Page(b"", sequence=sequence, page=len(pages))
-            viewer = self.ask(encode_update(request))
+            viewer = self.ask(encode(request))
             queries += 1
             self.server.serve(now_s + 0.25 * queries)
             assert viewer.is_done
             assert max(map(len, viewer.replies)) < LONGEST
             pages += viewer.pages
         assert [each.page for each in pages] == list(range(len(pages)))
-        return decode_update(b"".join(each.data for each in pages)), queries
+        data = b"".join(each.data for each in pages)
+        return decode(Update, data, UPDATE_BYTES), queries
 
 
 def births(viewer: Viewer) -> int:
     """Return the number of births in a state of one page."""
     (page,) = viewer.pages
-    return len(decode_update(page.data).births)
+    return len(decode(Update, page.data, UPDATE_BYTES).births)
 
 
 def test_each_viewer_gets_the_state_at_its_time(
@@ -168,7 +163,7 @@ def test_a_viewer_begins_again_when_its_state_is_outdated(
     first = live.ask()
     live.server.serve(1.0)
     sequence = first.pages[0].sequence
-    request = encode_update(Page(b"", sequence=sequence, page=6))
+    request = encode(Page(b"", sequence=sequence, page=6))
     live.born(1)
     same, newest = live.ask(request), live.ask()
     live.server.serve(1000.0)
@@ -181,7 +176,7 @@ def test_a_viewer_begins_again_when_its_state_is_outdated(
 
 def test_damaged_requests_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     live = Live(monkeypatch)
-    damaged, beyond = live.ask(b"\xff"), live.ask(encode_update(Page(b"", page=10**9)))
+    damaged, beyond = live.ask(b"\xff"), live.ask(encode(Page(b"", page=10**9)))
     live.server.serve(1.0)
     assert damaged.is_done
     assert damaged.replies == []

@@ -25,6 +25,7 @@ from schema.experiment.document import Experiment, Islands, Selection, Simulatio
 from schema.experiment.file import experiment_text
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
+from schema.wire.codec import encode
 from schema.wire.operator import (
     ListRobots,
     OperatorAction,
@@ -34,9 +35,7 @@ from schema.wire.operator import (
     RemoveRobot,
     SetBrain,
     decode_operator_reply,
-    encode_operator_request,
 )
-from schema.wire.protobuf import encode_robot
 from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import experiment
 
@@ -74,7 +73,7 @@ def started(*runs: Planned) -> Iterator[RunScheduler]:
 
 def ask(scheduler: RunScheduler, name: str) -> OperatorReply:
     request = OperatorRequest("x", 0, PauseArena(), name)
-    data = answer_operator(scheduler, encode_operator_request(request), 0.0)
+    data = answer_operator(scheduler, encode(request), 0.0)
     return decode_operator_reply(data)
 
 
@@ -146,7 +145,7 @@ def test_an_immigrant_is_listed_and_removed_by_its_whole_name() -> None:
     immigrant = next(one for one in births if one.island == 0)
     robot = arena.robot(immigrant)
     assert robot is not None
-    assert not ask(SetBrain(immigrant, encode_robot(robot))).is_refused
+    assert not ask(SetBrain(immigrant, robot)).is_refused
     assert not ask(RemoveRobot(immigrant)).is_refused
     wanted = [ReplaceBrain(immigrant, robot.brain), Remove(immigrant)]
     assert [order.order for order in orders] == wanted

@@ -19,6 +19,7 @@ from coordinator.run.session import RunSession
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import table_damages
+from schema.agent.request_handler import Compute
 from schema.errors import JobRefused
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_text, read_experiment
@@ -28,6 +29,7 @@ from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path, segments_of
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
+from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards
 
 ARENA = experiment(60, snapshot_interval_s=20.0)
@@ -53,15 +55,14 @@ def execute(
     There is one worker of each platform. An arena drifts if its own is not there.
     """
     held = RunFolder(path, None if path.exists() else details_of(document))
-    shards = Shards(world)
-    agents: dict[AgentKind, Callable[[bytes], bytes]] = {
+    agents: dict[AgentKind, Compute] = {
         "analyzer": analyzer.report.answer,
-        "worker": shards.answer,
+        "worker": Jobs(Shards(world)).answer,
     }
     local = LocalAgents(agents, platforms[0])
     fleet = Fleet(local, allows_drift=True)
     for other in platforms[1:]:
-        local._answers[f"worker-{other}"] = Shards(world).answer
+        local._agents[f"worker-{other}"] = Jobs(Shards(world)).answer
         fleet.tell(Joined(f"worker-{other}", "worker", 1, other))
     run = RunSession(held, fleet)
     try:

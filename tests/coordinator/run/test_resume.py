@@ -30,8 +30,7 @@ from schema.experiment.file import experiment_text
 from schema.experiment.learning import Learning
 from schema.robot.results import Evaluation
 from schema.tables.files import read_table
-from schema.wire.codec import decode_request, encode_answer
-from schema.wire.messages import Answer
+from schema.wire.messages import Evaluate, Failure, Request
 from schema.wire.protobuf import encode_robot
 
 EXPERIMENT = Experiment(
@@ -56,16 +55,16 @@ class Worker:
     left: int
     asked: int = field(default=0)
 
-    def answer(self, request: bytes) -> bytes:
+    def answer(self, request: Request) -> Evaluation | Failure:
         """Return a fitness that depends on the robot alone; one in nine fails."""
         self.asked += 1
         if self.asked > self.left:
             raise Killed
-        context = decode_request(request)
-        number = crc32(encode_robot(context.robot))
-        fitness = Evaluation(number / 2**32, 0.2, 0.1, 12.0)
-        result = "diverged" if number % 9 == 0 else fitness
-        return encode_answer(Answer(context.epoch, context.number, 0.0, result))
+        assert isinstance(request.work, Evaluate)
+        number = crc32(encode_robot(request.work.robot))
+        if number % 9 == 0:
+            return Failure("diverged")
+        return Evaluation(number / 2**32, 0.2, 0.1, 12.0)
 
 
 def run(
