@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.compute
 
 from coordinator.run.requests import check_count, impossible
+from schema.errors import MalformedMessage
 from schema.experiment.document import Experiment
 from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
@@ -121,7 +122,7 @@ def read_poses(columns: bytes, expected: ExpectedAdvance) -> pa.Table:
 
     Raises:
         MalformedMessage: not the columns of poses; poses at other times, of robots that
-            do not live here, repeated or not finite.
+            do not live here, repeated or not finite; too many angles.
     """
     samples = expected.samples
     rows = received_columns(
@@ -132,11 +133,7 @@ def read_poses(columns: bytes, expected: ExpectedAdvance) -> pa.Table:
     )
     if rows["birth_island"].null_count < rows.num_rows:
         raise impossible("poses: birth_island must be null")
-    coordinates = [rows[name].to_numpy() for name in ("x", "y", "z")]
-    attitudes = [rows[f"q{axis}"].to_numpy() for axis in "wxyz"]
-    angles = pyarrow.compute.list_flatten(rows["angles"]).to_numpy()
-    if not all(np.isfinite(c).all() for c in (*coordinates, *attitudes, angles)):
-        raise impossible("poses: must be finite")
+    _check_numbers(rows, expected.experiment.space.max_parts)
     islands, births = rows["island"].to_pylist(), rows["birth"].to_pylist()
     robots = [BirthId(*name) for name in zip(islands, births, strict=True)]
     if unknown := set(robots) - expected.living:
@@ -153,6 +150,20 @@ def read_poses(columns: bytes, expected: ExpectedAdvance) -> pa.Table:
     if len(set(zip(robots, times, strict=True))) < len(robots):
         raise impossible("poses: must have one row per robot and time")
     return rows
+
+
+def _check_numbers(poses: pa.Table, most_joints: int) -> None:
+    """Raise unless poses are finite, with at most so many angles each on average."""
+    coordinates = [poses[name].to_numpy() for name in ("x", "y", "z")]
+    attitudes = [poses[f"q{axis}"].to_numpy() for axis in "wxyz"]
+    angles = pyarrow.compute.list_flatten(poses["angles"]).to_numpy()
+    if not all(np.isfinite(c).all() for c in (*coordinates, *attitudes, angles)):
+        raise impossible("poses: must be finite")
+    most = poses.num_rows * most_joints
+    if len(angles) > most:
+        raise MalformedMessage(
+            f"poses: must have <= {most} angles, got {len(angles)}", "too large"
+        )
 
 
 def place_poses(columns: bytes, poses: pa.Table, island: int) -> bytes:

@@ -1,6 +1,5 @@
 """Advances of real arenas pass every check."""
 
-import dataclasses
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
@@ -12,29 +11,22 @@ from msgspec.structs import replace
 from coordinator.evolution.generation import generate
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
-    Inserted,
     check_advance,
-    check_answer,
-    inserted,
     read_poses,
 )
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings, read_arena_settings
+from schema.limits import ADVANCE_BYTES
 from schema.robot.brain import Brain
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, BrainChange, Changes, Insertion
-from schema.wire.arena_codec import (
-    AdvanceAnswer,
-    decode_advance_answer,
-    encode_advance_answer,
-)
+from schema.wire.codec import decode, encode
 from tests.coordinator.arena_world import experiment
 from worker.arena.world import World
 
 TICK = 25
-JOB = (1, 2)
 
 
 def settings_of(*, arena: dict[str, Any], simulation: dict[str, Any]) -> Experiment:
@@ -44,61 +36,43 @@ def settings_of(*, arena: dict[str, Any], simulation: dict[str, Any]) -> Experim
 
 def advances(
     rules: Experiment, stops: list[int]
-) -> Iterator[tuple[Advance, bytes, ExpectedAdvance]]:
+) -> Iterator[tuple[Advance, ExpectedAdvance]]:
     """Advance a crowd from stop to stop; robots come and go at each.
 
     The brain of one of those that stay is replaced by itself, and its window restarts.
     """
     settings = read_arena_settings(arena_settings(rules, Origin()))
     world, space = World(settings), body_space(rules.space)
-    born: dict[BirthId, Inserted] = {}
     brains: dict[BirthId, Brain] = {}
     try:
         for number, (begin, end) in enumerate(pairwise([0, *stops])):
-            births = [BirthId(number % 2, 3 * number + each) for each in range(3)]
-            genomes = [
-                generate(np.random.default_rng(birth.number), rules) for birth in births
-            ]
-            came = tuple(
-                Insertion(birth, develop(genome, space), (0.1 * place, 0.05 * number))
-                for place, (birth, genome) in enumerate(
-                    zip(births, genomes, strict=True)
-                )
-            )
-            gone = tuple(sorted(born)[:1]) if begin % TICK == 0 else ()
-            if begin % TICK:
-                came = ()
-            stay = (
-                tuple(sorted(born)[-1:])
-                if begin % settings.simulation.pose_steps == 0
-                else ()
-            )
+            living = list(world.births)
+            came: list[Insertion] = []
+            gone: list[BirthId] = []
+            if begin % TICK == 0:
+                for place in range(3):
+                    birth = BirthId(number % 2, 3 * number + place)
+                    genome = generate(np.random.default_rng(birth.number), rules)
+                    at = (0.1 * place, 0.05 * number)
+                    came.append(Insertion(birth, develop(genome, space), at))
+                gone = living[:1]
+            stay = living[-1:] if begin % settings.simulation.pose_steps == 0 else []
             again = tuple(BrainChange(birth, brains[birth], True) for birth in stay)
-            world.apply(Changes(gone, came, again))
-            born = {birth: at for birth, at in born.items() if birth not in gone}
-            born |= {each.birth: inserted(each.robot, space, begin) for each in came}
-            born |= {
-                birth: dataclasses.replace(born[birth], window=begin) for birth in stay
-            }
+            world.apply(Changes(tuple(gone), tuple(came), again))
             brains |= {each.birth: each.robot.brain for each in came}
-            advance, snapshot = world.advance(end), world.snapshot()
-            expected = ExpectedAdvance(JOB, begin, end, born, rules, True, False)
-            yield advance, snapshot, expected
-            born = {one.birth: born[one.birth] for one in advance.judgements}
+            expected = ExpectedAdvance(begin, end, set(world.births), rules, True)
+            advance = world.advance(end)
+            yield replace(advance, snapshot=world.snapshot()), expected
     finally:
         world.close()
 
 
-def check(advance: Advance, snapshot: bytes, expected: ExpectedAdvance) -> int:
+def check(advance: Advance, expected: ExpectedAdvance) -> int:
     """Fail if a check refuses an advance; return the number of its poses."""
-    sent = encode_advance_answer(AdvanceAnswer(*JOB, 0.5, advance, snapshot))
-    assert len(sent) < expected.most_bytes / 2
-    answer = decode_advance_answer(sent, expected.most_bytes)
-    assert answer.advance is not None
-    check_answer(answer, expected)
-    check_advance(answer.advance, expected)
-    rows = read_poses(answer.advance.poses, answer.advance, expected)
-    return int(rows.num_rows)
+    received = decode(Advance, encode(advance), ADVANCE_BYTES)
+    assert received == advance
+    check_advance(received, expected)
+    return int(read_poses(received.poses, expected).num_rows)
 
 
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
@@ -119,8 +93,8 @@ def test_honest_advances_are_taken(
 ) -> None:
     rules = settings_of(arena=arena, simulation=simulation)
     poses = matures = touches = 0
-    for advance, snapshot, expected in advances(rules, [25, 200, 333, 500, 1000, 1400]):
-        poses += check(advance, snapshot, expected)
+    for advance, expected in advances(rules, [25, 200, 333, 500, 1000, 1400]):
+        poses += check(advance, expected)
         matures += sum(one.is_mature for one in advance.judgements)
         touches += len(advance.touches)
     assert poses > 0
@@ -132,7 +106,7 @@ def test_robots_that_diverge_are_taken() -> None:
     """They fall faster than any robot may move."""
     rules = settings_of(arena={"drop_m": 40.0}, simulation={})
     casualties = 0
-    for advance, snapshot, expected in advances(rules, [200, 400, 700, 900]):
-        check(advance, snapshot, expected)
+    for advance, expected in advances(rules, [200, 400, 700, 900]):
+        check(advance, expected)
         casualties += len(advance.casualties)
     assert casualties > 0

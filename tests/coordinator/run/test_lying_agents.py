@@ -3,66 +3,57 @@
 Everything but the physics is real: machines, fleet, loop, journal and tables.
 """
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from msgspec import structs
+from msgspec.structs import replace
 
-from coordinator.dispatch.events import AgentKind, Joined
+from coordinator.dispatch.events import AgentKind, DispatchEvent, Joined, Returned
 from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.network.local import LocalAgents
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import Journal
-from schema.robot.results import Evaluation, Report
-from schema.wire import revolve_pb2 as pb
-from schema.wire.arena_codec import decode_advance_answer, encode_advance_answer
-from schema.wire.codec import decode_answer, encode_answer
+from schema.agent.request_handler import Compute
+from schema.limits import ADVANCE_BYTES, MOST_LIVING
+from schema.robot.ids import BirthId
+from schema.wire.arena import Advance, Casualty, Judgement
+from schema.wire.codec import decode, encode
+from schema.wire.messages import Answer, CallValue, Result
+from tests.coordinator.reports import VIABLE
 from tests.coordinator.run.test_arena_resume import Run, run
+from tests.coordinator.sent_requests import JUDGED
 
-Lie = Callable[[bytes], bytes]
-
-
-def without_a_robot(data: bytes) -> bytes:
-    """Leave out a living robot: such a journal could not be resumed."""
-    answer = decode_advance_answer(data)
-    if answer.advance is None:
-        return data
-    judged = answer.advance.judgements[1:]
-    changed = replace(answer.advance, judgements=judged)
-    return encode_advance_answer(replace(answer, advance=changed))
+Lie = Callable[[Answer], Answer | bytes]
 
 
-def with_a_stranger(data: bytes) -> bytes:
-    message = pb.AdvanceAnswer.FromString(data)
-    message.advance.judgements.add(birth=pb.BirthName(number=10_000))
-    return message.SerializeToString()
+def judging(
+    change: Callable[[tuple[Judgement, ...]], tuple[Judgement, ...]],
+) -> Lie:
+    """Return a change of the judgements of each advance."""
+
+    def lie(answer: Answer) -> Answer:
+        if not isinstance(answer.result, Advance):
+            return answer
+        judged = change(answer.result.judgements)
+        return replace(answer, result=replace(answer.result, judgements=judged))
+
+    return lie
 
 
-def of_another_job(data: bytes) -> bytes:
-    message = pb.AdvanceAnswer.FromString(data)
-    message.number += 1
-    return message.SerializeToString()
+def with_a_stranger(judged: tuple[Judgement, ...]) -> tuple[Judgement, ...]:
+    return (*judged, replace(judged[0], birth=BirthId(0, 10_000)))
 
 
-def heavy(data: bytes) -> bytes:
-    del data
-    message = pb.AdvanceAnswer(advance=pb.Advance(digest=bytes(32)))
-    message.advance.casualties.add(reason="x" * 30_000_000)
-    return message.SerializeToString()
+def saying(result: Result) -> Lie:
+    """Return a change of the whole result."""
+    return lambda answer: replace(answer, result=result)
 
 
-def false_report(data: bytes) -> bytes:
-    answer = decode_answer(data)
-    assert isinstance(answer.result, Report)
-    return encode_answer(replace(answer, result=replace(answer.result, motors=99)))
-
-
-def evaluation_for_report(data: bytes) -> bytes:
-    wrong = Evaluation(1.0, 0.5, 0.5, 12.0)
-    return encode_answer(replace(decode_answer(data), result=wrong))
+DEAD = Casualty(BirthId(0, 0), 1, "x", (0.0, 0.0, 0.0))
+ENDLESS = Advance(1, bytes(32), (), (DEAD,) * (MOST_LIVING + 1), (), b"")
 
 
 def with_liar(kind: AgentKind, lie: Lie) -> type[LocalAgents]:
@@ -71,13 +62,23 @@ def with_liar(kind: AgentKind, lie: Lie) -> type[LocalAgents]:
     class Liars(LocalAgents):
         """Honest agents and one that alters every answer."""
 
-        def __init__(
-            self, answers: Mapping[AgentKind, Callable[[bytes], bytes]], platform: str
-        ) -> None:
-            super().__init__(answers, platform)
-            honest = answers[kind]
-            self._answers["a-liar"] = lambda request: lie(honest(request))
+        def __init__(self, agents: Mapping[AgentKind, Compute], platform: str) -> None:
+            super().__init__(agents, platform)
+            self._agents["a-liar"] = agents[kind]
             self._news.insert(0, Joined("a-liar", kind, 1, platform))
+
+        def receive(
+            self, timeout_s: float, pause_s: float = 0.0, /
+        ) -> list[DispatchEvent]:
+            """Alter the answers of the liar."""
+            return list(map(self._altered, super().receive(timeout_s, pause_s)))
+
+        def _altered(self, event: DispatchEvent) -> DispatchEvent:
+            if not (isinstance(event, Returned) and event.agent == "a-liar"):
+                return event
+            told = lie(decode(Answer, event.answer, ADVANCE_BYTES))
+            data = told if isinstance(told, bytes) else encode(told)
+            return dataclasses.replace(event, answer=data)
 
     return Liars
 
@@ -86,7 +87,7 @@ def journalled(path: Path) -> list[JournalledEvent]:
     """Return the events of a journal in any order, without durations of answers."""
     with Journal.open(path) as journal:
         events = [
-            structs.replace(each, provenance=replace(each.provenance, wall_s=0.0))
+            replace(each, provenance=replace(each.provenance, wall_s=0.0))
             if isinstance(each, Advanced)
             else each
             for each in journal.replay()
@@ -103,13 +104,15 @@ def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 LIES: dict[str, tuple[AgentKind, Lie]] = {
-    "robot left out": ("worker", without_a_robot),
-    "unknown robot": ("worker", with_a_stranger),
-    "other job": ("worker", of_another_job),
-    "30 MB of text": ("worker", heavy),
+    # A journal with such an advance could not be resumed.
+    "robot left out": ("worker", judging(lambda judged: judged[1:])),
+    "unknown robot": ("worker", judging(with_a_stranger)),
+    "other job": ("worker", lambda answer: replace(answer, number=answer.number + 1)),
+    "too many deaths": ("worker", saying(ENDLESS)),
+    "30 MB of text": ("worker", saying(CallValue("x" * 30_000_000))),
     "no message": ("worker", lambda _: b"\xff"),
-    "false report": ("analyzer", false_report),
-    "evaluation for a report": ("analyzer", evaluation_for_report),
+    "no reason": ("analyzer", saying(replace(VIABLE, is_viable=False))),
+    "evaluation for a report": ("analyzer", saying(JUDGED)),
 }
 
 

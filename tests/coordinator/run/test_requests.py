@@ -19,23 +19,12 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.run.requests import REMEMBERED
 from schema.errors import JobRefused
-from schema.experiment.identity import NO_IDENTITY, Identity
-from schema.robot.brain import Brain
+from schema.experiment.identity import NO_ORIGIN
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
-from schema.robot.robot import Robot
-from schema.wire import revolve_pb2 as pb
-from schema.wire.codec import (
-    decode_body,
-    decode_request,
-    encode_answer,
-    encode_body,
-    fingerprint,
-)
-from schema.wire.messages import Answer, Evaluate, Vet
-from schema.wire.protobuf import encode_robot
+from schema.wire.codec import fingerprint
+from schema.wire.messages import Evaluate, Vet
 from tests.coordinator.sent_requests import (
     BIRTH,
     EPOCH,
@@ -44,6 +33,7 @@ from tests.coordinator.sent_requests import (
     ROBOT,
     VIABLE,
     SentRequests,
+    request_of,
 )
 
 
@@ -52,71 +42,42 @@ def sent_requests() -> SentRequests:
     return SentRequests()
 
 
-def test_a_request_carries_the_run_its_settings_and_the_robot(
+def test_a_request_carries_the_run_its_settings_and_the_work(
     sent_requests: SentRequests,
 ) -> None:
-    sent_requests.requests.send(Vet(BIRTH, 2, ROBOT))
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    (vet, judge, vetting), (_, worker, evaluation) = sent_requests.sent
-    assert (judge, worker) == ("judge", "one")
-    asked = decode_request(vetting, decode_body)
-    assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, vet)
-    assert (asked.settings, asked.robot) == (b'"vetting"', Robot(ROBOT.parts))
-    asked = decode_request(evaluation)
-    assert (asked.settings, asked.robot) == (b'"evaluation"', ROBOT)
+    works: tuple[Vet | Evaluate, ...] = (
+        Vet(BIRTH, 2, ROBOT),
+        Evaluate(BIRTH, ROBOT, 1, 300),
+    )
+    for work in works:
+        sent_requests.requests.send(work)
+    agents = [agent for _, agent, _ in sent_requests.sent]
+    assert agents == ["judge", "one"]
+    for (number, _, payload), work, settings in zip(
+        sent_requests.sent, works, (b'"vetting"', b'"evaluation"'), strict=True
+    ):
+        asked = request_of(payload)
+        assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, number)
+        assert (asked.work, asked.settings) == (work, settings)
 
 
-def test_vetting_sends_the_body_and_evaluation_the_whole_robot(
-    sent_requests: SentRequests,
-) -> None:
-    other = Robot(ROBOT.parts, Brain(ROBOT.brain.neurons))
-    sent_requests.requests.send(Vet(BIRTH, 0, ROBOT))
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
-    sent_requests.requests.send(Vet(BirthId(0, 8), 0, ROBOT))
-    # Of the same birth, and yet not the one that was vetted.
-    sent_requests.requests.send(Evaluate(BirthId(0, 8), other))
-    for number, agent, _ in sent_requests.sent[:2]:
-        result = VIABLE if agent == "judge" else JUDGED
-        data = encode_answer(Answer(EPOCH, number, 0.5, result))
-        sent_requests.tell(Returned(number, agent, "ok", data))
-    sent = {
-        number: pb.Request.FromString(payload).robot
-        for number, _, payload in sent_requests.sent
-    }
-    body, whole = encode_body(ROBOT), encode_robot(ROBOT)
-    assert [sent[number] for number in sorted(sent)] == [
-        body,
-        whole,
-        whole,
-        body,
-        encode_robot(other),
-    ]
-    assert body != whole
-
-
-def test_noise_depends_on_robot_island_and_trial(sent_requests: SentRequests) -> None:
-    guest = BirthId(3, 9)
-    for context in (
+def test_noise_depends_on_the_requesting_island(sent_requests: SentRequests) -> None:
+    for work in (
         Evaluate(BIRTH, ROBOT),
-        Evaluate(guest, ROBOT, trial=4, requester=2),
+        Evaluate(BirthId(3, 9), ROBOT, trial=4, requester=2),
         Vet(BIRTH, 1, ROBOT),
     ):
-        sent_requests.requests.send(context)
-    found = [
-        decode_request(payload, decode_body).identity
-        for _, _, payload in sent_requests.sent
-    ]
-    there = replace(ORIGIN, island=2)
-    assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NO_IDENTITY]
+        sent_requests.requests.send(work)
+    origins = [request_of(payload).origin for _, _, payload in sent_requests.sent]
+    assert origins == [ORIGIN, replace(ORIGIN, island=2), NO_ORIGIN]
 
 
 def test_both_jobs_of_a_cross_check_have_the_same_noise() -> None:
     sent_requests = SentRequests(audit=1.0)
     sent_requests.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
-    first, second = (decode_request(payload) for _, _, payload in sent_requests.sent)
+    first, second = (request_of(payload) for _, _, payload in sent_requests.sent)
     assert first.number != second.number
-    assert first.identity == second.identity == Identity(ORIGIN, BIRTH, 1)
+    assert replace(first, number=second.number) == second
 
 
 def test_evaluation_names_its_worker_and_platform(sent_requests: SentRequests) -> None:
@@ -129,24 +90,12 @@ def test_evaluation_names_its_worker_and_platform(sent_requests: SentRequests) -
     assert event.provenance.wall_s == 0.5
 
 
-def test_bodies_of_robots_that_are_never_evaluated_are_dropped(
-    sent_requests: SentRequests,
-) -> None:
-    """3000 robots of an arena are vetted, inserted and removed in one run."""
-    for number in range(REMEMBERED + 50):
-        sent_requests.requests.send(Vet(BirthId(0, number), 0, ROBOT))
-        (event,) = sent_requests.tell(sent_requests.reply(VIABLE))
-        assert isinstance(event, Vetted)
-    assert len(sent_requests.requests._bodies) == REMEMBERED
-
-
 def test_request_names_its_plugins_with_their_digests() -> None:
     sent_requests = SentRequests(
         b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
     )
     sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    sent = pb.Request.FromString(sent_requests.sent[0][2])
-    assert sent.plugins == "plugged="  # it is not here
+    assert request_of(sent_requests.sent[0][2]).plugins == "plugged="  # it is not here
 
 
 @pytest.mark.parametrize("kind", ["evaluate", "vet"])
