@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import zenoh
+from msgspec.structs import replace
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
-from schema.agent.platform_tag import wire_version
 from schema.agent.service import session_config
 from schema.agent.topics import Member, Role, agents_alive, member_of
-from schema.wire import revolve_pb2 as pb
+from schema.limits import ADVANCE_REQUEST_BYTES
+from schema.robot.results import Evaluation
+from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.messages import Answer, Call, Crash, Evaluate, Request
+from tests.system.introduction import introduce
 
 _NOW = zenoh.ConsolidationMode.NONE
 _ENDLESS = 10**9
@@ -23,6 +27,11 @@ def run_name(folder: Path) -> str:
     """Return the unique name of a run, as its jobs carry it."""
     nonce = json.loads((folder / "run.json").read_text())["nonce"]
     return f"{socket.gethostname()}:{nonce}:{folder.resolve()}"
+
+
+def claim_of(run: str, epoch: int) -> bytes:
+    """Return a request that no agent can do, of a coordinator that claims an epoch."""
+    return encode(Request(run, epoch, 1, Call(None), b""))
 
 
 class Attacker:
@@ -43,7 +52,7 @@ class Attacker:
 
     def claim(self, epoch: int) -> None:
         """Claim to each agent to be the run's coordinator of an epoch."""
-        data = pb.Request(run=self.run, epoch=epoch, number=1).SerializeToString()
+        data = claim_of(self.run, epoch)
         for role in ("worker", "analyzer"):
             for member in self.agents(role):
                 self.session.get(member.jobs, payload=data, consolidation=_NOW)
@@ -62,13 +71,13 @@ class Attacker:
         """Cancel each job when it is sent."""
 
         def act(key: str, data: bytes) -> None:
-            self.session.put(key.replace("/jobs", "/cancelled"), data)
+            self.session.put(key.replace("/jobs", "/cancelled"), fingerprint(data))
 
         self.overhear(act)
 
     def claim_as(self, epoch: int) -> None:
         """Claim to be the run's coordinator of an epoch whenever a job is sent."""
-        data = pb.Request(run=self.run, epoch=epoch, number=1).SerializeToString()
+        data = claim_of(self.run, epoch)
 
         def act(key: str, seen: bytes) -> None:
             if seen != data:
@@ -86,15 +95,16 @@ class Attacker:
         chosen: list[int] = []
 
         def act(key: str, data: bytes) -> None:
-            request = pb.Request.FromString(data)
-            if "/w/" not in key or request.number < first or request.steps >= _ENDLESS:
+            request = decode(Request, data, ADVANCE_REQUEST_BYTES)
+            work = request.work
+            if not isinstance(work, Evaluate) or work.steps >= _ENDLESS:
                 return
-            if request.number in chosen[:1] or not chosen:
-                chosen.append(request.number)
-                if len(chosen) <= times:
-                    request.steps = _ENDLESS
-                    endless = request.SerializeToString()
-                    self.session.get(key, payload=endless, consolidation=_NOW)
+            if request.number != (chosen[0] if chosen else max(first, request.number)):
+                return
+            chosen.append(request.number)
+            if len(chosen) <= times:
+                endless = replace(request, work=replace(work, steps=_ENDLESS))
+                self.session.get(key, payload=encode(endless), consolidation=_NOW)
 
         self.overhear(act)
 
@@ -129,32 +139,9 @@ class Attacker:
                 fake = Member("default", "worker", f"{member.name[:-8]}{number:08}")
                 config = session_config(client_config(self._address), fake)
                 session = self._stack.enter_context(zenoh.open(config))
-                info = pb.AgentInfo(
-                    agent=fake.name,
-                    kind="worker",
-                    slots=1,
-                    shards=1,
-                    cores=1,
-                    version=wire_version(),
-                )
-                info.deaths.add(
-                    agent=member.name,
-                    run=self.run,
-                    epoch=1,
-                    number=number,
-                    cause="SIGSEGV",
-                )
-                data = info.SerializeToString()
-
-                def tell(
-                    query: zenoh.Query, key: str = fake.info, data: bytes = data
-                ) -> None:
-                    with query:
-                        query.reply(key, data)
-
-                told = zenoh.handlers.Callback(tell)
+                crash = Crash(member.name, self.run, 1, number, "SIGSEGV", bytes(8))
                 self._held += [
-                    session.declare_queryable(fake.info, told, complete=True),
+                    introduce(session, fake, crash),
                     session.liveliness().declare_token(fake.alive),
                 ]
 
@@ -167,9 +154,7 @@ def attacker_at(folder: Path) -> Iterator[Attacker]:
         yield Attacker(folder, address, stack)
 
 
-FORGED_ANSWER = pb.Answer(
-    epoch=1, number=1, evaluation=pb.Evaluation(fitness=99.0, simulated_s=1.0)
-).SerializeToString()
+FORGED_ANSWER = encode(Answer(1, 1, 0.0, Evaluation(99.0, 0.0, 0.0, 1.0)))
 REASONS = {
     "fenced": f"{FENCED}epoch 1 is over: epoch 9 has begun",
     "unfit": f"{UNFIT}has no plug-in 'x'",

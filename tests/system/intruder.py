@@ -16,8 +16,9 @@ import zenoh
 
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import Member
-from schema.wire import revolve_pb2 as pb
-from schema.wire.operator import GetStatus, OperatorRequest, encode_operator_request
+from schema.wire.codec import encode
+from schema.wire.messages import Call, Request
+from schema.wire.operator import GetStatus, OperatorRequest
 
 _EPOCH = 2**31
 _EACH_S = 1.0
@@ -75,8 +76,8 @@ def intrude(
         *(chief.alive, other.alive),
         *(f"revolve/default/{role}/forged.1/alive" for role in ("co", "w", "an")),
     ]
-    order = encode_operator_request(OperatorRequest("1", 0, GetStatus()))
-    claim = pb.Request(run="any", epoch=_EPOCH, number=1).SerializeToString()
+    order = encode(OperatorRequest("1", 0, GetStatus()))
+    claim = encode(Request("any", _EPOCH, 1, Call(None), b""))
     held = [
         ears.declare_subscriber("revolve/**", count("news")),
         ears.liveliness().declare_subscriber("revolve/*/w/*/alive", count("tokens")),

@@ -24,15 +24,11 @@ from schema.agent.topics import Member, unique_name
 from schema.limits import ADVANCE_REQUEST_BYTES
 from schema.wire.codec import decode
 from schema.wire.messages import Request
-from tests.system.silent_agents import own_info
+from tests.system.introduction import introduce
 
 GONE_S = 0.3
 GOOD_ANSWERS = 3
 """Answers of a silent worker before it falls silent."""
-
-
-def request_of(data: bytes) -> Request:
-    return decode(Request, data, ADVANCE_REQUEST_BYTES)
 
 
 def main(address: str, behaviour: str) -> None:
@@ -44,27 +40,20 @@ def main(address: str, behaviour: str) -> None:
     from worker.serve.shards import Shards  # noqa: PLC0415
 
     compute = Jobs(Shards(World)).answer
-
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
     member = Member("default", "worker", unique_name("odd"))
-    info = own_info(member)
     inbox: Inbox[zenoh.Query] = Inbox()
     count = held_back = 0
     is_cancelled = threading.Event()
-
-    def reply_info(query: zenoh.Query) -> None:
-        with query:
-            query.reply(member.info, info)
 
     def note_cancelled(_: zenoh.Sample) -> None:
         is_cancelled.set()
 
     with zenoh.open(session_config(client_config(address), member)) as session:
         on_job = zenoh.handlers.Callback(inbox.put, indirect=False)
-        on_info = zenoh.handlers.Callback(reply_info)
         _jobs = session.declare_queryable(member.jobs, on_job, complete=True)
-        _info = session.declare_queryable(member.info, on_info, complete=True)
+        _info = introduce(session, member)
         _cancelled = session.declare_subscriber(member.cancelled, note_cancelled)
         token = session.liveliness().declare_token(member.alive)
         while not stop.is_set():
@@ -74,7 +63,8 @@ def main(address: str, behaviour: str) -> None:
                 continue
             with query:
                 assert query.payload is not None
-                data = answer(compute, request_of(query.payload.to_bytes()))
+                asked = query.payload.to_bytes()
+                data = answer(compute, decode(Request, asked, ADVANCE_REQUEST_BYTES))
                 count += 1
                 if behaviour == "late":
                     token.undeclare()  # type: ignore[no-untyped-call]

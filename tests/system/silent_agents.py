@@ -7,25 +7,9 @@ from typing import Any, Literal
 import zenoh
 
 from schema.agent.network import client_config
-from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.service import session_config
 from schema.agent.topics import Member
-from schema.wire.codec import encode
-from schema.wire.messages import AgentInfo
-
-
-def own_info(member: Member) -> bytes:
-    """Return the properties of an agent on this machine, as it replies with them."""
-    info = AgentInfo(
-        agent=member.name,
-        kind=member.role,
-        slots=1,
-        platform=platform_tag(),
-        version=wire_version(),
-        shards=8,
-        cores=1,
-    )
-    return encode(info)
+from tests.system.introduction import introduce
 
 
 @contextmanager
@@ -43,21 +27,10 @@ def silent_agents(
             member = Member("default", role, f"a-silent-{role}-{number}")
             config = session_config(client_config(address), member)
             session = stack.enter_context(zenoh.open(config))
-            info = own_info(member)
-
-            def tell(
-                query: zenoh.Query, key: str = member.info, info: bytes = info
-            ) -> None:
-                with query:
-                    query.reply(key, info)
-
             on_job: Any = zenoh.handlers.Callback(taken.append, indirect=False)
-            on_info: Any = zenoh.handlers.Callback(tell)
             stack.enter_context(
                 session.declare_queryable(member.jobs, on_job, complete=True)
             )
-            stack.enter_context(
-                session.declare_queryable(member.info, on_info, complete=True)
-            )
+            stack.enter_context(introduce(session, member))
             stack.enter_context(session.liveliness().declare_token(member.alive))
         yield taken

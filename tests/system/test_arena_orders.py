@@ -11,10 +11,11 @@ from coordinator.islands.events import Advanced, Commanded
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import Journal
 from schema.agent.network import client_config
+from schema.limits import LIVE_BYTES
 from schema.tables.files import read_table
 from schema.tables.received import read_columns
 from schema.wire.arena import Live
-from schema.wire.arena_codec import decode_live
+from schema.wire.codec import decode
 from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
@@ -57,7 +58,7 @@ def test_pause_list_insert_remove_snapshot_resume(
     received: list[Live] = []
 
     def watch(sample: zenoh.Sample) -> None:
-        received.append(decode_live(sample.payload.to_bytes()))
+        received.append(decode(Live, sample.payload.to_bytes(), LIVE_BYTES))
 
     config = zenoh.Config.from_json5(client_config(address))
     with zenoh.open(config) as session:

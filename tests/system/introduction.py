@@ -1,0 +1,41 @@
+"""How agents that tests make up introduce themselves at a hub."""
+
+from typing import Any
+
+import zenoh
+
+from schema.agent.platform_tag import platform_tag, wire_version
+from schema.agent.topics import Member
+from schema.wire.codec import encode
+from schema.wire.messages import AgentInfo, Crash
+
+
+def introduce(session: zenoh.Session, member: Member, *deaths: Crash) -> Any:  # noqa: ANN401 - of Zenoh
+    """Declare a queryable that says what a good agent of this machine says.
+
+    Args:
+        session: of the agent.
+        member: the agent.
+        deaths: of its predecessors.
+
+    Returns:
+        The queryable, which ends with its session or with the last reference to it.
+    """
+    info = encode(
+        AgentInfo(
+            agent=member.name,
+            kind=member.role,
+            slots=1,
+            platform=platform_tag(),
+            version=wire_version(),
+            deaths=deaths,
+            shards=8,
+        )
+    )
+
+    def tell(query: zenoh.Query) -> None:
+        with query:
+            query.reply(member.info, info)
+
+    told = zenoh.handlers.Callback(tell)
+    return session.declare_queryable(member.info, told, complete=True)
