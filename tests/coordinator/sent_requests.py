@@ -24,6 +24,7 @@ from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode, encode
 from schema.wire.messages import Answer, Failure, Request, Result
+from tests.coordinator.sent_jobs import SentJobs
 
 EPOCH = 3
 CLIENT = Client("run", EPOCH)
@@ -52,12 +53,11 @@ def request_of(payload: bytes) -> Request:
     return decode(Request, payload, REQUEST_BYTES)
 
 
-class SentRequests:
+class SentRequests(SentJobs):
     """Requests whose jobs are recorded, with two workers and an analyzer."""
 
     def __init__(self, evaluation: bytes = b'"evaluation"', audit: float = 0.0) -> None:
-        self.sent: list[tuple[int, str, bytes]] = []
-        self.cancelled: list[tuple[int, str]] = []
+        super().__init__()
         self.fleet = Fleet(self)
         self.now_s = 0.0
         experiment = Experiment(name="requests")
@@ -75,20 +75,6 @@ class SentRequests:
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))
         self.tell(Joined("judge", "analyzer", 1, "platform"))
         self.tell(Ticked(0.0))
-
-    def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
-        self.sent.append((number, agent, payload))
-
-    def cancel(self, agent: str, payload: bytes) -> None:
-        self.cancelled.append((request_of(payload).number, agent))
-
-    def ask(self, _agent: str) -> None:
-        """No agent reports progress."""
-
-    def receive(
-        self, _timeout_s: float, _pause_s: float = 0.0, /
-    ) -> list[DispatchEvent]:
-        return []
 
     def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
         """Pass an event to the fleet; return the island's events that follow."""

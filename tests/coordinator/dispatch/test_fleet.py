@@ -9,7 +9,6 @@ from coordinator.dispatch.events import (
     Client,
     Deliver,
     Died,
-    DispatchEvent,
     Job,
     Joined,
     Left,
@@ -23,6 +22,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.dispatch.pool import FIRST_S, LEAST_WAIT_S, LONGEST_WAIT_S, REPLY_S
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.codec import fingerprint
+from tests.coordinator.sent_jobs import SentJobs
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
 EMPTY = fingerprint(b"")
@@ -39,45 +39,16 @@ def encode(command: AssignShard) -> tuple[bytes, Read]:
     return f"whole {command.is_whole}".encode(), read
 
 
-class Agents:
-    """Two workers that answer when the test says so."""
-
-    def __init__(self) -> None:
-        self.sent: list[tuple[int, str, bytes]] = []
-        self.waits_s: list[float] = []
-        self.cancelled: list[tuple[str, bytes]] = []
-        self.asked: list[str] = []
-        self.pauses_s: list[float] = []
-        self.news: list[DispatchEvent] = [
-            Joined("one", "worker", 1, "p"),
-            Joined("two", "worker", 2, "p"),
-        ]
-
-    def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
-        self.sent.append((number, agent, payload))
-        self.waits_s.append(wait_s)
-
-    def cancel(self, agent: str, payload: bytes, /) -> None:
-        self.cancelled.append((agent, payload))
-
-    def ask(self, agent: str, /) -> None:
-        self.asked.append(agent)
-
-    def receive(
-        self, _timeout_s: float, pause_s: float = 0.0, /
-    ) -> list[DispatchEvent]:
-        self.pauses_s.append(pause_s)
-        news, self.news = self.news, []
-        return news
+WORKERS = (Joined("one", "worker", 1, "p"), Joined("two", "worker", 2, "p"))
 
 
 @pytest.fixture
-def agents() -> Agents:
-    return Agents()
+def agents() -> SentJobs:
+    return SentJobs(*WORKERS)
 
 
 @pytest.fixture
-def fleet(agents: Agents) -> Fleet:
+def fleet(agents: SentJobs) -> Fleet:
     made = Fleet(agents)
     assert made.listen(0.0, 0.0) == {}
     return made
@@ -93,7 +64,7 @@ def new_shard(fleet: Fleet, client: Client = ARENA) -> int:
     return fleet.new_shard(client, encode, "")
 
 
-def test_an_answer_goes_to_its_client(fleet: Fleet, agents: Agents) -> None:
+def test_an_answer_goes_to_its_client(fleet: Fleet, agents: SentJobs) -> None:
     numbers = [request(fleet, client) for client in (CLIENT, OTHER, CLIENT)]
     assert fleet.open == 3
     agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[:2]]
@@ -113,7 +84,9 @@ def test_credits_count_the_workers_that_joined(fleet: Fleet) -> None:
     assert fleet.dispatch.credits == 2
 
 
-def test_jobs_of_a_client_that_left_are_withdrawn(fleet: Fleet, agents: Agents) -> None:
+def test_jobs_of_a_client_that_left_are_withdrawn(
+    fleet: Fleet, agents: SentJobs
+) -> None:
     request(fleet)
     fleet.leave(CLIENT)
     assert fleet.open == 0
@@ -128,7 +101,7 @@ def test_jobs_of_a_client_that_left_are_withdrawn(fleet: Fleet, agents: Agents) 
 
 
 def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     request(fleet)
     waiting = [request(fleet, each) for each in (CLIENT, OTHER, OTHER, OTHER, CLIENT)][
@@ -147,7 +120,7 @@ def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
 
 
 def test_deaths_by_jobs_of_other_coordinators_do_not_count(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     number = request(fleet)
     names = ["one", "two", "x"]
@@ -169,7 +142,7 @@ def test_deaths_by_jobs_of_other_coordinators_do_not_count(
 
 @pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
 def test_a_job_that_its_agent_declined_is_given_to_another(
-    fleet: Fleet, agents: Agents, outcome: Literal["fenced", "cancelled"]
+    fleet: Fleet, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
 ) -> None:
     """Nobody's word about epochs ends a job, and it never counts as an error."""
     request(fleet)
@@ -189,7 +162,7 @@ def test_a_job_that_its_agent_declined_is_given_to_another(
 
 
 def test_a_job_whose_wait_is_over_stays_with_its_worker(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     request(fleet)
     shard = new_shard(fleet)
@@ -211,7 +184,7 @@ def test_a_job_whose_wait_is_over_stays_with_its_worker(
 
 
 def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     request(fleet)
     ((number, agent, _),) = agents.sent
@@ -223,7 +196,7 @@ def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
 
 
 def test_a_job_that_was_sent_again_took_all_the_time(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     request(fleet)
     ((number, agent, _),) = agents.sent
@@ -241,7 +214,7 @@ def test_a_job_that_was_sent_again_took_all_the_time(
     assert agents.waits_s[-1] == pytest.approx(100.0 * typical_s)
 
 
-def advance_until(fleet: Fleet, agents: Agents, shard: int, *times_s: float) -> None:
+def advance_until(fleet: Fleet, agents: SentJobs, shard: int, *times_s: float) -> None:
     """Advance a shard several times; the answers come at these times."""
     for now_s in times_s:
         fleet.advance(shard)
@@ -251,7 +224,7 @@ def advance_until(fleet: Fleet, agents: Agents, shard: int, *times_s: float) -> 
 
 
 def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
     advance_until(fleet, agents, shard, 20.0, 40.0)
@@ -261,7 +234,7 @@ def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
 
 
 def test_advances_after_one_that_expired_wait_longer(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
     advance_until(fleet, agents, shard, 1.0, 2.0)
@@ -282,7 +255,7 @@ def test_advances_after_one_that_expired_wait_longer(
 
 
 def test_a_state_that_cannot_be_read_ends_only_its_own_run(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     def unreadable(_command: AssignShard) -> tuple[bytes, Read]:
         raise RunFolderError("island-0-5.bin: is missing")
@@ -303,7 +276,7 @@ def test_a_state_that_cannot_be_read_ends_only_its_own_run(
 
 @pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
 def test_an_advance_that_its_worker_declined_is_repeated(
-    fleet: Fleet, agents: Agents, outcome: Literal["fenced", "cancelled"]
+    fleet: Fleet, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
 ) -> None:
     fleet.advance(new_shard(fleet))
     for now_s in range(1, 7):
@@ -317,7 +290,7 @@ def test_an_advance_that_its_worker_declined_is_repeated(
 
 
 def test_a_cancelled_copy_that_is_not_wanted_is_no_fault(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     request(fleet)
     fleet.leave(CLIENT)
@@ -327,7 +300,7 @@ def test_a_cancelled_copy_that_is_not_wanted_is_no_fault(
     assert fleet.faults.counts == ()
 
 
-def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> None:
+def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: SentJobs) -> None:
     shards = [new_shard(fleet, ARENA), new_shard(fleet, OTHER)]
     for shard in shards:
         fleet.advance(shard)
@@ -343,7 +316,7 @@ def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> N
 
 @pytest.mark.parametrize("is_answer", [True, False])
 def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
-    fleet: Fleet, agents: Agents, *, is_answer: bool
+    fleet: Fleet, agents: SentJobs, *, is_answer: bool
 ) -> None:
     shard = new_shard(fleet)
     fleet.advance(shard)
@@ -370,7 +343,7 @@ def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
 
 
 def test_an_unfit_worker_gets_jobs_of_other_clients_only(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     """Jobs, and an arena, of a client; an agent that joins again is tried again."""
     shard = new_shard(fleet, CLIENT)
@@ -399,7 +372,7 @@ def test_an_unfit_worker_gets_jobs_of_other_clients_only(
 
 @pytest.mark.parametrize("is_late", [False, True])
 def test_an_unfit_worker_gets_no_copy_of_an_overdue_job(
-    fleet: Fleet, agents: Agents, *, is_late: bool
+    fleet: Fleet, agents: SentJobs, *, is_late: bool
 ) -> None:
     first = request(fleet)
     agents.news = [Returned(first, agents.sent[0][1], "unfit", reason="no plug-in")]
@@ -412,7 +385,7 @@ def test_an_unfit_worker_gets_no_copy_of_an_overdue_job(
 
 
 def test_a_worker_is_fit_again_for_a_client_that_has_ended(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     number = request(fleet)
     agent = agents.sent[0][1]
@@ -425,7 +398,7 @@ def test_a_worker_is_fit_again_for_a_client_that_has_ended(
     assert fleet.dispatch.unfit() == {}
 
 
-def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: Agents) -> None:
+def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: SentJobs) -> None:
     shard = new_shard(fleet)
     for data in (b"answer", b"stateless"):
         fleet.advance(shard)
@@ -438,7 +411,7 @@ def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: Agents) ->
 
 
 def test_an_advance_that_crashes_three_workers_is_given_up(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
     fleet.advance(shard)
@@ -460,7 +433,9 @@ def test_an_advance_that_crashes_three_workers_is_given_up(
     assert (end.shard, end.agent) == (shard, agent)
 
 
-def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) -> None:
+def test_a_released_arena_leaves_room_for_another(
+    fleet: Fleet, agents: SentJobs
+) -> None:
     fleet.advance(new_shard(fleet, ARENA))
     fleet.advance(new_shard(fleet, OTHER))
     freed = agents.sent[1][1]
@@ -474,7 +449,7 @@ def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) 
 
 
 def test_fleet_pauses_while_all_workers_have_spare_jobs(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     numbers = [request(fleet) for _ in range(200)]
     fleet.listen(0.2, 0.0)
@@ -496,7 +471,7 @@ def test_fleet_pauses_while_all_workers_have_spare_jobs(
 
 
 def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
-    agents: Agents,
+    agents: SentJobs,
 ) -> None:
     lines: list[str] = []
     fleet = Fleet(agents, warn=lines.append)
@@ -527,7 +502,7 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
 
 
 def test_an_advance_is_timed_from_its_own_assignment(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     """Also the first one of all, of a coordinator that has run for long."""
     fleet.listen(0.0, 1000.0)
@@ -539,7 +514,7 @@ def test_an_advance_is_timed_from_its_own_assignment(
 
 
 def test_jobs_and_advances_share_one_account_of_load(
-    fleet: Fleet, agents: Agents
+    fleet: Fleet, agents: SentJobs
 ) -> None:
     fleet.advance(new_shard(fleet))
     assert [agent for _, agent, _ in agents.sent] == ["one"]

@@ -16,7 +16,6 @@ from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
     Client,
-    DispatchEvent,
     Joined,
     Read,
     Returned,
@@ -45,6 +44,7 @@ from schema.wire.arena import (
 from schema.wire.codec import decode, encode
 from schema.wire.messages import Answer, Request, StateMissing
 from tests.coordinator.arena_world import DT, experiment
+from tests.coordinator.sent_jobs import SentJobs
 from tests.coordinator.sent_requests import JUDGED, ROBOT
 from tests.worker.fake_world import FakeWorld
 from worker.serve.jobs import Jobs
@@ -85,14 +85,14 @@ class Kept:
         del shard, step
 
 
-class Two:
+class Two(SentJobs):
     """An arena and two workers; the test answers for them.
 
     After its first advance three robots live: one was removed, one inserted.
     """
 
     def __init__(self, *, has_touches: bool = False) -> None:
-        self.sent: list[tuple[int, str, bytes]] = []
+        super().__init__()
         self.now_s = 0.0
         self.fleet = Fleet(self)
         rules = experiment(9, record_touches=has_touches)
@@ -107,20 +107,6 @@ class Two:
         self.requests.commit(event_of(end))
         changes = Changes((FIRST,), (Insertion(THIRD, ROBOT, (1.0, 0.0)),))
         self.requests.send(AdvanceShard(0, 1, NEXT, changes, True))
-
-    def send(self, number: int, agent: str, payload: bytes, _wait_s: float, /) -> None:
-        self.sent.append((number, agent, payload))
-
-    def cancel(self, _agent: str, _payload: bytes, /) -> None:
-        raise NotImplementedError
-
-    def ask(self, _agent: str) -> None:
-        """No agent reports progress."""
-
-    def receive(
-        self, _timeout_s: float, _pause_s: float = 0.0, /
-    ) -> list[DispatchEvent]:
-        return []
 
     @property
     def request(self) -> Request:

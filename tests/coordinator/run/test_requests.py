@@ -127,7 +127,7 @@ def test_robot_that_crashes_three_processes_is_quarantined(
     else:
         signed = Provenance(killed[-1])
         assert event == EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
-    assert sent_requests.cancelled == [(number, agent)]
+    assert sent_requests.cancelled == [(agent, payload)]
     assert sent_requests.tell(sent_requests.reply(JUDGED)) == []
 
 

@@ -24,6 +24,7 @@ from schema.errors import RevolveError, RunFolderError
 from schema.experiment.file import read_experiment
 from schema.tables.description import read_state
 from schema.wire.status import RunStatus
+from tests.coordinator.sent_jobs import SentJobs
 
 BIRTHS = 24
 EXPERIMENTS = tuple(
@@ -199,32 +200,6 @@ def never() -> RunFolder:
     raise AssertionError("a finished run was begun")
 
 
-class Silent:
-    """Two workers and an analyzer that never answer."""
-
-    def __init__(self) -> None:
-        self._news: list[DispatchEvent] = [
-            Joined("one", "worker", 1, "p"),
-            Joined("two", "worker", 1, "p"),
-            Joined("judge", "analyzer", 1, "p"),
-        ]
-
-    def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
-        """Take a job and never answer."""
-
-    def cancel(self, agent: str, payload: bytes, /) -> None:
-        """Continue in any case."""
-
-    def ask(self, _agent: str, /) -> None:
-        """Report no progress."""
-
-    def receive(
-        self, _timeout_s: float, _pause_s: float = 0.0, /
-    ) -> list[DispatchEvent]:
-        news, self._news = self._news, []
-        return news
-
-
 def test_runs_are_started_until_requests_are_twice_the_credits(
     tmp_path: Path,
 ) -> None:
@@ -236,7 +211,12 @@ def test_runs_are_started_until_requests_are_twice_the_credits(
         Planned(unbegun_status(path, each), partial(RunFolder, path, each))
         for path, each in details
     ]
-    scheduler = scheduler_of(planned, Silent())
+    silent = SentJobs(
+        Joined("one", "worker", 1, "p"),
+        Joined("two", "worker", 1, "p"),
+        Joined("judge", "analyzer", 1, "p"),
+    )
+    scheduler = scheduler_of(planned, silent)
     scheduler.turn(0.0, lambda: 0.0)
     assert len(scheduler.active) == 1
     scheduler.turn(0.0, lambda: 1.0)
