@@ -57,7 +57,9 @@ class Widths:
         return self.outputs + self.hidden
 
 
-class Neuron(Struct, frozen=True, gc=False, array_like=True):
+class Neuron(
+    Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True
+):
     """Neuron; ``part`` is the index of its part."""
 
     layer: Layer
@@ -66,7 +68,9 @@ class Neuron(Struct, frozen=True, gc=False, array_like=True):
     parameters: tuple[Finite, ...] = ()
 
 
-class Connection(Struct, frozen=True, gc=False, array_like=True):
+class Connection(
+    Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True
+):
     """Weighted edge between two neurons, given by their indices in the brain."""
 
     source: int
@@ -74,7 +78,7 @@ class Connection(Struct, frozen=True, gc=False, array_like=True):
     weight: Finite
 
 
-class Brain(Struct, frozen=True, gc=False, array_like=True):
+class Brain(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
     """Network: inputs, then outputs, then hidden neurons, each in part order.
 
     Attributes:

@@ -21,7 +21,7 @@ Track = Trace
 """Former name of ``Trace``, which fitness functions of users import."""
 
 
-class Evaluation(Struct, frozen=True, tag="evaluation"):
+class Evaluation(Struct, frozen=True, forbid_unknown_fields=True, tag="evaluation"):
     """Result of one simulation.
 
     Attributes:
@@ -39,7 +39,7 @@ class Evaluation(Struct, frozen=True, tag="evaluation"):
     measures: Measures = ()
 
 
-class Provenance(Struct, frozen=True):
+class Provenance(Struct, frozen=True, forbid_unknown_fields=True):
     """Agent, platform and duration [s] of an answer; information only."""
 
     agent: str = ""
@@ -56,7 +56,7 @@ def failed_fitness(others: Iterable[float]) -> float:
     return min((0.0, *others))
 
 
-class Report(Struct, frozen=True, tag="report"):
+class Report(Struct, frozen=True, forbid_unknown_fields=True, tag="report"):
     """Report of the analyzer on a body in its neutral pose.
 
     Attributes:

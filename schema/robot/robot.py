@@ -22,7 +22,7 @@ GENES = 2**64
 NO_BRAIN = Brain()
 
 
-class Part(Struct, frozen=True, gc=False, array_like=True):
+class Part(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
     """Part of a body.
 
     Attributes:
@@ -44,7 +44,7 @@ class Part(Struct, frozen=True, gc=False, array_like=True):
     gene: int = 0
 
 
-class Robot(Struct, frozen=True, gc=False, array_like=True):
+class Robot(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
     """A body and its brain."""
 
     parts: Annotated[tuple[Part, ...], Meta(max_length=MOST_PARTS)]

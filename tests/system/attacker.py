@@ -31,7 +31,7 @@ def run_name(folder: Path) -> str:
 
 def claim_of(run: str, epoch: int) -> bytes:
     """Return a request that no agent can do, of a coordinator that claims an epoch."""
-    return encode(Request(run, epoch, 1, Call(None), b""))
+    return encode(Request(run, epoch, 1, Call(b"\xc0"), b""))
 
 
 class Attacker:

@@ -77,7 +77,7 @@ def intrude(
         *(f"revolve/default/{role}/forged.1/alive" for role in ("co", "w", "an")),
     ]
     order = encode(OperatorRequest("1", 0, GetStatus()))
-    claim = encode(Request("any", _EPOCH, 1, Call(None), b""))
+    claim = encode(Request("any", _EPOCH, 1, Call(b"\xc0"), b""))
     held = [
         ears.declare_subscriber("revolve/**", count("news")),
         ears.liveliness().declare_subscriber("revolve/*/w/*/alive", count("tokens")),

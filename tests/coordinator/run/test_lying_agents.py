@@ -109,7 +109,7 @@ LIES: dict[str, tuple[AgentKind, Lie]] = {
     "unknown robot": ("worker", judging(with_a_stranger)),
     "other job": ("worker", lambda answer: replace(answer, number=answer.number + 1)),
     "too many deaths": ("worker", saying(ENDLESS)),
-    "30 MB of text": ("worker", saying(CallValue("x" * 30_000_000))),
+    "30 MB of text": ("worker", saying(CallValue(b"x" * 30_000_000))),
     "no message": ("worker", lambda _: b"\xff"),
     "no reason": ("analyzer", saying(replace(VIABLE, is_viable=False))),
     "evaluation for a report": ("analyzer", saying(JUDGED)),
