@@ -124,26 +124,19 @@ def parser(command: str) -> Flags:
 def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
-    from worker.robot.brains import Controls, load_controls
-
-    def controls(experiment: Experiment) -> Controls:
-        tick_s = experiment.simulation.tick_s
-        # Its check runs when it is made.
-        return load_controls(experiment.brain, experiment.space, tick_s)
+    from worker.robot.brains import load_controls
 
     def check_brain(experiment: Experiment) -> None:
         check_brain_genes(experiment)
-        controls(experiment)
-
-    def check_new_brain(experiment: Experiment) -> None:
-        check_brain_genes(experiment, is_new=True)
-        controls(experiment).check_new()
+        # Its check runs when it is made.
+        tick_s = experiment.simulation.tick_s
+        load_controls(experiment.brain, experiment.space, tick_s)
 
     return (
         *schema.experiment.kinds.KINDS,
         *worker.kinds.KINDS,
         *KINDS,
-        brain_kind(check_brain, check_new_brain),
+        brain_kind(check_brain),
     )
 
 

@@ -1,4 +1,4 @@
-"""Fitness functions and the check of their contract.
+"""Fitness functions.
 
 A fitness function is any ``module:attribute`` that takes a trace and its parameters
 and returns a finite number, higher is better. Its second argument is annotated with a
@@ -17,7 +17,6 @@ import numpy as np
 from schema.errors import FitnessUndefined, error_text
 from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
-from schema.plugins.simple_traces import check_function
 from schema.robot.sums import sum_in_order
 from schema.robot.trace import Trace
 
@@ -112,18 +111,3 @@ def thesis(track: Trace, fitness: Fitness) -> float:
         track
     ) + fitness.straight_weight * straight_velocity(track)
     return 0.0 if value > fitness.limit else value
-
-
-def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
-    """Raise unless a fitness function keeps its contract on simple traces.
-
-    Args:
-        function: the function that an experiment would name.
-        fitness: the experiment's section.
-
-    Raises:
-        ExperimentError: as of ``schema.plugins.simple_traces.check_function``, or
-            parameters that it refuses.
-    """
-    argument = fitness_argument(function, fitness)
-    check_function(function, (argument,), "fitness.function")

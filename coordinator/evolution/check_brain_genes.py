@@ -5,14 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from coordinator.evolution.brains import OwnGenes, brain_genes
+from coordinator.evolution.brains import brain_genes
 from coordinator.evolution.revolve_angle import RevolveAngle
-from schema.errors import ExperimentError, InvalidRobot, RevolveError, shown
+from schema.errors import ExperimentError, InvalidRobot, shown
 from schema.experiment.brains import widths
 from schema.experiment.document import Experiment, body_space
-from schema.plugins.origin import raised_text
+from schema.plugins.contract import broken, repeated
 from schema.robot.brain import NeuronKinds, check_widths
-from schema.robot.genome import Genome, develop, walk
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop, walk
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
 
@@ -20,76 +20,83 @@ _FOUNDERS = 6
 _CHILDREN = 20
 
 
-def check_brain_genes(experiment: Experiment, *, is_new: bool = False) -> None:
+def check_brain_genes(experiment: Experiment) -> None:
     """Raise unless a brain type makes valid robots, and equal ones of equal streams.
 
     A few random robots are made and mated, twice.
 
     Args:
         experiment: names the brain type.
-        is_new: refuse also what runs that have begun may go on with.
 
     Raises:
-        ExperimentError: the brain type raises, makes a robot that breaks the rules or
-            has too many hidden neurons, or depends on more than its arguments; of new
-            runs, a connection that comes twice, or a parameter outside its range.
+        ExperimentError: genes that are no tuples of genes, a robot that breaks the
+            rules or has too many hidden neurons, a connection that comes twice, a
+            parameter outside its range, or robots that depend on more than `draws`.
+        Exception: any error of its code.
     """
-    genes = brain_genes(experiment)
-    where = genes.where if isinstance(genes, OwnGenes) else experiment.brain.type
-    place = f"brain.type: {where}"
-    try:
-        first: list[Genome] = []
+    kinds, space = brain_genes(experiment).neurons, body_space(experiment.space)
+
+    def made() -> list[Genome]:
+        genomes: list[Genome] = []
         for genome in _genomes(experiment):
-            robot = develop(genome, body_space(experiment.space))
-            check_robot(robot, body_space(experiment.space), genes.neurons)
-            check_widths(robot.brain, widths(experiment.space))
-            if is_new:
-                _check_genes(genome, genes.neurons, is_random=len(first) < _FOUNDERS)
-            first.append(genome)
-        second = list(_genomes(experiment))
-    except InvalidRobot as error:
-        raise ExperimentError(f"{place}: expected valid robots, got {error}") from None
-    except RevolveError:
-        raise
-    except Exception as error:
-        raise ExperimentError(
-            f"{place}: expected outputs, grow, prune and vary to make genes, got "
-            f"{raised_text(error, where)}"
-        ) from error
-    if first != second:
-        raise ExperimentError(
-            f"{place}: expected equal robots from equal random numbers, got different "
-            "ones: draw from `draws` only and keep no state"
-        )
+            for node, _, _ in walk(genome):
+                _check_types(node)
+            try:
+                robot = develop(genome, space)
+                check_robot(robot, space, kinds)
+                check_widths(robot.brain, widths(experiment.space))
+            except InvalidRobot as error:
+                raise ExperimentError(f"must make valid robots, got {error}") from None
+            for node, _, _ in walk(genome):
+                _check_genes(node, kinds, is_random=len(genomes) < _FOUNDERS)
+            genomes.append(genome)
+        return genomes
+
+    repeated("robots", made)
 
 
-def _check_genes(genome: Genome, kinds: NeuronKinds, *, is_random: bool) -> None:
+def _check_types(node: Node) -> None:
+    """Raise unless a node has genes of the right types."""
+    for name, kind in (
+        ("outputs", NeuronGene),
+        ("hidden", NeuronGene),
+        ("connections", ConnectionGene),
+    ):
+        for gene in getattr(node, name):
+            if not isinstance(gene, kind):
+                raise broken(name, f"be a tuple of {kind.__name__}", gene)
+            if not isinstance(getattr(gene, "parameters", ()), tuple):
+                raise broken(name, "have parameters that are a tuple", gene)
+
+
+def _check_genes(node: Node, kinds: NeuronKinds, *, is_random: bool) -> None:
     """Raise for a connection that comes twice, or a parameter outside its range."""
-    for node, _, _ in walk(genome):
-        ends = [(each.source, each.path, each.target) for each in node.connections]
-        # Development ignores those that mutation may add.
-        if is_random and len(set(ends)) < len(ends):
-            raise InvalidRobot(f"one with a second connection among {shown(ends)}")
-        for gene in (*node.outputs, *node.hidden):
-            for known, value in zip(kinds[gene.kind], gene.parameters, strict=True):
-                if not known.low <= value <= known.high:
-                    what = f"{gene.kind} must have {known.name} from {known.low} to"
-                    raise InvalidRobot(f"{what} {known.high}, got {value}")
+    ends = [(each.source, each.path, each.target) for each in node.connections]
+    # Development ignores those that mutation may add.
+    if is_random and len(set(ends)) < len(ends):
+        raise broken(
+            "connections", "differ in source, path or target", came=shown(ends)
+        )
+    for gene in (*node.outputs, *node.hidden):
+        for known, value in zip(kinds[gene.kind], gene.parameters, strict=True):
+            if not known.low <= value <= known.high:
+                at = f"{known.name} of {gene.kind}"
+                raise broken(at, f"be from {known.low} to {known.high}", value)
 
 
 def _genomes(experiment: Experiment) -> Iterator[Genome]:
     """Yield random genomes and children of them."""
     encoding = RevolveAngle(experiment, body_space(experiment.space), None)
-    found = []
+    genomes = []
     for seed in range(_FOUNDERS):
         rng = np.random.default_rng(seed)
-        found.append(encoding.random(rng, BirthId(0, seed)))
-        yield found[-1]
+        genomes.append(encoding.random(rng, BirthId(0, seed)))
+        yield genomes[-1]
     for seed in range(_CHILDREN):
-        for first, second in pairwise(found[-_FOUNDERS:]):
-            rng = np.random.default_rng((seed, len(found)))
-            birth = BirthId(0, len(found))
+        for first, second in pairwise(genomes[-_FOUNDERS:]):
+            rng = np.random.default_rng((seed, len(genomes)))
+            birth = BirthId(0, len(genomes))
             if child := encoding.mate(first, second, rng, birth):
-                found.append(child)
+                genomes.append(child)
                 yield child
                 break

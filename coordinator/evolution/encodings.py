@@ -1,23 +1,15 @@
 """The encoding of an island: loading, and checks of what it returns."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache
-from traceback import extract_tb
 from typing import Any, cast
 
 import numpy as np
 
 from coordinator.evolution.cppn.encoding import Cppn
 from coordinator.evolution.revolve_angle import RevolveAngle
-from schema.errors import (
-    ExperimentError,
-    InvalidRobot,
-    RevolveError,
-    error_text,
-    one_line,
-    shown,
-)
+from schema.errors import ExperimentError, InvalidRobot, one_line
 from schema.experiment.brains import NoParameters, types_of
 from schema.experiment.document import (
     REVOLVE_ANGLE,
@@ -27,7 +19,9 @@ from schema.experiment.document import (
 )
 from schema.limits import ROBOT_BYTES
 from schema.parts import BodySpace
+from schema.plugins.contract import broken
 from schema.plugins.load import load_object
+from schema.plugins.origin import naming_plugin
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Encoding, OneStepMating, RobotEncoding
 from schema.robot.brain import Brain
@@ -68,7 +62,7 @@ def encoding_of(experiment: Experiment) -> "IslandEncoding":
     table = experiment.encoding.parameters
     parameters = read_parameters(table, kind or NoParameters, "encoding.parameters")
     types = body_space(experiment.space)
-    with _guarded(name, "the class"):
+    with naming_plugin(WHERE, found):
         made = found(experiment, types, parameters if kind else None)
     return IslandEncoding(made, experiment)
 
@@ -92,11 +86,19 @@ class IslandEncoding:
         self._mates = encoding if isinstance(encoding, OneStepMating) else None
         self._space = experiment.space
         self._is_thesis = self.name == REVOLVE_ANGLE
+        self._own = WHERE, type(encoding), self.name
+        if ":" not in self.name:
+            self._own = "brain.type", type(encoding), experiment.brain.type
         self.no_child = "its parents' genomes gave no child"
         if self._is_thesis:
             self.no_child = (
                 "crossover found no fitting subtree, or the child had no motor"
             )
+
+    def _named(self) -> AbstractContextManager[None]:
+        """Return a context that names the own code that raises."""
+        key, plugin, path = self._own
+        return naming_plugin(key, plugin, path) if ":" in path else nullcontext()
 
     def random(self, rng: np.random.Generator, birth: BirthId) -> object:
         """Return the genome of a random robot.
@@ -104,7 +106,7 @@ class IslandEncoding:
         Raises:
             ExperimentError: the method raises, or no robot meets the restrictions.
         """
-        with _guarded(self.name, "random"):
+        with self._named():
             return self._encoding.random(rng, birth)
 
     def mate(
@@ -116,13 +118,13 @@ class IslandEncoding:
             ExperimentError: a method raises.
         """
         if self._mates is not None:
-            with _guarded(self.name, "mate"):
+            with self._named():
                 return self._mates.mate(first, second, rng, birth)
-        with _guarded(self.name, "crossover"):
+        with self._named():
             child = self._encoding.crossover(first, second, rng)
         if child is None:
             return None
-        with _guarded(self.name, "mutate"):
+        with self._named():
             return self._encoding.mutate(child, rng, birth)
 
     def develop(self, genome: object) -> Robot:
@@ -135,19 +137,16 @@ class IslandEncoding:
         """
         if self._is_thesis:
             return self._encoding.develop(genome)
-        with _guarded(self.name, "develop"):
+        with self._named():
             found: object = self._encoding.develop(genome)
             parts, brain = (getattr(found, each, None) for each in ("parts", "brain"))
             if not isinstance(parts, tuple | list) or not isinstance(brain, Brain):
-                raise ExperimentError(
-                    f"{WHERE}: {self.name!r}: develop must return a Robot, "
-                    f"got {shown(found)}"
-                )
+                raise broken("develop", "return a Robot", found)
             # The Python API has a class of its own.
             robot = Robot(tuple(parts), brain)
             self.check(robot)
-        if problem := outside_limits(robot, self._space, self.types):
-            raise InvalidRobot(f"{WHERE}: {self.name!r}: {problem}")
+            if problem := outside_limits(robot, self._space, self.types):
+                raise InvalidRobot(f"{WHERE}: {self.name!r}: {problem}")
         return robot
 
     def check(self, robot: Robot) -> None:
@@ -164,13 +163,10 @@ class IslandEncoding:
         Raises:
             ExperimentError: the method raises, or returns no or too many bytes.
         """
-        with _guarded(self.name, "to_bytes"):
+        with self._named():
             data: object = self._encoding.to_bytes(genome)
-        if not isinstance(data, bytes) or len(data) > ROBOT_BYTES:
-            raise ExperimentError(
-                f"{WHERE}: {self.name!r}: to_bytes must return <= {ROBOT_BYTES} "
-                f"bytes, got {shown(data)}"
-            )
+            if not isinstance(data, bytes) or len(data) > ROBOT_BYTES:
+                raise broken("to_bytes", f"return <= {ROBOT_BYTES} bytes", data)
         return data
 
     def from_bytes(self, data: bytes) -> object:
@@ -259,19 +255,3 @@ def outside_limits(robot: Robot, space: Space, types: BodySpace) -> str:
             )
         turns.append(turn)
     return ""
-
-
-@contextmanager
-def _guarded(name: str, method: str) -> Iterator[None]:
-    """Turn errors of an encoding's own code into one line; not those of Revolve."""
-    try:
-        yield
-    except RevolveError:
-        raise
-    except (Exception, SystemExit) as error:
-        frame = extract_tb(error.__traceback__)[-1]
-        file = frame.filename.replace("\\", "/").rpartition("/")[2]
-        raise ExperimentError(
-            f"{WHERE}: {name!r}: {method} failed in {file}:{frame.lineno}: "
-            f"{error_text(error)}"
-        ) from error

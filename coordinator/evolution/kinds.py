@@ -1,13 +1,14 @@
 """Kinds of plug-ins that the coordinator runs: selection, encoding, brain, learner."""
 
-import inspect
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import replace as replace_struct
 
 from coordinator.evolution.brains import BUILT_IN as BRAINS
 from coordinator.evolution.breeding import NO_MEASURES
@@ -34,8 +35,9 @@ from schema.experiment.document import (
     Selection,
     island_experiments,
 )
-from schema.experiment.kinds import Kind, Use
+from schema.experiment.kinds import Kind, is_class, sections_of, takes
 from schema.experiment.learning import Learning
+from schema.plugins.contract import repeated
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
@@ -47,7 +49,6 @@ Labels = tuple[str, ...] | None
 _CHILDREN = 15
 _FAILED = 4
 """One of so many robots of a population has failed."""
-_RULES = {"parents": parents_rule, "survivors": survivors_rule}
 _ASKED: Mapping[str, tuple[int, int, tuple[int, ...]]] = {
     "selection.parents": (2, 2, ()),
     "selection.survivors": (_CHILDREN + 1, _CHILDREN, (_CHILDREN,)),
@@ -88,37 +89,29 @@ def _populations(least: int, labels: Labels) -> Iterator[list[_Example]]:
         yield [_example(number, fitness(number), labels) for number in range(count)]
 
 
-def check_rule(rule: Rule, labels: Labels = None) -> None:
+def check_rule(rule: Rule, labels: Labels = None) -> str:
     """Raise unless a rule of selection keeps its contract on simple populations.
 
     Args:
         rule: of parents or survivors.
         labels: measures of the individuals.
 
+    Returns:
+        A warning: what it raises for a population with failed robots, which is no
+        error, as a run in which no robot fails goes on; or an empty text.
+
     Raises:
         ExperimentError: it raises, returns other than as many different places as it
             must, or different ones for the same population and stream.
     """
     least, count, rest = _ASKED[rule.key]
+
+    def places(population: Sequence[_Example]) -> list[int]:
+        return rule.places(count, population, *rest, np.random.default_rng(1))
+
+    population: list[_Example] = []
     for population in _populations(least, labels):
-        first, second = (
-            rule.places(count, population, *rest, np.random.default_rng(1))
-            for _ in range(2)
-        )
-        if first != second:
-            raise ExperimentError(
-                f"{rule.key}: {where_defined(rule.function)}: must return the same for "
-                f"the same population and rng, got {first} and {second}"
-            )
-
-
-def _advise(rule: Rule) -> str:
-    """Return what a rule raises for a population with failed robots, or nothing.
-
-    It is not an error: a run in which no robot fails goes on.
-    """
-    least, count, rest = _ASKED[rule.key]
-    *_, population = _populations(least, None)
+        repeated("", partial(places, population))
     failed = failed_fitness(one.fitness for one in population)
     mixed = [
         replace(one, fitness=failed, measures=NO_MEASURES)
@@ -127,141 +120,109 @@ def _advise(rule: Rule) -> str:
         for number, one in enumerate(population)
     ]
     try:
-        rule.places(count, mixed, *rest, np.random.default_rng(1))
+        places(mixed)
     except ExperimentError as error:
         why = str(error).removeprefix(f"{rule.key}: {where_defined(rule.function)}: ")
         return f"of a population with failed robots (fitness 0, no measures): {why}"
     return ""
 
 
-def _use(name: str, selection: Selection, labels: Labels) -> Use:
-    """Return the use of an own rule of a section; ``name`` as of ``own_rule``."""
-    rule = partial(_RULES[name], selection)
-    return Use(
-        f"selection.{name}",
-        getattr(selection, name),
-        lambda: rule().function,
-        lambda _: check_rule(rule(), labels),
-        lambda _: _advise(rule()),
-    )
+class _Ruled(NamedTuple):
+    """A section of selection, and the measures that the experiment records."""
+
+    selection: Selection
+    labels: Labels
 
 
-def _used(name: str, experiment: Experiment) -> Iterator[Use]:
-    sections = (experiment.selection, *(each.selection for each in experiment.islands))
-    for selection in dict.fromkeys(filter(None, sections)):
+def _rules(name: str, experiment: Experiment) -> Iterator[_Ruled]:
+    for selection in sections_of(experiment, "selection"):
         if ":" in getattr(selection, name):
-            yield _use(name, selection, experiment.measures.labels)
+            yield _Ruled(selection, experiment.measures.labels)
 
 
-def _takes(arguments: int, plugin: object) -> bool:
-    if not inspect.isfunction(plugin):
-        return False
-    try:
-        inspect.signature(plugin).bind(*range(arguments))
-    except TypeError:
-        return False
-    return True
-
-
-def _has(methods: Iterable[str], plugin: object) -> bool:
-    """Return whether an object is a class with some methods."""
-    return isinstance(plugin, type) and all(hasattr(plugin, name) for name in methods)
-
-
-def _encoding(experiment: Experiment, own: Experiment) -> Use:
-    """Return the use of an encoding by an island whose experiment is ``own``."""
-    path = own.encoding.type
-    return Use(
-        WHERE,
-        path,
-        lambda: load_object(path, WHERE, ENCODINGS, METHODS),
-        lambda _: check_encoding(own),
-        # What is wrong elsewhere is not the fault of this plug-in.
-        check_rest=lambda: check_experiment(experiment, experiment.name),
+def _selection_kind(
+    name: str,
+    built_in: Mapping[str, object],
+    arguments: int,
+    rule: Callable[[Selection], Rule],
+) -> Kind:
+    return Kind(
+        name,
+        f"selection.{name}",
+        built_in,
+        is_one=partial(takes, arguments),
+        section=lambda path: _Ruled(replace_struct(Selection(), **{name: path}), None),
+        sections=partial(_rules, name),
+        path=lambda ruled: str(getattr(ruled.selection, name)),
+        load=lambda ruled: rule(ruled.selection).function,
+        check=lambda ruled: check_rule(rule(ruled.selection), ruled.labels),
     )
 
 
-def _encoding_by_hand(path: str) -> Use:
+class _Encoded(NamedTuple):
+    """An experiment, and that of an island, whose encoding is meant."""
+
+    whole: Experiment
+    island: Experiment
+
+
+def _load_encoding(encoded: _Encoded) -> object:
+    # What is wrong elsewhere is not the fault of this plug-in.
+    check_experiment(encoded.whole, encoded.whole.name)
+    return load_object(encoded.island.encoding.type, WHERE, ENCODINGS, METHODS)
+
+
+def _by_hand(path: str) -> _Encoded:
     experiment = Experiment("by hand", encoding=Encoding(type=path))
-    return _encoding(experiment, experiment)
+    return _Encoded(experiment, experiment)
 
 
-def _encodings(experiment: Experiment) -> Iterator[Use]:
-    for own in dict.fromkeys(island_experiments(experiment)):
-        yield _encoding(experiment, own)
-
-
-def brain_kind(
-    check: Callable[[Experiment], None], check_new: Callable[[Experiment], None]
-) -> Kind:
+def brain_kind(check: Callable[[Experiment], None]) -> Kind:
     """Return the kind of brain types.
 
     Args:
         check: of both halves of the brain type of an experiment; one of them runs in
             workers.
-        check_new: of what only new runs must keep.
     """
-
-    def use(experiment: Experiment) -> Use:
-        path, key = experiment.brain.type, "brain.type"
-        return Use(
-            key,
-            path,
-            lambda: load_object(path, key, BRAINS),
-            lambda _: check(experiment),
-            check_new=lambda _: check_new(experiment),
-        )
-
     return Kind(
         "brain",
+        "brain.type",
         BRAINS,
-        partial(_has, ("outputs", "grow", "pack", "bank")),
-        lambda path: use(Experiment("by hand", brain=BrainSection(type=path))),
-        lambda experiment: [use(experiment)],
+        is_one=partial(is_class, ("outputs", "grow", "pack", "bank")),
+        section=lambda path: Experiment("by hand", brain=BrainSection(type=path)),
+        sections=lambda experiment: [experiment],
+        path=lambda experiment: experiment.brain.type,
+        load=lambda each: load_object(each.brain.type, "brain.type", BRAINS),
+        check=check,
     )
-
-
-def _learner(rules: Learning) -> Use:
-    def load() -> object:
-        return load_object(rules.learner, LEARNER, LEARNERS, LEARNER_METHODS)
-
-    return Use(LEARNER, rules.learner, load, lambda _: check_learner(rules))
-
-
-def _learners(experiment: Experiment) -> Iterator[Use]:
-    sections = [experiment.learning, *(each.learning for each in experiment.islands)]
-    for rules in dict.fromkeys(filter(None, sections)):
-        yield _learner(rules)
 
 
 ENCODING = Kind(
     "encoding",
+    WHERE,
     ENCODINGS,
-    partial(_has, METHODS),
-    _encoding_by_hand,
-    _encodings,
+    is_one=partial(is_class, METHODS),
+    section=_by_hand,
+    sections=lambda each: [_Encoded(each, own) for own in island_experiments(each)],
+    path=lambda encoded: encoded.island.encoding.type,
+    load=_load_encoding,
+    check=lambda encoded: check_encoding(encoded.island),
 )
 KINDS = (
     ENCODING,
-    Kind(
-        "parents",
-        PARENTS,
-        partial(_takes, 3),
-        lambda path: _use("parents", Selection(parents=path), None),
-        partial(_used, "parents"),
-    ),
-    Kind(
-        "survivors",
-        SURVIVORS,
-        partial(_takes, 4),
-        lambda path: _use("survivors", Selection(survivors=path), None),
-        partial(_used, "survivors"),
-    ),
+    _selection_kind("parents", PARENTS, 3, parents_rule),
+    _selection_kind("survivors", SURVIVORS, 4, survivors_rule),
     Kind(
         "learner",
+        LEARNER,
         LEARNERS,
-        partial(_has, LEARNER_METHODS),
-        lambda path: _learner(Learning(learner=path)),
-        _learners,
+        is_one=partial(is_class, LEARNER_METHODS),
+        section=lambda path: Learning(learner=path),
+        sections=lambda experiment: sections_of(experiment, "learning"),
+        path=lambda rules: rules.learner,
+        load=lambda rules: load_object(
+            rules.learner, LEARNER, LEARNERS, LEARNER_METHODS
+        ),
+        check=check_learner,
     ),
 )

@@ -7,7 +7,7 @@ function call, and convert it into a new genome.
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from operator import add, sub
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from msgspec import Struct, field
 from msgspec.structs import replace
@@ -17,6 +17,8 @@ from schema.parts import BodySpace, PartType
 from schema.robot.brain import Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
 from schema.robot.ids import BirthId
+
+Gene = TypeVar("Gene", NeuronGene, ConnectionGene)
 
 
 class MutableGenome(Struct, eq=False):
@@ -124,12 +126,25 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
             branch.orientation,
             branch.parameters,
             branch.gene,
-            branch.outputs,
-            branch.hidden,
-            branch.connections,
+            _genes(branch.outputs),
+            _genes(branch.hidden),
+            _genes(branch.connections),
             tuple([(slot, nodes[child]) for slot, child in branch.children.items()]),
         )
     return nodes[branches[0]]
+
+
+def _genes(genes: tuple[Gene, ...]) -> tuple[Gene, ...]:
+    """Return genes as a tuple, as genomes share them; a brain type may return a list.
+
+    Raises:
+        TypeError: neither a tuple nor a list.
+    """
+    if type(genes) is tuple:
+        return genes
+    if not isinstance(genes, list):
+        raise TypeError(f"genes must be a tuple, got a {type(genes).__name__}")
+    return tuple(genes)
 
 
 def preorder(root: MutableGenome) -> list[MutableGenome]:

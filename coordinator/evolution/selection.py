@@ -18,7 +18,8 @@ from coordinator.evolution.random_streams import BufferedRng
 from schema.errors import ExperimentError, shown
 from schema.experiment.document import Arena, Culling, Selection
 from schema.experiment.selection_rules import own_rule
-from schema.plugins.origin import naming_plugin, where_defined
+from schema.plugins.contract import broken
+from schema.plugins.origin import naming_plugin
 from schema.plugins.protocols import ParentSelection, Selectable, SurvivorSelection
 
 S = TypeVar("S", bound=Selectable)
@@ -68,26 +69,23 @@ class Rule:
                 its list.
         """
         given = list(population)
-        with naming_plugin(self.function, self.key):
+        with naming_plugin(self.key, self.function):
             answer = self.function(given, *rest, self.parameters)
-        place_of = {id(one): place for place, one in enumerate(population)}
-        try:
-            left = [place_of.pop(id(one)) for one in given]
-        except KeyError:
-            raise ExperimentError(
-                f"{self.key}: {where_defined(self.function)}: must not replace "
-                "individuals of the population"
-            ) from None
-        places = _whole_numbers(answer)
-        if len(places) == len(set(places)) == count and (
-            min(places) >= 0 and max(places) < len(left)
-        ):
+            place_of = {id(one): place for place, one in enumerate(population)}
+            try:
+                left = [place_of.pop(id(one)) for one in given]
+            except KeyError:
+                raise ExperimentError(
+                    "must not replace individuals of the population"
+                ) from None
+            places = _whole_numbers(answer)
+            if not len(places) == len(set(places)) == count or not (
+                min(places) >= 0 and max(places) < len(left)
+            ):
+                highest = len(left) - 1
+                rule = f"return {count} different whole numbers from 0 to {highest}"
+                raise broken("", rule, came=shown(answer))
             return [left[at] for at in places]
-        raise ExperimentError(
-            f"{self.key}: {where_defined(self.function)}: must return {count} "
-            f"different whole numbers from 0 to {len(left) - 1}, got "
-            f"{shown(answer)}"
-        )
 
 
 def _whole_numbers(answer: object) -> list[int]:

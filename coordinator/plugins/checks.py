@@ -12,7 +12,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
-from itertools import product
 from pathlib import Path
 from typing import IO
 
@@ -49,11 +48,10 @@ from schema.experiment.file import (
     own_references,
 )
 from schema.experiment.fitness_keys import check_fitness_keys
-from schema.experiment.kinds import Kind, Use, check_use, kind_of
-from schema.parts import BUILT_IN, PartType
+from schema.experiment.kinds import Kind, Use, kind_of, uses
+from schema.parts import BUILT_IN
 from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
-from schema.plugins.part_checks import check_sensed_boxes, check_slot_directions
 from schema.plugins.permission import FLAG, allow, allow_references, allowed, is_own
 from schema.tables.description import allow_plugins_of
 
@@ -136,14 +134,13 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
     Raises:
         ExperimentError: a name or parameters that are not allowed.
     """
-    for kind in kinds:
-        for use in kind.used(experiment):
-            if is_own(use.path):
-                continue
-            try:
-                use.check(use.load())
-            except ExperimentError as error:
-                raise _with_hint(error, experiment) from None
+    for use in uses(experiment, kinds):
+        if is_own(use.path):
+            continue
+        try:
+            use.check()
+        except ExperimentError as error:
+            raise _with_hint(error, experiment) from None
     for own in island_experiments(experiment):
         _check_births(own.arena)
         if not is_own(own.fitness.function):
@@ -259,14 +256,14 @@ def check_here(
             try:
                 say("begin", word)
                 with _time_limit(limit_s):
-                    uses = list(_uses(word, kinds, kind, births))
-                for name, use in uses:
-                    with _time_limit(limit_s):
-                        _check_plugin(word, name, use, say)
+                    own = _uses(word, kinds, kind, births)
+                for use in own:
+                    with _time_limit(limit_s), _placing(word, use):
+                        _check_plugin(use, say)
                 if ":" not in word and not _is_folder(Path(word)):
                     for warning in _check_document(word, kinds, births, limit_s):
                         say("warn", f"{word}: warning: {warning}")
-                if not uses:
+                if not own:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
                 is_fine = False
@@ -274,33 +271,18 @@ def check_here(
     return is_fine
 
 
-def _check_plugin(
-    word: str, name: str, use: Use, say: Callable[[str, str], None]
-) -> None:
-    """Check a plug-in of a kind; say that it is in order, and what to beware of.
+def _check_plugin(use: Use, say: Callable[[str, str], None]) -> None:
+    """Check a plug-in; say that it is in order, and what to beware of.
 
     Raises:
         ExperimentError: it is not in order.
     """
-    say("begin", f"{use.key}: {use.path}")
-    # A run goes on that was started before a check was added.
-    is_new = not _is_folder(Path(word))
-    try:
-        if is_new:
-            use.check_rest()
-        where = check_use(
-            use, lambda at: say("begin", f"{use.key}: {at}"), is_new=is_new
-        )
-        plugin = use.load()
-        if isinstance(plugin, PartType) and is_new:
-            check_slot_directions(plugin, use.key)
-            check_sensed_boxes(plugin, use.key)
-        warning = use.advise(plugin)
-    except ExperimentError as error:
-        raise _placed(error, word, use) from error
-    say("fine", f"{use.path}: {name} at {where}: in order")
+    key = use.kind.key
+    say("begin", f"{key}: {use.path}")
+    where, warning = use.check(lambda place: say("begin", f"{key}: {place}"))
+    say("fine", f"{use.path}: {use.kind.name} at {where}: in order")
     if warning:
-        say("warn", f"{use.key}: {where}: warning: {warning}")
+        say("warn", f"{key}: {where}: warning: {warning}")
 
 
 def _check_document(
@@ -327,20 +309,24 @@ def _is_folder(folder: Path) -> bool:
     return is_campaign(folder) or holds_run(folder)
 
 
-def _placed(error: ExperimentError, word: str, use: Use) -> ExperimentError:
-    """Return an error with file and line: of the plug-in, its name, or another key."""
-    story = one_line(error)
-    if word.endswith(".toml") and not _PLACE.search(story):
+@contextmanager
+def _placing(word: str, use: Use) -> Iterator[None]:
+    """Name file and line in an error: of the plug-in, its name, or another key."""
+    try:
+        yield
+    except ExperimentError as error:
+        story = one_line(error)
+        if not word.endswith(".toml") or _PLACE.search(story):
+            raise
         key = story.partition(":")[0]
+        is_named = key == use.kind.key
         leaf = re.escape(key.rpartition(".")[2])
-        is_named = key == use.key
         sought = re.escape(use.path) if is_named else rf"^\s*{leaf}\s*="
         lines = enumerate(Path(word).read_text("utf-8").splitlines(), 1)
         found = [number for number, line in lines if re.search(sought, line)]
         # Another section may have a key of the same name.
         place = f":{found[0]}" if (is_named and found) or len(found) == 1 else ""
-        return ExperimentError(f"{Path(word).name}{place}: {story}")
-    return error
+        raise ExperimentError(f"{Path(word).name}{place}: {story}") from error
 
 
 @contextmanager
@@ -356,26 +342,24 @@ def _time_limit(limit_s: float) -> Iterator[None]:
 
 def _uses(
     word: str, kinds: Sequence[Kind], kind: str | None, births: int | None
-) -> Iterator[tuple[str, Use]]:
-    """Yield the plug-ins that a word of the command line means, with their kinds.
+) -> list[Use]:
+    """Return the own plug-ins that a word of the command line means.
 
     Raises:
-        ExperimentError: it cannot be loaded, or is of no kind.
+        ExperimentError: one cannot be loaded, or is of no kind.
     """
     place, colon, attribute = word.rpartition(":")
     if word.endswith(".py"):
         raise ExperimentError(f"{word}: name a function or class: {word}:NAME")
     if not colon:
         folder = Path(word)
-        is_folder = _is_folder(folder)
         experiments = (
-            _experiments_of(folder) if is_folder else draft_experiments(word, births)
+            _experiments_of(folder)
+            if _is_folder(folder)
+            else draft_experiments(word, births)
         )
-        for each, experiment in product(kinds, experiments):
-            for use in each.used(experiment):
-                if is_own(use.path):
-                    yield each.name, use
-        return
+        named = [use for each in experiments for use in uses(each, kinds)]
+        return [use for use in dict.fromkeys(named) if is_own(use.path)]
     path = word
     if place.endswith(".py"):
         allow([place])
@@ -383,14 +367,12 @@ def _uses(
     else:
         allow_references([path], Path())
     plugin: object = load_object(path, "revolve check", {})
-    if kind is None:
-        found = kind_of(plugin, kinds)
-    else:
-        found = next(each for each in kinds if each.name == kind)
+    by_name = {each.name: each for each in kinds}
+    found = by_name[kind] if kind else kind_of(plugin, kinds)
     if found is None:
         names = ", ".join(each.name for each in kinds)
         raise UnknownPlugin(
             f"{path}: {place_of(path)}: must be of one of the kinds {names}, got a "
             f"{type(plugin).__name__}; --kind says which"
         )
-    yield found.name, found.by_hand(path)
+    return [Use(found, found.section(path))]

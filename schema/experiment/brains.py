@@ -7,24 +7,24 @@ from typing import Any, NamedTuple, TypeVar, cast
 from msgspec import Struct
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, error_text
+from schema.errors import ExperimentError
 from schema.experiment.document import BrainSection, Experiment, Space, body_space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.parts import BodySpace
 from schema.plugins.check_neuron_type import check_neuron_type
+from schema.plugins.contract import broken
 from schema.plugins.load import load_object
-from schema.plugins.origin import where_defined
+from schema.plugins.origin import naming_plugin
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import BrainType, NeuronType
 from schema.robot.brain import Brain, NeuronKinds, Widths
 from schema.robot.cpg import CpgParameters, cpg_neurons
 from schema.robot.neurons import BUILT_IN_NEURONS
 
-T = TypeVar("T")
 Half = TypeVar("Half")
 
 NEURON_MEMBERS = ("name", "parameters", "states", "step")
-_BRAIN_MEMBERS = ("neurons", "outputs", "grow", "prune", "vary", "pack", "bank")
+_BRAIN_METHODS = ("outputs", "grow", "prune", "vary", "pack", "bank")
 _TYPE = "brain.type"
 
 
@@ -67,11 +67,10 @@ def neuron_types(names: tuple[str, ...]) -> tuple[NeuronType, ...]:
     for path in names:
         built_in: Mapping[str, NeuronType] = BUILT_IN_NEURONS
         kind: Any = load_object(path, where, built_in)
-        if isinstance(kind, type):
-            kind = _made(kind, where)
         if ":" in path:
-            _require(kind, NEURON_MEMBERS, where)
-            check_neuron_type(kind, where)
+            with naming_plugin(where, kind, path):
+                kind = kind() if isinstance(kind, type) else kind
+                check_neuron_type(kind)
         if kind.name in types:
             raise ExperimentError(f"{where}: two types are named {kind.name!r}")
         types[kind.name] = kind
@@ -149,38 +148,17 @@ def with_room(settings: EvaluationSettings, brain: Brain) -> EvaluationSettings:
 def _own_brain(brain: BrainSection, names: tuple[str, ...]) -> BrainType:
     """Return the brain type of a user's module, with its parameters."""
     no_types: Mapping[str, type[BrainType]] = {}
-    found = load_object(brain.type, _TYPE, no_types)
-    if not isinstance(found, type):
-        raise ExperimentError(
-            f"{_TYPE}: {where_defined(found)}: expected a class, got an object of type "
-            f"{type(found).__name__}"
-        )
+    found = load_object(brain.type, _TYPE, no_types, _BRAIN_METHODS)
+    types = neuron_types(names)
     parameters = _parameters(brain, getattr(found, "Parameters", NoParameters))
-    made = _made(found, _TYPE, parameters, neuron_types(names))
-    _require(made, _BRAIN_MEMBERS, _TYPE)
+    with naming_plugin(_TYPE, found, brain.type):
+        if not isinstance(found, type):
+            raise broken("", "be a class", came=f"a {type(found).__name__}")
+        made: BrainType = cast("Any", found)(parameters, types)
+        if not made.neurons:
+            raise broken("neurons", "name at least one neuron type", came="none")
     return made
 
 
 def _parameters(brain: BrainSection, kind: type[Struct]) -> Struct:
     return read_parameters(brain.parameters, kind, "brain.parameters")
-
-
-def _made(kind: type[T], where: str, *arguments: object) -> T:
-    """Return an object of a user's class."""
-    try:
-        return kind(*arguments)
-    except Exception as error:
-        raise ExperimentError(
-            f"{where}: {where_defined(kind)}: expected a class of "
-            f"{len(arguments)} arguments, got {error_text(error)}"
-        ) from error
-
-
-def _require(plugin: object, members: tuple[str, ...], where: str) -> None:
-    """Raise unless a plug-in has all attributes of its kind."""
-    for member in members:
-        if not hasattr(plugin, member):
-            raise ExperimentError(
-                f"{where}: {where_defined(plugin)}: expected an attribute {member!r}, "
-                f"got {type(plugin).__name__} without it"
-            )

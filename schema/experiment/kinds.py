@@ -1,107 +1,93 @@
 """Kinds of plug-ins: how one is recognised, what an experiment uses, how it is checked.
 
-Each room lists its kinds; the commands put the lists together.
+A table in each room lists its kinds; the commands put the tables together.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import inspect
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import schema.parts
 import schema.robogen_parts
-from schema.errors import ExperimentError, RevolveError, error_text, one_line
-from schema.experiment.brains import NEURON_MEMBERS, neuron_types
+from schema.experiment.brains import neuron_types
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
-from schema.plugins.load import load_instance, load_object
-from schema.plugins.origin import where_defined, where_raised
-from schema.plugins.part_checks import advise_shape
+from schema.plugins.load import load_instance, load_object, place_of
+from schema.plugins.origin import naming_plugin, where_defined
+from schema.plugins.part_checks import advise_shape, check_slots_and_sensors
 from schema.plugins.sensor_checks import check_sensor
 from schema.robot.neurons import BUILT_IN_NEURONS
 
 
-@dataclass(frozen=True, slots=True)
-class Use:
-    """A plug-in that a key of an experiment names, and its check.
-
-    Attributes:
-        key: of the experiment, or the command line, for messages.
-        path: short name or ``module:attribute``.
-        load: returns the plug-in; raises ``ExperimentError`` if it cannot be had.
-        check: takes the plug-in; raises any error if it breaks its contract.
-        advise: takes a plug-in that is in order; returns a warning, or nothing.
-        check_new: as ``check``, of what versions before did not check: only for a run
-            that begins now.
-        check_rest: raises ``ExperimentError`` if the rest of a new experiment is wrong,
-            for plug-ins that are checked with it; called before ``load``.
-    """
-
-    key: str
-    path: str
-    load: Callable[[], object]
-    check: Callable[[Any], None]
-    advise: Callable[[Any], str] = lambda _: ""
-    check_new: Callable[[Any], None] = lambda _: None
-    check_rest: Callable[[], None] = lambda: None
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Kind:
-    """A kind of plug-in.
+    """A kind of plug-in. A *section* is what names one, with its parameters.
 
     Attributes:
         name: of the kind, such as ``fitness``.
+        key: of the experiment that names a plug-in, for messages.
         built_in: objects that ship, by the name that an experiment gives them.
         is_one: whether an object is of this kind.
-        by_hand: returns the use of a path, with default parameters.
-        used: yields the uses of an experiment, those of its islands included.
+        section: returns the section of a path, with default parameters.
+        sections: of an experiment, those of its islands included.
+        path: returns the short name or ``module:attribute`` of a section.
+        load: returns the plug-in of a section; raises ``ExperimentError`` if it cannot
+            be had.
+        check: raises any error if the plug-in of a section breaks its contract; may
+            return a warning.
     """
 
     name: str
+    key: str
     built_in: Mapping[str, object]
     is_one: Callable[[object], bool]
-    by_hand: Callable[[str], Use]
-    used: Callable[[Experiment], Iterable[Use]]
+    section: Callable[[str], Any]
+    sections: Callable[[Experiment], Iterable[Any]]
+    path: Callable[[Any], str]
+    load: Callable[[Any], object]
+    check: Callable[[Any], str | None]
 
 
-def check_use(
-    use: Use, begin: Callable[[str], None] = lambda _: None, *, is_new: bool = False
-) -> str:
-    """Check a plug-in; return where it is defined.
+class Use(NamedTuple):
+    """A plug-in that an experiment, or the command line, names."""
 
-    Args:
-        use: to check.
-        begin: called with file and line before the check.
-        is_new: also check what only new runs must keep.
+    kind: Kind
+    section: Any
 
-    Raises:
-        ExperimentError: one line with key, file and line, and what was expected.
-    """
-    plugin = use.load()
-    where = where_defined(plugin)
-    begin(where)
-    file, _, _ = where.partition(":")
-    try:
-        use.check(plugin)
-        if is_new:
-            use.check_new(plugin)
-    # A plug-in may call exit().
-    except (Exception, SystemExit) as error:
-        story = one_line(error)
-        if not isinstance(error, RevolveError):
-            line = where_raised(error, file) or where
-            story = f"{line}: raised {error_text(error)}"
-        story = story.removeprefix(f"{use.key}: ")
-        section, _, _ = use.key.partition(".")
-        if isinstance(error, ExperimentError) and story.startswith(f"{section}."):
-            # Of another key, such as the plug-in's parameters: not in its file.
-            raise ExperimentError(story) from error
-        if f"{file}:" not in story:
-            story = f"{where}: {story}"
-        raise ExperimentError(f"{use.key}: {story}") from error
-    return where
+    @property
+    def path(self) -> str:
+        """Short name or ``module:attribute``."""
+        return self.kind.path(self.section)
+
+    def check(self, begin: Callable[[str], None] = lambda _: None) -> tuple[str, str]:
+        """Check the plug-in; return where it is defined, and a warning or nothing.
+
+        Args:
+            begin: called with file and line before the check.
+
+        Raises:
+            ExperimentError: one line with key, file and line, and what was expected.
+        """
+        plugin = self.kind.load(self.section)
+        where = place_of(self.path) if ":" in self.path else where_defined(plugin)
+        begin(where)
+        with naming_plugin(self.kind.key, plugin, self.path):
+            return where, self.kind.check(self.section) or ""
+
+
+def uses(experiment: Experiment, kinds: Iterable[Kind]) -> list[Use]:
+    """Return the plug-ins of some kinds that an experiment names, each once."""
+    named = [Use(kind, each) for kind in kinds for each in kind.sections(experiment)]
+    return list(dict.fromkeys(named))
+
+
+def sections_of(experiment: Experiment, name: str) -> list[Any]:
+    """Return the sections of a name of an experiment and of its islands."""
+    holders = (experiment, *experiment.islands)
+    return [each for holder in holders if (each := getattr(holder, name)) is not None]
 
 
 def offered(module: ModuleType, kinds: Iterable[Kind]) -> list[tuple[Kind, str]]:
@@ -124,83 +110,92 @@ def kind_of(plugin: object, kinds: Iterable[Kind]) -> Kind | None:
     return next((kind for kind in kinds if kind.is_one(plugin)), None)
 
 
-def _part_type(path: str) -> Use:
-    key = "space.part_types"
+def takes(count: int, plugin: object) -> bool:
+    """Return whether an object is a function of so many arguments."""
+    if not inspect.isfunction(plugin):
+        return False
+    try:
+        inspect.signature(plugin).bind(*range(count))
+    except TypeError:
+        return False
+    return True
 
-    def check(kind: PartType) -> None:
-        # A space needs a core.
-        core = () if kind.is_root else ("schema.parts:CORE",)
-        body_space(Space(part_types=(*core, path)))
 
-    load = partial(load_instance, path, key, PartType)
-    return Use(key, path, load, check, advise_shape)
+def has(members: Iterable[str], plugin: object) -> bool:
+    """Return whether an object has some attributes."""
+    return all(hasattr(plugin, name) for name in members)
 
 
-def _part_types(experiment: Experiment) -> Iterator[Use]:
-    for path in experiment.space.part_types:
-        yield _part_type(path)
+def is_class(methods: Iterable[str], plugin: object) -> bool:
+    """Return whether an object is a class with some methods."""
+    return isinstance(plugin, type) and has(methods, plugin)
+
+
+def _check_part_type(path: str) -> str:
+    kind = _load_part_type(path)
+    # A space needs a core.
+    core = () if kind.is_root else ("schema.parts:CORE",)
+    body_space(Space(part_types=(*core, path)))
+    check_slots_and_sensors(kind)
+    return advise_shape(kind)
+
+
+def _load_part_type(path: str) -> PartType:
+    return load_instance(path, "space.part_types", PartType)
 
 
 PART_TYPE = Kind(
     "part-type",
+    "space.part_types",
     {
         f"{module.__name__}:{name}": value
         for module in (schema.parts, schema.robogen_parts)
         for name, value in vars(module).items()
         if isinstance(value, PartType)
     },
-    lambda plugin: isinstance(plugin, PartType),
-    _part_type,
-    _part_types,
+    is_one=lambda plugin: isinstance(plugin, PartType),
+    section=str,
+    sections=lambda experiment: experiment.space.part_types,
+    path=str,
+    load=_load_part_type,
+    check=_check_part_type,
 )
 
 
-def _neuron_type(path: str) -> Use:
-    key = "space.neuron_types"
-
-    def check(_: object) -> None:
-        neuron_types((path,))
-
-    return Use(key, path, lambda: load_object(path, key, BUILT_IN_NEURONS), check)
-
-
-def _neuron_types(experiment: Experiment) -> Iterator[Use]:
-    for path in experiment.space.neuron_types:
-        yield _neuron_type(path)
-
-
-def _is_neuron_type(plugin: object) -> bool:
-    return all(hasattr(plugin, name) for name in NEURON_MEMBERS)
+def _check_neuron_type(path: str) -> None:
+    neuron_types((path,))
 
 
 NEURON_TYPE = Kind(
     "neuron-type",
+    "space.neuron_types",
     BUILT_IN_NEURONS,
-    _is_neuron_type,
-    _neuron_type,
-    _neuron_types,
+    is_one=partial(has, ("name", "parameters", "states", "step")),
+    section=str,
+    sections=lambda experiment: experiment.space.neuron_types,
+    path=str,
+    load=lambda path: load_object(path, "space.neuron_types", BUILT_IN_NEURONS),
+    check=_check_neuron_type,
 )
 
 
-def _sensor(path: str) -> Use:
-    key = "sensor"
-
-    def load() -> object:
-        return load_object(path, key, {}, ("inputs", "read"))
-
-    return Use(key, path, load, lambda sensor: check_sensor(sensor, key))
+def _load_sensor(path: str) -> Any:  # noqa: ANN401 - of any class
+    return load_object(path, "sensor", {}, ("inputs", "read"))
 
 
 SENSOR = Kind(
     "sensor",
+    "sensor",
     {},
-    lambda plugin: (
-        not isinstance(plugin, type)
-        and all(hasattr(plugin, name) for name in ("inputs", "read"))
+    is_one=lambda plugin: (
+        not isinstance(plugin, type) and has(("inputs", "read"), plugin)
     ),
-    _sensor,
+    section=str,
     # Sensors are checked with the part types that hold them.
-    lambda _: (),
+    sections=lambda _: (),
+    path=str,
+    load=_load_sensor,
+    check=lambda path: check_sensor(_load_sensor(path)),
 )
 KINDS = (PART_TYPE, NEURON_TYPE, SENSOR)
 """Kinds whose checks need no other room."""

@@ -9,18 +9,22 @@ from functools import partial
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
+from typing import Any
 
-from schema.errors import ExperimentError, error_text
-
-_CONSTANTS = (bool, int, float, complex, str, bytes, tuple, frozenset, type(None))
+from schema.errors import (
+    ExperimentError,
+    InvalidRobot,
+    RevolveError,
+    error_text,
+    one_line,
+)
 
 
 def where_defined(plugin: object) -> str:
     """Return the file and line of a plug-in's code, such as ``my_lab.py:12``.
 
-    A wrapped or partial function counts as the function inside. An object that is
-    neither function nor class is found by the assignment that names it in its module,
-    or else by its class.
+    A wrapped or partial function counts as the function inside, an object that is
+    neither function nor class as its class.
 
     Args:
         plugin: function, class or object.
@@ -29,19 +33,15 @@ def where_defined(plugin: object) -> str:
         Name of the file and line of the definition; without a line if the source is
         not there; module and name if there is no file.
     """
-    found = inspect.unwrap(plugin) if callable(plugin) else plugin
-    while isinstance(found, partial):
-        found = inspect.unwrap(found.func)
-    if not (inspect.isclass(found) or inspect.isroutine(found)):
-        if assigned := _where_assigned(found):
-            return assigned
-        found = type(found)
+    code = _code(plugin)
+    if not _is_code(code):
+        code = type(code)
     try:
-        file = Path(inspect.getsourcefile(found) or inspect.getfile(found)).name
+        file = Path(inspect.getsourcefile(code) or inspect.getfile(code)).name
     except TypeError:
-        return f"{found.__module__}:{found.__qualname__}"
+        return f"{code.__module__}:{code.__qualname__}"
     try:
-        return f"{file}:{inspect.getsourcelines(found)[1]}"
+        return f"{file}:{inspect.getsourcelines(code)[1]}"
     except OSError:
         return file
 
@@ -57,8 +57,8 @@ def where_named(module: ModuleType, name: str) -> str:
         As of ``where_defined``; without a line for a name that is not assigned at the
         top of the module.
     """
-    value = getattr(module, name, None)
-    if inspect.isclass(value) or inspect.isroutine(value):
+    value = _code(getattr(module, name, None))
+    if _is_code(value):
         return where_defined(value)
     file = Path(str(module.__file__)).name
     line = _assignment(module, name)
@@ -80,49 +80,57 @@ def where_raised(error: BaseException, file: str) -> str:
     return lines[-1] if lines else ""
 
 
-def raised_text(error: BaseException, where: str) -> str:
-    """Return an error of a plug-in as one line, and where it was raised.
-
-    Args:
-        error: with its traceback.
-        where: the plug-in is defined, as of ``where_defined``.
-    """
-    line = where_raised(error, where.partition(":")[0])
-    return error_text(error) + (f" ({line})" if line else "")
-
-
 @contextmanager
-def naming_plugin(plugin: object, key: str) -> Iterator[None]:
-    """Say where a plug-in is defined, what it raised, and where, if it raises.
+def naming_plugin(key: str, plugin: object, path: str = "") -> Iterator[None]:
+    """Say in one line which plug-in raised, where it is defined, and where it raised.
+
+    An ``InvalidRobot`` is what an attempt at a birth comes to, and passes.
 
     Args:
+        key: of the experiment, which names the plug-in.
         plugin: function, class or object that is called.
-        key: of the experiment, which names it.
+        path: ``module:attribute`` of an object that is neither function nor class.
 
     Raises:
         ExperimentError: for any error of its code, ``exit`` included.
     """
     try:
         yield
+    except InvalidRobot:
+        raise
     except (Exception, SystemExit) as error:
-        where = where_defined(plugin)
-        story = raised_text(error, where)
-        raise ExperimentError(f"{key}: {where}: raised {story}") from error
+        module, _, name = path.partition(":")
+        known = sys.modules.get(module)
+        where = where_named(known, name) if known and name else where_defined(plugin)
+        raise ExperimentError(_story(error, key, where)) from error
 
 
-def _where_assigned(value: object) -> str:
-    """Return file and line of the assignment of a module's object; or empty."""
-    # Equal constants of different modules may be one object; a module is imported by
-    # many, each of whose sources would be parsed.
-    if isinstance(value, (*_CONSTANTS, ModuleType)):
-        return ""
-    for module in list(sys.modules.values()):
-        # A snapshot: the import of another thread may change it.
-        names = dict(getattr(module, "__dict__", {}))
-        for name, each in names.items():
-            if each is value and (line := _assignment(module, name)):
-                return f"{Path(str(module.__file__)).name}:{line}"
-    return ""
+def _story(error: BaseException, key: str, where: str) -> str:
+    """Return an error as one line with key, file and line, each of them once."""
+    file = where.partition(":")[0]
+    story = f"raised {error_text(error)}"
+    if isinstance(error, RevolveError):
+        story = one_line(error).removeprefix(f"{key}: ")
+    if story.startswith(f"{key.partition('.')[0]}."):
+        # Of another key, such as the plug-in's parameters: not in its file.
+        return story
+    if line := where_raised(error, file):
+        story += f" ({line})"
+    elif f"{file}:" in story:
+        return f"{key}: {story}"
+    return f"{key}: {where}: {story}"
+
+
+def _code(plugin: object) -> Any:  # noqa: ANN401 - of any type
+    """Return the function inside wrappers, or what is no function."""
+    code = inspect.unwrap(plugin) if callable(plugin) else plugin
+    while isinstance(code, partial):
+        code = inspect.unwrap(code.func)
+    return code
+
+
+def _is_code(value: object) -> bool:
+    return inspect.isclass(value) or inspect.isroutine(value)
 
 
 def _assignment(module: ModuleType, name: str) -> int:
@@ -137,6 +145,7 @@ def _assignment(module: ModuleType, name: str) -> int:
             targets = line.targets
         elif isinstance(line, ast.AnnAssign):
             targets = [line.target]
-        if any(isinstance(each, ast.Name) and each.id == name for each in targets):
+        names = (each for target in targets for each in ast.walk(target))
+        if any(isinstance(each, ast.Name) and each.id == name for each in names):
             return line.lineno
     return 0

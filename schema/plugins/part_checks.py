@@ -1,9 +1,9 @@
 """Checks of part types, built-in or own, when an experiment is loaded."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
-from typing import Any
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -11,15 +11,18 @@ from schema.errors import ExperimentError, cut, error_text, shown
 from schema.parts import (
     Box,
     Joint,
+    Matrix,
     Motor,
-    Parameter,
     PartType,
     Sensor,
     Shape,
     Slot,
+    Vector,
 )
-from schema.plugins.origin import where_defined
+from schema.plugins.contract import broken, repeated
+from schema.plugins.origin import naming_plugin
 from schema.plugins.sensor_checks import check_sensor
+from schema.robot.results import Floats
 
 _ROUNDING = 1e-6
 """Greatest deviation of a length from 1, and of a cosine from 0."""
@@ -27,10 +30,6 @@ _OFF_SURFACE_M = 0.001
 """Distance of a slot from the surface above which it gets a warning."""
 _MOST_TOGETHER = 8
 """Most parameters of which all combinations of extreme values are tried."""
-_KINDS = ("imu", "touch", "light")
-_JOINTS = ("revolute", "continuous", "prismatic")
-_EMPTY = Shape((), ())
-_CONTROLS = ("position", "velocity")
 
 
 def check_part_type(kind: PartType, where: str = "part type") -> None:
@@ -49,67 +48,57 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
             segments without joint; a motor without joint; sensors of no box; a shape
             that raises, differs from call to call, or is not hashable.
     """
-    if problem := next(_problems(kind), ""):
-        raise _refusal(kind, where, problem)
+    with naming_plugin(where, kind.shape):
+        try:
+            _check_consistency(kind)
+        except ExperimentError as error:
+            name = shown(kind.name)
+            raise ExperimentError(f"part type {name}: {error}") from error
+
+
+def _check_consistency(kind: PartType) -> None:
+    _check_declaration(kind)
+    for values in _extremes(kind):
+        try:
+            _check_shape(kind, values)
+        except ExperimentError as error:
+            raise ExperimentError(f"{error}{_given(kind, values)}") from error
     shape = kind.shape(_default(kind))
     for number, sensor in enumerate(kind.sensors):
         if not isinstance(sensor, Sensor):
-            check_sensor(sensor, f"{where}: {kind.name}.sensors[{number}]", shape)
+            with naming_plugin(f"sensors[{number}]", sensor):
+                check_sensor(sensor, shape)
 
 
-def check_slot_directions(kind: PartType, where: str = "part type") -> None:
-    """Raise if a slot of a consistent part type points into its own part.
+def check_slots_and_sensors(kind: PartType) -> None:
+    """Raise unless a model can hold the sensors and slots of a consistent part type.
 
-    It is not part of ``check_part_type``: runs that were started before this check can
-    be resumed.
-
-    Args:
-        kind: the part type.
-        where: the key that names it, for messages.
+    It is not part of ``check_part_type``: finished runs may have such parts.
 
     Raises:
-        ExperimentError: there is such a slot, for extreme or other parameters.
+        ExperimentError: a slot that points into its own part, for extreme or other
+            parameters; imus on two boxes, as a part has one site for them; a touch
+            sensor of a box whose name MJCF files cannot hold.
     """
     for values in _extremes(kind):
         shape = kind.shape(values)
         for number, slot in enumerate(shape.slots):
-            at = f"slots[{number}]"
-            if problem := next(_direction_problems(slot, shape.boxes, at), ""):
-                raise _refusal(kind, where, problem)
-
-
-def check_sensed_boxes(kind: PartType, where: str = "part type") -> None:
-    """Raise if a model cannot hold the sensors of a consistent part type.
-
-    It is not part of ``check_part_type``, as ``check_slot_directions``.
-
-    Args:
-        kind: the part type.
-        where: the key that names it, for messages.
-
-    Raises:
-        ExperimentError: imus on two boxes, as a part has one site for them; a touch
-            sensor of a box whose name MJCF files cannot hold.
-    """
+            _check_direction(slot, shape.boxes, f"slots[{number}].normal")
     sensors = [sensor for sensor in kind.sensors if isinstance(sensor, Sensor)]
     imus = sorted({sensor.box for sensor in sensors if sensor.kind == "imu"})
     if len(imus) > 1:
-        boxes = ", ".join(map(shown, imus))
-        raise _refusal(kind, where, f"sensors: imus must be on one box, got {boxes}")
+        raise broken("sensors", "have imus on one box only", imus)
     for sensor in sensors:
         if sensor.kind == "touch" and "/" in sensor.box:
-            problem = f"a box with a touch sensor must have no '/', got {sensor.box!r}"
-            raise _refusal(kind, where, f"boxes: the name of {problem}")
+            rule = "have no '/' in the name of a box with a touch sensor"
+            raise broken("boxes", rule, sensor.box)
 
 
 def advise_shape(kind: PartType) -> str:
-    """Return a warning about the shape of a part, or nothing.
+    """Return a warning about the shape of a consistent part type, or nothing.
 
     It is about a slot that is not on the part's surface, or a joint that turns further
     than once: its limit may be in degrees.
-
-    Args:
-        kind: a consistent part type.
     """
     for values in _extremes(kind):
         shape = kind.shape(values)
@@ -130,79 +119,174 @@ def advise_shape(kind: PartType) -> str:
     return ""
 
 
-def _distance_from_surface(slot: Slot, boxes: Sequence[Box]) -> float:
-    """Return how far a slot is from the nearest surface of its segment's boxes [m].
-
-    Within a box its nearest face counts, hidden or not. 0 if the segment has no box. A
-    cylinder counts as the box around it.
-    """
-    outside, inside = math.inf, 0.0
-    for box in boxes:
-        if box.segment != slot.segment:
-            continue
-        turn = np.array(box.rotation, dtype=np.float64).T
-        place = turn @ np.subtract(slot.position, box.position)
-        beyond = abs(place) - np.array(box.size) / 2.0
-        outside = min(outside, float(np.linalg.norm(np.maximum(beyond, 0.0))))
-        inside = max(inside, -float(beyond.max()))
-    return outside if 0.0 < outside < math.inf else inside
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and math.isfinite(value)
 
 
-def _refusal(kind: PartType, where: str, problem: str) -> ExperimentError:
-    return ExperimentError(
-        f"{where}: {where_defined(kind.shape)}: part type {shown(kind.name)}: {problem}"
+def _is_positive(value: Any) -> bool:  # noqa: ANN401 - whatever a user wrote
+    return _is_finite(value) and value > 0.0
+
+
+def _is_vector(value: Any) -> bool:  # noqa: ANN401
+    return isinstance(value, tuple) and len(value) == 3 and all(map(_is_finite, value))  # noqa: PLR2004
+
+
+def _is_unit(value: Any) -> bool:  # noqa: ANN401
+    return _is_vector(value) and abs(math.hypot(*value) - 1.0) <= _ROUNDING
+
+
+def _is_rotation(value: Any) -> bool:  # noqa: ANN401
+    turn = np.array(value, dtype=np.float64)
+    return turn.shape == (3, 3) and bool(
+        np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=_ROUNDING)
+        and np.linalg.det(turn) > 0.0
     )
 
 
-def _problems(kind: PartType) -> Iterator[str]:
-    """Yield what is wrong with a part type; each check relies on those before it."""
+_POSITIVE = "be finite and > 0", _is_positive
+_UNIT = "be 3 finite numbers of length 1", _is_unit
+_BY_NAME: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
+    **dict.fromkeys(("mass", "max_torque", "max_velocity"), _POSITIVE),
+    **dict.fromkeys(("axis", "normal", "tangent"), _UNIT),
+    "size": (
+        "be 3 finite numbers > 0",
+        lambda size: _is_vector(size) and min(size) > 0.0,
+    ),
+    "limit": ("be > 0", lambda limit: _is_finite(limit) or limit == math.inf),
+}
+"""What attributes of the pieces of a part must be, whatever others are."""
+_BY_TYPE: Mapping[object, tuple[str, Callable[[Any], bool]]] = {
+    str: ("be a text", lambda value: isinstance(value, str)),
+    bool: ("be true or false", lambda value: isinstance(value, bool)),
+    int: ("be a whole number", lambda value: type(value) is int),
+    float: ("be finite", _is_finite),
+    Vector: ("be 3 finite numbers", _is_vector),
+    Matrix: ("be a rotation matrix", _is_rotation),
+}
+"""What other attributes must be, by their type."""
+
+
+def _check_attributes(piece: object, at: str) -> None:
+    """Raise unless each attribute of a piece of a part is what it must be by itself."""
+    for name, kind in get_type_hints(type(piece)).items():
+        value = getattr(piece, name)
+        if get_origin(kind) is Literal:
+            allowed = get_args(kind)
+            if value not in allowed:
+                raise broken(f"{at}.{name}", f"be one of {', '.join(allowed)}", value)
+            continue
+        rule, holds = _BY_NAME.get(name) or _BY_TYPE[kind]
+        if not holds(value):
+            raise broken(f"{at}.{name}", rule, value)
+
+
+def _check_declaration(kind: PartType) -> None:
+    """Raise for what is wrong with a part type whatever its shape."""
     if not kind.name.strip():
-        yield f"name: must not be empty, got {shown(kind.name)}"
+        raise broken("name", "not be empty", kind.name)
     if kind.arity < 1:
-        yield f"arity: must be a whole number >= 1, got {shown(kind.arity)}"
+        raise broken("arity", "be a whole number >= 1", kind.arity)
     for number, parameter in enumerate(kind.own_parameters):
-        yield from _parameter_problems(parameter, f"own_parameters[{number}]")
-    names = [parameter.name for parameter in kind.parameters]
-    if doubled := _doubled(names):
-        yield f"own_parameters: two are named {shown(doubled)}"
+        at = f"own_parameters[{number}] ({parameter.name})"
+        _check_attributes(parameter, at)
+        ends = parameter.low, parameter.default, parameter.high
+        if list(ends) != sorted(ends):
+            raise broken(at, "have low <= default <= high", ends)
+    _check_names("own_parameters", [each.name for each in kind.parameters])
     if kind.motor is not None:
-        yield from _motor_problems(kind.motor)
-    yield from _sensor_kinds(kind.sensors)
-    for values in _extremes(kind):
-        for problem in _shape_problems(kind, values):
-            own = ", ".join(
-                f"{parameter.name} = {value:g}"
-                for parameter, value in zip(kind.own_parameters, values, strict=False)
+        _check_attributes(kind.motor, "motor")
+        if kind.motor.control == "position" and kind.motor.gain <= 0.0:
+            raise broken("motor.gain", _POSITIVE[0], kind.motor.gain)
+    for number, sensor in enumerate(kind.sensors):
+        if isinstance(sensor, Sensor):
+            _check_attributes(sensor, f"sensors[{number}]")
+
+
+def _shape(kind: PartType, values: tuple[float, ...]) -> Shape:
+    """Return the shape of some parameters, made twice."""
+    try:
+        shape = repeated("shape", lambda: kind.shape(values))
+    except ExperimentError:
+        raise
+    except Exception as error:
+        raise ExperimentError(f"shape raised {cut(error_text(error))}") from error
+    if not isinstance(shape, Shape):
+        raise broken("shape", "return a Shape", shape)
+    try:
+        hash(shape)
+    except TypeError as error:
+        raise broken(
+            "shape", "hold tuples and numbers only", came=f"an {error}"
+        ) from error
+    return shape
+
+
+def _check_shape(kind: PartType, values: tuple[float, ...]) -> None:
+    """Raise for what is wrong with the shape of some parameters."""
+    shape = _shape(kind, values)
+    _check_slots(kind, shape.slots)
+    names = [box.name for box in shape.boxes]
+    _check_names("boxes", names)
+    for number, box in enumerate(shape.boxes):
+        at = f"boxes[{number}] ({box.name})"
+        _check_attributes(box, at)
+        if box.is_round and box.size[0] != box.size[1]:
+            raise broken(f"{at}.size", "have equal x and y in a cylinder", box.size)
+    for number, sensor in enumerate(kind.sensors):
+        if isinstance(sensor, Sensor) and sensor.box not in names:
+            rule = f"be one of {', '.join(names) or 'none'}"
+            raise broken(f"sensors[{number}].box", rule, sensor.box)
+    _check_segments(kind, shape)
+    if shape.joint is not None:
+        _check_joint(shape.joint, kind.motor)
+    elif kind.motor is not None:
+        raise broken("motor", "have a joint", came="a shape without one")
+
+
+def _check_slots(kind: PartType, slots: Sequence[Slot]) -> None:
+    """Raise for what is wrong with the slots of a shape."""
+    if len(slots) != kind.arity:
+        raise broken("slots", f"be {kind.arity}, the arity", len(slots))
+    for number, slot in enumerate(slots):
+        at = f"slots[{number}]"
+        _check_attributes(slot, at)
+        if abs(float(np.dot(slot.normal, slot.tangent))) > _ROUNDING:
+            rule = f"be at right angles to the normal {slot.normal}"
+            raise broken(f"{at}.tangent", rule, slot.tangent)
+
+
+def _check_segments(kind: PartType, shape: Shape) -> None:
+    """Raise for a segment that must not be there, or that has no box."""
+    allowed, how = ((0,), "without") if shape.joint is None else ((0, 1), "with")
+    pieces: list[Box | Slot] = [*shape.boxes, *shape.slots]
+    for piece in pieces:
+        if piece.segment not in allowed:
+            rule = f"be {' or '.join(map(str, allowed))} {how} a joint"
+            raise broken("segment", rule, piece.segment)
+    for segment in allowed if shape.joint is not None or kind.is_root else ():
+        if all(box.segment != segment for box in shape.boxes):
+            raise broken(
+                "boxes", f"have at least one in segment {segment}", came="none"
             )
-            yield f"{problem}{f' (with {own}, then three colours)' if own else ''}"
 
 
-def _parameter_problems(parameter: Parameter, at: str) -> Iterator[str]:
-    low, high, default = parameter.low, parameter.high, parameter.default
-    if not _are_finite((low, high, default)) or not low <= default <= high:
-        yield (
-            f"{at} ({parameter.name}): must be finite with low <= default <= high, "
-            f"got {shown(low)}, {shown(default)}, {shown(high)}"
-        )
-    unit: Any = parameter.unit
-    if not isinstance(unit, str):
-        yield f"{at}.unit ({parameter.name}): must be a text, got {shown(unit)}"
+def _check_joint(joint: Joint, motor: Motor | None) -> None:
+    """Raise for what is wrong with a joint and its motor."""
+    _check_attributes(joint, "joint")
+    is_continuous = joint.kind == "continuous"
+    if is_continuous != (joint.limit == math.inf) or joint.limit <= 0.0:
+        rule = "be infinite if continuous" if is_continuous else _POSITIVE[0]
+        raise broken("joint.limit", rule, joint.limit)
+    if is_continuous and motor is not None and motor.control != "velocity":
+        rule = "be 'velocity' for a continuous joint"
+        raise broken("motor.control", rule, motor.control)
 
 
-def _motor_problems(motor: Motor) -> Iterator[str]:
-    if motor.control not in _CONTROLS:
-        yield f"motor.control: {_one_of(_CONTROLS, motor.control)}"
-    for name in ("max_torque", "max_velocity", "gain"):
-        value = getattr(motor, name)
-        is_unused = name == "gain" and motor.control == "velocity"
-        if not _are_finite((value,)) or (value <= 0.0 and not is_unused):
-            yield f"motor.{name}: must be finite and > 0, got {shown(value)}"
-
-
-def _sensor_kinds(sensors: Sequence[object]) -> Iterator[str]:
-    for number, sensor in enumerate(sensors):
-        if isinstance(sensor, Sensor) and sensor.kind not in _KINDS:
-            yield f"sensors[{number}].kind: {_one_of(_KINDS, sensor.kind)}"
+def _check_names(at: str, names: Sequence[str]) -> None:
+    """Raise if a name occurs twice."""
+    for name in names:
+        if names.count(name) > 1:
+            raise broken(at, "have different names", came=f"two named {shown(name)}")
 
 
 def _default(kind: PartType) -> tuple[float, ...]:
@@ -223,97 +307,36 @@ def _extremes(kind: PartType) -> Iterator[tuple[float, ...]]:
                 yield (*default[:index], value, *default[index + 1 :])
 
 
-def _shape(kind: PartType, values: tuple[float, ...]) -> tuple[Shape, str]:
-    """Return the shape of some parameters, or an empty one and what is wrong."""
-    try:
-        found: list[object] = [kind.shape(values), kind.shape(values)]
-    except Exception as error:  # noqa: BLE001 - any error of the user's code
-        return _EMPTY, cut(f"shape raised {error_text(error)}")
-    shape = found[0]
-    if not isinstance(shape, Shape):
-        return _EMPTY, f"shape: must return a Shape, got {shown(shape)}"
-    try:
-        hash(shape)
-    except TypeError as error:
-        return _EMPTY, f"shape: all of it must be tuples and numbers, got an {error}"
-    # NaN differs from itself; what is not finite has a message of its own.
-    if shape != found[1] and repr(shape) != repr(found[1]):
-        return _EMPTY, "shape: must be equal for equal parameters, got different ones"
-    return shape, ""
+def _given(kind: PartType, values: tuple[float, ...]) -> str:
+    """Return the end of a message that names own parameters; empty without them."""
+    given = zip(kind.own_parameters, values, strict=False)
+    own = ", ".join(f"{parameter.name} = {value:g}" for parameter, value in given)
+    return f" (with {own}, then three colours)" if own else ""
 
 
-def _shape_problems(kind: PartType, values: tuple[float, ...]) -> Iterator[str]:
-    """Yield what is wrong with the shape of some parameters."""
-    shape, problem = _shape(kind, values)
-    if problem:
-        yield problem
-        return
-    if len(shape.slots) != kind.arity:
-        got = len(shape.slots)
-        yield f"slots: must be {kind.arity}, the arity, got {got}"
-    for number, slot in enumerate(shape.slots):
-        yield from _slot_problems(slot, f"slots[{number}]")
-    names = [box.name for box in shape.boxes]
-    if doubled := _doubled(names):
-        yield f"boxes: two are named {shown(doubled)}"
-    for number, box in enumerate(shape.boxes):
-        yield from _box_problems(box, f"boxes[{number}] ({box.name})")
-    yield from _joint_problems(kind, shape)
-    for number, sensor in enumerate(kind.sensors):
-        if isinstance(sensor, Sensor) and sensor.box not in names:
-            yield f"sensors[{number}].box: {_one_of(names, sensor.box)}"
+def _in_box(box: Box, slot: Slot) -> tuple[Floats, Floats]:
+    """Return position and normal of a slot in the frame of a box."""
+    turn = np.array(box.rotation, dtype=np.float64).T
+    return turn @ np.subtract(slot.position, box.position), turn @ np.array(slot.normal)
 
 
-def _joint_problems(kind: PartType, shape: Shape) -> Iterator[str]:
-    """Yield what is wrong with joint, motor and segments."""
-    used = {box.segment for box in shape.boxes}
-    used.update(slot.segment for slot in shape.slots)
-    allowed = (0,) if shape.joint is None else (0, 1)
-    for segment in sorted(used.difference(allowed)):
-        yield (
-            f"segment: must be {' or '.join(map(str, allowed))} "
-            f"{'without' if shape.joint is None else 'with'} a joint, got {segment}"
-        )
-    needed = {0} if kind.is_root else set()
-    if shape.joint is not None:
-        needed = {0, 1}
-        yield from _axis_problems(shape.joint)
-    elif kind.motor is not None:
-        yield "motor: needs a joint, and the shape has none"
-    if missing := needed.difference(box.segment for box in shape.boxes):
-        yield f"boxes: segment {min(missing)} must have at least one, got none"
-    if shape.joint is None or kind.motor is None:
-        return
-    if shape.joint.kind == "continuous" and kind.motor.control != "velocity":
-        yield "motor.control: must be 'velocity' for a continuous joint, got 'position'"
+def _distance_from_surface(slot: Slot, boxes: Sequence[Box]) -> float:
+    """Return how far a slot is from the nearest surface of its segment's boxes [m].
+
+    Within a box its nearest face counts, hidden or not. 0 if the segment has no box. A
+    cylinder counts as the box around it.
+    """
+    outside, inside = math.inf, 0.0
+    for box in boxes:
+        if box.segment == slot.segment:
+            beyond = abs(_in_box(box, slot)[0]) - np.array(box.size) / 2.0
+            outside = min(outside, float(np.linalg.norm(np.maximum(beyond, 0.0))))
+            inside = max(inside, -float(beyond.max()))
+    return outside if 0.0 < outside < math.inf else inside
 
 
-def _axis_problems(joint: Joint) -> Iterator[str]:
-    if joint.kind not in _JOINTS:
-        yield f"joint.kind: {_one_of(_JOINTS, joint.kind)}"
-    yield from _vector_problems(joint.anchor, "joint.anchor")
-    yield from _unit_problems(joint.axis, "joint.axis")
-    if joint.kind == "continuous":
-        if joint.limit != math.inf:
-            yield f"joint.limit: a continuous joint has none, got {shown(joint.limit)}"
-    elif not _are_finite((joint.limit,)) or joint.limit <= 0.0:
-        yield f"joint.limit: must be finite and > 0, got {shown(joint.limit)}"
-
-
-def _slot_problems(slot: Slot, at: str) -> Iterator[str]:
-    yield from _vector_problems(slot.position, f"{at}.position")
-    yield from _unit_problems(slot.normal, f"{at}.normal")
-    yield from _unit_problems(slot.tangent, f"{at}.tangent")
-    cosine = float(np.dot(slot.normal, slot.tangent))
-    if abs(cosine) > _ROUNDING:
-        yield (
-            f"{at}.tangent: must be at right angles to the normal {slot.normal}, "
-            f"got {slot.tangent}"
-        )
-
-
-def _direction_problems(slot: Slot, boxes: Sequence[Box], at: str) -> Iterator[str]:
-    """Yield a line if most of the boxes around a slot is in front of it.
+def _check_direction(slot: Slot, boxes: Sequence[Box], at: str) -> None:
+    """Raise if most of the boxes around a slot is in front of it.
 
     A slot may be sunk into a box, but by less than half. A cylinder counts as the box
     around it.
@@ -321,12 +344,10 @@ def _direction_problems(slot: Slot, boxes: Sequence[Box], at: str) -> Iterator[s
     ahead = behind = 0.0
     name = ""
     for box in boxes:
-        turn = np.array(box.rotation, dtype=np.float64).T
-        place = turn @ np.subtract(slot.position, box.position)
+        place, along = _in_box(box, slot)
         half = np.array(box.size) / 2.0
         if box.segment != slot.segment or np.any(abs(place) > half + _ROUNDING):
             continue
-        along = turn @ np.array(slot.normal)
         axes = abs(along) > _ROUNDING
         ends = (np.copysign(half, along) - place)[axes] / along[axes]
         starts = (np.copysign(half, along) + place)[axes] / along[axes]
@@ -334,58 +355,5 @@ def _direction_problems(slot: Slot, boxes: Sequence[Box], at: str) -> Iterator[s
             ahead, name = float(ends.min()), box.name
         behind = max(behind, float(starts.min()))
     if ahead > behind + _ROUNDING:
-        yield (
-            f"{at}.normal: must point out of the part, but {slot.normal} points into "
-            f"its box {shown(name)}, {1000 * ahead:.3g} mm deep"
-        )
-
-
-def _box_problems(box: Box, at: str) -> Iterator[str]:
-    yield from _vector_problems(box.position, f"{at}.position")
-    if not _is_vector(box.size) or min(box.size) <= 0.0:
-        yield f"{at}.size: must be 3 finite numbers > 0, got {shown(box.size)}"
-    elif box.is_round and box.size[0] != box.size[1]:
-        yield f"{at}.size: x and y of a cylinder must be equal, got {shown(box.size)}"
-    if not _are_finite((box.mass,)) or box.mass <= 0.0:
-        yield f"{at}.mass: must be finite and > 0, got {shown(box.mass)}"
-    turn = np.array(box.rotation, dtype=np.float64)
-    is_rotation = turn.shape == (3, 3) and np.isfinite(turn).all()
-    if not is_rotation or not (
-        np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=_ROUNDING)
-        and np.linalg.det(turn) > 0.0
-    ):
-        yield f"{at}.rotation: must be a rotation matrix, got {shown(box.rotation)}"
-
-
-def _vector_problems(vector: Sequence[float], at: str) -> Iterator[str]:
-    if not _is_vector(vector):
-        yield f"{at}: must be 3 finite numbers, got {shown(vector)}"
-
-
-def _unit_problems(vector: Sequence[float], at: str) -> Iterator[str]:
-    if not _is_vector(vector):
-        yield f"{at}: must be 3 finite numbers, got {shown(vector)}"
-    elif abs(math.hypot(*vector) - 1.0) > _ROUNDING:
-        yield (
-            f"{at}: must have length 1, got {shown(vector)} "
-            f"of length {math.hypot(*vector):.6g}"
-        )
-
-
-def _is_vector(vector: Sequence[object]) -> bool:
-    return isinstance(vector, tuple) and len(vector) == 3 and _are_finite(vector)  # noqa: PLR2004
-
-
-def _are_finite(numbers: Sequence[object]) -> bool:
-    return all(
-        isinstance(each, int | float) and math.isfinite(each) for each in numbers
-    )
-
-
-def _doubled(names: Sequence[str]) -> str:
-    """Return a name that occurs twice, or an empty text."""
-    return next((name for name in names if names.count(name) > 1), "")
-
-
-def _one_of(allowed: Sequence[str], got: object) -> str:
-    return f"must be one of {', '.join(allowed) or 'none'}, got {shown(got)}"
+        depth = f"its box {shown(name)}, {1000 * ahead:.3g} mm deep"
+        raise broken(at, "point out of the part", came=f"{slot.normal} into {depth}")

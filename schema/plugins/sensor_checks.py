@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import SupportsFloat
 
 import numpy as np
 
 from schema.errors import ExperimentError, cut, error_text, shown
 from schema.parts import Box, OwnSensor, Shape, Vector
-from schema.plugins.origin import where_defined
+from schema.plugins.contract import broken, repeated
 from schema.robot.results import Floats
 
 MOST_INPUTS = 1000
@@ -78,7 +79,7 @@ def ray_problem(direction: Vector, reach: float, start: Vector) -> None:
         raise ValueError(f"start must be finite, got {start}")
 
 
-def check_sensor(sensor: OwnSensor, where: str, shape: Shape | None = None) -> None:
+def check_sensor(sensor: OwnSensor, shape: Shape | None = None) -> None:
     """Raise unless an own sensor keeps its contract on three hand-made views.
 
     The views: at birth with nothing around; later, in touch, with a light and two other
@@ -86,7 +87,6 @@ def check_sensor(sensor: OwnSensor, where: str, shape: Shape | None = None) -> N
 
     Args:
         sensor: the sensor.
-        where: what holds it, for messages.
         shape: of its part; None allows any name of a box.
 
     Raises:
@@ -94,51 +94,47 @@ def check_sensor(sensor: OwnSensor, where: str, shape: Shape | None = None) -> N
             raises, returns another number of values, one that is not a finite number,
             or different values for one view.
     """
-    at = f"{where}: {where_defined(sensor)}: {type(sensor).__name__}"
+    name = type(sensor).__name__
     inputs = getattr(sensor, "inputs", None)
     if type(inputs) is not int or not 1 <= inputs <= MOST_INPUTS:
-        raise ExperimentError(
-            f"{at}.inputs: must be a whole number from 1 to {MOST_INPUTS}, "
-            f"got {shown(inputs)}"
-        )
+        raise broken(f"{name}.inputs", f"be a whole number from 1 to {MOST_INPUTS}",
+                     inputs)  # fmt: skip
     if not callable(getattr(sensor, "read", None)):
-        raise ExperimentError(f"{at}: must have a method read(view), got none")
-    for name, view in _views(shape).items():
-        found = [_read(sensor, view, f"{at}.read of a part {name}") for _ in range(2)]
-        if found[0] != found[1]:
-            raise ExperimentError(
-                f"{at}.read: must return the same for the same view, "
-                f"got {found[0]} and {found[1]} for a part {name}"
-            )
+        raise broken(name, "have a method read(view)", came="none")
+
+    for place, view in _views(shape).items():
+        repeated(name, partial(_read, sensor, view, place), (view.others,))
 
 
-def _read(sensor: OwnSensor, view: HandMadeView, at: str) -> list[float]:
+def _read(sensor: OwnSensor, view: HandMadeView, place: str) -> list[float]:
+    """Return the values of a sensor; its errors tell what the view shows."""
     try:
         return values_of(sensor.inputs, sensor.read(view))
     except Exception as error:
         # A ValueError of ``values_of`` says what was expected.
-        raise ExperimentError(f"{at}: {cut(error_text(error))}") from error
+        what = f"{type(sensor).__name__}.read of a part {place}"
+        raise ExperimentError(f"{what}: {cut(error_text(error))}") from error
 
 
-def values_of(inputs: int, found: Iterable[object]) -> list[float]:
+def values_of(inputs: int, values: Iterable[object]) -> list[float]:
     """Return the values that a sensor has read as plain floats.
 
     Args:
         inputs: of the sensor.
-        found: what its ``read`` returned.
+        values: what its ``read`` returned.
 
     Raises:
         ValueError: another number of values, or one that is not a finite number.
     """
     try:
-        values = [_number(value) for value in found]
+        numbers = [_number(value) for value in values]
     except TypeError:
-        raise ValueError(f"must return numbers, got {shown(found)}") from None
-    if len(values) != inputs:
-        raise ValueError(f"must return {inputs} values, its inputs, got {len(values)}")
-    if not all(map(math.isfinite, values)):
-        raise ValueError(f"must return finite numbers, got {shown(values)}")
-    return values
+        raise ValueError(f"must return numbers, got {shown(values)}") from None
+    if len(numbers) != inputs:
+        raise ValueError(f"must return {inputs} values, its inputs, got {len(numbers)}")
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"must return finite numbers, got {shown(numbers)}")
+    return numbers
 
 
 def _number(value: object) -> float:
@@ -154,14 +150,12 @@ def _views(shape: Shape | None) -> dict[str, HandMadeView]:
         speed = 0.0 if shape.joint is None else speed
         angle = 0.0 if shape.joint is None else min(angle, shape.joint.limit)
     alone, crowd = np.zeros((0, 3)), np.array([(0.3, 0.0, 0.0), (-1.0, 2.0, 0.1)])
+    inf, lamp = math.inf, (0.0, 0.0, 1.0)
+    born = HandMadeView(shape, 0.0, 0.0, 0.0, None, alone, inf, is_touched=False)
+    later = HandMadeView(shape, 12.5, angle, speed, lamp, crowd, 0.3, is_touched=True)
+    near = replace(born, age_s=60.0, joint_angle=-angle, joint_speed=-speed)
     return {
-        "at birth": HandMadeView(
-            shape, 0.0, 0.0, 0.0, None, alone, math.inf, is_touched=False
-        ),
-        "in a crowd": HandMadeView(
-            shape, 12.5, angle, speed, (0.0, 0.0, 1.0), crowd, 0.3, is_touched=True
-        ),
-        "at an obstacle": HandMadeView(
-            shape, 60.0, -angle, -speed, None, alone, 1e-3, is_touched=False
-        ),
+        "at birth": born,
+        "in a crowd": later,
+        "at an obstacle": replace(near, obstacle_m=1e-3),
     }

@@ -13,11 +13,10 @@ import pytest
 
 from revolve.cli.commands import COMMANDS
 from schema.experiment.document import Arena
-from schema.experiment.settings import fitness_function
 from schema.parts import ACTIVE_HINGE, PartType
 from tests.documents import parse_experiment
 from tests.own_brains import write_module
-from worker.fitness import check_fitness
+from worker.kinds import check_fitness
 from worker.measures.functions import BUILT_IN, measures_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
@@ -232,7 +231,7 @@ def test_experiments_of_the_tasks_page_are_accepted(tmp_path: Path) -> None:
     assert len(documents) >= 5
     for document in documents:
         fitness = parse_experiment(document, str(tmp_path / "mine.toml")).fitness
-        check_fitness(fitness_function(fitness), fitness)
+        check_fitness(fitness)
 
 
 def test_arenas_page_lists_all_keys_with_their_defaults() -> None:

@@ -14,7 +14,8 @@ from schema.experiment.file import read_experiment, shipped_experiments
 from schema.experiment.settings import FITNESS, fitness_argument, fitness_function
 from schema.robot.results import Floats
 from schema.robot.trace import Trace
-from worker.fitness import check_fitness, thesis
+from worker.fitness import thesis
+from worker.kinds import check_fitness
 from worker.tasks import (
     Balance,
     Directed,
@@ -259,4 +260,4 @@ def test_wrong_names_and_parameters_are_refused_in_one_line() -> None:
 @pytest.mark.parametrize("name", FITNESS)
 def test_each_function_keeps_the_contract_of_fitness_functions(name: str) -> None:
     fitness = Fitness(function=name)
-    check_fitness(fitness_function(fitness), fitness)
+    check_fitness(fitness)

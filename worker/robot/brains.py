@@ -19,7 +19,7 @@ from schema.errors import SimulationDiverged, cut, error_text
 from schema.experiment.brains import NoParameters, brain_half, kinds_of, widths
 from schema.experiment.document import BrainSection, Space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
-from schema.plugins.origin import where_defined
+from schema.plugins.origin import naming_plugin
 from schema.plugins.protocols import Bank, BrainControl, NeuronType
 from schema.robot.brain import (
     Brain,
@@ -31,7 +31,7 @@ from schema.robot.brain import (
 )
 from schema.robot.neurons import BUILT_IN_NEURONS, SHORTEST_PERIOD_S
 from schema.robot.results import Floats
-from worker.robot.check_controls import check_controls, check_new_controls
+from worker.robot.check_controls import check_controls
 from worker.robot.cpg import CpgControl
 from worker.robot.own_neurons import STATE_LIMIT, OwnNeuron, OwnNeurons
 
@@ -226,18 +226,10 @@ class Controls:
         self._control = brain_half(brain, space, BUILT_IN)
         self.tick_s = tick_s
         self.neurons = self._control.neurons
-        self._place = f"brain.type: {where_defined(type(self._control))}"
         if self.is_checked:
-            check_controls(self, self._place)
+            with naming_plugin("brain.type", self._control):
+                check_controls(self)
         self._rest = self.bank(()).states.shape[1]
-
-    def check_new(self) -> None:
-        """Check what brains of new runs must keep, and runs begun earlier need not.
-
-        Raises:
-            ExperimentError: as of ``check_new_controls``.
-        """
-        check_new_controls(self, self._place)
 
     def check(self, brain: Brain) -> None:
         """Raise unless a checked brain has neurons of these types and widths.

@@ -4,14 +4,14 @@ from functools import lru_cache
 from typing import TypeVar
 
 from schema.experiment.document import body_space
-from schema.experiment.kinds import check_use
+from schema.experiment.kinds import Use
 from schema.experiment.settings import (
     ArenaSettings,
     EvaluationSettings,
     read_arena_settings,
     read_evaluation_settings,
 )
-from worker.kinds import fitness_use, measure_uses
+from worker.kinds import FITNESS_KIND, MEASURE_KIND, single_measures
 
 T = TypeVar("T", EvaluationSettings, ArenaSettings)
 
@@ -39,6 +39,7 @@ def checked_arena(settings: bytes) -> ArenaSettings:
 
 def _checked(settings: T) -> T:
     body_space(settings.space)
-    for use in (fitness_use(settings.fitness), *measure_uses(settings.measures)):
-        check_use(use)
+    Use(FITNESS_KIND, settings.fitness).check()
+    for measures in single_measures(settings.measures):
+        Use(MEASURE_KIND, measures).check()
     return settings

@@ -11,6 +11,7 @@ from coordinator.evolution.learners.simple import OnePlusOne, RandomSearch
 from schema.errors import ExperimentError
 from schema.experiment.brains import NoParameters
 from schema.experiment.learning import LEARNERS, Learning
+from schema.plugins.contract import broken
 from schema.plugins.load import load_object
 from schema.plugins.origin import naming_plugin, where_defined
 from schema.plugins.parameters import read_parameters
@@ -41,9 +42,8 @@ def learner_class(rules: Learning) -> tuple[Callable[..., Learner], Struct | Non
     """
     found = load_object(rules.learner, WHERE, BUILT_IN, METHODS)
     if not isinstance(found, type):
-        raise ExperimentError(
-            f"{WHERE}: {where_defined(found)}: must be a class, not an object"
-        )
+        where = where_defined(found)
+        raise ExperimentError(f"{WHERE}: {where}: must be a class, not an object")
     kind = getattr(found, "Parameters", None)
     table = rules.parameters
     parameters = read_parameters(table, kind or NoParameters, "learning.parameters")
@@ -68,7 +68,7 @@ class NewbornLearner:
         self._class, parameters = learner_class(rules)
         self._count = len(start)
         point = np.array(start, float)
-        with naming_plugin(self._class, WHERE):
+        with naming_plugin(WHERE, self._class):
             self._learner: Learner = self._class(point, rules.sigma, parameters)
 
     def tell(self, batch: Batch) -> None:
@@ -78,7 +78,7 @@ class NewbornLearner:
             ExperimentError: the learner raises.
         """
         points, fitness = (np.array(each, float) for each in batch)
-        with naming_plugin(self._class, WHERE):
+        with naming_plugin(WHERE, self._class):
             self._learner.tell(points, fitness)
 
     def ask(self, rng: np.random.Generator, most: int) -> Points:
@@ -91,28 +91,23 @@ class NewbornLearner:
         Raises:
             ExperimentError: the learner raises, or returns anything else.
         """
-        with naming_plugin(self._class, WHERE):
+        with naming_plugin(WHERE, self._class):
             answer = self._learner.ask(rng, most)
-        try:
-            points: Floats = np.array(answer, float)
-        except (TypeError, ValueError):
-            points = np.empty(0)
-        if (
-            points.ndim != 2  # noqa: PLR2004 - a point in each row
-            or not 1 <= len(points) <= most
-            or points.shape[1] != self._count
-        ):
-            raise self._broken(
-                f"1 to {most} points of {self._count} numbers", f"shape {points.shape}"
-            )
-        # Also false for what is not a number.
-        if not ((points >= 0.0) & (points <= 1.0)).all():
-            worst = points[~((points >= 0.0) & (points <= 1.0))][0]
-            raise self._broken("numbers from 0 to 1", str(worst))
+            try:
+                points: Floats = np.array(answer, float)
+            except (TypeError, ValueError):
+                points = np.empty(0)
+            if (
+                points.ndim != 2  # noqa: PLR2004 - a point in each row
+                or not 1 <= len(points) <= most
+                or points.shape[1] != self._count
+            ):
+                rule = f"return 1 to {most} points of {self._count} numbers"
+                raise broken("ask", rule, came=f"shape {points.shape}")
+            # Also false for what is not a number.
+            outside = ~((points >= 0.0) & (points <= 1.0))
+            if outside.any():
+                raise broken(
+                    "ask", "return numbers from 0 to 1", float(points[outside][0])
+                )
         return tuple(map(tuple, points.tolist()))
-
-    def _broken(self, expected: str, got: str) -> ExperimentError:
-        return ExperimentError(
-            f"{WHERE}: {where_defined(self._class)}: ask must return {expected}, "
-            f"got {got}"
-        )

@@ -1,14 +1,17 @@
 """The check of genes refuses each breach of the contract, with file and line."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from coordinator.evolution.check_brain_genes import check_brain_genes
+from coordinator.evolution.kinds import brain_kind
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError
 from schema.experiment.document import BrainSection, Experiment
+from schema.experiment.kinds import Use
 from schema.parts import BUILT_IN
 from schema.plugins import permission
 from schema.robot.genome import walk
@@ -27,7 +30,7 @@ CASES = {
     "Unfair": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (random.random(), 0.5)),) * part.outputs',
-        "equal robots from equal random numbers",
+        "robots: must return the same twice",
     ),
     "Mute": ("outputs(self, draws, part)", "return ()", "no motor"),
     "Doubled": (
@@ -50,113 +53,90 @@ CASES = {
         'new[0].hidden = (NeuronGene("Waver", (0.0, 1.0)),) * 11',
         "got brain: hidden neurons must be <= space.max_hidden = 10, got ",
     ),
-    "Arrayed": (
-        "vary(self, draws, branches, rules, pruned)",
-        "branches[0].outputs = np.array(branches[0].outputs)",
-        "expected outputs as a tuple of NeuronGene, got a ndarray$",
-    ),
     "Paired": (
         "grow(self, draws, new, branches, rules)",
         'new[0].hidden = (("Waver", (0.5, 0.5)),)',
-        "expected hidden as a tuple of NeuronGene, got one with a tuple$",
+        "hidden: must be a tuple of NeuronGene, got \\('Waver'",
     ),
     "Inside": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", [0.5, 0.5]),) * part.outputs',
-        "of NeuronGene, got one with parameters as a list, not a tuple$",
+        "outputs: must have parameters that are a tuple",
     ),
-    "Unconnected": (
-        "prune(self, draws, branches, rules)",
-        "branches[0].connections = None",
-        "expected connections as a tuple of ConnectionGene, got a NoneType$",
-    ),
-    "Raising": (
-        "vary(self, draws, branches, rules, pruned)",
-        "branches[99].outputs",
-        r"prune and vary to make genes, got IndexError: .* \(broken_raising\.py:7\)$",
-    ),
-}
-
-
-@pytest.mark.usefixtures("_own_brains")
-@pytest.mark.parametrize("name", list(CASES))
-def test_broken_genes_are_refused_in_one_line(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.syspath_prepend(tmp_path)
-    method, body, message = CASES[name]
-    module = f"broken_{name.lower()}"
-    file = tmp_path / f"{module}.py"
-    file.write_text(MODULE.format(name=name, method=method, body=body))
-    monkeypatch.setattr(permission, "_allowed", {**permission._allowed, module: file})
-    experiment = Experiment(name="x", brain=BrainSection(type=f"{module}:{name}"))
-    with pytest.raises(ExperimentError, match=message) as caught:
-        check_brain_genes(experiment)
-    assert "\n" not in str(caught.value)
-    if name != "Mute":
-        assert str(caught.value).startswith(f"brain.type: {module}.py:5: expected ")
-
-
-NEW_CASES = {
     "Twice": (
         "grow(self, draws, new, branches, rules)",
         (
             "new[0].connections = "
             '(ConnectionGene(("output", 0), (), ("output", 0), 0.5),) * 2'
         ),
-        "valid robots, got one with a second connection among .*'output', 0",
+        "connections: must differ in source, path or target, got",
     ),
     "Beyond": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (0.5, 9.0)),) * part.outputs',
-        "valid robots, got Waver must have delay from 0.0 to 1.0, got 9.0$",
+        "delay of Waver: must be from 0.0 to 1.0, got 9.0$",
     ),
     "Unknown": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (0.5, float("nan"))),) * part.outputs',
         "valid robots, got ",
     ),
+    "Arrayed": (
+        "vary(self, draws, branches, rules, pruned)",
+        "branches[0].outputs = np.array(branches[0].outputs or (1,))",
+        "genes must be a tuple, got a ndarray$",
+    ),
+    "Unconnected": (
+        "prune(self, draws, branches, rules)",
+        "branches[0].connections = None",
+        "genes must be a tuple, got a NoneType$",
+    ),
+    "Raising": (
+        "vary(self, draws, branches, rules, pruned)",
+        "branches[99].outputs",
+        r"raised IndexError: .* \(broken_raising\.py:7\)$",
+    ),
 }
 
 
-@pytest.mark.usefixtures("_own_brains")
-@pytest.mark.parametrize("name", list(NEW_CASES))
-def test_new_runs_refuse_doubled_connections_and_parameters_beyond_their_range(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A run that has begun goes on with them."""
+@pytest.fixture
+def experiment_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, _own_brains: None
+) -> Callable[[str, str, str], Experiment]:
+    """Return a function that makes an experiment of a changed brain type."""
     monkeypatch.syspath_prepend(tmp_path)
-    method, body, message = NEW_CASES[name]
-    file = tmp_path / f"broken_{name.lower()}.py"
-    file.write_text(MODULE.format(name=name, method=method, body=body))
-    allowed = {**permission._allowed, file.stem: file}
-    monkeypatch.setattr(permission, "_allowed", allowed)
-    experiment = Experiment(name="x", brain=BrainSection(type=f"{file.stem}:{name}"))
-    if name != "Unknown":
-        check_brain_genes(experiment)
-    with pytest.raises(ExperimentError, match=message):
-        check_brain_genes(experiment, is_new=True)
+
+    def write(name: str, method: str, body: str) -> Experiment:
+        file = tmp_path / f"broken_{name.lower()}.py"
+        file.write_text(MODULE.format(name=name, method=method, body=body))
+        permission.allow([str(file)])
+        return Experiment(name="x", brain=BrainSection(type=f"{file.stem}:{name}"))
+
+    return write
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_broken_genes_are_refused(
+    name: str, experiment_of: Callable[[str, str, str], Experiment]
+) -> None:
+    method, body, message = CASES[name]
+    experiment = experiment_of(name, method, body)
+    brain = brain_kind(check_brain_genes)
+    with pytest.raises(ExperimentError, match=message) as caught:
+        Use(brain, experiment).check()
+    assert str(caught.value).startswith(f"brain.type: broken_{name.lower()}.py:5: ")
 
 
 @pytest.mark.parametrize("name", ["network", "cpg"])
-def test_built_in_brain_types_pass_as_new(name: str) -> None:
-    check_brain_genes(Experiment(name="x", brain=BrainSection(type=name)), is_new=True)
+def test_built_in_brain_types_pass(name: str) -> None:
+    check_brain_genes(Experiment(name="x", brain=BrainSection(type=name)))
 
 
-@pytest.mark.usefixtures("_own_brains")
 def test_lists_of_genes_become_tuples(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    experiment_of: Callable[[str, str, str], Experiment],
 ) -> None:
-    """Runs of earlier versions may have such brain types."""
-    monkeypatch.syspath_prepend(tmp_path)
-    file = tmp_path / "broken_listing.py"
     body = 'return [NeuronGene("Waver", (0.5, 0.5))] * part.outputs'
-    method = "outputs(self, draws, part)"
-    file.write_text(MODULE.format(name="Listing", method=method, body=body))
-    allowed = {**permission._allowed, file.stem: file}
-    monkeypatch.setattr(permission, "_allowed", allowed)
-    brain = BrainSection(type="broken_listing:Listing")
-    experiment = Experiment(name="x", brain=brain)
+    experiment = experiment_of("Listing", "outputs(self, draws, part)", body)
     check_brain_genes(experiment)
     rng = np.random.default_rng(1)
     genome = RevolveAngle(experiment, BUILT_IN, None).random(rng, BirthId(0, 0))
@@ -166,4 +146,4 @@ def test_lists_of_genes_become_tuples(
 @pytest.mark.usefixtures("_own_brains")
 def test_sound_genes_pass() -> None:
     own = Experiment(name="x", brain=BrainSection(type="my_brains:Wave"))
-    check_brain_genes(own, is_new=True)
+    check_brain_genes(own)

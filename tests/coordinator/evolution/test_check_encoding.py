@@ -5,8 +5,10 @@ from collections.abc import Callable
 import pytest
 
 from coordinator.evolution.check_encoding import check_encoding
+from coordinator.evolution.kinds import ENCODING
 from schema.errors import ExperimentError
 from schema.experiment.document import Encoding, Experiment
+from schema.experiment.kinds import Use
 
 Own = Callable[..., Experiment]
 
@@ -24,17 +26,17 @@ CASES = {
     "random is None": (
         "return tuple(self.joint(rng) for",
         "return None and tuple(self.joint(rng) for",
-        "expected random to return a genome, got None",
+        "random: must return a genome, got None",
     ),
     "a source of its own": (
         "0.5 + 4.5 * rng.random()",
         "0.5 + 4.5 * __import__('random').random()",
-        "expected random: the same of the same rng, got another genome",
+        "random: must return the same twice, got ",
     ),
     "a memory": (
         "cut = int(rng.integers(0, len(first) + 1))",
         "cut = self.cut = (getattr(self, 'cut', 0) + 1) % len(first)",
-        "expected crossover and mutate: the same of the same rng, got another",
+        "crossover and mutate: must return the same twice",
     ),
     "bytes that lose joints": (
         "return msgspec.json.decode(data, type=tuple[Joint, ...])",
@@ -42,17 +44,17 @@ CASES = {
             "return self.read(data)[:2]\n\n    def read(self, data):\n"
             "        return msgspec.json.decode(data, type=tuple[Joint, ...])"
         ),
-        "expected from_bytes to give the genome back, got another genome",
+        "from_bytes: must give the genome back",
     ),
     "unreadable bytes": (
         "return msgspec.json.encode(genome)",
         "return msgspec.json.encode(genome)[:-1]",
-        "expected a robot within [space], got not a genome of encoding",
+        "must make robots within [space], got not a genome of encoding",
     ),
     "random development": (
         "values = (joint.period, joint.phase, 1.0)",
         "values = (joint.period, joint.phase, __import__('random').random())",
-        "expected develop: the same robot of the same genome, got another",
+        "develop: must return the same twice",
     ),
     "too many parts": (
         "space.max_parts - 1, space.max_outputs)",
@@ -62,7 +64,7 @@ CASES = {
     "a slot that is not there": (
         "slot = 1 if index else 0",
         "slot = 2 if index else 0",
-        "expected a robot within [space], got body.parts[2].parent_slot: ActiveHinge",
+        "must make robots within [space], got body.parts[2].parent_slot: ActiveHinge",
     ),
     "a rotated brick": (
         "return rv.Robot(",
@@ -72,7 +74,7 @@ CASES = {
     "no children": (
         "return child if len(child) >= self.least else None",
         "return None",
-        "expected a child of some couple, got None of all 24",
+        "must make a child of some couple, got None of all 24",
     ),
 }
 
@@ -84,9 +86,9 @@ def test_a_broken_rule_is_refused_with_file_and_line(
     old, new, problem = CASES[case]
     experiment = own_encoding((old, new))
     with pytest.raises(ExperimentError) as caught:
-        check_encoding(experiment)
+        Use(ENCODING, *ENCODING.sections(experiment)).check()
     file = f"{experiment.encoding.type.partition(':')[0]}.py"
-    assert str(caught.value).startswith(f"encoding.type: {file}:15: expected ")
+    assert str(caught.value).startswith(f"encoding.type: {file}:15: ")
     assert problem in str(caught.value)
 
 
@@ -97,5 +99,5 @@ def test_changed_parents_are_refused(own_encoding: Own) -> None:
         ("child = first[:cut] + second[cut:]",
          "child = first[:cut] + second[cut:]\n        first.append(second[0])"),
     )  # fmt: skip
-    with pytest.raises(ExperimentError, match="expected crossover and mutate"):
+    with pytest.raises(ExperimentError, match="crossover and mutate: must"):
         check_encoding(experiment)

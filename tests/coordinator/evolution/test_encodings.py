@@ -1,6 +1,7 @@
 """Encodings as islands use them: built-in and own ones, and what is refused."""
 
 import dataclasses
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -126,11 +127,15 @@ def test_a_class_without_a_method_is_refused(own_encoding: Own) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("self.types = types", "1 / 0", "the class failed in {}:22: ZeroDivisionError"),
+        (
+            "self.types = types",
+            "1 / 0",
+            "raised ZeroDivisionError: division by zero ({}:22)",
+        ),
         (
             "def __init__(self, experiment, types, parameters)",
             "def __init__(self, experiment)",
-            "the class failed in encodings.py:",
+            "raised TypeError: Worms.__init__() takes",
         ),
     ],
 )
@@ -154,13 +159,12 @@ def test_errors_of_own_code_are_one_line(own_encoding: Own) -> None:
     )
     with pytest.raises(ExperimentError) as caught:
         encoding.random(rng(), BIRTH)
-    assert str(caught.value).endswith("_0.py:28: SystemExit: a b")
-    assert "random failed in" in str(caught.value)
+    assert re.search(r"raised SystemExit: a b \(\w+_0.py:28\)$", str(caught.value))
 
 
 def test_a_result_that_is_no_robot_is_refused(own_encoding: Own) -> None:
     encoding = broken(own_encoding, "return rv.Robot(", "return (")
-    with pytest.raises(ExperimentError, match="develop must return a Robot, got "):
+    with pytest.raises(ExperimentError, match="develop: must return a Robot, got "):
         encoding.develop(encoding.random(rng(), BIRTH))
 
 
@@ -168,15 +172,13 @@ def test_a_robot_of_wrong_types_is_refused(own_encoding: Own) -> None:
     encoding = broken(
         own_encoding, "return rv.Robot(tuple(parts)", "return rv.Robot((7,)"
     )
-    with pytest.raises(
-        ExperimentError, match=r"develop failed in .*: AttributeError: "
-    ):
+    with pytest.raises(ExperimentError, match="raised AttributeError: "):
         encoding.develop(encoding.random(rng(), BIRTH))
 
 
 def test_bytes_that_are_none_are_refused(own_encoding: Own) -> None:
     encoding = broken(own_encoding, "return msgspec.json.encode", "return len")
-    with pytest.raises(ExperimentError, match="to_bytes must return <= 1048576 bytes"):
+    with pytest.raises(ExperimentError, match="to_bytes: must return <= 1048576 bytes"):
         encoding.to_bytes(encoding.random(rng(), BIRTH))
 
 

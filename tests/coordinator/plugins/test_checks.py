@@ -10,17 +10,8 @@ from pathlib import Path
 import pytest
 
 from coordinator.__main__ import plugin_kinds
-from coordinator.plugins.checks import (
-    check_apart,
-    check_here,
-    refuse_faulty,
-    refuse_faulty_of,
-)
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.plugins.checks import check_apart, check_here, refuse_faulty
 from schema.errors import ExperimentError
-from schema.experiment.document import BrainSection, Experiment
-from schema.experiment.file import draft_experiments, experiment_text
-from schema.experiment.kinds import check_use
 from schema.plugins import permission
 from tests.own_brains import write_module
 
@@ -111,7 +102,9 @@ from schema.parts import TOUCH_SENSOR, Sensor
 PAIR = replace(TOUCH_SENSOR, sensors=(Sensor("imu", "left"), Sensor("imu", "right")))
 """)
     ((_, fault),) = [each for each in checked(f"{file}:PAIR") if each[0] == "fault"]
-    assert fault.endswith("sensors: imus must be on one box, got 'left', 'right'")
+    assert fault.endswith(
+        "sensors: must have imus on one box only, got ['left', 'right']"
+    )
 
 
 def test_neuron_and_brain_types_are_recognised(tmp_path: Path) -> None:
@@ -122,26 +115,6 @@ def test_neuron_and_brain_types_are_recognised(tmp_path: Path) -> None:
     assert re.fullmatch(r"my_brains:Wave: brain at my_brains.py:\d+: in order", brain)
 
 
-def test_brain_type_with_other_outputs_is_refused_in_new_runs_only(
-    tmp_path: Path,
-) -> None:
-    file = tmp_path / "single_brains.py"
-    text = write_module(tmp_path).read_text()
-    single = text.replace("return 0.5 + 0.5 * amplitude", "return np.float32(amplitude")
-    file.write_text(single.replace("(self.states - delay))", "(self.states - delay)))"))
-    ((_, fault),) = [each for each in checked(f"{file}:Wave") if each[0] == "fault"]
-    expected = r"brain\.type: single_brains\.py:\d+: expected .* got one of float32"
-    assert re.match(expected, fault)
-    brain = BrainSection(type="single_brains:Wave")
-    (use,) = [
-        use
-        for kind in plugin_kinds()
-        for use in kind.used(Experiment(name="begun", brain=brain))
-        if use.path == brain.type
-    ]
-    assert check_use(use).startswith("single_brains.py:")
-
-
 def test_a_broken_half_of_a_brain_type_is_named(tmp_path: Path) -> None:
     file = tmp_path / "half_brains.py"
     text = write_module(tmp_path).read_text()
@@ -149,30 +122,21 @@ def test_a_broken_half_of_a_brain_type_is_named(tmp_path: Path) -> None:
     assert half != text
     file.write_text(half)
     ((_, fault),) = [each for each in checked(f"{file}:Wave") if each[0] == "fault"]
-    expected = r"brain\.type: half_brains\.py:\d+: expected equal outputs .* alone"
+    expected = r"brain\.type: half_brains\.py:\d+: outputs: must be equal .* alone"
     assert re.match(expected, fault)
 
 
 FAULTS = {
-    "missing": (GOOD, "nobody", "FILE.py: .* has no 'nobody'"),
-    "misspelt": (GOOD, "juge", "has no 'juge'; did you mean '.*:judge'"),
     "arity": ("def f():\n    return 1.0", "f", "FILE.py:1: must be of one of the"),
-    "type": ("\ndef f(a, b):\n    return 'x'", "f", "FILE.py:2: must return a number"),
-    "finite": ("def f(a, b):\n    return 1e999", "f", "FILE.py:1: .* finite number"),
-    "repeatable": (
-        "from random import random\ndef f(a, b):\n    return random()",
-        "f",
-        "FILE.py:2: must return the same twice, got",
-    ),
     "raising": (
         "def f(a, b):\n    c = 0\n    return 1 / c",
         "f",
-        r"must return a number, raised ZeroDivisionError: .* \(FILE.py:3\)",
+        r"FILE.py:1: raised ZeroDivisionError: .* \(FILE.py:3\)",
     ),
     "exiting": (
         "import sys\ndef f(a, b):\n    sys.exit(3)",
         "f",
-        r"FILE.py:3: raised SystemExit: 3",
+        r"FILE.py:2: raised SystemExit: 3 \(FILE.py:3\)",
     ),
     "import": ("a = 1\nb = a / 0", "f", "FILE.py:2: .*ZeroDivisionError"),
     "import-exits": ("\nexit(4)", "f", "FILE.py:2: .*SystemExit: 4"),
@@ -257,8 +221,7 @@ def test_own_encoding_of_islands_is_in_order(tmp_path: Path) -> None:
     assert check_apart([str(document)]) == []
 
 
-def test_run_with_an_own_encoding_goes_on_after_later_checks(tmp_path: Path) -> None:
-    """Its pushes never come: a new run is refused, and its encoding not named."""
+def test_what_is_wrong_elsewhere_is_no_fault_of_an_encoding(tmp_path: Path) -> None:
     shutil.copy(CRITTERS / "genomes.py", tmp_path)
     document = tmp_path / "late.toml"
     document.write_text(
@@ -268,10 +231,6 @@ def test_run_with_an_own_encoding_goes_on_after_later_checks(tmp_path: Path) -> 
     (problem,) = check_apart([str(document)])
     expected = r"late\.toml: late: environment\.push_interval_s: must be < 2 s"
     assert re.match(expected, problem), problem
-    (experiment,) = draft_experiments(str(document))
-    details = RunDetails("late", 0, 0, experiment_text(experiment))
-    RunFolder(tmp_path / "run", details).close()
-    assert refuse_faulty_of(tmp_path / "run") == (experiment,)
 
 
 def test_name_that_no_folder_can_have_is_a_fault(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from schema.errors import ExperimentError
-from schema.experiment.kinds import KINDS, SENSOR, check_use, kind_of
+from schema.experiment.kinds import KINDS, SENSOR, Use, kind_of
 from schema.plugins.permission import allow
 
 MODULE = '''"""Two sensors."""
@@ -37,13 +37,13 @@ def test_a_sensor_is_recognised_and_checked(tmp_path: Path) -> None:
     file = tmp_path / "noses_of_a_user.py"
     file.write_text(MODULE)
     allow([str(file)])
-    use = SENSOR.by_hand("noses_of_a_user:NOSE")
-    plugin = use.load()
+    use = Use(SENSOR, "noses_of_a_user:NOSE")
+    plugin = SENSOR.load(use.path)
     assert kind_of(plugin, KINDS) is SENSOR
     assert kind_of(type(plugin), KINDS) is None
-    assert check_use(use).startswith("noses_of_a_user.py")
+    assert use.check() == ("noses_of_a_user.py:22", "")
     message = r"sensor: noses_of_a_user.py.*must return 1 values, its inputs, got 2"
     with pytest.raises(ExperimentError, match=message):
-        check_use(SENSOR.by_hand("noses_of_a_user:DRIP"))
+        Use(SENSOR, "noses_of_a_user:DRIP").check()
     with pytest.raises(ExperimentError, match="has no 'inputs'"):
-        SENSOR.by_hand("schema.parts:SERVO").load()
+        SENSOR.load("schema.parts:SERVO")

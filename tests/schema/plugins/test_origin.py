@@ -1,5 +1,6 @@
 """File and line of a plug-in's code."""
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -59,7 +60,10 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 )
 def test_file_and_line_of_a_module(lab: str, attribute: str, line: int) -> None:
     plugin: object = load_object(f"{lab}:{attribute}", "key", {})
-    assert where_defined(plugin) == f"{lab}.py:{line}"
+    place = f"{lab}.py:{line}"
+    assert where_named(sys.modules[lab], attribute) == place
+    if callable(plugin):
+        assert where_defined(plugin) == place
 
 
 def test_object_without_a_name_is_found_by_its_class(lab: str) -> None:
@@ -96,12 +100,12 @@ def test_line_that_raised(lab: str) -> None:
     with pytest.raises(ZeroDivisionError) as caught_inside:
         load_object(f"{lab}:fails", "key", dict[str, Callable[[], None]]())()
     assert where_raised(caught_inside.value, f"{lab}.py") == f"{lab}.py:24"
-    with pytest.raises(ExperimentError) as told, naming_plugin(judge, "key"):
+    with pytest.raises(ExperimentError) as told, naming_plugin("key", judge):
         raise ValueError("two\nlines")
     assert str(told.value) == (
         f"key: {where_defined(judge)}: raised ValueError: two lines"
     )
-    with pytest.raises(ExperimentError) as told, naming_plugin(judge, "key"):
+    with pytest.raises(ExperimentError) as told, naming_plugin("key", judge):
         raise caught_inside.value
     assert str(told.value).endswith(
         f"raised ZeroDivisionError: division by zero ({lab}.py:24)"

@@ -6,13 +6,12 @@ import pytest
 
 from schema.errors import ExperimentError, FitnessUndefined, UnknownPlugin
 from schema.experiment.document import Fitness, Measures, Simulation, Space
-from schema.experiment.kinds import check_use
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
-from schema.plugins.simple_traces import check_function, simple_traces
+from schema.plugins.simple_traces import simple_traces
 from schema.robot.trace import Trace
 from worker.fitness import TraceFunction
-from worker.kinds import measure_use
+from worker.kinds import check_measures
 from worker.measures.functions import BUILT_IN, functions_of, measures_of
 
 OWN = """
@@ -47,7 +46,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_measures_keep_the_contract(name: str) -> None:
-    check_use(measure_use(Measures(names=(name,))))
+    check_measures(Measures(names=(name,)))
 
 
 def test_own_measures_have_parameters(own: str) -> None:
@@ -92,8 +91,3 @@ def test_undefined_measures_are_failed_results() -> None:
         TraceFunction("measure x", lambda _trace: 1 / 0).value(trace)
     with pytest.raises(FitnessUndefined, match="measure x must return a finite number"):
         TraceFunction("measure x", lambda _trace: float("nan")).value(trace)
-
-
-def test_measure_that_is_not_finite_is_refused_before_a_run() -> None:
-    with pytest.raises(ExperimentError, match=r"test_functions.py:\d+: must return a"):
-        check_function(lambda _trace: float("nan"), (), "measures.names")

@@ -7,12 +7,11 @@ import pytest
 
 from schema.errors import ExperimentError
 from schema.experiment.brains import widths
-from schema.experiment.document import NETWORK, Space
+from schema.experiment.document import Space
 from schema.plugins.protocols import Bank
 from schema.robot.brain import NEURON_TYPES, Brain, NeuronKinds
 from schema.robot.results import Floats
-from worker.robot.brains import Controls
-from worker.robot.check_controls import check_controls, check_new_controls
+from worker.robot.check_controls import check_controls
 
 Change = Callable[["Leaking", Floats, Floats], Floats]
 
@@ -70,8 +69,8 @@ def raises(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
 
 
 CASES: dict[str, tuple[Change, str]] = {
-    "shape": (lambda _, __, outputs: outputs[:, :3], "outputs of shape"),
-    "not finite": (lambda _, __, outputs: outputs / 0.0, "outputs that are not finite"),
+    "shape": (lambda _, __, outputs: outputs[:, :3], r"must be .* shape \(7, 10\)"),
+    "not finite": (lambda _, __, outputs: outputs / 0.0, "outputs: must be finite"),
     "other robots": (lambda _, readings, outputs: outputs + readings.max(), "alone"),
     "row": (
         lambda _, __, outputs: outputs + np.arange(len(outputs))[:, np.newaxis],
@@ -82,21 +81,17 @@ CASES: dict[str, tuple[Change, str]] = {
         lambda _, __, outputs: outputs + np.random.default_rng().random(),
         "a second time",
     ),
-    "raises": (raises, "got KeyError: '10 motors'"),
-}
-NEW_CASES: dict[str, tuple[Change, str]] = {
     "whole numbers": (
         lambda _, __, outputs: (outputs > 0.0).astype(np.int64),
-        "outputs must be an array of float64, got one of int64",
+        "outputs: must be float64 .* got int64",
     ),
     "single": (
         lambda _, __, outputs: outputs.astype(np.float32),
-        "outputs must be an array of float64, got one of float32",
+        "outputs: must be float64 .* got float32",
     ),
     "list": (lambda _, __, outputs: outputs.tolist(), "of float64, got a list"),
-    "other array": (replaces, "`states` is another array after a step"),
-    "awake": (awake, "`states` must be 0 at birth, got 0.25"),
-    "ages": (asks, r"with an array \(R, 1\) of ages, got ValueError: The truth value"),
+    "other array": (replaces, "states: must be changed in place"),
+    "awake": (awake, "states: must be 0 at birth, got 0.25"),
     "ages of rows": (
         lambda bank, _, outputs: outputs + 0.1 * (np.shape(bank.ages) == (7, 1)),
         r"got other ones with an array \(R, 1\) of ages at tick 0",
@@ -106,25 +101,18 @@ NEW_CASES: dict[str, tuple[Change, str]] = {
 
 @pytest.mark.parametrize("name", list(CASES))
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_broken_brains_are_refused_in_one_line(name: str) -> None:
+def test_broken_brains_are_refused(name: str) -> None:
     change, message = CASES[name]
-    with pytest.raises(ExperimentError, match=message) as caught:
-        check_controls(Broken(change), "brain.type: mine.py:7")
-    assert str(caught.value).startswith("brain.type: mine.py:7: expected ")
-    assert "\n" not in str(caught.value)
+    with pytest.raises(ExperimentError, match=message):
+        check_controls(Broken(change))
 
 
-@pytest.mark.parametrize("name", list(NEW_CASES))
-def test_brains_of_runs_begun_earlier_may_break_what_was_not_checked(name: str) -> None:
-    change, message = NEW_CASES[name]
-    check_controls(Broken(change), "brain.type: mine.py:7")
-    with pytest.raises(ExperimentError, match=message) as caught:
-        check_new_controls(Broken(change), "brain.type: mine.py:7")
-    assert str(caught.value).startswith("brain.type: mine.py:7: expected ")
-    assert "\n" not in str(caught.value)
+@pytest.mark.parametrize(("change", "error"), [(raises, KeyError), (asks, ValueError)])
+def test_errors_of_the_code_pass(change: Change, error: type[Exception]) -> None:
+    """Of one that takes the ages for a number, too."""
+    with pytest.raises(error):
+        check_controls(Broken(change))
 
 
 def test_sound_brains_pass() -> None:
-    for check in (check_controls, check_new_controls):
-        check(Broken(lambda _, __, outputs: outputs), "mine")
-        check(Controls(NETWORK, Space(), 0.125), "network")
+    check_controls(Broken(lambda _, __, outputs: outputs))

@@ -88,8 +88,8 @@ def test_a_coupling_acts_on_its_target_only() -> None:
 
 
 def test_brains_are_independent_of_the_batch_and_can_be_restored() -> None:
-    check_controls(controls_of(), "cpg")
-    check_controls(controls_of(coupling=100.0), "cpg")
+    check_controls(controls_of())
+    check_controls(controls_of(coupling=100.0))
 
 
 def test_numbers_of_files_beyond_all_ranges_stay_finite() -> None:

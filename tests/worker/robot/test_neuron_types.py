@@ -240,7 +240,7 @@ def test_states_of_another_form_are_a_failed_result(
     form: Callable[[Floats], Floats], got: str
 ) -> None:
     assert reason_of(Turning(form), 1) == (
-        "brain failed: neuron type Turning: expected step to return float64 "
+        "brain failed: neuron type Turning: step: must return float64 "
         f"of shape (K, N) = (2, 1), got {got}"
     )
 
