@@ -44,7 +44,7 @@ from schema.limits import (
     MOST_PARTS,
 )
 from schema.parts import BodySpace, Parameter, PartType, Vector
-from schema.plugins.load import load_instance
+from schema.plugins.load import load_object
 from schema.plugins.part_checks import check_part_type
 
 Neurons = Annotated[int, Meta(ge=0, le=MOST_NEURONS)]
@@ -632,7 +632,7 @@ def body_space(space: Space) -> BodySpace:
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:
-        kind = load_instance(path, "space.part_types", PartType)
+        kind = load_object(path, "space.part_types", {}, kind=PartType)
         if kind.name in types:
             raise ExperimentError(
                 f"space.part_types: two part types are named {kind.name!r}"

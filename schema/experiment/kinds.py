@@ -15,7 +15,7 @@ import schema.robogen_parts
 from schema.experiment.brains import neuron_types
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
-from schema.plugins.load import load_instance, load_object, place_of
+from schema.plugins.load import load_object, place_of
 from schema.plugins.origin import naming_plugin, where_defined
 from schema.plugins.part_checks import advise_shape, check_slots_and_sensors
 from schema.plugins.sensor_checks import check_sensor
@@ -141,7 +141,7 @@ def _check_part_type(path: str) -> str:
 
 
 def _load_part_type(path: str) -> PartType:
-    return load_instance(path, "space.part_types", PartType)
+    return load_object(path, "space.part_types", {}, kind=PartType)
 
 
 PART_TYPE = Kind(

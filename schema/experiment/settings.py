@@ -34,7 +34,7 @@ from schema.experiment.robust import Robust, robust_problems
 from schema.experiment.section import Count, Section
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Vector
-from schema.plugins.load import full_name, load_function
+from schema.plugins.load import load_function, unknown
 from schema.plugins.parameters import parameters_type, read_parameters
 
 T = TypeVar("T")
@@ -262,8 +262,10 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
         ExperimentError: not a function of a trace and its parameters.
     """
     where = "fitness.function"
-    path = full_name(fitness.function, where, FITNESS)
-    return load_function(path, where, 2, "trace, parameters")
+    path = fitness.function
+    if ":" not in path and path not in FITNESS:
+        raise unknown(path, where, FITNESS)
+    return load_function(FITNESS.get(path, path), where, 2, "trace, parameters")
 
 
 @lru_cache(maxsize=64)

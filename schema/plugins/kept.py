@@ -6,15 +6,14 @@ continue the run and to look at it. Of a module of one file, the copy is the fil
 those files beside it that its text names; of a package, all files. Of compiled or large
 ones only the digest is kept.
 
-A run folder may also come from somebody else, and an import runs the code. A copy is
-therefore imported without ``--plugins`` only if it has the user's seal: an HMAC with a
-secret key in the user's own state folder.
+A run folder may also come from another person, and an import runs the code. A copy is
+therefore imported without ``--plugins`` only if a run of this user wrote the same
+files: the user's state folder has an empty file for each copy, named by its content.
 """
 
-import hmac
 import os
-import secrets
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
@@ -33,17 +32,16 @@ from schema.plugins.source import (
 
 PLUGINS = "plugins"
 """Folder of the copies in a run or campaign folder."""
-_KEY_BYTES = 32
 _COMPILED = (".so", ".pyd")
 
 
-class KeptPlugin(Struct, frozen=True, forbid_unknown_fields=True):
+class KeptPlugin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """Plug-in module of a run.
 
     Attributes:
         digest: of its source, as workers compare it.
         file: path of the file or folder that was copied; empty without a copy.
-        seal: of the copy; empty without a copy, or for a user without a key.
+        seal: of versions before 0.3; not used.
     """
 
     digest: str
@@ -79,10 +77,14 @@ def keep(
                 what = f"its data file {path} differs from that of another plug-in"
                 raise ExperimentError(f"plug-in {name}: {what}: rename it")
             write(folder / PLUGINS / path, data)
+        kept[name] = KeptPlugin(digest_of(name), str(sources[0]) if files else "")
         if files:
             use_copy(name, kept_file(folder, name))
-        file = str(sources[0]) if files else ""
-        kept[name] = KeptPlugin(digest_of(name), file, _seal(name, files))
+            # Without a state folder, ``--plugins`` is needed to use the copy again.
+            with suppress(OSError, RuntimeError):
+                mark = _mark_of(name, files)
+                mark.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                mark.touch()
     refuse_other(folder, kept)
     return kept
 
@@ -107,7 +109,7 @@ def allow_kept(
 
     Raises:
         ExperimentError: a source that was named or imported differs from that of the
-            run; a copy is missing, damaged or not the user's own.
+            run; a copy is missing, damaged or not written by a run of this user.
     """
     for name, note in kept.items():
         if is_chosen(name) if note.file else is_resumed:
@@ -116,13 +118,10 @@ def allow_kept(
         if not note.file or (not is_resumed and digest_of(name) == note.digest):
             continue
         copy = kept_file(folder, name)
-        try:
-            _check_copy(name, note, copy)
-        except ExperimentError:
-            if digest_of(name) != note.digest:
-                raise
-        else:
+        if not (problem := _problem(name, note, copy)):
             use_copy(name, copy)
+        elif digest_of(name) != note.digest:
+            raise ExperimentError(f"plug-in {name}: {copy} {problem}")
 
 
 def refuse_other(folder: Path, kept: Mapping[str, KeptPlugin]) -> None:
@@ -149,20 +148,22 @@ def refuse_other(folder: Path, kept: Mapping[str, KeptPlugin]) -> None:
         )
 
 
-def _check_copy(name: str, note: KeptPlugin, copy: Path) -> None:
+def _problem(name: str, note: KeptPlugin, copy: Path) -> str:
+    """Return why a copy is not imported, and what to do; empty if it may be."""
     files = _files(name, copy)
-    found, seal = digest_of_sources([copy] if files else []), _seal(name, files)
+    found = digest_of_sources([copy] if files else [])
     if found != note.digest:
-        raise ExperimentError(
-            f"plug-in {name}: {copy} is damaged (source digest {found}, expected "
-            f"{note.digest}): give the original with {FLAG} FILE"
+        return (
+            f"is damaged (source digest {found}, expected {note.digest}): give the "
+            f"original with {FLAG} FILE"
         )
-    if not seal or not hmac.compare_digest(seal, note.seal):
-        raise ExperimentError(
-            f"plug-in {name}: {copy} was not written by a run of yours on this "
-            f"machine, and importing it runs its code; if you trust it, add "
-            f"{FLAG} {name}={copy}"
-        )
+    with suppress(OSError, RuntimeError):
+        if _mark_of(name, files).exists():
+            return ""
+    return (
+        "was not written by a run of yours on this machine, and importing it runs its "
+        f"code; if you trust it, add {FLAG} {name}={copy}"
+    )
 
 
 def _files(name: str, source: Path) -> dict[str, bytes]:
@@ -191,45 +192,13 @@ def _files(name: str, source: Path) -> dict[str, bytes]:
         ) from None
 
 
-def _seal(name: str, files: dict[str, bytes]) -> str:
-    """Return the user's seal of a copy; empty for a user without a key."""
-    key = _user_key()
-    if list(files) == [f"{name}.py"]:
-        text = name.encode() + b"\0" + files[f"{name}.py"]
-    else:
-        digests = {path: sha256(data).hexdigest() for path, data in files.items()}
-        text = msgspec.json.encode((name, digests))
-    return hmac.new(key, text, "sha256").hexdigest() if key and files else ""
+def _mark_of(name: str, files: Mapping[str, bytes]) -> Path:
+    """Return the file that says that a run of this user wrote a copy.
 
-
-def _user_key() -> bytes:
-    """Return the user's secret key, made at its first use; empty if that fails."""
-    try:
-        state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-        file = Path(state) / "revolve" / "plugin-key"
-        if not file.exists():
-            file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            _write_key(file)
-        found = file.stat()
-        is_secret = found.st_uid == os.getuid() and not found.st_mode & 0o077
-        key = file.read_bytes() if is_secret else b""
-    # No home folder is a RuntimeError.
-    except (OSError, RuntimeError):
-        return b""
-    return key if len(key) == _KEY_BYTES else b""
-
-
-def _write_key(file: Path) -> None:
-    """Write a new key, unless another process has done so meanwhile."""
-    new = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
-    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    try:
-        os.write(descriptor, secrets.token_bytes(_KEY_BYTES))
-        try:
-            os.link(new, file)
-        except OSError:
-            if not file.exists():  # Its file system has no hard links.
-                new.rename(file)
-    finally:
-        os.close(descriptor)
-        new.unlink(missing_ok=True)
+    Raises:
+        RuntimeError: the user has no home folder.
+    """
+    digests = {path: sha256(data).hexdigest() for path, data in files.items()}
+    content = sha256(msgspec.json.encode((name, digests))).hexdigest()
+    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(state) / "revolve" / "plugins" / content

@@ -32,31 +32,12 @@ from schema.plugins.source import digest_in_use
 T = TypeVar("T")
 
 
-def load_instance(path: str, where: str, kind: type[T]) -> T:
-    """Return the object of a type that a dotted path names.
-
-    Args:
-        path: ``package.module:attribute``.
-        where: the key that holds it, for messages.
-        kind: of the object.
-
-    Raises:
-        UnknownPlugin: not of that form, a module that is not allowed or not there, no
-            such attribute (the nearest is named).
-        ExperimentError: importing the module raises another error; an object of
-            another type.
-    """
-    found = _load(path, where)
-    if not isinstance(found, kind):
-        raise ExperimentError(
-            f"{where}: {place_of(path)}: {path!r} is not a {kind.__name__}, but a "
-            f"{type(found).__name__}"
-        )
-    return found
-
-
 def load_object(
-    path: str, where: str, built_in: Mapping[str, T], members: tuple[str, ...] = ()
+    path: str,
+    where: str,
+    built_in: Mapping[str, T],
+    members: tuple[str, ...] = (),
+    kind: type[T] | None = None,
 ) -> T:
     """Return the built-in or own object that a key of an experiment names.
 
@@ -65,44 +46,31 @@ def load_object(
         where: the key that holds it, for messages.
         built_in: objects of this kind by short name.
         members: attributes that an own object must have.
+        kind: type that an own object must have.
 
     Raises:
-        UnknownPlugin: no such built-in object (the nearest is named); else as for
-            ``load_instance``.
-        ExperimentError: as for ``load_instance``; an attribute is missing.
+        UnknownPlugin: no such built-in object, module or attribute (the nearest is
+            named), or a module that is not allowed.
+        ExperimentError: importing the module raises another error; an object of
+            another type, or without an attribute.
     """
-    if ":" not in path:
+    if ":" not in path and built_in:
         if path not in built_in:
-            raise _unknown(path, where, built_in)
+            raise unknown(path, where, built_in)
         return built_in[path]
     found = _load(path, where)
-    for member in members:
-        if not hasattr(found, member):
-            raise ExperimentError(
-                f"{where}: {place_of(path)}: {path!r} has no {member!r}"
-            )
+    problem = next(
+        (f"has no {one!r}" for one in members if not hasattr(found, one)), ""
+    )
+    if kind is not None and not isinstance(found, kind):
+        problem = f"is not a {kind.__name__}, but a {type(found).__name__}"
+    if problem:
+        raise ExperimentError(f"{where}: {place_of(path)}: {path!r} {problem}")
     return cast("T", found)
 
 
-def full_name(path: str, where: str, built_in: Mapping[str, str]) -> str:
-    """Return the dotted path of a built-in object, or of a user's own.
-
-    Args:
-        path: the short name of a built-in object, or ``module:attribute``.
-        where: the key that holds it, for messages.
-        built_in: dotted paths by short name.
-
-    Raises:
-        UnknownPlugin: no such built-in object (the nearest is named).
-    """
-    if ":" in path:
-        return path
-    if path not in built_in:
-        raise _unknown(path, where, built_in)
-    return built_in[path]
-
-
-def _unknown(path: str, where: str, built_in: Collection[str]) -> UnknownPlugin:
+def unknown(path: str, where: str, built_in: Collection[str]) -> UnknownPlugin:
+    """Return the error of a short name that is none of the built-in ones."""
     return UnknownPlugin(
         f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
         f"got {shown(path)}{nearest(path, built_in)}"
@@ -121,9 +89,9 @@ def load_function(
         names: of the arguments, for messages, such as ``trace, parameters``.
 
     Raises:
-        UnknownPlugin: as for ``load_instance``; a function that was defined in a
+        UnknownPlugin: as for ``load_object``; a function that was defined in a
             module that is not allowed.
-        ExperimentError: as for ``load_instance``; not a function, or one that takes
+        ExperimentError: as for ``load_object``; not a function, or one that takes
             another number of arguments.
     """
     found = _load(path, where)
@@ -217,18 +185,16 @@ def load_module(name: str, where: str, path: str = "") -> ModuleType:
     wanted = path or name
     try:
         module = import_allowed(name)
-    except ImportError as error:
-        missing = isinstance(error, ModuleNotFoundError) and error.name == name
-        hint = f": no {name}.py is beside the experiment" if missing else ""
-        raise UnknownPlugin(
-            f"{where}: {_line_of(error, name)}{wanted!r}: {error}{hint}"
-        ) from None
     # A module may call exit().
     except (Exception, SystemExit) as error:
-        place = _line_of(error, name)
-        raise ExperimentError(
-            f"{where}: {place}{wanted!r}: {error_text(error)}"
-        ) from error
+        names = [source.name for source in source_of(name.partition(".")[0])]
+        line = next(filter(None, (where_raised(error, each) for each in names)), "")
+        start = f"{where}: {line}{': ' if line else ''}{wanted!r}"
+        if not isinstance(error, ImportError):
+            raise ExperimentError(f"{start}: {error_text(error)}") from error
+        missing = isinstance(error, ModuleNotFoundError) and error.name == name
+        hint = f": no {name}.py is beside the experiment" if missing else ""
+        raise UnknownPlugin(f"{start}: {error}{hint}") from None
     digest_in_use(name)  # remembers it
     return module
 
@@ -237,10 +203,3 @@ def place_of(path: str) -> str:
     """Return file and line of a ``module:attribute`` that was loaded."""
     module_name, _, attribute = path.partition(":")
     return where_named(import_allowed(module_name), attribute)
-
-
-def _line_of(error: BaseException, module_name: str) -> str:
-    """Return the line of a module that failed at its import, and a colon; or empty."""
-    names = [source.name for source in source_of(module_name.partition(".")[0])]
-    line = next(filter(None, (where_raised(error, name) for name in names)), "")
-    return f"{line}: " if line else ""

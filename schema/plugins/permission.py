@@ -45,8 +45,7 @@ def allow(entries: Iterable[str]) -> None:
 
     Raises:
         ExperimentError: no such module or file; a module of the standard library or of
-            Revolve; a file with the name of another module (``is_only_found`` ones do
-            not count).
+            Revolve; a file with the name of another module.
     """
     for entry in entries:
         name, is_copy, place = entry.partition("=")
@@ -59,9 +58,7 @@ def allow(entries: Iterable[str]) -> None:
             use_copy(_top(name), copy)
             _allowed.setdefault(name, None)
         elif entry.endswith(".py"):
-            file = Path(entry).resolve()
-            _check_file(file, FLAG)
-            _allowed[file.stem] = file
+            _allow_file(Path(entry).resolve(), FLAG)
         else:
             _check_name(entry)
             if _source(_top(entry)) is None and _top(entry) not in _allowed:
@@ -89,8 +86,7 @@ def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:
             continue
         file = (folder / f"{module}.py").resolve() if folder else None
         if file is not None and "." not in module and file.is_file():
-            _check_file(file, "a plug-in of the experiment")
-            _allowed[module] = file
+            _allow_file(file, "a plug-in of the experiment")
         elif not is_allowed(module):
             _allowed[module] = None
 
@@ -141,9 +137,7 @@ def is_allowed(module: str) -> bool:
 
 def allows_any_of(top: str) -> bool:
     """Return whether a top-level module, or a module inside it, is allowed."""
-    return _may_be_plugin(top) and any(
-        _top(name) == top for name in (*_allowed, *_installed_modules())
-    )
+    return top in map(_top, (*_allowed, *_installed_modules()))
 
 
 def is_own(path: str) -> bool:
@@ -158,9 +152,9 @@ def how_to_allow(module: str) -> str:
         return f"plug-ins are {', '.join(BUILT_IN)} and modules of users"
     names = ", ".join(dict.fromkeys([*_allowed, *_installed_modules()])) or "none"
     found = [] if "." in module else _source(module)
-    file = f"{module}.py"
-    is_here = found == [Path.cwd() / file]
-    entry = file if is_here else f"PATH/{file}" if found is None else module
+    entry = module if found is not None else f"PATH/{module}.py"
+    if found == [Path.cwd() / f"{module}.py"]:
+        entry = f"{module}.py"
     return f"allowed with {FLAG} are {names}; if you trust it, add {FLAG} {entry}"
 
 
@@ -222,22 +216,6 @@ def source_of(top: str) -> list[Path]:
     return [each for each in found if each.exists()]
 
 
-def is_only_found(top: str) -> bool:
-    """Return whether a module is only a file where Python looks first.
-
-    That is the current folder, with ``python -m``, or the folder of the script. A file
-    that is named takes precedence, unless the module is named or imported already.
-    """
-    if top in _allowed or top in sys.modules:
-        return False
-    first = {Path(folder).resolve() for folder in ("", *sys.path[:1])}
-    return any(
-        found.is_file() and found.resolve() == folder / f"{top}.py"
-        for found in _source(top) or ()
-        for folder in first
-    )
-
-
 def _source(top: str) -> list[Path] | None:
     """Return where a top-level module is installed; None if it is not."""
     try:
@@ -252,21 +230,27 @@ def _source(top: str) -> list[Path] | None:
     return [Path(spec.origin)] if spec.has_location and spec.origin else []
 
 
-def _check_file(file: Path, where: str) -> None:
-    """Raise unless a file can be loaded under its own name."""
+def _allow_file(file: Path, where: str) -> None:
+    """Allow a file as a module of its own name, unless that is another module's."""
     if not file.is_file():
         raise UnknownPlugin(f"{where}: no such file: {file}")
-    _check_name(file.stem)
-    named = _copies.get(file.stem) or _allowed.get(file.stem)
-    found = _source(file.stem)
+    top = file.stem
+    _check_name(top)
+    named, found = _copies.get(top) or _allowed.get(top), _source(top)
     others = [named] if named else [each.resolve() for each in found or ()]
     # A copy, as a run folder keeps it, is no other module.
     is_same = any(one.is_file() and cmp(file, one, shallow=False) for one in others)
-    if not is_same and (named or found is not None) and not is_only_found(file.stem):
+    # A file in the folder of the script, or in the current one, is only found there.
+    first = {Path(folder).resolve() for folder in ("", *sys.path[:1])}
+    is_found = top not in _allowed and top not in sys.modules
+    if is_found and any(one.parent in first for one in others):
+        found = None
+    if not is_same and (named or found is not None):
         other = others[0] if others else "a built-in module"
         raise ExperimentError(
             f"{where}: {file} has the name of another module, {other}: rename the file"
         )
+    _allowed[top] = file
 
 
 def _check_name(module: str) -> None:

@@ -1,7 +1,5 @@
 """Copies of plug-ins in run folders: only the user's own ones are imported."""
 
-import errno
-import hmac
 import os
 import py_compile
 import sys
@@ -165,7 +163,7 @@ def test_copies_of_two_runs_do_not_mix(
 def test_a_copy_is_imported_as_it_is(
     tmp_path: Path, kept: dict[str, KeptPlugin]
 ) -> None:
-    """Not from a compiled file beside it, which no seal covers."""
+    """Not from a compiled file beside it."""
     copy = kept_file(tmp_path / "run", "kept_lab")
     write_time = copy.stat().st_mtime_ns
     copy.write_text("judge = 7\n")
@@ -326,38 +324,35 @@ def test_a_copy_of_somebody_else_is_refused(
     allow([f"kept_lab={copy}"])
     allow_kept(tmp_path / "run", kept, is_resumed=True)
     forget()
-    # The same source, found on the import path, needs no seal.
+    # The same source, found on the import path, needs no flag.
     monkeypatch.syspath_prepend(tmp_path)
     allow_kept(tmp_path / "run", kept, is_resumed=True)
     assert not permission._copies
 
 
-def test_a_seal_of_a_user_without_a_key_is_never_valid(
+def test_without_a_state_folder_a_copy_needs_the_flag(
     tmp_path: Path, original: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
     allow([str(original)])
     kept = kept_by(tmp_path / "run")
-    assert kept["kept_lab"].seal == ""
     with pytest.raises(ExperimentError, match="was not written by a run of yours"):
         allow_kept(tmp_path / "run", kept, is_resumed=False)
 
 
-def test_a_key_that_others_can_read_is_not_used(
-    tmp_path: Path, kept: dict[str, KeptPlugin]
+def test_a_copy_of_an_earlier_version_needs_the_flag(
+    tmp_path: Path, original: Path
 ) -> None:
-    (tmp_path / "state" / "revolve" / "plugin-key").chmod(0o644)
+    """It has a seal, which is not used."""
+    write(tmp_path / "run" / "plugins" / "kept_lab.py", original.read_bytes())
+    kept = {"kept_lab": KeptPlugin("5ff4453f1603", str(original), "a" * 64)}
     with pytest.raises(ExperimentError, match="was not written by a run of yours"):
         allow_kept(tmp_path / "run", kept, is_resumed=False)
-
-
-def test_the_seal_of_a_single_file_is_that_of_earlier_versions(
-    tmp_path: Path, kept: dict[str, KeptPlugin]
-) -> None:
-    key = (tmp_path / "state" / "revolve" / "plugin-key").read_bytes()
-    expected = hmac.new(key, b"kept_lab\0judge = 1\n", "sha256").hexdigest()
-    assert kept["kept_lab"].seal == expected
+    allow([f"kept_lab={kept_file(tmp_path / 'run', 'kept_lab')}"])
+    allow_kept(tmp_path / "run", kept, is_resumed=False)
+    assert import_allowed("kept_lab").judge == 1
+    del sys.modules["kept_lab"]
 
 
 def test_built_ins_and_names_that_are_no_modules_are_not_kept(tmp_path: Path) -> None:
@@ -394,20 +389,3 @@ def test_a_new_run_has_the_present_source(
     original.unlink()
     invalidate_caches()
     assert allowed(is_new=True) == (f"kept_lab={copy}",)
-
-
-def test_the_key_needs_no_hard_links(
-    tmp_path: Path,
-    original: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def link(*_: object) -> None:
-        raise PermissionError(errno.EPERM, "Operation not permitted")
-
-    monkeypatch.setattr("os.link", link)
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "new"))
-    allow([str(original)])
-    seals = {keep(tmp_path / "run", DOCUMENT, write)["kept_lab"].seal for _ in "ab"}
-    assert (len(seals), "" in seals) == (1, False)
-    (key,) = (tmp_path / "new" / "revolve").iterdir()
-    assert (key.name, key.stat().st_mode & 0o777) == ("plugin-key", 0o600)

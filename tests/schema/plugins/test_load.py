@@ -17,7 +17,7 @@ from schema.experiment.settings import (
 )
 from schema.parts import BUILT_IN, PartType
 from schema.plugins import permission, source
-from schema.plugins.load import load_function, load_instance, load_object
+from schema.plugins.load import load_function, load_object
 from schema.plugins.permission import allow, allowed
 from schema.plugins.source import check_plugins, plugins_of
 from tests.documents import parse_experiment
@@ -26,7 +26,7 @@ FITNESS = "def fitness(track, settings):\n    return 1.0\n"
 
 
 def load(path: str) -> PartType:
-    return load_instance(path, "key", PartType)
+    return load_object(path, "key", {}, kind=PartType)
 
 
 pytestmark = pytest.mark.usefixtures("_nothing_allowed")
