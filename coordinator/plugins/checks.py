@@ -36,7 +36,6 @@ from schema.errors import (
 )
 from schema.experiment.check import naming
 from schema.experiment.document import (
-    Arena,
     Experiment,
     body_space,
     island_experiments,
@@ -98,13 +97,13 @@ def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
             beginning.
     """
     experiments = _experiments_of(folder)
-    named = [path for each in experiments for path in references(each)]
-    _refuse([str(folder)] if any(map(is_own, named)) else [])
+    if any(is_own(path) for each in experiments for path in references(each)):
+        _refuse([str(folder)])
     return experiments
 
 
 def _refuse(words: Sequence[str]) -> None:
-    if words and (problems := check_apart(words, warn=warn_user)):
+    if problems := check_apart(words, warn=warn_user):
         raise ExperimentError(problems[0])
 
 
@@ -114,14 +113,14 @@ def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
     Raises:
         ExperimentError: a plug-in that is not that of the beginning.
     """
-    if is_campaign(folder):
-        allow_kept(folder, campaign_plugins(folder), is_resumed=True)
-        experiments = read_campaign(folder).experiments
-        for experiment in experiments:
-            allow_references(references(experiment))
-        return experiments
-    allow_plugins_of(folder, is_resumed=True)
-    return (own_experiment(read_details(folder).document),)
+    if not is_campaign(folder):
+        allow_plugins_of(folder, is_resumed=True)
+        return (own_experiment(read_details(folder).document),)
+    allow_kept(folder, campaign_plugins(folder), is_resumed=True)
+    experiments = read_campaign(folder).experiments
+    for experiment in experiments:
+        allow_references(references(experiment))
+    return experiments
 
 
 def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
@@ -142,7 +141,6 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
         except ExperimentError as error:
             raise _with_hint(error, experiment) from None
     for own in island_experiments(experiment):
-        _check_births(own.arena)
         if not is_own(own.fitness.function):
             check_fitness_keys(own.fitness)
         if own.learning is not None:
@@ -158,23 +156,6 @@ def _with_hint(error: ExperimentError, experiment: Experiment) -> ExperimentErro
         return error
     hint = "'parameters = {}' in [islands.fitness] replaces those of [fitness]"
     return type(error)(f"{error}; {hint}")
-
-
-def _check_births(arena: Arena | None) -> None:
-    """Raise if robots of an arena may be born outside its wall.
-
-    A run that was started before this check keeps its births: it is not part of
-    ``check_experiment``.
-    """
-    if arena is None or not arena.wall_diameter_m:
-        return
-    radius_m = 0.5 * arena.wall_diameter_m
-    if arena.birth_radius_m >= radius_m:
-        raise ExperimentError(
-            f"arena.birth_radius_m: must be less than half of wall_diameter_m, "
-            f"{radius_m:g} m, as robots are born inside the wall; got "
-            f"{arena.birth_radius_m:g}"
-        )
 
 
 def check_apart(

@@ -233,6 +233,13 @@ def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:
             "arena.split_distance_m: must be >= arena.merge_distance_m = "
             f"{arena.merge_distance_m}, got {arena.split_distance_m}"
         )
+    radius_m = 0.5 * arena.wall_diameter_m
+    if 0.0 < radius_m <= arena.birth_radius_m:
+        yield (
+            f"arena.birth_radius_m: must be less than half of wall_diameter_m, "
+            f"{radius_m:g} m, as robots are born inside the wall; got "
+            f"{arena.birth_radius_m:g}"
+        )
 
 
 def _arena_clock_problems(arena: Arena, clock: Simulation) -> Iterator[str]:
