@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
@@ -11,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace as replace_struct
 
 from coordinator.evolution.brains import BUILT_IN as BRAINS
-from coordinator.evolution.breeding import NO_MEASURES
+from coordinator.evolution.breeding import Individual, failed_last
 from coordinator.evolution.check_encoding import check_encoding
 from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
 from coordinator.evolution.encodings import METHODS, WHERE
@@ -41,7 +40,6 @@ from schema.plugins.contract import repeated
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
-from schema.robot.results import failed_fitness
 
 Labels = tuple[str, ...] | None
 """Measures that an experiment records; None: every one that a rule may ask for."""
@@ -56,29 +54,24 @@ _ASKED: Mapping[str, tuple[int, int, tuple[int, ...]]] = {
 """Least size of a population for a rule, number of places, and further arguments."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Example:
-    """An individual of a check."""
-
-    birth: BirthId
-    parents: tuple[BirthId, ...]
-    fitness: float
-    size: int
-    rank: int
-    measures: Mapping[str, float] = field(hash=False)
-
-
-def _example(number: int, fitness: float, labels: Labels) -> _Example:
+def _example(number: int, fitness: float, labels: Labels) -> Individual:
     parents = (BirthId(0, number // 2), BirthId(0, number // 3)) if number else ()
     measures: Mapping[str, float] = defaultdict(lambda: number / 7)
     if labels is not None:
         measures = dict.fromkeys(labels, number / 7)
-    size, rank = 3 + number % 5, 1 + number // 4
-    seen = MappingProxyType(measures)
-    return _Example(BirthId(0, number), parents, fitness, size, rank, seen)
+    return Individual(
+        BirthId(0, number),
+        genome=None,
+        fitness=fitness,
+        rank=1 + number // 4,
+        generation=0,
+        parents=parents,
+        size=3 + number % 5,
+        measures=MappingProxyType(measures),
+    )
 
 
-def _populations(least: int, labels: Labels) -> Iterator[list[_Example]]:
+def _populations(least: int, labels: Labels) -> Iterator[list[Individual]]:
     """Yield populations: small, of equals, varied, in part without fitness."""
     for count, fitness in (
         (least, float),
@@ -106,21 +99,18 @@ def check_rule(rule: Rule, labels: Labels = None) -> str:
     """
     least, count, rest = _ASKED[rule.key]
 
-    def places(population: Sequence[_Example]) -> list[int]:
+    def places(population: Sequence[Individual]) -> list[int]:
         return rule.places(count, population, *rest, np.random.default_rng(1))
 
-    population: list[_Example] = []
+    population: list[Individual] = []
     for population in _populations(least, labels):
         repeated("", partial(places, population))
-    failed = failed_fitness(one.fitness for one in population)
     mixed = [
-        replace(one, fitness=failed, measures=NO_MEASURES)
-        if number % _FAILED == 0
-        else one
+        one if number % _FAILED else one.evaluated(None, ())
         for number, one in enumerate(population)
     ]
     try:
-        places(mixed)
+        places(failed_last(mixed))
     except ExperimentError as error:
         why = str(error).removeprefix(f"{rule.key}: {where_defined(rule.function)}: ")
         return f"of a population with failed robots (fitness 0, no measures): {why}"

@@ -12,8 +12,8 @@ from coordinator.plugins.checks import BIRTHS, HERE, check_apart, check_here
 from schema.agent.flags import Flags, add_plugins, positive_number
 from schema.errors import RevolveError, one_line
 from schema.experiment.kinds import Kind, offered
-from schema.plugins.load import load_module
-from schema.plugins.origin import where_defined, where_named
+from schema.plugins.load import load_module, place_of
+from schema.plugins.origin import where_named
 from schema.plugins.permission import GROUP, allow, allowed
 from schema.plugins.source import digest_of
 
@@ -95,7 +95,7 @@ def list_plugins(arguments: list[str], kinds: Sequence[Kind]) -> int:
 def _built_in(kinds: Sequence[Kind]) -> Iterator[Listed]:
     for kind in kinds:
         for name, plugin in kind.built_in.items():
-            yield Listed(kind.name, name, where_defined(plugin), BUILT_IN)
+            yield Listed(kind.name, name, place_of(name, plugin), BUILT_IN)
 
 
 def _found(kinds: Sequence[Kind]) -> Iterator[Listed]:

@@ -16,7 +16,7 @@ from schema.experiment.brains import neuron_types
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
 from schema.plugins.load import load_object, place_of
-from schema.plugins.origin import naming_plugin, where_defined
+from schema.plugins.origin import naming_plugin
 from schema.plugins.part_checks import advise_shape, check_slots_and_sensors
 from schema.plugins.sensor_checks import check_sensor
 from schema.robot.neurons import BUILT_IN_NEURONS
@@ -72,7 +72,7 @@ class Use(NamedTuple):
             ExperimentError: one line with key, file and line, and what was expected.
         """
         plugin = self.kind.load(self.section)
-        where = place_of(self.path) if ":" in self.path else where_defined(plugin)
+        where = place_of(self.path, plugin)
         begin(where)
         with naming_plugin(self.kind.key, plugin, self.path):
             return where, self.kind.check(self.section) or ""

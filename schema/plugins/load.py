@@ -20,7 +20,7 @@ from schema.errors import (
     nearest,
     shown,
 )
-from schema.plugins.origin import where_named, where_raised
+from schema.plugins.origin import where_defined, where_named, where_raised
 from schema.plugins.permission import (
     how_to_allow,
     import_allowed,
@@ -199,7 +199,14 @@ def load_module(name: str, where: str, path: str = "") -> ModuleType:
     return module
 
 
-def place_of(path: str) -> str:
-    """Return file and line of a ``module:attribute`` that was loaded."""
-    module_name, _, attribute = path.partition(":")
+def place_of(path: str, plugin: object = None) -> str:
+    """Return file and line of a ``module:attribute``, or of a built-in plug-in.
+
+    Args:
+        path: of an object that was loaded; or a short name.
+        plugin: that a short name means.
+    """
+    module_name, colon, attribute = path.partition(":")
+    if not colon:
+        return where_defined(plugin)
     return where_named(import_allowed(module_name), attribute)

@@ -49,7 +49,6 @@ class Encoding(Protocol[Genome]):
             rng: the only source of randomness.
             birth: id of the individual; identities of its genes may derive from it.
         """
-        ...
 
     def develop(self, genome: Genome) -> Robot:
         """Return the robot that a genome describes.
@@ -59,7 +58,6 @@ class Encoding(Protocol[Genome]):
         the experiment says so. Whether its parts intersect, and whether it has a
         motor, is checked later.
         """
-        ...
 
     def crossover(
         self, first: Genome, second: Genome, rng: np.random.Generator
@@ -71,7 +69,6 @@ class Encoding(Protocol[Genome]):
             second: genome of the other one, which was selected second.
             rng: the only source of randomness.
         """
-        ...
 
     def mutate(
         self, genome: Genome, rng: np.random.Generator, birth: BirthId
@@ -83,11 +80,9 @@ class Encoding(Protocol[Genome]):
             rng: the only source of randomness, as `crossover` left it.
             birth: id of the child; identities of its new genes may derive from it.
         """
-        ...
 
     def to_bytes(self, genome: Genome) -> bytes:
         """Return a genome as bytes, for tables and the journal; at most 1 MiB."""
-        ...
 
     def from_bytes(self, data: bytes) -> Genome:
         """Return the genome that `to_bytes` wrote.
@@ -95,7 +90,6 @@ class Encoding(Protocol[Genome]):
         Raises:
             ValueError: other bytes.
         """
-        ...
 
 
 @runtime_checkable
@@ -106,7 +100,6 @@ class OneStepMating(Protocol[Genome]):
         self, first: Genome, second: Genome, rng: np.random.Generator, birth: BirthId
     ) -> Genome | None:
         """Return the genome of a child, or None; arguments as of the two methods."""
-        ...
 
 
 @runtime_checkable
@@ -122,7 +115,6 @@ class RobotEncoding(Protocol[Made_co]):
         Raises:
             ValueError: the encoding cannot describe this robot.
         """
-        ...
 
 
 class SensorView(Protocol):
@@ -463,12 +455,10 @@ class Selectable(Protocol):
     @property
     def birth(self) -> BirthId:
         """Birth id: ``island`` of birth and ``number`` there; hashable, in order."""
-        ...
 
     @property
     def parents(self) -> tuple[BirthId, ...]:
         """Birth ids of its parents, dead or alive; empty for a random robot."""
-        ...
 
     @property
     def fitness(self) -> float:
@@ -476,22 +466,18 @@ class Selectable(Protocol):
 
         Where its evaluation failed, it is 0, or the least of the population below 0.
         """
-        ...
 
     @property
     def size(self) -> int:
         """Number of parts of its body."""
-        ...
 
     @property
     def rank(self) -> int:
         """1 without parents, else 1 + the greatest rank of its parents."""
-        ...
 
     @property
     def measures(self) -> Mapping[str, float]:
         """Measures of its evaluation by name; those that the experiment records."""
-        ...
 
 
 class ParentSelection(Protocol):
@@ -525,7 +511,6 @@ class ParentSelection(Protocol):
             Two different places in ``population``, from 0; the child gets its root part
             from the first.
         """
-        ...
 
 
 class SurvivorSelection(Protocol):
@@ -556,7 +541,6 @@ class SurvivorSelection(Protocol):
         Returns:
             ``count`` different places in ``population``, from 0, in any order.
         """
-        ...
 
 
 class Learner(Protocol):
@@ -585,7 +569,6 @@ class Learner(Protocol):
         Returns:
             (P, N), 1 <= P <= most, from 0 to 1.
         """
-        ...
 
     def tell(self, points: Floats, fitness: Floats, /) -> None:
         """Take the fitness of all points that were tried together.
@@ -595,7 +578,6 @@ class Learner(Protocol):
                 first, which is always tried.
             fitness: (P,), higher is better; -inf for a failed trial.
         """
-        ...
 
 
 class FitnessFunction(Protocol):
@@ -617,7 +599,6 @@ class FitnessFunction(Protocol):
                 not to be changed.
             parameters: own parameters, or the section.
         """
-        ...
 
 
 class MeasureFunction(Protocol):
@@ -630,4 +611,3 @@ class MeasureFunction(Protocol):
 
     def __call__(self, trace: Trace, /, *parameters: Any) -> float:  # noqa: ANN401
         """Return the measure of a trace; arguments as of a fitness function."""
-        ...
