@@ -28,11 +28,6 @@ CASES = {
         "return None and tuple(self.joint(rng) for",
         "random: must return a genome, got None",
     ),
-    "a source of its own": (
-        "0.5 + 4.5 * rng.random()",
-        "0.5 + 4.5 * __import__('random').random()",
-        "random: must return the same twice, got ",
-    ),
     "a memory": (
         "cut = int(rng.integers(0, len(first) + 1))",
         "cut = self.cut = (getattr(self, 'cut', 0) + 1) % len(first)",

@@ -314,52 +314,28 @@ def test_a_document_with_a_wrong_part_type_is_refused(
 
 @dataclass
 class Nose:
-    """Sensor whose values are given."""
+    """Sensor whose values are given, or computed from what it has seen."""
 
     values: Any = (0.5,)
     inputs: Any = 1
-    calls: list[object] = field(default_factory=list)
+    calls: list[Any] = field(default_factory=list)
 
     def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
         self.calls.append(view)
-        found: Sequence[float] = self.values
-        return found
+        found: Any = self.values
+        return found(self.calls) if callable(found) else found  # type: ignore[no-any-return]
 
 
-class Drunk(Nose):
-    """Sensor that remembers."""
-
-    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
-        super().read(view)
-        return (float(len(self.calls)),)
+def wordy(_calls: list[Any]) -> Sequence[float]:
+    raise RuntimeError("two\nlines")
 
 
-class Blind(Nose):
-    """Sensor that raises if there is no light."""
-
-    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
-        return (float(view.light[2]),)
+def reaching(calls: list[Any]) -> Sequence[float]:
+    return (float(calls[-1].position("tip")[0]),)
 
 
-class Wordy(Nose):
-    """Sensor that raises with a message of two lines."""
-
-    def read(self, _view: Any) -> Sequence[float]:  # noqa: ANN401
-        raise RuntimeError("two\nlines")
-
-
-class Reaching(Nose):
-    """Sensor of a box that the part may not have."""
-
-    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
-        return (float(view.position("tip")[0]),)
-
-
-class Longsighted(Nose):
-    """Sensor with a direction that is too long."""
-
-    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
-        return (view.distance("body", (1.0, 1.0, 0.0), 0.5),)
+def longsighted(calls: list[Any]) -> Sequence[float]:
+    return (calls[-1].distance("body", (1.0, 1.0, 0.0), 0.5),)
 
 
 BAD: dict[str, tuple[Any, str]] = {
@@ -370,13 +346,16 @@ BAD: dict[str, tuple[Any, str]] = {
     "no inputs": (Nose((), 0), r"inputs: must be a whole number from 1 .* got 0"),
     "half an input": (Nose((0.5,), 0.5), r"inputs: must be a whole number.* got 0.5"),
     "state": (
-        Drunk(),
+        Nose(lambda calls: (float(len(calls)),)),
         r"must return the same twice, got \[1.0\] and \[2.0\]",
     ),
-    "raises": (Blind(), r"Blind.read of a part at birth: TypeError"),
-    "raises lines": (Wordy(), r"Wordy.read of a part at birth: .*: two lines$"),
+    "raises": (
+        Nose(lambda calls: (calls[-1].light[2],)),
+        "Nose.read of a part at birth: TypeError",
+    ),
+    "raises lines": (Nose(wordy), "Nose.read of a part at birth: .*: two lines$"),
     "direction": (
-        Longsighted(),
+        Nose(longsighted),
         r"direction must have length 1, got \(1.0, 1.0, 0.0\)",
     ),
     "no method": (object(), r"inputs: must be a whole number.* got None"),
@@ -404,6 +383,6 @@ def test_sensors_of_a_part_type_read_views_of_its_boxes() -> None:
     view: Any = nose.calls[0]
     assert view.position("conn_b").tolist() == [0.0276, 0.0, 0.0]
     with pytest.raises(
-        ExperimentError, match=r"x: .* 'Hinge': sensors\[0\]: .*Reaching.read"
+        ExperimentError, match=r"x: .* 'Hinge': sensors\[0\]: .*Nose.read"
     ):
-        check_part_type(replace(HINGE, sensors=(Reaching(),)), "x")
+        check_part_type(replace(HINGE, sensors=(Nose(reaching),)), "x")
