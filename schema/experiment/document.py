@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 from math import pi
 from typing import Annotated, ClassVar, Literal
 
-from msgspec import Meta, field, structs
+from msgspec import Meta, field, structs, to_builtins
 
 from schema.errors import ExperimentError
 from schema.experiment.calibration import Calibration
@@ -46,6 +46,7 @@ from schema.limits import (
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_object
 from schema.plugins.part_checks import check_part_type
+from schema.plugins.source import paths_named
 
 Neurons = Annotated[int, Meta(ge=0, le=MOST_NEURONS)]
 Evaluated = Annotated[float, Meta(gt=0, le=1e6)]
@@ -598,27 +599,7 @@ def references(experiment: Experiment) -> list[str]:
 
     Short names of built-in plug-ins are left out.
     """
-    own = [each.fitness for each in experiment.islands if each.fitness is not None]
-    functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    islands = [each.selection for each in experiment.islands if each.selection]
-    rules = [
-        path
-        for selection in (experiment.selection, *islands)
-        for path in (selection.parents, selection.survivors)
-    ]
-    learning = [each.learning for each in experiment.islands]
-    learners = [each.learner for each in (experiment.learning, *learning) if each]
-    named = [
-        *experiment.space.part_types,
-        *experiment.space.neuron_types,
-        *functions,
-        *experiment.measures.names,
-        *rules,
-        *learners,
-        experiment.encoding.type,
-        experiment.brain.type,
-    ]
-    return [path for path in named if ":" in path]
+    return paths_named(to_builtins(experiment))
 
 
 @lru_cache(maxsize=64)

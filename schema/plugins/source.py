@@ -52,8 +52,17 @@ def modules_named(document: bytes) -> list[str]:
     Raises:
         ValueError: the document is not JSON.
     """
-    found = (PATH.fullmatch(text) for text in _texts(json.loads(document)))
-    return sorted({each[1] for each in found if each}.difference(ROOMS))
+    modules = (path.partition(":")[0] for path in paths_named(json.loads(document)))
+    return sorted({name.partition(".")[0] for name in modules}.difference(ROOMS))
+
+
+def paths_named(document: object) -> list[str]:
+    """Return each ``module:attribute`` that the content of a document names, once.
+
+    Args:
+        document: as of ``modules_named``, but parsed.
+    """
+    return list(dict.fromkeys(filter(PATH.fullmatch, _texts(document))))
 
 
 def _texts(document: object) -> Iterator[str]:
@@ -65,7 +74,7 @@ def _texts(document: object) -> Iterator[str]:
         value = left.pop()
         if isinstance(value, str):
             yield value
-        elif isinstance(value, list):
+        elif isinstance(value, list | tuple):
             left += value
         elif isinstance(value, dict):
             for key, inner in value.items():
