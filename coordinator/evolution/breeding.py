@@ -15,10 +15,9 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose, stream
 from coordinator.evolution.selection import (
     cull_population,
-    parents_rule,
+    rule_of,
     select_parents,
     select_survivors,
-    survivors_rule,
 )
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment
@@ -154,8 +153,8 @@ class Breeder:
         self._experiment = experiment
         self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
-        self._parents_rule = parents_rule(experiment.selection)
-        self._survivors_rule = survivors_rule(experiment.selection)
+        self._parents_rule = rule_of(experiment.selection, "parents")
+        self._survivors_rule = rule_of(experiment.selection, "survivors")
 
     def candidate(
         self,

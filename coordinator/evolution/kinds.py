@@ -22,8 +22,7 @@ from coordinator.evolution.selection import (
     PARENTS,
     SURVIVORS,
     Rule,
-    parents_rule,
-    survivors_rule,
+    rule_of,
 )
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
@@ -134,7 +133,6 @@ def _selection_kind(
     name: str,
     built_in: Mapping[str, object],
     arguments: int,
-    rule: Callable[[Selection], Rule],
 ) -> Kind:
     return Kind(
         name,
@@ -144,8 +142,8 @@ def _selection_kind(
         section=lambda path: _Ruled(replace_struct(Selection(), **{name: path}), None),
         sections=partial(_rules, name),
         path=lambda ruled: str(getattr(ruled.selection, name)),
-        load=lambda ruled: rule(ruled.selection).function,
-        check=lambda ruled: check_rule(rule(ruled.selection), ruled.labels),
+        load=lambda ruled: rule_of(ruled.selection, name).function,
+        check=lambda ruled: check_rule(rule_of(ruled.selection, name), ruled.labels),
     )
 
 
@@ -200,8 +198,8 @@ ENCODING = Kind(
 )
 KINDS = (
     ENCODING,
-    _selection_kind("parents", PARENTS, 3, parents_rule),
-    _selection_kind("survivors", SURVIVORS, 4, survivors_rule),
+    _selection_kind("parents", PARENTS, 3),
+    _selection_kind("survivors", SURVIVORS, 4),
     Kind(
         "learner",
         LEARNER,

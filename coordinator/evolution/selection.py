@@ -99,33 +99,21 @@ def _whole_numbers(answer: object) -> list[int]:
     return [int(at) for at in answer] if is_whole else []
 
 
-def parents_rule(selection: Selection) -> Rule:
-    """Return the rule that selects parents; that of ``none`` is never called.
+def rule_of(selection: Selection, name: str) -> Rule:
+    """Return the rule that selects ``parents`` or ``survivors``.
+
+    That of the parents of ``none`` is never called.
 
     Raises:
         ExperimentError: as of ``own_rule``.
     """
-    found = own_rule(selection, "parents")
-    if found is None:
-        name = selection.parents
-        size = Tournament(selection.tournament_size)
-        found = (
-            PARENTS.get(name, random_parents),
-            size if name == "tournament" else None,
-        )
-    return Rule("selection.parents", *found)
-
-
-def survivors_rule(selection: Selection) -> Rule:
-    """Return the rule that selects survivors.
-
-    Raises:
-        ExperimentError: as of ``own_rule``.
-    """
-    found = own_rule(selection, "survivors")
-    return Rule(
-        "selection.survivors", *(found or (SURVIVORS[selection.survivors], None))
-    )
+    key, path = f"selection.{name}", getattr(selection, name)
+    if own := own_rule(selection, name):
+        return Rule(key, *own)
+    if name == "survivors":
+        return Rule(key, SURVIVORS[path], None)
+    size = Tournament(selection.tournament_size) if path == "tournament" else None
+    return Rule(key, PARENTS.get(path, random_parents), size)
 
 
 def select_parents(
@@ -136,7 +124,7 @@ def select_parents(
     Args:
         population: the candidates, in a reproducible order.
         rng: source of all choices.
-        rule: of ``parents_rule``.
+        rule: of ``rule_of``.
 
     Raises:
         ExperimentError: the rule raises, or returns no two places.
@@ -161,7 +149,7 @@ def select_survivors(
         selection: size of the population; whether parents compete with their children.
             A brood cut short by the end of the run always competes with its parents,
             or the population would shrink.
-        rule: of ``survivors_rule``.
+        rule: of ``rule_of``.
 
     Raises:
         ExperimentError: the rule raises, or returns other than that many places.

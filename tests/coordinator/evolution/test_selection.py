@@ -11,11 +11,10 @@ from coordinator.evolution.breeding import Individual
 from coordinator.evolution.selection import (
     cull_population,
     fittest_first,
-    parents_rule,
+    rule_of,
     select_culled,
     select_parents,
     select_survivors,
-    survivors_rule,
 )
 from schema.experiment.document import Arena, Culling, Selection
 from schema.robot.genome import Node
@@ -38,7 +37,7 @@ def numbers(chosen: Any) -> list[int]:  # noqa: ANN401 - any individuals
 
 def couples(population: list[Individual], **settings: Any) -> list[list[int]]:  # noqa: ANN401 - any setting
     selection = Selection(**settings)
-    rng, rule = np.random.default_rng(2), parents_rule(selection)
+    rng, rule = np.random.default_rng(2), rule_of(selection, "parents")
     return [numbers(select_parents(population, rng, rule)) for _ in range(N)]
 
 
@@ -88,7 +87,7 @@ def survivors(
     **settings: Any,  # noqa: ANN401 - any setting
 ) -> list[int]:
     rng, selection = np.random.default_rng(seed), Selection(**settings)
-    rule = survivors_rule(selection)
+    rule = rule_of(selection, "survivors")
     return numbers(select_survivors(parents, children, rng, selection, rule))
 
 

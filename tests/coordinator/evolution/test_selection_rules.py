@@ -14,10 +14,9 @@ from coordinator.evolution.selection import (
     SURVIVORS,
     Rule,
     Tournament,
-    parents_rule,
+    rule_of,
     select_parents,
     select_survivors,
-    survivors_rule,
 )
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import Selection
@@ -98,7 +97,7 @@ def test_built_in_rules_keep_their_contract() -> None:
 def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
     path = f"{lab(LAB)}:ends"
     selection = Selection(parents=path, parents_parameters={"first": 2})
-    rule = parents_rule(selection)
+    rule = rule_of(selection, "parents")
     living = population(3, 3, 3, 3, 3)
     first, second = select_parents(living, np.random.default_rng(0), rule)
     assert (first, second) == (living[2], living[4])
@@ -124,7 +123,7 @@ def test_any_sequence_of_places_is_an_answer(
     selection = Selection(population=2, survivors=f"{lab(text)}:some")
     everybody = population(9, 5, 7, 4)
     rng = np.random.default_rng(0)
-    rule = survivors_rule(selection)
+    rule = rule_of(selection, "survivors")
     chosen = select_survivors((), everybody, rng, selection, rule)
     assert chosen == tuple(everybody[1:3])
 
@@ -140,7 +139,7 @@ def test_other_answers_are_refused_in_one_line(
     everybody = population(9, 5, 7, 4)
     rng = np.random.default_rng(0)
     with pytest.raises(ExperimentError, match="must return 2 different whole numbers"):
-        select_survivors((), everybody, rng, selection, survivors_rule(selection))
+        select_survivors((), everybody, rng, selection, rule_of(selection, "survivors"))
 
 
 def test_own_survivors_come_in_birth_order(lab: Callable[[str], str]) -> None:
@@ -151,7 +150,7 @@ def test_own_survivors_come_in_birth_order(lab: Callable[[str], str]) -> None:
         everybody[2:],
         np.random.default_rng(0),
         selection,
-        survivors_rule(selection),
+        rule_of(selection, "survivors"),
     )
     # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
     assert chosen == (everybody[1], everybody[3])
@@ -164,8 +163,8 @@ def rules(lab: Callable[[str], str], change: str) -> tuple[Rule, Rule]:
         f"def live(population, count, rng, parameters):\n    {change}\n"
         "    return list(range(count))\n"
     )
-    parents = parents_rule(Selection(parents=f"{name}:mate"))
-    return parents, survivors_rule(Selection(survivors=f"{name}:live"))
+    parents = rule_of(Selection(parents=f"{name}:mate"), "parents")
+    return parents, rule_of(Selection(survivors=f"{name}:live"), "survivors")
 
 
 def test_rule_that_replaces_individuals_is_refused(lab: Callable[[str], str]) -> None:
@@ -203,7 +202,7 @@ def test_bad_rule_is_refused_with_file_and_line(
     lab: Callable[[str], str], answer: str
 ) -> None:
     name = lab(f"COUNT = [0]\ndef rule(population, rng, parameters):\n    {answer}\n")
-    rule = parents_rule(Selection(parents=f"{name}:rule"))
+    rule = rule_of(Selection(parents=f"{name}:rule"), "parents")
     expected = ANSWERS[answer].replace("NAME", name)
     with pytest.raises(ExperimentError) as caught:
         check_rule(rule)
@@ -213,7 +212,7 @@ def test_bad_rule_is_refused_with_file_and_line(
 
 def test_survivors_of_wrong_number_are_refused(lab: Callable[[str], str]) -> None:
     name = lab("def few(population, count, rng, parameters):\n    return [0, 1]\n")
-    rule = survivors_rule(Selection(survivors=f"{name}:few"))
+    rule = rule_of(Selection(survivors=f"{name}:few"), "survivors")
     expected = rf"survivors: {name}\.py:1: must return 15 different .* 0 to 15, got \[0"
     with pytest.raises(ExperimentError, match=expected):
         check_rule(rule)
@@ -248,4 +247,4 @@ def test_experiment_with_a_bad_rule_is_refused(
 
 def test_module_that_is_not_allowed_is_refused() -> None:
     with pytest.raises(UnknownPlugin, match="is not allowed"):
-        parents_rule(Selection(parents="no_lab:rule"))
+        rule_of(Selection(parents="no_lab:rule"), "parents")
