@@ -168,7 +168,7 @@ _BY_TYPE: Mapping[object, tuple[str, Callable[[Any], bool]]] = {
 
 def _check_attributes(piece: object, at: str) -> None:
     """Raise unless each attribute of a piece of a part is what it must be by itself."""
-    for name, kind in get_type_hints(type(piece)).items():
+    for name, kind in get_type_hints(type(piece), include_extras=True).items():
         value = getattr(piece, name)
         if get_origin(kind) is Literal:
             allowed = get_args(kind)
