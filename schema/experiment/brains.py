@@ -23,7 +23,6 @@ from schema.robot.neurons import BUILT_IN_NEURONS
 
 Half = TypeVar("Half")
 
-NEURON_MEMBERS = ("name", "parameters", "states", "step")
 _BRAIN_METHODS = ("outputs", "grow", "prune", "vary", "pack", "bank")
 _TYPE = "brain.type"
 
