@@ -30,28 +30,28 @@ CASES = {
     "Unfair": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (random.random(), 0.5)),) * part.outputs',
-        "robots: must return the same twice",
+        "random: must return the same twice",
     ),
     "Mute": ("outputs(self, draws, part)", "return ()", "no motor"),
     "Doubled": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (0.5, 0.5)),) * 2',
-        "valid robots, got brain: output neurons must belong to parts",
+        "got brain: output neurons must belong to parts",
     ),
     "Short": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (0.5,)),) * part.outputs',
-        "valid robots, got .*Waver takes 2, got 1",
+        "must be one of Waver with all of its parameters",
     ),
     "Strange": (
         "grow(self, draws, new, branches, rules)",
         'new[0].hidden = (NeuronGene("Sigmoid", (0.0, 1.0)),)',
-        "valid robots, got .*must be one of Waver, got 'Sigmoid'",
+        "must be one of Waver with all .* got .*'Sigmoid'",
     ),
     "Crowded": (
         "grow(self, draws, new, branches, rules)",
         'new[0].hidden = (NeuronGene("Waver", (0.0, 1.0)),) * 11',
-        "got brain: hidden neurons must be <= space.max_hidden = 10, got ",
+        "has 11 hidden, outside space.max_hidden = 10",
     ),
     "Paired": (
         "grow(self, draws, new, branches, rules)",
@@ -79,7 +79,7 @@ CASES = {
     "Unknown": (
         "outputs(self, draws, part)",
         'return (NeuronGene("Waver", (0.5, float("nan"))),) * part.outputs',
-        "valid robots, got ",
+        "delay of Waver: must be from 0.0 to 1.0, got nan",
     ),
     "Arrayed": (
         "vary(self, draws, branches, rules, pruned)",
