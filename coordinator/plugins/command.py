@@ -4,9 +4,9 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
 from importlib.metadata import entry_points
 from pkgutil import iter_modules
+from typing import NamedTuple
 
 from coordinator.plugins.checks import BIRTHS, HERE, check_apart, check_here
 from schema.agent.flags import Flags, add_plugins, positive_number
@@ -20,8 +20,7 @@ from schema.plugins.source import digest_of
 BUILT_IN = "built-in"
 
 
-@dataclass(frozen=True, slots=True)
-class Listed:
+class Listed(NamedTuple):
     """A plug-in of the list.
 
     Attributes:
@@ -80,15 +79,11 @@ def list_plugins(arguments: list[str], kinds: Sequence[Kind]) -> int:
     allow(options.plugins)
     rows = [*_built_in(kinds), *_found(kinds)]
     if options.json:
-        print(json.dumps([asdict(row) for row in rows], indent=1))
+        print(json.dumps([row._asdict() for row in rows], indent=1))
     else:
-        cells = [(row.kind, row.name, row.defined, row.digest) for row in rows]
-        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        for row in cells:
-            padded = (
-                f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)
-            )
-            print("  ".join(padded).rstrip())
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for row in rows:
+            print("  ".join(map(str.ljust, row, widths)).rstrip())
     return 0 if all(row.kind for row in rows) else 1
 
 
