@@ -15,9 +15,9 @@ from worker.measures.functions import BUILT_IN, measures_of
 def single_measures(measures: Measures) -> Iterator[Measures]:
     """Yield a section for each measure of a section."""
     for name, label in zip(measures.names, measures.labels, strict=True):
-        tables = measures.parameters
-        own = {label: tables[label]} if label in tables else {}
-        yield Measures(names=(name,), parameters=own)
+        table = measures.parameters.get(label)
+        parameters = {} if table is None else {label: table}
+        yield Measures(names=(name,), parameters=parameters)
 
 
 def check_fitness(fitness: Fitness) -> None:

@@ -52,7 +52,7 @@ def _check_types(node: Node) -> None:
 
 def _check_genes(node: Node, kinds: NeuronKinds, *, is_random: bool) -> None:
     """Raise for a connection that comes twice, or a parameter outside its range."""
-    ends = [(each.source, each.path, each.target) for each in node.connections]
+    ends = [(edge.source, edge.path, edge.target) for edge in node.connections]
     # Development ignores those that mutation may add.
     if is_random and len(set(ends)) < len(ends):
         raise broken(

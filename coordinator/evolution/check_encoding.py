@@ -76,14 +76,14 @@ class _Case:
 
     def child(self, couple: tuple[object, object], number: int) -> object:
         """Return a child of two genomes, checked; None if there is none."""
-        parents = [self.encoding.to_bytes(each) for each in couple]
+        parents = [self.encoding.to_bytes(parent) for parent in couple]
 
         def make() -> object:
             birth = BirthId(0, _GENOMES + number)
             return self.encoding.mate(*couple, np.random.default_rng(number), birth)
 
         child = self._made("crossover and mutate", make, is_random=False)
-        if parents != [self.encoding.to_bytes(each) for each in couple]:
+        if parents != [self.encoding.to_bytes(parent) for parent in couple]:
             rule = "leave parents as they are"
             raise broken("crossover and mutate", rule, came="changed ones")
         return child
@@ -109,7 +109,7 @@ class _Case:
         if encoding.to_bytes(read) != data:
             raise broken("from_bytes", "give the genome back", came="another one")
         robot = repeated("develop", partial(encoding.develop, genomes[0]))
-        if any(encoding.develop(each) != robot for each in (genomes[1], read)):
+        if any(encoding.develop(equal) != robot for equal in (genomes[1], read)):
             rule = "make equal robots of equal genomes"
             raise broken("develop", rule, came="another one")
         # Of the thesis's encoding, robots are not checked at each birth.

@@ -105,8 +105,8 @@ def check_rule(rule: Rule, labels: Labels = None) -> str:
     for population in _populations(least, labels):
         repeated("", partial(places, population))
     mixed = [
-        one if number % _FAILED else one.evaluated(None, ())
-        for number, one in enumerate(population)
+        individual if number % _FAILED else individual.evaluated(None, ())
+        for number, individual in enumerate(population)
     ]
     try:
         places(failed_last(mixed))
@@ -180,7 +180,9 @@ def brain_kind(check: Callable[[Experiment], None]) -> Kind:
         section=lambda path: Experiment("by hand", brain=BrainSection(type=path)),
         sections=lambda experiment: [experiment],
         path=lambda experiment: experiment.brain.type,
-        load=lambda each: load_object(each.brain.type, "brain.type", BRAINS),
+        load=lambda experiment: load_object(
+            experiment.brain.type, "brain.type", BRAINS
+        ),
         check=check,
     )
 
@@ -191,7 +193,7 @@ ENCODING = Kind(
     ENCODINGS,
     is_one=partial(is_class, METHODS),
     section=_by_hand,
-    sections=lambda each: [_Encoded(each, own) for own in island_experiments(each)],
+    sections=lambda whole: [_Encoded(whole, at) for at in island_experiments(whole)],
     path=lambda encoded: encoded.island.encoding.type,
     load=_load_encoding,
     check=lambda encoded: check_encoding(encoded.island),

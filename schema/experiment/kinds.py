@@ -80,14 +80,14 @@ class Use(NamedTuple):
 
 def uses(experiment: Experiment, kinds: Iterable[Kind]) -> list[Use]:
     """Return the plug-ins of some kinds that an experiment names, each once."""
-    named = [Use(kind, each) for kind in kinds for each in kind.sections(experiment)]
+    named = [Use(kind, at) for kind in kinds for at in kind.sections(experiment)]
     return list(dict.fromkeys(named))
 
 
 def sections_of(experiment: Experiment, name: str) -> list[Any]:
     """Return the sections of a name of an experiment and of its islands."""
-    holders = (experiment, *experiment.islands)
-    return [each for holder in holders if (each := getattr(holder, name)) is not None]
+    sections = (getattr(at, name) for at in (experiment, *experiment.islands))
+    return [section for section in sections if section is not None]
 
 
 def offered(module: ModuleType, kinds: Iterable[Kind]) -> list[tuple[Kind, str]]:
@@ -95,14 +95,14 @@ def offered(module: ModuleType, kinds: Iterable[Kind]) -> list[tuple[Kind, str]]
 
     Functions and classes that it imports from other modules are left out.
     """
-    found: list[tuple[Kind, str]] = []
+    plugins: list[tuple[Kind, str]] = []
     for name, value in vars(module).items():
         home = getattr(value, "__module__", module.__name__)
         is_own = home == module.__name__ or not callable(value)
         kind = kind_of(value, kinds) if is_own and not name.startswith("_") else None
         if kind is not None:
-            found.append((kind, name))
-    return found
+            plugins.append((kind, name))
+    return plugins
 
 
 def kind_of(plugin: object, kinds: Iterable[Kind]) -> Kind | None:

@@ -34,7 +34,7 @@ def check_neuron_type(kind: NeuronType) -> None:
     """
     _check_declaration(kind)
     rng = np.random.default_rng(0)
-    ranges = [rng.uniform(each.low, each.high, _COUNT) for each in kind.parameters]
+    ranges = [rng.uniform(p.low, p.high, _COUNT) for p in kind.parameters]
     parameters = np.array(ranges).reshape(-1, _COUNT)
     ages_s = rng.integers(0, 10_000, _COUNT).astype(np.float64) * _TICK_S
     state = np.zeros((kind.states, _COUNT))
@@ -44,7 +44,7 @@ def check_neuron_type(kind: NeuronType) -> None:
         state = _stepped(kind, *arguments)
         for first, last in _BATCHES:
             # Contiguous, as in workers: other layouts may have other rounding.
-            batch = [np.ascontiguousarray(each[..., first:last]) for each in arguments]
+            batch = [np.ascontiguousarray(full[..., first:last]) for full in arguments]
             if not np.array_equal(_stepped(kind, *batch), state[:, first:last]):
                 rule = "be equal for equal neurons: use elementwise NumPy only"
                 raise broken("states", rule, came="other ones in a smaller batch")
@@ -74,15 +74,15 @@ def _check_declaration(kind: NeuronType) -> None:
         raise broken("name", f"be an identifier other than {INPUT}", name)
     parameters: Any = kind.parameters
     is_tuple = isinstance(parameters, tuple)
-    if not is_tuple or not all(isinstance(each, Parameter) for each in parameters):
+    if not is_tuple or not all(isinstance(item, Parameter) for item in parameters):
         raise broken("parameters", "be a tuple of Parameter", parameters)
     if len(parameters) > MOST_NEURON_PARAMETERS:
         most = f"be <= {MOST_NEURON_PARAMETERS} parameters"
         raise broken("parameters", most, came=str(len(parameters)))
-    for each in parameters:
-        ends = (each.low, each.default, each.high)
+    for parameter in parameters:
+        ends = (parameter.low, parameter.default, parameter.high)
         if not all(map(math.isfinite, ends)) or list(ends) != sorted(ends):
-            raise broken(each.name, "be finite with low <= default <= high", ends)
+            raise broken(parameter.name, "be finite with low <= default <= high", ends)
     states: Any = kind.states
     if type(states) is not int or not 1 <= states <= MOST_NEURON_STATES:
         raise broken("states", f"be in 1..{MOST_NEURON_STATES}", states)

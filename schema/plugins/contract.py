@@ -63,7 +63,7 @@ def content_of(value: object) -> object:
     if isinstance(value, Mapping):
         return {key: content_of(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return type(value), [content_of(each) for each in value]
+        return type(value), [content_of(item) for item in value]
     if isinstance(value, Struct):
         return type(value), content_of(structs.astuple(value))
     if isinstance(value, float) and math.isnan(value):

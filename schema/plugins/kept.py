@@ -135,10 +135,10 @@ def refuse_other(folder: Path, kept: Mapping[str, KeptPlugin]) -> None:
         ExperimentError: a source differs.
     """
     for name, note in kept.items():
-        found = digest_in_use(name)
-        if found == note.digest:
+        digest = digest_in_use(name)
+        if digest == note.digest:
             continue
-        what = f"has source digest {found}" if found else "is not installed"
+        what = f"has source digest {digest}" if digest else "is not installed"
         how = "install that version, or start another run"
         if note.file:
             entry = f"{FLAG} {name}={kept_file(folder, name)}"
@@ -151,10 +151,10 @@ def refuse_other(folder: Path, kept: Mapping[str, KeptPlugin]) -> None:
 def _problem(name: str, note: KeptPlugin, copy: Path) -> str:
     """Return why a copy is not imported, and what to do; empty if it may be."""
     files = _files(name, copy)
-    found = digest_of_sources([copy] if files else [])
-    if found != note.digest:
+    digest = digest_of_sources([copy] if files else [])
+    if digest != note.digest:
         return (
-            f"is damaged (source digest {found}, expected {note.digest}): give the "
+            f"is damaged (source digest {digest}, expected {note.digest}): give the "
             f"original with {FLAG} FILE"
         )
     with suppress(OSError, RuntimeError):
@@ -175,12 +175,12 @@ def _files(name: str, source: Path) -> dict[str, bytes]:
     root = source.parent
     try:
         if source.is_dir():
-            found = [path for path in source.rglob("*") if path.suffix != ".pyc"]
+            paths = [path for path in source.rglob("*") if path.suffix != ".pyc"]
         else:
             text = source.read_text("utf-8", "replace")
             data = (path for path in root.iterdir() if path.suffix not in ("", ".py"))
-            found = [source, *(path for path in data if path.name in text)]
-        paths = sorted(filter(Path.is_file, found))
+            paths = [source, *(path for path in data if path.name in text)]
+        paths = sorted(filter(Path.is_file, paths))
         size = sum(path.stat().st_size for path in paths)
         if size > MOST_PLUGIN_BYTES or any(path.suffix in _COMPILED for path in paths):
             return {}

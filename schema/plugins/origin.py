@@ -145,7 +145,7 @@ def _assignment(module: ModuleType, name: str) -> int:
             targets = line.targets
         elif isinstance(line, ast.AnnAssign):
             targets = [line.target]
-        names = (each for target in targets for each in ast.walk(target))
-        if any(isinstance(each, ast.Name) and each.id == name for each in names):
+        nodes = (node for target in targets for node in ast.walk(target))
+        if any(isinstance(node, ast.Name) and node.id == name for node in nodes):
             return line.lineno
     return 0

@@ -192,7 +192,7 @@ def _check_declaration(kind: PartType) -> None:
         ends = parameter.low, parameter.default, parameter.high
         if list(ends) != sorted(ends):
             raise broken(at, "have low <= default <= high", ends)
-    _check_names("own_parameters", [each.name for each in kind.parameters])
+    _check_names("own_parameters", [parameter.name for parameter in kind.parameters])
     if kind.motor is not None:
         _check_attributes(kind.motor, "motor")
         if kind.motor.control == "position" and kind.motor.gain <= 0.0:
@@ -297,10 +297,10 @@ def _extremes(kind: PartType) -> Iterator[tuple[float, ...]]:
     """Yield the default parameters, then combinations of extreme ones."""
     default, count = _default(kind), len(kind.own_parameters)
     yield default
-    ends = [sorted({each.low, each.high}) for each in kind.own_parameters]
+    ends = [sorted({p.low, p.high}) for p in kind.own_parameters]
     if 0 < count <= _MOST_TOGETHER:
-        for own in product(*ends):
-            yield (*own, *default[count:])
+        for corner in product(*ends):
+            yield (*corner, *default[count:])
     elif count:
         for index, values in enumerate(ends):
             for value in values:
@@ -310,8 +310,8 @@ def _extremes(kind: PartType) -> Iterator[tuple[float, ...]]:
 def _given(kind: PartType, values: tuple[float, ...]) -> str:
     """Return the end of a message that names own parameters; empty without them."""
     given = zip(kind.own_parameters, values, strict=False)
-    own = ", ".join(f"{parameter.name} = {value:g}" for parameter, value in given)
-    return f" (with {own}, then three colours)" if own else ""
+    text = ", ".join(f"{parameter.name} = {value:g}" for parameter, value in given)
+    return f" (with {text}, then three colours)" if text else ""
 
 
 def _in_box(box: Box, slot: Slot) -> tuple[Floats, Floats]:

@@ -82,13 +82,13 @@ def simple_traces(function: Callable[..., Any]) -> dict[str, Trace]:
         "two-sample": np.array([(0.0, 0.0, 0.0), (0.01, 0.02, 0.03)]),
     }
     wanted = (*channels_of([function]), *CONSTANT)
-    found = {}
+    traces = {}
     for name, positions in tracks.items():
         turned = turn if name == "circular" else zero
         every = _channels(len(positions), turned[: len(positions)])
         chosen = {channel: every[channel] for channel in wanted}
-        found[name] = Trace(_INTERVAL_S, positions, chosen)
-    return found
+        traces[name] = Trace(_INTERVAL_S, positions, chosen)
+    return traces
 
 
 def _channels(count: int, heading: Floats) -> dict[str, Any]:

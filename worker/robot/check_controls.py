@@ -58,9 +58,11 @@ def check_controls(controls: Controls) -> None:
         ("after its states were restored", everybody, _TICKS // 2, False),
         ("with an array (R, 1) of ages", everybody, _TICKS, True),
     ):
-        found = _run(controls, rows, moved_at, has_ages=has_ages)
-        for tick, (one, other) in enumerate(zip(found, expected, strict=True)):
-            if one.tobytes() != other[rows].tobytes():
+        ticks = zip(
+            _run(controls, rows, moved_at, has_ages=has_ages), expected, strict=True
+        )
+        for tick, (outputs, expected_outputs) in enumerate(ticks):
+            if outputs.tobytes() != expected_outputs[rows].tobytes():
                 rule = "be equal for equal robots: use elementwise NumPy, arrays of "
                 rule += "fixed width, and keep everything in `states`"
                 raise broken("outputs", rule, came=f"other ones {what} at tick {tick}")
@@ -88,7 +90,7 @@ def _run(
     bank = controls.bank(packed)
     if bank.states.any():
         raise broken("states", "be 0 at birth", float(bank.states[bank.states != 0][0]))
-    found: list[Floats] = []
+    history: list[Floats] = []
     for tick in range(_TICKS):
         if tick == moved_at:
             states = bank.states.copy()
@@ -104,8 +106,8 @@ def _run(
             )
         _require("outputs", outputs, (len(rows), controls.width.outputs))
         _require("states", bank.states, (len(rows), kept))
-        found.append(np.hstack([outputs, bank.states]))
-    return found
+        history.append(np.hstack([outputs, bank.states]))
+    return history
 
 
 def _require(what: str, array: object, shape: tuple[int, int]) -> None:
@@ -144,5 +146,5 @@ def _neuron(
     if layer == "input":
         return Neuron(layer, INPUT, part)
     name = list(kinds)[int(rng.integers(len(kinds)))]
-    values = tuple(float(rng.uniform(each.low, each.high)) for each in kinds[name])
+    values = tuple(float(rng.uniform(p.low, p.high)) for p in kinds[name])
     return Neuron(layer, name, part, values)

@@ -35,8 +35,8 @@ def check_learner(rules: Learning) -> None:
             for batch in told:
                 other.tell(batch)
             first, second = (
-                each.ask(np.random.default_rng(tried), _TRIALS - tried)
-                for each in (learner, other)
+                asked.ask(np.random.default_rng(tried), _TRIALS - tried)
+                for asked in (learner, other)
             )
             if first != second:
                 rule = "want the same when it was told the same"
