@@ -17,8 +17,8 @@ from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
 from schema.plugins.load import load_object, place_of
 from schema.plugins.origin import naming_plugin
-from schema.plugins.part_checks import advise_shape, check_slots_and_sensors
 from schema.plugins.sensor_checks import check_sensor
+from schema.plugins.slot_checks import advise_shape, check_slots_and_sensors
 from schema.robot.neurons import BUILT_IN_NEURONS
 
 

@@ -22,12 +22,9 @@ from schema.parts import (
 from schema.plugins.contract import broken, repeated
 from schema.plugins.origin import naming_plugin
 from schema.plugins.sensor_checks import check_sensor
-from schema.robot.results import Floats
 
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 """Greatest deviation of a length from 1, and of a cosine from 0."""
-_OFF_SURFACE_M = 0.001
-"""Distance of a slot from the surface above which it gets a warning."""
 _MOST_TOGETHER = 8
 """Most parameters of which all combinations of extreme values are tried."""
 
@@ -58,7 +55,7 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
 
 def _check_consistency(kind: PartType) -> None:
     _check_declaration(kind)
-    for values in _extremes(kind):
+    for values in extremes(kind):
         try:
             _check_shape(kind, values)
         except ExperimentError as error:
@@ -68,55 +65,6 @@ def _check_consistency(kind: PartType) -> None:
         if not isinstance(sensor, Sensor):
             with naming_plugin(f"sensors[{number}]", sensor):
                 check_sensor(sensor, shape)
-
-
-def check_slots_and_sensors(kind: PartType) -> None:
-    """Raise unless a model can hold the sensors and slots of a consistent part type.
-
-    It is not part of ``check_part_type``: finished runs may have such parts.
-
-    Raises:
-        ExperimentError: a slot that points into its own part, for extreme or other
-            parameters; imus on two boxes, as a part has one site for them; a touch
-            sensor of a box whose name MJCF files cannot hold.
-    """
-    for values in _extremes(kind):
-        shape = kind.shape(values)
-        for number, slot in enumerate(shape.slots):
-            _check_direction(slot, shape.boxes, f"slots[{number}].normal")
-    sensors = [sensor for sensor in kind.sensors if isinstance(sensor, Sensor)]
-    imus = sorted({sensor.box for sensor in sensors if sensor.kind == "imu"})
-    if len(imus) > 1:
-        raise broken("sensors", "have imus on one box only", imus)
-    for sensor in sensors:
-        if sensor.kind == "touch" and "/" in sensor.box:
-            rule = "have no '/' in the name of a box with a touch sensor"
-            raise broken("boxes", rule, sensor.box)
-
-
-def advise_shape(kind: PartType) -> str:
-    """Return a warning about the shape of a consistent part type, or nothing.
-
-    It is about a slot that is not on the part's surface, or a joint that turns further
-    than once: its limit may be in degrees.
-    """
-    for values in _extremes(kind):
-        shape = kind.shape(values)
-        joint = shape.joint
-        if joint and joint.kind == "revolute" and math.tau < joint.limit < math.inf:
-            return (
-                f"joint.limit is {joint.limit:g} rad, more than a turn: "
-                f"{joint.limit:g} degrees are {math.radians(joint.limit):.3g} rad"
-            )
-        for number, slot in enumerate(shape.slots):
-            away_m = _distance_from_surface(slot, shape.boxes)
-            if away_m > _OFF_SURFACE_M:
-                return (
-                    f"slots[{number}].position is {1000 * away_m:.3g} mm from the "
-                    f"surface of the boxes of segment {slot.segment}: attached parts "
-                    "float or sink by as much"
-                )
-    return ""
 
 
 def _is_finite(value: object) -> bool:
@@ -132,13 +80,13 @@ def _is_vector(value: Any) -> bool:  # noqa: ANN401
 
 
 def _is_unit(value: Any) -> bool:  # noqa: ANN401
-    return _is_vector(value) and abs(math.hypot(*value) - 1.0) <= _ROUNDING
+    return _is_vector(value) and abs(math.hypot(*value) - 1.0) <= ROUNDING
 
 
 def _is_rotation(value: Any) -> bool:  # noqa: ANN401
     turn = np.array(value, dtype=np.float64)
     return turn.shape == (3, 3) and bool(
-        np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=_ROUNDING)
+        np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=ROUNDING)
         and np.linalg.det(turn) > 0.0
     )
 
@@ -250,7 +198,7 @@ def _check_slots(kind: PartType, slots: Sequence[Slot]) -> None:
     for number, slot in enumerate(slots):
         at = f"slots[{number}]"
         _check_attributes(slot, at)
-        if abs(float(np.dot(slot.normal, slot.tangent))) > _ROUNDING:
+        if abs(float(np.dot(slot.normal, slot.tangent))) > ROUNDING:
             rule = f"be at right angles to the normal {slot.normal}"
             raise broken(f"{at}.tangent", rule, slot.tangent)
 
@@ -293,7 +241,7 @@ def _default(kind: PartType) -> tuple[float, ...]:
     return tuple(parameter.default for parameter in kind.parameters)
 
 
-def _extremes(kind: PartType) -> Iterator[tuple[float, ...]]:
+def extremes(kind: PartType) -> Iterator[tuple[float, ...]]:
     """Yield the default parameters, then combinations of extreme ones."""
     default, count = _default(kind), len(kind.own_parameters)
     yield default
@@ -312,48 +260,3 @@ def _given(kind: PartType, values: tuple[float, ...]) -> str:
     given = zip(kind.own_parameters, values, strict=False)
     text = ", ".join(f"{parameter.name} = {value:g}" for parameter, value in given)
     return f" (with {text}, then three colours)" if text else ""
-
-
-def _in_box(box: Box, slot: Slot) -> tuple[Floats, Floats]:
-    """Return position and normal of a slot in the frame of a box."""
-    turn = np.array(box.rotation, dtype=np.float64).T
-    return turn @ np.subtract(slot.position, box.position), turn @ np.array(slot.normal)
-
-
-def _distance_from_surface(slot: Slot, boxes: Sequence[Box]) -> float:
-    """Return how far a slot is from the nearest surface of its segment's boxes [m].
-
-    Within a box its nearest face counts, hidden or not. 0 if the segment has no box. A
-    cylinder counts as the box around it.
-    """
-    outside, inside = math.inf, 0.0
-    for box in boxes:
-        if box.segment == slot.segment:
-            beyond = abs(_in_box(box, slot)[0]) - np.array(box.size) / 2.0
-            outside = min(outside, float(np.linalg.norm(np.maximum(beyond, 0.0))))
-            inside = max(inside, -float(beyond.max()))
-    return outside if 0.0 < outside < math.inf else inside
-
-
-def _check_direction(slot: Slot, boxes: Sequence[Box], at: str) -> None:
-    """Raise if most of the boxes around a slot is in front of it.
-
-    A slot may be sunk into a box, but by less than half. A cylinder counts as the box
-    around it.
-    """
-    ahead = behind = 0.0
-    name = ""
-    for box in boxes:
-        place, along = _in_box(box, slot)
-        half = np.array(box.size) / 2.0
-        if box.segment != slot.segment or np.any(abs(place) > half + _ROUNDING):
-            continue
-        axes = abs(along) > _ROUNDING
-        ends = (np.copysign(half, along) - place)[axes] / along[axes]
-        starts = (np.copysign(half, along) + place)[axes] / along[axes]
-        if ends.min() > ahead:
-            ahead, name = float(ends.min()), box.name
-        behind = max(behind, float(starts.min()))
-    if ahead > behind + _ROUNDING:
-        depth = f"its box {shown(name)}, {1000 * ahead:.3g} mm deep"
-        raise broken(at, "point out of the part", came=f"{slot.normal} into {depth}")

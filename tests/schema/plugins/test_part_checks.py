@@ -23,12 +23,9 @@ from schema.parts import (
     Sensor,
     Shape,
 )
-from schema.plugins.part_checks import (
-    advise_shape,
-    check_part_type,
-    check_slots_and_sensors,
-)
+from schema.plugins.part_checks import check_part_type
 from schema.plugins.sensor_checks import check_sensor, ray_problem
+from schema.plugins.slot_checks import advise_shape, check_slots_and_sensors
 
 HINGED = ACTIVE_HINGE.shape(())
 BRICK = FIXED_BRICK.shape(())
