@@ -256,50 +256,39 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
 
 
 @pytest.mark.parametrize(
-    ("entry", "expected"),
+    ("tables", "expected"),
     [
         (
-            "heigth_m = 0.2",
+            "[fitness.parameters]\nheigth_m = 0.2",
             r"mine.toml:5: fitness.parameters.heigth_m: no such",
         ),
         (
-            "height_m = true",
+            "[fitness.parameters]\nheight_m = true",
             "mine.toml:5: fitness.parameters.height_m: must be a number",
         ),
         ("", r"mine.toml: fitness.parameters: .*height_m"),
+        # Another section has the key: no line is named.
+        (
+            "[fitness.parameters]\nfriction = true\n[simulation]\nfriction = 0.5",
+            "mine.toml: fitness.parameters.friction: must be",
+        ),
     ],
 )
 def test_a_wrong_parameter_is_placed_in_the_experiment(
-    lab: Callable[[str], Path], tmp_path: Path, entry: str, expected: str
+    lab: Callable[[str], Path], tmp_path: Path, tables: str, expected: str
 ) -> None:
     file = lab(
-        "from msgspec import Struct\n\n\nclass Own(Struct):\n    height_m: float\n\n\n"
-        "def judge(trace, own: Own):\n    return own.height_m\n"
+        "from msgspec import Struct\n\n\nclass Own(Struct):\n    height_m: float\n"
+        "    friction: float = 1.0\n\n\ndef judge(trace, own: Own):\n"
+        "    return own.height_m\n"
     )
     document = tmp_path / "mine.toml"
     document.write_text(
-        f'name = "x"\n[fitness]\nfunction = "{file.stem}:judge"\n'
-        f"[fitness.parameters]\n{entry}\n"
+        f'name = "x"\n[fitness]\nfunction = "{file.stem}:judge"\n{tables}\n'
     )
     step, line = checked(str(document))[-1]
     assert step == "fault"
     assert re.match(expected, line), line
-
-
-def test_no_line_is_named_if_another_section_has_the_key(
-    lab: Callable[[str], Path], tmp_path: Path
-) -> None:
-    file = lab(
-        "from msgspec import Struct\n\n\nclass Own(Struct):\n    friction: float\n\n\n"
-        "def judge(trace, own: Own):\n    return own.friction\n"
-    )
-    document = tmp_path / "mine.toml"
-    document.write_text(
-        'name = "x"\n[simulation]\nfriction = 0.5\n[fitness]\n'
-        f'function = "{file.stem}:judge"\n[fitness.parameters]\nfriction = true\n'
-    )
-    _, line = checked(str(document))[-1]
-    assert line.startswith("mine.toml: fitness.parameters.friction: must be"), line
 
 
 def test_a_key_of_fitness_without_effect_is_refused(
