@@ -5,18 +5,15 @@ navigation. Notebooks show the output that is stored in them; tests run them.
 """
 
 import re
-from pathlib import Path
 
-import msgspec
 from sphinx.application import Sphinx
 
-_PROJECT = msgspec.toml.decode(
-    (Path(__file__).parents[1] / "pyproject.toml").read_bytes()
-)["project"]
+from schema.agent.version import VERSION
+
 _TOP_FILE = re.compile(r"\]\(((?:\.\./)*)\.\./(CHANGELOG|CONTRIBUTING)\.md")
 
 project = "Revolve Islands"
-version = release = _PROJECT["version"]
+version = release = VERSION
 html_title = f"{project} {version}"
 
 extensions = ["myst_nb"]

@@ -24,6 +24,7 @@ from coordinator.storage.folder import (
     RunFolder,
     holds_run,
     read_details,
+    refuse_other_version,
 )
 from coordinator.storage.folder_status import (
     check_rewritable,
@@ -108,11 +109,14 @@ def finished_code(folder: Path) -> int | None:
         written again, and where there is no run.
 
     Raises:
-        RunFolderError: a damaged table cannot be written again.
+        RunFolderError: a damaged table cannot be written again, or another version of
+            Revolve Islands began a run that is to be continued.
     """
     if is_campaign(folder) or not holds_run(folder):
         return None
     if _is_to_be_rewritten(folder) or read_state(folder) != "finished":
+        # Before its plug-ins are looked at.
+        refuse_other_version(folder)
         return None
     tell_user(f"{folder}: already finished")
     restore_best(folder)

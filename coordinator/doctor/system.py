@@ -9,7 +9,8 @@ from pathlib import Path
 
 from schema.agent.capacity import group_numbers, system_text
 from schema.agent.import_path import environment
-from schema.agent.platform_tag import our_version, wire_version
+from schema.agent.platform_tag import wire_version
+from schema.agent.version import VERSION
 from schema.plugins.permission import GROUP
 
 _LIBRARIES = {
@@ -38,7 +39,7 @@ print(engine)
 def versions() -> dict[str, str | None]:
     """Return the version of each package, None for those that are missing."""
     found: dict[str, str | None] = {
-        "Revolve Islands": our_version(),
+        "Revolve Islands": VERSION,
         "messages": wire_version().partition("+")[2],
     }
     for name, package in _LIBRARIES.items():

@@ -29,7 +29,8 @@ from coordinator.storage.journal import Journal, is_begun
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.agent.log import warn_user
-from schema.agent.platform_tag import cpu_flags, our_version, platform_tag
+from schema.agent.platform_tag import cpu_flags, platform_tag
+from schema.agent.version import VERSION
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
@@ -307,7 +308,7 @@ def _runs_row(held: RunFolder) -> Record:
     """Return the one row of the runs table."""
     began = (held.path / DETAILS).stat().st_mtime
     versions = {name: metadata.version(name) for name in _LIBRARIES}
-    versions["revolve-islands"] = our_version()
+    versions["revolve-islands"] = VERSION
     row = {
         **asdict(held.details),
         "state": "finished",

@@ -32,6 +32,7 @@ from coordinator.storage.journal import (
 )
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, FolderLock
+from schema.agent.version import VERSION
 from schema.errors import ExperimentError, RunFolderError, unreadable
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
@@ -55,6 +56,8 @@ EPOCH = "epoch"
 # that the journal does not show.
 _UNRECORDED = 1000
 MOST_FILED_EPOCH = MOST_RECORDED_EPOCH - _UNRECORDED
+_VERSION_OF_UNNAMED = "0.2"
+"""Version that resumes runs whose description names none."""
 _DIGITS = re.compile(rb"[1-9][0-9]{0,9}")
 
 
@@ -100,13 +103,14 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
 
         Raises:
             RunFolderError: another coordinator has locked it (named), a new run's
-                folder is used, there is no run to open, or the disk fails.
+                folder is used, there is no run to open, another version of Revolve
+                Islands began it, or the disk fails.
             ExperimentError: a plug-in file of a new run cannot be kept.
         """
         self.path = path
         self._is_new = details is not None
         if details is None:
-            read_details(path)
+            refuse_other_version(path)
         else:
             make_folder(path)
             with storage_errors(path):
@@ -119,6 +123,7 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
                     **asdict(details),
                     nonce=secrets.token_hex(4),
                     checksums=True,
+                    version=VERSION,
                     plugins=keep(path, details.document, replace_bytes),
                 )
                 replace_text(path / DETAILS, description_text(new))
@@ -225,6 +230,30 @@ def read_details(path: Path) -> RunDetails:
     """
     found = read_description(path)
     return RunDetails(found.name, found.run, found.seed, found.document)
+
+
+def refuse_other_version(path: Path) -> None:
+    """Raise unless the minor version that began a run is this one.
+
+    Journal and snapshots are those of one minor version; finished runs are read by all
+    later ones.
+
+    Raises:
+        RunFolderError: another version began it; there is no run, or its description
+            is damaged.
+    """
+    begun_by = read_description(path).version or _VERSION_OF_UNNAMED
+    minor, ours = (_minor(each) for each in (begun_by, VERSION))
+    if minor != ours:
+        raise RunFolderError(
+            f"{path}: Revolve Islands {minor} began this run, and this is {ours}: "
+            f"resume it with revolve-islands=={minor}.*"
+        )
+
+
+def _minor(version: str) -> str:
+    """Return major and minor number of a version."""
+    return ".".join(version.split(".")[:2])
 
 
 def forget_plugins(path: Path, plugins: Mapping[str, KeptPlugin]) -> None:

@@ -32,7 +32,7 @@ def cut_segment(path: Path, last: Batch | None) -> None:
     """Cut a segment behind a batch; remove it if there is none.
 
     Args:
-        path: the segment; a segment of an earlier version has no checksums.
+        path: the segment.
         last: batch that stays, with all before it.
 
     Raises:

@@ -5,6 +5,8 @@ import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from schema.agent.version import VERSION
+
 _LIBRARIES = {
     "mujoco": "mujoco-core",
     "zenoh": "eclipse-zenoh",
@@ -18,7 +20,7 @@ def version_text() -> str:
     """Return the lines of ``revolve --version``; nothing large is imported."""
     libraries = ", ".join(f"{name} {_of(dist)}" for name, dist in _LIBRARIES.items())
     return (
-        f"revolve {_of('revolve-islands')}{_commit(_ROOT)}\n"
+        f"revolve {VERSION}{_commit(_ROOT)}\n"
         f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
         f" {platform.release()}\n"
         f"{libraries}"

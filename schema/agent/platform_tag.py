@@ -11,6 +11,7 @@ from importlib.metadata import version as installed
 from pathlib import Path
 
 from schema.agent.capacity import system_text
+from schema.agent.version import VERSION
 from schema.wire.codec import format_digest
 from schema.wire.messages import OF_AGENTS
 
@@ -37,15 +38,10 @@ def platform_tag() -> str:
     return f"{system}-{machine}-{library}-mujoco{mujoco}-numpy{numpy}"
 
 
-def our_version() -> str:
-    """Return the version of Revolve Islands, "0" if it is not installed."""
-    return _version("revolve-islands")
-
-
 @cache
 def wire_version() -> str:
     """Return this project's version and, after a ``+``, that of its messages."""
-    return f"{our_version()}+{format_digest(*OF_AGENTS)}.{MEANING}"
+    return f"{VERSION}+{format_digest(*OF_AGENTS)}.{MEANING}"
 
 
 def cpu_class(machine: str, flags: Collection[str]) -> str:

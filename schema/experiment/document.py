@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from math import pi
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from msgspec import Meta, field, structs, to_builtins
 
@@ -70,8 +70,6 @@ class Space(Section, frozen=True):
         neuron_types: types of output and hidden neurons: short names of built-in
             types, or ``module:attribute``; each is equally likely.
     """
-
-    later: ClassVar = ("neuron_types",)
 
     part_types: tuple[str, ...] = (
         "schema.parts:CORE",
@@ -308,8 +306,6 @@ class Simulation(Section, frozen=True):
             [0, 1], the range of its joint; the network's state has no noise.
     """
 
-    later: ClassVar = ("start_deg", "mass_factor", "torque_factor")
-
     timestep_s: Annotated[float, Meta(ge=1e-6, le=10)] = 0.005
     brain_steps: AtLeastOne = 25
     pose_steps: AtLeastOne = 40
@@ -354,8 +350,6 @@ class Fitness(PluginSection, frozen=True):
             ``locomotion`` has it.
         parameters: parameters of a function that has a Struct of its own.
     """
-
-    later: ClassVar = ("parameters",)
 
     function: str = "worker.fitness:thesis"
     path_weight: Number = 1.0

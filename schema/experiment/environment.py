@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property, lru_cache
 from math import cos, inf, isclose, radians, sin
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
 import numpy as np
-from msgspec import UNSET, Meta, UnsetType
+from msgspec import Meta
 
 from schema.experiment.section import Count, Extent, Length, Place, Positive, Section
 from schema.limits import MOST_LENGTH_M
@@ -49,13 +49,7 @@ class Environment(Section, frozen=True, dict=True):
         push_impulse: horizontal impulse on the core at each push [N s], off-line; 0
             is no pushes. Directions are drawn uniformly for each evaluation.
         push_interval_s: time between pushes [s].
-        gap_contacts: contacts within the ``gap`` of scenery, where no force acts, count
-            as contacts. If not given, they count only in runs that were begun by
-            versions in which all did.
     """
-
-    later: ClassVar = ("light", "push_impulse", "push_interval_s", "gap_contacts")
-    uncounted: ClassVar = ("gap_contacts",)
 
     slope_deg: Annotated[float, Meta(ge=0, lt=45)] = 0.0
     roughness_m: Length = 0.0
@@ -66,18 +60,11 @@ class Environment(Section, frozen=True, dict=True):
     light: Place | None = None
     push_impulse: Annotated[float, Meta(ge=0, le=MOST_IMPULSE)] = 0.0
     push_interval_s: Positive = 3.0
-    # Documents of new runs have it if their scenery has gaps; see ``add_gap_contacts``.
-    gap_contacts: bool | UnsetType = UNSET
 
     @cached_property
     def is_even(self) -> bool:
         """Whether the ground is a plane without scenery."""
         return not (self.roughness_m or self.scenery)
-
-    @property
-    def counts_gap(self) -> bool:
-        """Whether contacts within the gap of scenery count."""
-        return self.gap_contacts is not False
 
     @property
     def patches(self) -> int:
@@ -103,32 +90,14 @@ def gravity_vector(environment: Environment, gravity: float) -> Vector:
     return 0.0 + gravity * x, gravity * y, gravity * z
 
 
-def add_gap_contacts(environment: dict[str, Any]) -> None:
-    """Add ``gap_contacts`` to the table of a new document whose scenery has gaps.
-
-    The documents of old runs lack the key, and these runs go on as they began.
-
-    Args:
-        environment: the table ``[environment]``, with the text of its scenery.
-    """
-    if "gap" in str(environment.get("scenery", "")):
-        environment.setdefault("gap_contacts", False)
-
-
 def unused_attribute(scenery: str) -> str:
-    """Return the first attribute of scenery that has no effect, or an empty text.
-
-    Runs that were begun with one go on: only new documents are checked.
-    """
+    """Return the first attribute of scenery that has no effect, or an empty text."""
     found = _UNUSED.search(scenery)
     return found[1] if found else ""
 
 
 def too_long(scenery: str) -> str:
-    """Return the first attribute with a length beyond ``MOST_LENGTH_M``, or no text.
-
-    Only new documents are checked, as for attributes without effect.
-    """
+    """Return the first attribute with a length beyond ``MOST_LENGTH_M``, or no text."""
     for found in _LENGTHS.finditer(scenery):
         for word in found[1].split():
             # What is no finite number is refused with its element.

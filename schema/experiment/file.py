@@ -20,7 +20,6 @@ from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, island_experiments, references
 from schema.experiment.environment import (
-    add_gap_contacts,
     is_mjcf,
     too_long,
     unused_attribute,
@@ -374,17 +373,14 @@ def _refuse_many_islands(document: dict[str, Any], where: str) -> None:
 
 
 def _read_scenery(document: dict[str, Any], where: str) -> None:
-    """Replace paths of scenery by the text of the files, in place.
-
-    Tables whose scenery has gaps get the key ``gap_contacts``.
-    """
+    """Replace paths of scenery by the text of the files, in place."""
     for table in (document, *document.get("islands", ())):
         environment = table.get("environment", {})
         named = environment.get("scenery", "")
         if not isinstance(named, str) or not named:
             continue
         if is_mjcf(named):
-            _check_new_scenery(environment, where)
+            _check_scenery(named, where)
             continue
         path = Path(where).parent / named
         try:
@@ -397,22 +393,21 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
             # An empty text means no scenery.
             raise ExperimentError(f"{where}: environment.scenery: {named}: is empty")
         environment["scenery"] = text
-        _check_new_scenery(environment, f"{where}: {named}")
+        _check_scenery(text, f"{where}: {named}")
 
 
-def _check_new_scenery(environment: dict[str, Any], where: str) -> None:
-    """Refuse what scenery of a new document must not have; add ``gap_contacts``."""
-    if name := unused_attribute(environment["scenery"]):
+def _check_scenery(scenery: str, where: str) -> None:
+    """Raise for attributes that scenery must not have."""
+    if name := unused_attribute(scenery):
         raise ExperimentError(
             f"{where}: environment.scenery: <geom {name}=...> is not allowed: it has "
             "no effect here"
         )
-    if found := too_long(environment["scenery"]):
+    if found := too_long(scenery):
         raise ExperimentError(
             f"{where}: environment.scenery: {cut(found)}: lengths must be <= "
             f"{MOST_LENGTH_M:g} m"
         )
-    add_gap_contacts(environment)
 
 
 def _read_calibration(document: dict[str, Any], where: str) -> None:
@@ -448,15 +443,8 @@ def _completed(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def experiment_text(experiment: Experiment) -> str:
-    """Return an experiment as one line of JSON with all defaults.
-
-    The text of an experiment without learning is that of versions without it.
-    """
-    document = msgspec.to_builtins(experiment)
-    for section in (document, *document["islands"]):
-        if section["learning"] is None:
-            del section["learning"]
-    return msgspec.json.encode(document).decode()
+    """Return an experiment as one line of JSON with all defaults."""
+    return msgspec.json.encode(experiment).decode()
 
 
 def experiment_from_text(text: str) -> Experiment:

@@ -1,9 +1,8 @@
 """Base classes and number types of the sections of an experiment."""
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
-from msgspec import NODEFAULT, Meta, Struct, json
-from msgspec.structs import fields
+from msgspec import Meta, Struct, json
 
 from schema.limits import MOST_COUNT, MOST_LENGTH_M
 
@@ -26,43 +25,7 @@ Size = Annotated[int, Meta(ge=1, le=10**6)]
 
 
 class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Base of the sections: immutable, without unknown keys, keyword-only.
-
-    Attributes:
-        later: keys that documents of commit 3063df1 did not have.
-        uncounted: keys that ``stable_json`` leaves out, whatever their values.
-    """
-
-    later: ClassVar[tuple[str, ...]] = ()
-    uncounted: ClassVar[tuple[str, ...]] = ()
-
-
-def stable_json(section: Section) -> bytes:
-    """Return a section as JSON whose digest does not change with new keys.
-
-    Keys that came later are left out if they have their default, in all inner
-    sections, too: states of arenas hold such digests.
-    """
-    return json.encode(_stable(section))
-
-
-def _stable(section: Section) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for each in fields(section):
-        value = getattr(section, each.name)
-        if each.name in section.uncounted:
-            continue
-        if each.name in section.later and value == _default(each):
-            continue
-        found[each.encode_name] = (
-            _stable(value) if isinstance(value, Section) else value
-        )
-    return found
-
-
-def _default(each: Any) -> object:  # noqa: ANN401 - msgspec gives it no public type
-    has_factory = each.default_factory is not NODEFAULT
-    return each.default_factory() if has_factory else each.default
+    """Base of the sections: immutable, without unknown keys, keyword-only."""
 
 
 Parameters = dict[str, Any]

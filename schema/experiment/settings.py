@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from functools import cached_property, lru_cache
-from typing import ClassVar, TypeVar
+from typing import TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -86,8 +86,6 @@ class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
     The hash is computed once, so that workers can look up what they made of settings.
     """
 
-    later: ClassVar = ("measures", "brain", "robust", "calibration", "ablation")
-
     space: Space
     simulation: Simulation
     fitness: Fitness
@@ -106,8 +104,6 @@ class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
 
 class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
     """Settings of a request to advance an arena; hashed once, as those above."""
-
-    later: ClassVar = ("measures", "brain")
 
     space: Space
     simulation: Simulation

@@ -27,7 +27,7 @@ _RUN_ID_DIGITS = 12
 
 
 class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Content of ``run.json``; older runs have only the first four fields.
+    """Content of ``run.json``; runs of 0.1 have only the first four fields.
 
     Attributes:
         name: name of the experiment.
@@ -38,7 +38,8 @@ class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         checksums: all segments have checksums.
         digests: SHA-256 of each finished table in hexadecimal, by name of the table.
         plugins: modules of the experiment's plug-ins, by name.
-        digest: SHA-256 of the other fields in hexadecimal; empty in older runs.
+        digest: SHA-256 of the other fields in hexadecimal; empty in runs of 0.1.
+        version: of Revolve Islands that began the run; empty in runs of 0.1 and 0.2.
     """
 
     name: str
@@ -50,14 +51,12 @@ class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     digests: dict[str, str] = {}
     plugins: dict[str, KeptPlugin] = {}
     digest: str = ""
+    version: str = ""
 
 
 def description_text(description: Description) -> str:
     """Return the text of ``run.json``, with its digest."""
     entries = msgspec.to_builtins(description)
-    if not description.plugins:
-        # Older versions know no such entry.
-        del entries["plugins"]
     entries["digest"] = _digest(entries)
     return msgspec.json.format(msgspec.json.encode(entries), indent=1).decode()
 

@@ -1,35 +1,8 @@
-"""Tables of earlier versions, which lack some columns."""
+"""Finished tables of earlier versions, which lack some columns."""
 
 from collections.abc import Mapping
 
 import pyarrow as pa
-
-
-def is_earlier(found: pa.Schema, schema: pa.Schema) -> bool:
-    """Return whether a schema is that of a table, now or before it got new columns.
-
-    Args:
-        found: schema of stored rows, with metadata.
-        schema: present schema of the table.
-    """
-    known = pa.schema([field for field in schema if field.name in found.names])
-    missing = [field for field in schema if field.name not in found.names]
-    return (
-        found.equals(known)
-        # Units and descriptions of earlier versions were other texts, or none.
-        and [_fixed(each) for each in found] == [_fixed(each) for each in known]
-        and [found.metadata.get(key) for key in _IDENTITY]
-        == [schema.metadata[key] for key in _IDENTITY]
-        and all(field.nullable or b"absent" in field.metadata for field in missing)
-    )
-
-
-_IDENTITY = (b"revolve.schema", b"revolve.schema_version")
-
-
-def _fixed(field: pa.Field) -> tuple[bytes | None, ...]:
-    metadata = field.metadata or {}
-    return metadata.get(b"repeatable"), metadata.get(b"absent")
 
 
 def absent_value(field: pa.Field) -> int | None:

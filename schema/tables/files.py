@@ -29,7 +29,6 @@ from schema.tables.earlier import absent_value, completed
 from schema.tables.segments import (
     FINISHED,
     Batch,
-    note_unchecked,
     parquet_files,
     read_segment,
     segments_of,
@@ -40,6 +39,9 @@ SORTED_BYTES = 32 * 2**20
 """Size of the rows of several islands that are sorted in memory together, about."""
 GROUP_BYTES = 4 * 2**20
 """Size of the rows that are written, or read and filtered, at once, about."""
+
+_NOTED: list[Path] = []
+"""The first run folder without digests that this process has read."""
 
 
 class Stored(NamedTuple):
@@ -227,7 +229,7 @@ def is_sealed(folder: Path) -> bool:
     """Return whether a run has once had finished tables.
 
     They get their digests together before the run's state becomes "finished". Runs of
-    earlier versions have no digests, but files.
+    0.1 have no digests, but files.
 
     Raises:
         RunFolderError: the run's description is damaged.
@@ -253,7 +255,7 @@ def finished_path(folder: Path, table: str) -> Path | None:
 def damage_of(folder: Path, table: str) -> str:
     """Return what is wrong with the Parquet file of a table; empty if nothing is.
 
-    A file of an earlier version has no digest; it must be a Parquet file.
+    A file of 0.1 has no digest; it must be a Parquet file.
     """
     digest = read_seal(folder).digests.get(table)
     found = parquet_files(folder, table)
@@ -265,13 +267,23 @@ def damage_of(folder: Path, table: str) -> str:
     why = ""
     try:
         if digest is None:
-            note_unchecked(folder)
+            _note_unchecked(folder)
             ParquetFile(found[0]).close()
         elif digest_of(found[0]) != digest:
             why = "damaged (its SHA-256 is not the one in run.json)"
     except (ValueError, OSError) as error:
         why = f"cannot be read: {error}"
     return f"{found[0]}: {why}: resume the run to write it again" if why else ""
+
+
+def _note_unchecked(folder: Path) -> None:
+    """Log that a run of 0.1 has no digests, for the first such run."""
+    if not _NOTED:
+        _NOTED.append(folder)
+        warn_once(
+            f"{folder}: has no digests, as all runs of version 0.1: damage in their "
+            "tables may not be noticed"
+        )
 
 
 def read_table(
@@ -375,7 +387,8 @@ def _in_campaign(table: str) -> pa.Schema:
 def _lacking(file: Path) -> pc.Expression:
     """Return the values of columns that a finished table lacks.
 
-    They are those of its folders' names, and in earlier runs those of the run.
+    They are those of its folders' names, and in runs of earlier versions those of the
+    run.
     """
     names = dict(place.partition("=")[::2] for place in file.parts[-3:-1])
     schema = _in_campaign(file.stem)

@@ -4,29 +4,25 @@ The first damaged batch of a segment ends its sound part. What is damaged is nam
 per process; the rows before it are read. Resuming the run computes the others again.
 """
 
-import contextlib
 import logging
 import re
-from collections.abc import Iterator, Mapping
-from functools import cache, partial
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 import pyarrow as pa
 
 from schema.errors import RunFolderError
-from schema.tables.checksums import Damaged, read_seal, sound_messages, sums_path
+from schema.tables.checksums import Damaged, sound_messages, sums_path
 from schema.tables.columns import TABLES
-from schema.tables.description import run_columns
-from schema.tables.earlier import completed, is_earlier
 
 SEGMENTS = "segments"
 FINISHED = "tables"
 
 _LOG = logging.getLogger(__name__)
-_NOTED: list[Path] = []
-"""The first run folder without checksums that this process has read."""
 
+_VERSION = b"revolve.schema_version"
 _NAME = re.compile(r"([a-z]+)-(\d+)\.(?:arrows|sums)")
 
 
@@ -83,11 +79,7 @@ def read_segment(folder: Path, table: str, path: Path) -> Iterator[Batch]:
             fails.
     """
     try:
-        sums = _sums(folder, path)
-        batches = _unchecked if sums is None else _checked
-        whole = partial(_whole, schema=TABLES[table], of_run=run_columns(folder))
-        for batch in batches(path, TABLES[table], sums or b""):
-            yield batch._replace(rows=whole(batch.rows))
+        yield from _batches(path, TABLES[table])
     except Damaged as damage:
         # At the end of a run, segments are removed as soon as there is Parquet.
         if not parquet_files(folder, table):
@@ -106,81 +98,28 @@ def warn_once(line: str) -> None:
     _LOG.warning("%s", line)
 
 
-def note_unchecked(folder: Path) -> None:
-    """Log that a run of an earlier version has no checksums, for the first such run."""
-    if not _NOTED:
-        _NOTED.append(folder)
-        _LOG.warning(
-            "%s: has no checksums, as all runs of earlier versions: damage in their "
-            "tables may not be noticed",
-            folder,
-        )
-
-
-def _sums(folder: Path, path: Path) -> bytes | None:
-    """Return the checksums of a segment; None if it is older than checksums.
-
-    Raises:
-        Damaged: they are missing.
-    """
-    try:
-        return sums_path(path).read_bytes()
-    except FileNotFoundError:
-        if read_seal(folder).checksums:
-            raise Damaged(sums_path(path), 0, "the file is missing") from None
-    note_unchecked(folder)
-    return None
-
-
-def _checked(path: Path, schema: pa.Schema, sums: bytes) -> Iterator[Batch]:
+def _batches(path: Path, schema: pa.Schema) -> Iterator[Batch]:
     """Yield the batches whose bytes have the right checksum.
 
     Raises:
-        Damaged: after the last of them.
+        Damaged: after the last of them, or the checksums are missing.
         RunFolderError: the segment is of another version of its table.
     """
-    stored: pa.Schema | None = None
+    try:
+        sums = sums_path(path).read_bytes()
+    except FileNotFoundError:
+        raise Damaged(sums_path(path), 0, "the file is missing") from None
     for number, (end, message) in enumerate(sound_messages(path, sums), start=1):
-        if stored is None:
-            stored = pa.ipc.read_schema(message)
-            _check_version(path, stored, schema)
-        else:
-            batch = pa.ipc.read_record_batch(message, stored)
-            yield Batch(end, number, batch)
+        if number > 1:
+            yield Batch(end, number, pa.ipc.read_record_batch(message, schema))
+        elif not _is_same(pa.ipc.read_schema(message), schema):
+            raise RunFolderError(
+                f"{path}: was written by another version of Revolve: finish the run "
+                "with that version"
+            )
 
 
-def _unchecked(path: Path, schema: pa.Schema, _sums: bytes) -> Iterator[Batch]:
-    """Yield the batches of a segment of an earlier version, which has no checksums.
-
-    Raises:
-        RunFolderError: the segment is of another version of its table.
-    """
-    # A truncated or damaged tail raises one of these; the batches before are whole.
-    with (
-        pa.OSFile(str(path)) as source,
-        contextlib.suppress(pa.ArrowInvalid, OSError, MemoryError),
-    ):
-        reader = pa.ipc.open_stream(source)
-        _check_version(path, reader.schema, schema)
-        for number, batch in enumerate(reader, start=2):
-            batch.validate(full=True)
-            yield Batch(source.tell(), number, batch)
-
-
-def _check_version(path: Path, found: pa.Schema, schema: pa.Schema) -> None:
-    if not is_earlier(found, schema):
-        raise RunFolderError(
-            f"{path}: was written by another version of Revolve: finish the run "
-            "with that version"
-        )
-
-
-def _whole(
-    batch: pa.RecordBatch, schema: pa.Schema, of_run: Mapping[str, object]
-) -> pa.RecordBatch:
-    """Return a batch with all columns of its table."""
-    if batch.schema.names == schema.names:
-        return batch
-    columns = completed(pa.Table.from_batches([batch]), schema, of_run).columns
-    arrays = [column.combine_chunks() for column in columns]
-    return pa.RecordBatch.from_arrays(arrays, schema=schema)
+def _is_same(stored: pa.Schema, schema: pa.Schema) -> bool:
+    """Return whether two schemas differ in descriptions and units at most."""
+    versions = [(each.metadata or {}).get(_VERSION) for each in (stored, schema)]
+    return stored.equals(schema) and versions[0] == versions[1]

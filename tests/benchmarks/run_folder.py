@@ -12,6 +12,7 @@ from schema.robot.robot import Robot
 from schema.tables.columns import BIRTHS, EVALUATIONS, RUNS
 from schema.tables.segments import segment_path
 from schema.wire.protobuf import encode_robot
+from tests.segments import write_segment
 
 
 def write_run(
@@ -46,6 +47,4 @@ def _write(
 ) -> None:
     rows = [{"record": number} | row for number, row in enumerate(rows)]
     path = segment_path(folder, table, 0)
-    path.parent.mkdir(exist_ok=True, parents=True)
-    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_stream(file, schema) as to:
-        to.write_batch(pa.RecordBatch.from_pylist(rows, schema))
+    write_segment(path, schema, [pa.RecordBatch.from_pylist(rows, schema)])

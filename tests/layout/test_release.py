@@ -6,6 +6,8 @@ from pathlib import Path
 
 import yaml
 
+from schema.agent.version import VERSION
+
 ROOT = Path(__file__).parents[2]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 PROJECT = PYPROJECT["project"]
@@ -13,7 +15,7 @@ PROJECT = PYPROJECT["project"]
 
 def test_citation_names_version_and_licence() -> None:
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
-    assert cited["version"] == PROJECT["version"]
+    assert cited["version"] == VERSION
     assert cited["license"] == PROJECT["license"]
     (thesis,) = cited["references"]
     assert (thesis["authors"][0]["family-names"], thesis["year"]) == ("Hupkes", 2016)
@@ -21,7 +23,7 @@ def test_citation_names_version_and_licence() -> None:
 
 def test_release_notes_have_a_section_of_this_version() -> None:
     notes = (ROOT / "docs" / "releases.md").read_text("utf-8")
-    assert f"## {PROJECT['version']}\n" in notes
+    assert f"## {VERSION}\n" in notes
 
 
 def test_licence_is_the_whole_text() -> None:

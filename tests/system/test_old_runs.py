@@ -1,15 +1,9 @@
-"""Checks that the current code reads and resumes runs and documents of commit 3063df1.
+"""Checks that finished runs, documents and robots of commit 3063df1 are read.
 
-``tests/data/runs-3063df1/README.md`` describes how they were made. Tables are compared
-with pyarrow only: the old files determine the columns and which of them are repeatable.
-
-The run of a later commit in ``tests/data/runs-b68fda16`` has contacts that no longer
-count.
+``tests/data/runs-3063df1/README.md`` describes how they were made.
 """
 
-import os
 import re
-from collections.abc import Callable
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -17,18 +11,16 @@ import pyarrow as pa
 import pytest
 from pyarrow.parquet import ParquetFile
 
-from tests.system.workspace import PATIENCE_S, Workspace
+from schema.tables.columns import TABLES
+from schema.tables.files import read_table
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
-
-Once = Callable[[str, Callable[[Workspace], object]], Path]
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data"
 DOCUMENTS = DATA / "documents-3063df1"
-FOLDERS = ("undisturbed", "killed")
 BIRTHS = {"off-line": 72, "arena": 24, "archipelago": 74}
-LATER = {"arena-gap": 12}
 FILLED = {
     "off-line": {"births", "evaluations", "population", "runs"},
     "arena": {"births", "deaths", "fitness", "population", "poses", "runs", "touches"},
@@ -42,22 +34,17 @@ FILLED = {
         "poses",
         "runs",
     },
-    "arena-gap": {"births", "deaths", "fitness", "population", "runs"},
 }
-"""Tables that have rows in each undisturbed run."""
-
-# --allow-drift has no effect on the recorded platform. On another platform an arena
-# first waits half a minute for a worker of the recorded one.
-RESUME = ("--workers", "1", "--threads", "1", "--quiet", "--allow-drift")
+"""Tables that have rows in each run."""
 
 each_run = pytest.mark.parametrize("name", list(BIRTHS))
 
 
-def unpack(name: str, folder: Path) -> None:
-    """Extract the folders ``killed`` and ``undisturbed`` of a run into a folder."""
-    (file,) = DATA.glob(f"runs-*/{name}.zip")
-    with ZipFile(file) as archive:
+def unpacked(name: str, folder: Path) -> Path:
+    """Extract a finished run into a folder; return the path of the run."""
+    with ZipFile(DATA / "runs-3063df1" / f"{name}.zip") as archive:
         archive.extractall(folder)
+    return (folder / "undisturbed").rename(folder / "run")
 
 
 def tables(folder: Path) -> dict[str, pa.Table]:
@@ -88,58 +75,58 @@ def differences(old: pa.Table, new: pa.Table) -> list[str]:
     ]
 
 
-def platform(found: dict[str, pa.Table]) -> str:
-    """Return the platform tag of the coordinator that finished a run."""
-    (tag,) = found["runs"]["platform"].to_pylist()
-    return str(tag)
-
-
-def births_in_status(status: str, name: str) -> int:
-    """Return the number of births of a run in the output of ``revolve status``."""
-    (count,) = {
-        int(births)
-        for births, wanted in re.findall(r"(\d+) of (\d+)", status)
-        if int(wanted) == BIRTHS[name]
-    }
-    return count
-
-
-@pytest.fixture(scope="session")
-def resumed(once: Once) -> Callable[[str], Path]:
-    """Return a function that resumes a killed run and returns the parent folder."""
-
-    def make(name: str) -> Path:
-        def build(workspace: Workspace) -> None:
-            unpack(name, workspace.folder)
-            workspace.run("resume", "killed", *RESUME)
-
-        return once(f"old-{name}", build)
-
-    return make
-
-
-@pytest.mark.parametrize("name", [*BIRTHS, *LATER])
-def test_killed_run_resumes_to_the_tables_of_the_undisturbed_run(
-    resumed: Callable[[str], Path], name: str
-) -> None:
-    folder = resumed(name)
-    old, new = tables(folder / "undisturbed"), tables(folder / "killed")
-    assert {table for table, rows in old.items() if rows.num_rows} == FILLED[name]
-    assert old["births"].num_rows == (BIRTHS | LATER)[name]
-    assert old.keys() <= new.keys()
-    if platform(old) != platform(new):
-        pytest.skip(f"only promised on the platform of the data, {platform(old)}")
-    assert {table: differences(old[table], new[table]) for table in old} == {
-        table: [] for table in old
-    }
-    assert new["drifts"].num_rows == 0
+@each_run
+def test_tables_of_a_finished_run_are_read(tmp_path: Path, name: str) -> None:
+    """Columns that came later are null, or have the value of older rows."""
+    folder = unpacked(name, tmp_path)
+    stored = tables(folder)
+    found = {table: read_table(folder, table) for table in TABLES}
+    assert {table for table, rows in found.items() if rows.num_rows} == FILLED[name]
+    assert found["births"].num_rows == BIRTHS[name]
+    for table, rows in stored.items():
+        old = found[table].select(rows.column_names)
+        assert repr(old.to_pylist()) == repr(rows.to_pylist()), table
 
 
 @each_run
-def test_comparison_detects_differences(
-    resumed: Callable[[str], Path], name: str
-) -> None:
-    births = tables(resumed(name) / "undisturbed")["births"]
+def test_commands_read_a_finished_run(workspace: Workspace, name: str) -> None:
+    folder = unpacked(name, workspace.folder)
+    births = {
+        int(have)
+        for have, wanted in re.findall(
+            r"(\d+) of (\d+)", workspace.run("status", "run")
+        )
+        if int(wanted) == BIRTHS[name]
+    }
+    assert births == {BIRTHS[name]}
+    workspace.run("compare", "run", "run")
+    workspace.run("view", "run", "--save", "run.rrd")
+    assert (workspace.folder / "run.rrd").stat().st_size
+    before = tables(folder)
+    assert "already finished" in workspace.run("resume", "run")
+    assert tables(folder) == before
+
+
+@each_run
+def test_a_new_run_has_the_rows_of_the_old_one(workspace: Workspace, name: str) -> None:
+    """Births of an experiment and seed never change on one platform."""
+    old = tables(unpacked(name, workspace.folder))
+    document = str(DATA / "runs-3063df1" / f"{name}.toml")
+    flags = ("--seed", "7", "--in-process", "--quiet", "--out", "new")
+    workspace.run("run", document, *flags)
+    new = tables(workspace.folder / "new")
+    platforms = [each["runs"]["platform"].to_pylist() for each in (old, new)]
+    if platforms[0] != platforms[1]:
+        pytest.skip(f"only promised on the platform of the data, {platforms[0]}")
+    # The document of the new run has more keys.
+    rows = {table: each for table, each in old.items() if table != "runs"}
+    assert {table: differences(each, new[table]) for table, each in rows.items()} == {
+        table: [] for table in rows
+    }
+
+
+def test_comparison_detects_differences(tmp_path: Path) -> None:
+    births = tables(unpacked("off-line", tmp_path))["births"]
     assert len(repeatable(births.schema)) > 10
     last = births.num_rows - 1
     shorter = births.slice(0, last)
@@ -150,73 +137,27 @@ def test_comparison_detects_differences(
     assert differences(births, births.drop_columns(["rank"])) == ["rank"]
 
 
-@pytest.mark.long
 @each_run
-def test_commands_read_old_runs_without_a_resume(
+def test_an_unfinished_run_is_refused_in_one_line(
     workspace: Workspace, name: str
 ) -> None:
-    unpack(name, workspace.folder)
-    births = births_in_status(workspace.run("status", "killed"), name)
-    assert 0 < births < BIRTHS[name]
-    assert (
-        births_in_status(workspace.run("status", "undisturbed"), name) == BIRTHS[name]
-    )
-    assert f"births: {births} rows against {BIRTHS[name]}" in workspace.run(
-        "compare", "killed", "undisturbed", code=1
-    )
-    for kind in ("killed", "undisturbed"):
-        workspace.run("view", kind, "--save", f"{kind}.rrd")
-        assert (workspace.folder / f"{kind}.rrd").stat().st_size
-    # Resuming a finished run does not change its tables.
-    before = tables(workspace.folder / "undisturbed")
-    workspace.run("resume", "undisturbed", *RESUME)
-    after = tables(workspace.folder / "undisturbed")
-    assert all(before[table].equals(after[table]) for table in before)
-
-
-@each_run
-def test_compare_reads_a_resumed_run(
-    resumed: Callable[[str], Path], workspace: Workspace, name: str
-) -> None:
-    folder = resumed(name)
-    if len({platform(tables(folder / kind)) for kind in FOLDERS}) > 1:
-        pytest.skip("runs of two platforms may differ")
-    workspace.run("compare", *(str(folder / kind) for kind in FOLDERS))
+    folder = unpacked(name, workspace.folder)
+    (folder / "state").write_text("stopped")
+    (line,) = workspace.run("resume", "run", code=2).splitlines()
+    assert "Revolve Islands 0.2 began this run" in line
+    assert "revolve-islands==0.2.*" in line
 
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_resumed_archipelago_is_analysed(
-    resumed: Callable[[str], Path], workspace: Workspace
-) -> None:
+def test_a_finished_archipelago_is_analysed(workspace: Workspace) -> None:
     """Analyze the archipelago, which has islands of both kinds."""
-    folder = resumed("archipelago")
-    report = ("--out", "report", "--processes", "1")
-    workspace.run("analyze", str(folder / "killed"), *report)
+    unpacked("archipelago", workspace.folder)
+    workspace.run("analyze", "run", "--out", "report", "--processes", "1")
     assert (workspace.folder / "report" / "report.html").stat().st_size
     measures = {path.stem: path for path in workspace.folder.glob("report/*/*.parquet")}
     runs = ParquetFile(measures["runs"]).read()
     assert sum(runs["births"].to_pylist()) == BIRTHS["archipelago"]
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_arena_resumes_on_another_platform(workspace: Workspace) -> None:
-    """The run continues without bitwise equality and records the drift."""
-    unpack("arena", workspace.folder)
-    (workspace.folder / "sitecustomize.py").write_text(
-        "import platform\nplatform.machine = lambda: 'another'\n"
-    )
-    path = os.pathsep.join([str(workspace.folder), str(ROOT)])
-    process = workspace.start(
-        "resume", "killed", *RESUME, environment={"PYTHONPATH": path}
-    )
-    out, err = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0, out + err
-    old, new = (tables(workspace.folder / kind) for kind in FOLDERS)
-    assert platform(old) != platform(new)
-    assert new["drifts"].num_rows == 1
-    assert new["births"].num_rows == BIRTHS["arena"]
 
 
 @pytest.mark.parametrize("robot", ["parts.yaml", "robogen-parts.yaml", "fitness.xml"])

@@ -17,7 +17,6 @@ from msgspec.structs import astuple
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
-from schema.experiment.section import stable_json
 from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.ids import BirthId
@@ -154,7 +153,7 @@ def _is_recorded(settings: ArenaSettings) -> bool:
 @lru_cache(maxsize=8)
 def _digest(settings: ArenaSettings) -> bytes:
     """Return the SHA-256 of an arena's settings."""
-    return hashlib.sha256(stable_json(settings)).digest()
+    return hashlib.sha256(msgspec.json.encode(settings)).digest()
 
 
 def _robot_state(robot: ArenaRobot) -> _RobotState:

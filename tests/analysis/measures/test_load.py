@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -18,6 +17,7 @@ from schema.tables.description import run_columns
 from schema.tables.files import parquet_path
 from schema.tables.segments import segment_path
 from tests.analysis.tables import births, population, table
+from tests.segments import write_segment
 
 A, B, C = ((0, number) for number in range(3))
 LIVING = population((0, 2, {A: 0.1, B: 0.3}), (0, 3, {B: 0.3, C: 0.5}))
@@ -60,10 +60,7 @@ def made(tmp_path: Path) -> Maker:
                 pq.write_table(rows, path)
             else:
                 path = segment_path(folder, table_name, 0)
-                path.parent.mkdir(exist_ok=True)
-                with pa.ipc.new_stream(path, rows.schema) as stream:
-                    for batch in rows.to_batches(max_chunksize=1):
-                        stream.write_batch(batch)
+                write_segment(path, rows.schema, rows.to_batches(max_chunksize=1))
         return folder
 
     return make
@@ -293,8 +290,7 @@ def test_a_segment_of_another_version_is_reported(made: Maker) -> None:
     rows = ROWS["births"].rename_columns(
         ["rank_" if name == "rank" else name for name in ROWS["births"].column_names]
     )
-    with pa.ipc.new_stream(path, rows.schema) as stream:
-        stream.write_table(rows)
+    write_segment(path, rows.schema, rows.to_batches())
     measured = measure_run(found_in(folder), "parent")
     assert "another version" in whys(measured)["table births"]
     assert "2 populations skipped" in whys(measured)["populations"]

@@ -24,12 +24,18 @@ from coordinator.storage.folder import (
 )
 from coordinator.storage.journal import Journal
 from coordinator.storage.lock import read_holder
+from schema.agent.version import VERSION
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
-from schema.tables.description import read_description, read_state
+from schema.tables.description import (
+    description_text,
+    read_description,
+    read_state,
+)
 
 DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
+MINOR = VERSION.rpartition(".")[0]
 HOLD = """
 import sys
 from pathlib import Path
@@ -78,6 +84,26 @@ def test_a_description_without_nonce_is_read(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(entries))
     with RunFolder(tmp_path) as folder:
         assert folder.details == DETAILS
+
+
+@pytest.mark.parametrize(
+    ("begun_by", "named"),
+    [(VERSION, ""), (f"{MINOR}.99", ""), ("", "0.2"), ("0.2.5", "0.2"), ("1.0", "1.0")],
+)
+def test_a_run_is_resumed_by_the_minor_version_that_began_it(
+    tmp_path: Path, begun_by: str, named: str
+) -> None:
+    RunFolder(tmp_path, DETAILS).close()
+    known = read_description(tmp_path)
+    assert known.version == VERSION
+    text = description_text(structs.replace(known, version=begun_by))
+    (tmp_path / "run.json").write_text(text)
+    if not named:
+        RunFolder(tmp_path).close()
+        return
+    message = f"{named} began this run, and this is {MINOR}: .*=={named}\\.\\*$"
+    with pytest.raises(RunFolderError, match=message):
+        RunFolder(tmp_path)
 
 
 @pytest.mark.parametrize("left", [None, "1"])

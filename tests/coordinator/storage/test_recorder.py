@@ -15,6 +15,7 @@ from schema.tables.columns import POPULATION, TABLES
 from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path, segments_of
 from tests.coordinator.conftest import DETAILS, Check, Feed, Make
+from tests.segments import write_segment
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 
@@ -183,7 +184,7 @@ def test_a_segment_of_another_version_is_refused(
     feed_rows(tmp_path, make_records(3)).close()
     path = segment_path(tmp_path, "population", 0)
     newer = POPULATION.with_metadata({"revolve.schema_version": "999"})
-    path.write_bytes(newer.serialize().to_pybytes())
+    write_segment(path, newer, [])
     with pytest.raises(RunFolderError, match="another version of Revolve"):
         Recorder(tmp_path, DETAILS)
 

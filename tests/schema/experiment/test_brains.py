@@ -11,7 +11,6 @@ from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
 )
-from schema.experiment.section import stable_json
 from schema.experiment.settings import evaluation_settings, evaluation_settings_of
 from schema.formats.files import read_robot, write_robot
 from schema.plugins import permission
@@ -33,16 +32,6 @@ def test_the_default_is_the_thesis() -> None:
     names = [kind.name for kind in neuron_types(Space().neuron_types)]
     assert names == list(NEURON_TYPES)
     assert neuron_kinds(NETWORK, Space()) == NEURON_TYPES
-
-
-def test_settings_of_the_thesis_keep_their_digest() -> None:
-    """States of arenas hold it; keys that came later must not change it."""
-    experiment = parse_experiment('name = "x"\n', "x.toml")
-    document = stable_json(evaluation_settings_of(experiment))
-    assert b"neuron_types" not in document
-    assert b'"brain"' not in document
-    changed = parse_experiment('name = "x"\n[brain]\ntype = "cpg"\n', "x.toml")
-    assert b'"brain"' in stable_json(evaluation_settings_of(changed))
 
 
 @own

@@ -4,7 +4,6 @@ import math
 import re
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 from msgspec import structs
@@ -18,7 +17,6 @@ from schema.experiment.file import (
     read_experiment,
 )
 from schema.experiment.identity import Origin
-from schema.experiment.section import stable_json
 from schema.experiment.settings import (
     arena_settings,
     evaluation_settings,
@@ -131,62 +129,6 @@ def test_there_is_a_push_in_the_longest_evaluation(clock: str, longest: int) -> 
         f"mine.toml: environment.push_interval_s: must be < {longest} s, the longest "
         f"evaluation, or there is no push, got {longest}"
     )
-
-
-def test_later_keys_count_in_stable_json_only_if_they_are_set() -> None:
-    plain = msgspec.json.decode(stable_json(FLAT))
-    assert plain == {
-        "slope_deg": 0.0,
-        "roughness_m": 0.0,
-        "patch_m": 0.1,
-        "extent_m": 5.0,
-        "ground_seed": 1,
-        "scenery": "",
-    }
-    lit = Environment(light=(1.0, 0.0, 0.5))
-    assert msgspec.json.decode(stable_json(lit)) == plain | {"light": [1.0, 0.0, 0.5]}
-
-
-GAP = WALL.replace("<geom", '<geom gap="0.03"')
-
-
-def test_documents_of_scenery_with_a_gap_say_that_it_is_no_contact(
-    tmp_path: Path,
-) -> None:
-    (tmp_path / "gap.xml").write_text(GAP)
-    where = str(tmp_path / "mine.toml")
-    for scenery in (GAP, "gap.xml"):
-        text = f"{HEAD}[environment]\nscenery = '{scenery}'\n"
-        experiment = parse_experiment(text, where)
-        assert experiment.environment.gap_contacts is False
-        assert not experiment.environment.counts_gap
-        assert experiment_from_text(experiment_text(experiment)) == experiment
-        settings = read_evaluation_settings(evaluation_settings(experiment))
-        assert not settings.environment.counts_gap
-        assert parse_experiment(f"{text}gap_contacts = true", where).environment == (
-            Environment(scenery=GAP, gap_contacts=True)
-        )
-    text = f"{HEAD}[[islands]]\n[[islands]]\nenvironment.scenery = '{GAP}'\n"
-    islands = [island_experiment(parse_experiment(text, "it"), n) for n in (0, 1)]
-    assert [each.environment.counts_gap for each in islands] == [True, False]
-
-
-def test_documents_of_old_runs_count_contacts_within_a_gap() -> None:
-    """They lack the key; their requests and digests have to stay as they were."""
-    new = parse_experiment(f"{HEAD}[environment]\nscenery = '{GAP}'\n", "it")
-    text = experiment_text(new).replace(',"gap_contacts":false', "")
-    assert text != experiment_text(new)
-    old = experiment_from_text(text)
-    assert old.environment.counts_gap
-    assert experiment_text(old) == text
-    assert b"gap_contacts" not in evaluation_settings(old)
-    assert stable_json(old.environment) == stable_json(new.environment)
-
-
-def test_documents_without_a_gap_have_no_key_about_it() -> None:
-    experiment = parse_experiment(f"{HEAD}[environment]\nscenery = '{WALL}'\n", "it")
-    assert "gap_contacts" not in experiment_text(experiment)
-    assert b"gap_contacts" not in evaluation_settings(experiment)
 
 
 def test_gravity_pulls_downhill() -> None:

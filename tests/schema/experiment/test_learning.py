@@ -4,8 +4,6 @@ import pytest
 
 from schema.experiment.document import island_experiment
 from schema.experiment.file import (
-    experiment_from_text,
-    experiment_text,
     read_experiment,
 )
 from schema.experiment.learning import Learning
@@ -16,15 +14,6 @@ def test_it_is_off_unless_the_section_is_there() -> None:
     assert parse("").learning is None
     assert parse("[learning]").learning == Learning()
     assert read_experiment("learning").learning == Learning(budget=20)
-
-
-def test_the_text_of_an_experiment_without_it_does_not_name_it() -> None:
-    """Runs of earlier versions have this text; see tests/system/test_old_runs.py."""
-    plain = parse("[[islands]]\n[[islands]]")
-    assert "learning" not in experiment_text(plain)
-    learning = parse("[learning]\nbudget = 3\n[[islands]]\n[[islands]]")
-    for each in (plain, learning):
-        assert experiment_from_text(experiment_text(each)) == each
 
 
 def test_an_island_may_have_its_own() -> None:

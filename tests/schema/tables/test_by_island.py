@@ -12,6 +12,7 @@ from schema.tables.columns import EVALUATIONS
 from schema.tables.files import batches_by_island, read_table, stored_batches
 from schema.tables.segments import segment_path
 from tests.schema.tables.test_files import ROW
+from tests.segments import write_segment
 
 ISLANDS = 12
 ROWS = 100
@@ -25,13 +26,12 @@ def folder(tmp_path: Path) -> Path:
         {**ROW, "record": number, "island": int(island), "birth": 1000 + number}
         for number, island in enumerate(rng.integers(0, ISLANDS, ROWS))
     ]
-    path = segment_path(tmp_path, "evaluations", 0)
-    path.parent.mkdir()
-    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_stream(file, EVALUATIONS) as to:
-        while rows:
-            size = int(rng.integers(1, 5))
-            to.write_batch(pa.RecordBatch.from_pylist(rows[:size], EVALUATIONS))
-            rows = rows[size:]
+    batches = []
+    while rows:
+        size = int(rng.integers(1, 5))
+        batches.append(pa.RecordBatch.from_pylist(rows[:size], EVALUATIONS))
+        rows = rows[size:]
+    write_segment(segment_path(tmp_path, "evaluations", 0), EVALUATIONS, batches)
     return tmp_path
 
 

@@ -14,7 +14,6 @@ from schema.errors import RunFolderError
 from schema.tables.columns import EVALUATIONS, TABLES
 from schema.tables.description import Description, description_text, run_columns
 from schema.tables.files import campaign, parquet_path, read_table
-from schema.tables.segments import segment_path
 
 ROW = {
     "record": 0,
@@ -44,49 +43,33 @@ def without(*names: str) -> pa.Table:
     return pa.Table.from_pylist([ROW], pa.schema(kept, EVALUATIONS.metadata))
 
 
-def write_segment(folder: Path, rows: pa.Table) -> None:
-    path = segment_path(folder, "evaluations", 0)
-    path.parent.mkdir()
-    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_stream(file, rows.schema) as to:
-        to.write_table(rows)
-
-
 def write_parquet(folder: Path, rows: pa.Table) -> None:
     path = parquet_path(folder, "old", 0, "evaluations")
     path.parent.mkdir(parents=True)
     pq.write_table(rows, path)
 
 
-@pytest.mark.parametrize("write", [write_segment, write_parquet])
-def test_evaluations_of_older_runs_have_trial_0(
-    tmp_path: Path, write: Callable[[Path, pa.Table], None]
-) -> None:
-    write(tmp_path, without("trial"))
+def test_evaluations_of_older_runs_have_trial_0(tmp_path: Path) -> None:
+    write_parquet(tmp_path, without("trial"))
     found = read_table(tmp_path, "evaluations")
     assert found.schema.equals(TABLES["evaluations"], check_metadata=True)
     assert found.to_pylist() == [{**ROW, "trial": 0}]
 
 
-@pytest.mark.parametrize("write", [write_segment, write_parquet])
-def test_present_rows_are_read_unchanged(
-    tmp_path: Path, write: Callable[[Path, pa.Table], None]
-) -> None:
-    write(tmp_path, without())
+def test_present_rows_are_read_unchanged(tmp_path: Path) -> None:
+    write_parquet(tmp_path, without())
     assert read_table(tmp_path, "evaluations").to_pylist() == [ROW]
 
 
-@pytest.mark.parametrize("write", [write_segment, write_parquet])
-def test_rows_of_older_runs_get_seed_and_id_of_their_run(
-    tmp_path: Path, write: Callable[[Path, pa.Table], None]
-) -> None:
-    write(tmp_path, without("seed", "run_id"))
+def test_rows_of_older_runs_get_seed_and_id_of_their_run(tmp_path: Path) -> None:
+    write_parquet(tmp_path, without("seed", "run_id"))
     (tmp_path / "run.json").write_text(description_text(DESCRIPTION))
     (row,) = read_table(tmp_path, "evaluations").to_pylist()
     assert row == {**ROW, "seed": 2**64 - 1, "run_id": run_columns(tmp_path)["run_id"]}
 
 
 def test_run_columns_are_null_without_a_description(tmp_path: Path) -> None:
-    write_segment(tmp_path, without("seed", "run_id"))
+    write_parquet(tmp_path, without("seed", "run_id"))
     (row,) = read_table(tmp_path, "evaluations").to_pylist()
     assert row == {**ROW, "seed": None, "run_id": None}
 
@@ -142,27 +125,15 @@ def relabelled(**changes: str | None) -> pa.Table:
 
 
 def test_descriptions_and_units_of_earlier_runs_are_replaced(tmp_path: Path) -> None:
-    write_segment(tmp_path, relabelled(description=None, unit="furlong"))
+    write_parquet(tmp_path, relabelled(description=None, unit="furlong"))
     found = read_table(tmp_path, "evaluations")
     assert found.to_pylist() == [ROW]
     assert found.schema.equals(EVALUATIONS, check_metadata=True)
 
 
-def test_columns_of_another_repeatability_are_refused(tmp_path: Path) -> None:
-    write_segment(tmp_path, relabelled(repeatable="maybe"))
-    with pytest.raises(RunFolderError, match="another version of Revolve"):
-        read_table(tmp_path, "evaluations")
-
-
 def test_a_nullable_column_is_null_in_older_rows(tmp_path: Path) -> None:
-    write_segment(tmp_path, without("fitness"))
+    write_parquet(tmp_path, without("fitness"))
     assert read_table(tmp_path, "evaluations")["fitness"].to_pylist() == [None]
-
-
-def test_rows_without_a_required_column_are_refused(tmp_path: Path) -> None:
-    write_segment(tmp_path, without("status"))
-    with pytest.raises(RunFolderError, match="another version of Revolve"):
-        read_table(tmp_path, "evaluations")
 
 
 def test_file_without_a_required_column_is_refused(tmp_path: Path) -> None:

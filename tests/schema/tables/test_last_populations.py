@@ -9,7 +9,7 @@ import pytest
 from schema.tables import last_populations
 from schema.tables.columns import EVALUATIONS
 from schema.tables.last_populations import best_ever, fittest_first
-from tests.schema.tables.test_files import ROW, write_segment
+from tests.schema.tables.test_files import ROW, write_parquet
 
 
 def test_the_best_ever_come_first_each_with_its_greatest_fitness(
@@ -31,7 +31,7 @@ def test_the_best_ever_come_first_each_with_its_greatest_fitness(
                 "fitness": fitness - 6.5 if fitness else None,
             }
         )
-    write_segment(tmp_path, pa.Table.from_pylist(rows, EVALUATIONS))
+    write_parquet(tmp_path, pa.Table.from_pylist(rows, EVALUATIONS))
     greatest: dict[tuple[int | None, ...], float] = {}
     for row in rows:
         key = (row["island"], row["birth_island"], row["birth"])
@@ -56,7 +56,7 @@ def test_only_rows_that_may_be_first_are_compared_in_python(
         {**ROW, "record": birth, "birth": birth, "fitness": min(birth, 990) / 100}
         for birth in range(1000)
     ]
-    write_segment(tmp_path, pa.Table.from_pylist(rows, EVALUATIONS))
+    write_parquet(tmp_path, pa.Table.from_pylist(rows, EVALUATIONS))
     births: list[int] = []
 
     def counted(row: last_populations.Row) -> tuple[float, ...]:

@@ -2,16 +2,15 @@
 
 import json
 import logging
-import struct
 from collections.abc import Iterator
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from schema.errors import RunFolderError
 from schema.tables import segments
 from schema.tables.checksums import MAGIC, digest_of, sums_path
 from schema.tables.columns import EVALUATIONS
@@ -23,6 +22,7 @@ from schema.tables.files import (
 )
 from schema.tables.segments import segment_path, segments_of
 from tests.schema.tables.test_files import ROW
+from tests.segments import write_segment
 
 BATCHES = 3
 
@@ -31,7 +31,6 @@ BATCHES = 3
 def _forget(caplog: pytest.LogCaptureFixture) -> None:
     """Forget what was named before, and record what is named."""
     segments.warn_once.cache_clear()
-    segments._NOTED.clear()
     caplog.set_level(logging.WARNING)
 
 
@@ -43,19 +42,9 @@ def batch(first: int) -> pa.RecordBatch:
 def write(folder: Path, number: int = 0, first: int = 0) -> list[int]:
     """Write a segment of three batches of two rows; return the ends of its messages."""
     path = segment_path(folder, "evaluations", number)
-    path.parent.mkdir(exist_ok=True)
-    data, sums, ends = b"", MAGIC, []
     batches = [batch(first + 2 * each) for each in range(BATCHES)]
-    for message in (EVALUATIONS, *batches):
-        piece = message.serialize().to_pybytes()
-        data += piece
-        fields = struct.pack("<QI", len(data), crc32(piece))
-        sums += fields + struct.pack("<I", crc32(fields))
-        ends.append(len(data))
-    path.write_bytes(data)
-    sums_path(path).write_bytes(sums)
     (folder / "run.json").write_text('{"name": "any", "checksums": true}')
-    return ends
+    return write_segment(path, EVALUATIONS, batches)
 
 
 def flip(path: Path, byte: int, bit: int = 0) -> None:
@@ -202,16 +191,21 @@ def test_rows_behind_damage_are_a_gap(
     assert stored.unused == [segment_path(tmp_path, "evaluations", 1)]
 
 
-def test_segments_of_earlier_versions_are_read_with_one_line(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+@pytest.mark.parametrize("is_same", [True, False])
+def test_only_segments_of_the_present_columns_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, is_same: bool
 ) -> None:
-    for number in (0, 1):
-        write(tmp_path, number=number, first=6 * number)
-        sums_path(segment_path(tmp_path, "evaluations", number)).unlink()
-    (tmp_path / "run.json").write_text('{"name": "any"}')
-    assert len(births(tmp_path)) == 12
-    assert len(caplog.messages) == 1
-    assert "has no checksums, as all runs of earlier versions" in caplog.messages[0]
+    """Other descriptions do not matter."""
+    write(tmp_path)
+    fields = [field.with_metadata({"unit": "furlong"}) for field in EVALUATIONS]
+    present = pa.schema(fields if is_same else fields[:-1], EVALUATIONS.metadata)
+    monkeypatch.setitem(segments.TABLES, "evaluations", present)
+    path = segment_path(tmp_path, "evaluations", 0)
+    if is_same:
+        assert len(list(segments.read_segment(tmp_path, "evaluations", path))) == 3
+        return
+    with pytest.raises(RunFolderError, match="another version of Revolve"):
+        list(segments.read_segment(tmp_path, "evaluations", path))
 
 
 def test_foreign_files_are_no_segments(tmp_path: Path) -> None:
