@@ -34,9 +34,7 @@ def brain_rules(experiment: Experiment) -> BrainRules:
     return BrainRules(
         max_hidden=experiment.space.max_hidden,
         p_connect_neurons=experiment.generation.p_connect_neurons,
-        hidden_on=experiment.generation.hidden_on,
         p_delete_hidden_neuron=variation.p_delete_hidden_neuron,
         p_remove_brain_connection=variation.p_remove_brain_connection,
         epsilon=variation.brain_epsilon,
-        hidden_rounding=variation.hidden_rounding,
     )

@@ -56,11 +56,8 @@ class NetworkGenes:
         self, draws: Draws, branches: Sequence[Branch], rules: BrainRules
     ) -> None:
         """Add 0..max_hidden neurons."""
-        hosts = branches
-        if rules.hidden_on == "wired":
-            hosts = [b for b in branches if b.kind.inputs or b.outputs]
         for _ in range(draws.below(rules.max_hidden + 1)):
-            draws.pick(hosts).hidden += (random_neuron(draws, self._types),)
+            draws.pick(branches).hidden += (random_neuron(draws, self._types),)
 
     def _add_hidden_of_part(
         self, draws: Draws, part: Branch, branches: Sequence[Branch], rules: BrainRules
@@ -247,13 +244,10 @@ def add_hidden_neurons(
         draws: source of all choices.
         branches: branches of the tree, depth first.
         before: number of hidden neurons before deletion.
-        rules: probability of deletion, limit and rounding.
+        rules: probability of deletion, and limit.
         kinds: neuron types.
     """
-    if rules.hidden_rounding == "half-up":
-        wanted = _share(before, rules.p_delete_hidden_neuron)
-    else:
-        wanted = draws.rounded(before * rules.p_delete_hidden_neuron)
+    wanted = draws.rounded(before * rules.p_delete_hidden_neuron)
     types = tuple(kinds.items())
     room = rules.max_hidden - sum(len(b.hidden) for b in branches)
     for _ in range(min(wanted, room)):

@@ -211,7 +211,7 @@ def crossover(
         return False
     donated = draws.pick(candidates)
     parts = rest.parts + donated_sizes[donated][0]
-    if experiment.variation.check_min_parts and parts < space.min_parts:
+    if parts < space.min_parts:
         return False
     assert replaced.parent is not None
     donated.cut()
@@ -294,7 +294,7 @@ def add_parts(
     expected = expected_parts(branches, experiment)
     if expected <= 0.0:
         return
-    trials = ceil(2.0 * expected) if experiment.variation.add_parts == "loop" else 1
+    trials = ceil(2.0 * expected)
     for _ in range(trials):
         if draws.chance(expected / trials):
             _add_part(draws, branches[0], genes, experiment)
@@ -334,9 +334,7 @@ def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) ->
     sizes = subtree_sizes(branches)
     deleted = [sizes[branch][0] for branch in deletable(sizes, space)]
     duplicated = [sizes[branch][0] for branch in duplicable(sizes, space)]
-    more = float(sum(duplicated))
-    if duplicated and variation.duplicable_size == "mean":
-        more /= len(duplicated)
+    more = sum(duplicated) / len(duplicated) if duplicated else 0.0
     less = sum(deleted) / len(deleted) if deleted else 0.0
     return min(
         variation.p_delete_subtree * less - variation.p_duplicate_subtree * more,

@@ -115,20 +115,20 @@ class Generation(Section, frozen=True):
             limit.
         parts_sd: standard deviation of the number of parts.
         p_connect_neurons: probability of each possible connection.
-        hidden_on: parts that get hidden neurons: ``any``, or those that are
-            ``wired`` (have a sensor or a motor).
         max_tries: attempts per robot; after these the run stops with an error.
     """
 
     parts_mean: Number = 12.0
     parts_sd: NotNegative = 5.0
     p_connect_neurons: Probability = 0.1
-    hidden_on: Literal["any", "wired"] = "any"
     max_tries: AtLeastOne = 100
 
 
 class Variation(Section, frozen=True):
     """Mutation of offspring (thesis section 4.4.6).
+
+    As many parts are added as deletion removes, less those that duplication adds, on
+    average.
 
     Attributes:
         p_delete_subtree: probability that a part and all below it are removed.
@@ -143,12 +143,6 @@ class Variation(Section, frozen=True):
             random value.
         brain_epsilon: step size of the parameters of neurons, of ``cpg`` brains also
             of weights, as a share of the way to a random value.
-        add_parts: ``loop`` may add several parts, ``once`` at most one; the expected
-            number is what deletion removes, less what duplication adds.
-        duplicable_size: size of subtrees in that number: their ``mean`` or ``sum``.
-        hidden_rounding: rounding of the number of hidden neurons to add.
-        check_min_parts: refuse a crossover that leaves fewer than
-            ``space.min_parts``.
     """
 
     p_delete_subtree: Probability = 0.05
@@ -158,10 +152,6 @@ class Variation(Section, frozen=True):
     p_remove_brain_connection: Probability = 0.05
     body_epsilon: Probability = 0.05
     brain_epsilon: Probability = 0.1
-    add_parts: Literal["loop", "once"] = "loop"
-    duplicable_size: Literal["mean", "sum"] = "mean"
-    hidden_rounding: Literal["stochastic", "half-up"] = "stochastic"
-    check_min_parts: bool = True
 
 
 class Encoding(PluginSection, frozen=True):

@@ -314,19 +314,15 @@ class BrainRules(Struct, frozen=True):
     Attributes:
         max_hidden: greatest number of hidden neurons of a robot.
         p_connect_neurons: probability of each possible connection.
-        hidden_on: parts that get hidden neurons at random: ``any`` or ``wired``.
         p_delete_hidden_neuron, p_remove_brain_connection: probabilities of mutation.
         epsilon: step size of parameters, as a share of the way to a random value.
-        hidden_rounding: rounding of the number of hidden neurons to add.
     """
 
     max_hidden: int
     p_connect_neurons: float
-    hidden_on: str
     p_delete_hidden_neuron: float
     p_remove_brain_connection: float
     epsilon: float
-    hidden_rounding: str
 
 
 class BrainGenes(Protocol):

@@ -78,10 +78,6 @@ def test_rows_of_settings_have_type_default_unit_and_meaning() -> None:
         ),
         "`timestep_s` | number >= 1e-06, <= 10 | `0.005` | s | physics step",
         (
-            '`duplicable_size` | `"mean"`, `"sum"` | `"mean"` |  | size of subtrees in'
-            " that number: their `mean` or `sum`"
-        ),
-        (
             "`light` | list of 3 (number >= -1e+06, <= 1e+06) | not given | m |"
             " position of the light; no light if not given"
         ),

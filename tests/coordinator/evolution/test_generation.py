@@ -95,9 +95,8 @@ def test_hidden_neurons_are_uniform_in_number_and_type() -> None:
     assert all(abs(n - expected) < 5 * expected**0.5 for n in kinds.values())
 
 
-@pytest.mark.parametrize("option", ["any", "wired"])
-def test_parts_that_may_hold_hidden_neurons(option: str) -> None:
-    experiment = shaped(hidden_on=option)
+def test_any_part_may_hold_hidden_neurons() -> None:
+    experiment = shaped()
     types = body_space(experiment.space)
     on_plain = on_wired = 0
     for seed in range(200):
@@ -106,7 +105,7 @@ def test_parts_that_may_hold_hidden_neurons(option: str) -> None:
             on_wired += len(node.hidden) * bool(is_wired)
             on_plain += len(node.hidden) * (not is_wired)
     assert on_wired > 100
-    assert (on_plain == 0) == (option == "wired")
+    assert on_plain > 100
 
 
 def test_each_possible_connection_is_there_with_its_probability() -> None:

@@ -137,11 +137,8 @@ def test_crossover_fails_where_nothing_fits() -> None:
     assert crossed(1, MOTHER, node("Core")) is None
 
 
-@pytest.mark.parametrize("is_checked", [True, False])
-def test_crossover_fails_on_too_few_parts_if_check_min_parts_is_set(
-    *, is_checked: bool
-) -> None:
-    setting = experiment({"min_parts": 5}, check_min_parts=is_checked)
+def test_crossover_fails_on_too_few_parts() -> None:
+    setting = experiment({"min_parts": 5})
     sizes = Counter(
         None if child is None else len(kinds(child))
         for seed in range(300)
@@ -149,7 +146,7 @@ def test_crossover_fails_on_too_few_parts_if_check_min_parts_is_set(
     )
     # In the place of a hinge with its brick the gifts give 4 and 3 parts, in that
     # of the brick 5 and 4, in that of the other hinge 5 and 4.
-    assert set(sizes) == ({None, 5} if is_checked else {3, 4, 5})
+    assert set(sizes) == {None, 5}
 
 
 def test_crossover_keeps_the_donated_subtree_unchanged() -> None:
@@ -190,9 +187,6 @@ def offspring(seed: int, setting: Experiment = DEFAULT) -> Genome | None:
             p_delete_hidden_neuron=0.5,
             p_remove_brain_connection=0.5,
             p_swap_subtree=1.0,
-            hidden_rounding="half-up",
-            add_parts="once",
-            duplicable_size="sum",
         ),
         experiment({"planar": False}, body_epsilon=1.0, brain_epsilon=1.0),
     ],

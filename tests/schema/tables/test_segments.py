@@ -13,7 +13,7 @@ import pytest
 from schema.errors import RunFolderError
 from schema.tables import segments
 from schema.tables.checksums import MAGIC, digest_of, sums_path
-from schema.tables.columns import EVALUATIONS
+from schema.tables.columns import EVALUATIONS, TABLES
 from schema.tables.files import (
     parquet_path,
     read_table,
@@ -199,7 +199,7 @@ def test_only_segments_of_the_present_columns_are_read(
     write(tmp_path)
     fields = [field.with_metadata({"unit": "furlong"}) for field in EVALUATIONS]
     present = pa.schema(fields if is_same else fields[:-1], EVALUATIONS.metadata)
-    monkeypatch.setitem(segments.TABLES, "evaluations", present)
+    monkeypatch.setitem(TABLES, "evaluations", present)
     path = segment_path(tmp_path, "evaluations", 0)
     if is_same:
         assert len(list(segments.read_segment(tmp_path, "evaluations", path))) == 3
