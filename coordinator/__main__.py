@@ -25,9 +25,10 @@ from coordinator.plugins.cost import cost_line
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
+    checked_experiments,
     is_campaign,
     joined_name,
-    read_experiments,
+    read_drafts,
     shipped_campaigns,
 )
 from coordinator.storage.compare import compare
@@ -172,9 +173,10 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     """Return the experiments to run, checked; imports package ``worker``."""
     import worker.kinds
 
-    refuse_faulty(options.experiments, options.births)
+    drafts = read_drafts(options.experiments, options.births)
+    refuse_faulty(drafts, options.births)
     check = partial(check_built_in, kinds=worker.kinds.KINDS)
-    found = read_experiments(options.experiments, options.births, check)
+    found = checked_experiments(drafts, check)
     islands = (own for each in found for own in island_experiments(each))
     for line in dict.fromkeys(filter(None, map(cost_line, islands))):
         warn_user(line)

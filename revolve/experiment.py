@@ -8,12 +8,8 @@ from typing import Any, Self
 import msgspec
 
 from schema.experiment.document import Experiment as Document
-from schema.experiment.file import (
-    experiment_from_tables,
-    parse_toml,
-    read_experiment,
-    source_text,
-)
+from schema.experiment.file import read_experiment
+from schema.experiment.sources import parse_toml, source_text
 
 _GIVEN = "experiment"
 """Name of a text without a file, in messages."""
@@ -82,7 +78,7 @@ class Experiment:
         cls, tables: dict[str, Any], where: str, changes: Mapping[str, Any]
     ) -> Self:
         merged = _merged(tables, changes)
-        return cls(experiment_from_tables(merged, where), merged.get("islands", []))
+        return cls(read_experiment(merged, where), merged.get("islands", []))
 
     def _tables(self) -> dict[str, Any]:
         return {**self.settings, "islands": self._islands}

@@ -15,7 +15,7 @@ from revolve.robot import Robot, of_plain
 from schema.agent.supervisor import most_processes
 from schema.errors import RevolveError, RunFolderError, nearest, rounded, shown
 from schema.experiment.document import island_experiment, island_experiments
-from schema.experiment.file import own_experiment
+from schema.experiment.file import experiment_from_text
 from schema.limits import MOST_SEED
 from schema.plugins.permission import allowed
 from schema.robot.ids import BirthId
@@ -74,7 +74,8 @@ class Run:
         details = read_description(self.folder)
         self.name, self.number, self.seed = details.name, details.run, details.seed
         self.run_id = run_columns(self.folder)["run_id"]
-        self.experiment = Experiment(own_experiment(details.document))
+        document = experiment_from_text(details.document, is_own=True)
+        self.experiment = Experiment(document)
 
     @property
     def state(self) -> str:

@@ -4,11 +4,12 @@ import pytest
 
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment
-from schema.experiment.file import experiment_from_tables, parse_toml
+from schema.experiment.file import read_experiment
+from schema.experiment.sources import parse_toml
 
 
 def parse_experiment(text: str, where: str) -> Experiment:
-    return experiment_from_tables(parse_toml(text, where), where)
+    return read_experiment(parse_toml(text, where), where)
 
 
 def parse(text: str) -> Experiment:

@@ -33,7 +33,7 @@ from analysis.measures.families import family
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
-from schema.experiment.file import own_experiment
+from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
 from schema.plugins.source import modules_named
 from schema.robot.ids import BirthId
@@ -235,7 +235,7 @@ def _robot_pictures(
                 best[name],
                 births,
                 family(births, row),
-                own_experiment(document),
+                experiment_from_text(document, is_own=True),
                 simulation,
                 origin=Origin(seed=run.seed, run=run.number),
                 has_family=name not in _BASELINES,

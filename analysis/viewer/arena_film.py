@@ -24,7 +24,7 @@ from analysis.viewer.replay import (
 from analysis.viewer.scene import scene_of
 from schema.agent.log import tell_user
 from schema.experiment.document import Experiment, island_experiment
-from schema.experiment.file import own_experiment
+from schema.experiment.file import experiment_from_text
 from schema.experiment.settings import arena_settings_of
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
@@ -98,7 +98,7 @@ def draw_film(
     """
     run = shown_run(folder)
     allow_plugins_of(folder)
-    experiment = own_experiment(run.document)
+    experiment = experiment_from_text(run.document, is_own=True)
     bodies = {one.birth: one.body for one in read_news(run).births}
     found = read_frames(folder, *span)
     if not found:

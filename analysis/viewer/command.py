@@ -32,7 +32,7 @@ from analysis.viewer.watch import watch
 from schema.agent.command import connect_of, tls_of
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
-from schema.experiment.file import own_experiment
+from schema.experiment.file import experiment_from_text
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -78,7 +78,7 @@ def _replay(
     folder: Path = options.run
     run = shown_run(folder)
     allow_plugins_of(folder)
-    scene = scene_of(own_experiment(run.document))
+    scene = scene_of(experiment_from_text(run.document, is_own=True))
     news = read_news(run)
     born = {one.birth for one in news.births}
     _check(options, born, is_online=bool(scene.arenas))

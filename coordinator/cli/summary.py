@@ -24,7 +24,7 @@ from schema.experiment.document import (
     island_count,
     island_experiments,
 )
-from schema.experiment.file import own_experiment
+from schema.experiment.file import experiment_from_text
 from schema.experiment.fitness_keys import fitness_text
 from schema.formats.files import BEST
 from schema.formats.yaml import robot_to_yaml
@@ -84,7 +84,7 @@ def restore_best(folder: Path) -> None:
         return
     try:
         allow_plugins_of(folder, is_resumed=False)
-        experiment = own_experiment(read_details(folder).document)
+        experiment = experiment_from_text(read_details(folder).document, is_own=True)
         if _is_extinct(experiment, _born(folder)):
             return
         _, robot = _read_best(folder, best, experiment)

@@ -19,9 +19,10 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.learning import IslandLearning
 from coordinator.storage.campaign import (
     campaign_plugins,
+    checked_experiments,
     is_campaign,
     read_campaign,
-    read_experiments,
+    read_drafts,
 )
 from coordinator.storage.folder import holds_run, read_details
 from schema.agent.import_path import environment, python_command
@@ -41,11 +42,7 @@ from schema.experiment.document import (
     island_experiments,
     references,
 )
-from schema.experiment.file import (
-    draft_experiments,
-    own_experiment,
-    own_references,
-)
+from schema.experiment.file import Draft, experiment_from_text, read_draft
 from schema.experiment.fitness_keys import check_fitness_keys
 from schema.experiment.kinds import Kind, Use, kind_of, uses
 from schema.parts import BUILT_IN
@@ -66,22 +63,22 @@ _LATE = re.compile(r'^Thread .* first\):\n *File "([^"]*)", line (\d+)', re.MULT
 _PLACE = re.compile(r"\.py:\d")
 
 
-def refuse_faulty(sources: Iterable[str], births: int | None = None) -> None:
+def refuse_faulty(
+    drafts: Iterable[tuple[str, Draft]], births: int | None = None
+) -> None:
     """Check the plug-ins of experiments before a run, in a process of their own.
 
     Built-in plug-ins are not checked: the tests of this project do that.
 
     Args:
-        sources: as for ``experiments_of``.
-        births: as for ``experiments_of``.
+        drafts: of ``read_drafts``.
+        births: as for ``read_drafts``.
 
     Raises:
         ExperimentError: one cannot be loaded, breaks its contract, takes too long or
             ends its process; an experiment that is invalid.
     """
-    own = [
-        source for source in sources if any(map(is_own, own_references(source, births)))
-    ]
+    own = [word for word, draft in drafts if any(map(is_own, draft.references))]
     if own:
         _refuse(own if births is None else [*own, BIRTHS, str(births)])
 
@@ -115,7 +112,7 @@ def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
     """
     if not is_campaign(folder):
         allow_plugins_of(folder, is_resumed=True)
-        return (own_experiment(read_details(folder).document),)
+        return (experiment_from_text(read_details(folder).document, is_own=True),)
     allow_kept(folder, campaign_plugins(folder), is_resumed=True)
     experiments = read_campaign(folder).experiments
     for experiment in experiments:
@@ -223,7 +220,7 @@ def check_here(
         kind: name of the kind that the words are of; None: detected.
         output: gets the steps as lines of JSON.
         limit_s: time after which an import or a check ends this process [s].
-        births: as for ``experiments_of``.
+        births: as for ``read_drafts``.
     """
     is_fine = True
 
@@ -270,7 +267,7 @@ def _check_document(
     source: str, kinds: Sequence[Kind], births: int | None, limit_s: float
 ) -> Iterator[str]:
     """Raise what a run would refuse besides own plug-ins; yield warnings."""
-    for experiment in read_experiments((source,), births):
+    for experiment in checked_experiments(read_drafts((source,), births)):
         with _time_limit(limit_s), naming(source):
             check_built_in(experiment, kinds)
             for own in island_experiments(experiment):
@@ -337,7 +334,7 @@ def _uses(
         experiments = (
             _experiments_of(folder)
             if _is_folder(folder)
-            else draft_experiments(word, births)
+            else read_draft(word, births).allowed()
         )
         named = [use for each in experiments for use in uses(each, kinds)]
         return [use for use in dict.fromkeys(named) if is_own(use.path)]

@@ -119,7 +119,7 @@ class RunSession:
                 )
             self._recorder = Recorder(held.path, details, fsync=fsync, seal=held.seal)
             stack.callback(self._recorder.close)
-            self.experiment = experiment_from_text(details.document)
+            self.experiment = experiment_from_text(details.document, is_resumed=True)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None
             self.recovery: PoseRecovery | None = None
             self._events: Sequence[JournalledEvent] = ()

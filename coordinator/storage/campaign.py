@@ -24,12 +24,12 @@ from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.check import naming
 from schema.experiment.document import Experiment
 from schema.experiment.file import (
-    check_source,
+    Draft,
     experiment_from_text,
     experiment_text,
-    experiments_of,
-    shipped_experiments,
+    read_draft,
 )
+from schema.experiment.sources import check_source, shipped_experiments
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
 from schema.plugins.kept import KeptPlugin, keep
 from schema.tables.description import read_small
@@ -82,34 +82,47 @@ def shipped_campaigns() -> dict[str, tuple[str, ...]]:
     }
 
 
-def read_experiments(
-    sources: Sequence[str],
-    births: int | None = None,
-    check: Callable[[Experiment], None] = lambda _experiment: None,
-) -> tuple[Experiment, ...]:
-    """Return the experiments of some names; a campaign stands for its experiments.
+def read_drafts(
+    sources: Sequence[str], births: int | None = None
+) -> list[tuple[str, Draft]]:
+    """Return names and documents; a campaign stands for its experiments.
 
     Args:
         sources: names of shipped experiments or campaigns, or paths to .toml files.
         births: of ``--births``, in place of those of the documents.
-        check: raises ``ExperimentError`` for an experiment that is refused.
 
     Raises:
-        ExperimentError: there is no such experiment, its document is invalid or
-            refused, or two experiments have the same name.
+        ExperimentError: there is no such experiment, or its document is invalid.
     """
     shipped = shipped_campaigns()
     for source in sources:
         check_source(source, [*shipped_experiments(), *shipped])
     words = [word for source in sources for word in shipped.get(source, (source,))]
+    return [(word, read_draft(word, births)) for word in words]
+
+
+def checked_experiments(
+    drafts: Sequence[tuple[str, Draft]],
+    check: Callable[[Experiment], None] = lambda _experiment: None,
+) -> tuple[Experiment, ...]:
+    """Return the experiments of documents that can be runs of one campaign.
+
+    Args:
+        drafts: of ``read_drafts``.
+        check: raises ``ExperimentError`` for an experiment that is refused.
+
+    Raises:
+        ExperimentError: a document is inconsistent or refused, or two experiments have
+            the same name.
+    """
     experiments: list[Experiment] = []
-    for word in words:
-        found = experiments_of(word, births)
+    for word, draft in drafts:
+        own = draft.checked()
         with naming(word):
-            _check_folders(found)
-            for experiment in found:
+            _check_folders(own)
+            for experiment in own:
                 check(experiment)
-        experiments += found
+        experiments += own
     _check_distinct(experiments)
     return tuple(experiments)
 

@@ -30,7 +30,7 @@ from docs.studies.pages import (
     markdown,
 )
 from schema.experiment.document import Experiment
-from schema.experiment.file import own_experiment
+from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import write_robot
@@ -159,7 +159,7 @@ def _outcome(out: Path) -> dict[str, object]:
 def best_robot(out: Path) -> tuple[Experiment, int, Robot]:
     """Return the experiment of a run, and birth and robot of the last best fitness."""
     (one,), _ = read_runs([out])
-    experiment = own_experiment(one.document)
+    experiment = experiment_from_text(one.document, is_own=True)
     alive = last_population(out)
     best = int(np.argmax(alive["fitness"].to_numpy()))
     birth = alive["birth"][best].as_py()

@@ -26,7 +26,6 @@ from schema.experiment.document import (
 from schema.experiment.learning import learning_problems
 from schema.experiment.robust import robust_problems
 from schema.experiment.selection_rules import rule_problems
-from schema.experiment.sweep import sweep_problems
 from schema.parts import BodySpace, Sensor
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
@@ -66,13 +65,6 @@ def naming(where: str) -> Iterator[None]:
 
 def _problems(experiment: Experiment) -> Iterator[str]:
     """Yield what is wrong with an experiment; each check relies on those before it."""
-    if experiment.sweep is not None:
-        yield from sweep_problems(experiment.sweep)
-        if not experiment.sweep.chosen:
-            yield (
-                "sweep: stands for several experiments; only revolve run and "
-                "revolve check take all of them"
-            )
     for where, own in _each_island(experiment):
         for problem in _island_problems(own):
             yield f"{where}{problem}"

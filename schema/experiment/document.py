@@ -38,6 +38,7 @@ from schema.experiment.section import (
 from schema.experiment.sweep import Sweep
 from schema.limits import (
     MOST_GEOMS,
+    MOST_ISLAND_TABLES,
     MOST_ISLANDS,
     MOST_MEASURES,
     MOST_NEURONS,
@@ -505,7 +506,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
     environment: Environment = FLAT
     fitness: Fitness = Fitness()
     arena: Arena | None = None
-    islands: tuple[Islands, ...] = ()
+    islands: Annotated[tuple[Islands, ...], Meta(max_length=MOST_ISLAND_TABLES)] = ()
     migration: Migration | None = None
     measures: Measures = Measures()
     encoding: Encoding = Encoding()

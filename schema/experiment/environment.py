@@ -10,6 +10,7 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
+from schema.errors import cut
 from schema.experiment.section import Count, Extent, Length, Place, Positive, Section
 from schema.limits import MOST_LENGTH_M
 from schema.parts import Vector
@@ -90,20 +91,17 @@ def gravity_vector(environment: Environment, gravity: float) -> Vector:
     return 0.0 + gravity * x, gravity * y, gravity * z
 
 
-def unused_attribute(scenery: str) -> str:
-    """Return the first attribute of scenery that has no effect, or an empty text."""
-    found = _UNUSED.search(scenery)
-    return found[1] if found else ""
-
-
-def too_long(scenery: str) -> str:
-    """Return the first attribute with a length beyond ``MOST_LENGTH_M``, or no text."""
-    for found in _LENGTHS.finditer(scenery):
-        for word in found[1].split():
+def scenery_problem(scenery: str) -> str:
+    """Return what is wrong with attributes of scenery; empty if nothing is."""
+    if unused := _UNUSED.search(scenery):
+        return f"<geom {unused[1]}=...> is not allowed: it has no effect here"
+    for lengths in _LENGTHS.finditer(scenery):
+        for word in lengths[1].split():
             # What is no finite number is refused with its element.
             with suppress(ValueError):
                 if MOST_LENGTH_M < abs(float(word)) < inf:
-                    return found[0].strip()
+                    named = cut(lengths[0].strip())
+                    return f"{named}: lengths must be <= {MOST_LENGTH_M:g} m"
     return ""
 
 

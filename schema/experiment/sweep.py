@@ -1,5 +1,6 @@
 """Sweeps: one document that stands for experiments with different settings."""
 
+import json
 import math
 import random
 from collections.abc import Iterable, Iterator
@@ -9,9 +10,10 @@ from typing import Any
 
 from msgspec import field
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, cut, shown
 from schema.experiment.section import Count, Parameters, PluginSection, Section, Value
 from schema.limits import MOST_SWEEP_POINTS
+from schema.plugins.parameters import read_parameters
 
 Point = dict[str, Any]
 """Values of the settings at one point of a sweep, by their dotted keys."""
@@ -59,6 +61,37 @@ class Sweep(PluginSection, frozen=True):
     samples: Count = 0
     seed: Count = 0
     chosen: Parameters = field(default_factory=dict)
+
+
+def settings_problem(tables: dict[str, Any]) -> str:
+    """Return what is wrong with the values of a sweep's settings; empty if nothing is.
+
+    The errors of ``msgspec`` do not name the setting.
+
+    Args:
+        tables: of the document.
+    """
+    sweep = tables.get("sweep")
+    settings = sweep.get("settings") if isinstance(sweep, dict) else None
+    for key, value in settings.items() if isinstance(settings, dict) else ():
+        name = f"sweep.settings.{json.dumps(cut(key))}"
+        if isinstance(value, dict):
+            inner, first = next(iter(value.items()), ("", None))
+            if isinstance(first, dict | list):
+                return (
+                    f"{name}: a key with dots must be quoted: "
+                    f'settings."{key}.{cut(inner)}" = ...'
+                )
+            try:
+                read_parameters(value, Range, name)
+            except ExperimentError as error:
+                return str(error)
+        elif not isinstance(value, list):
+            return (
+                f"{name}: must be a list, or a range such as {{ low = 1, high = 2, "
+                f"steps = 3 }}, got {shown(value)}"
+            )
+    return ""
 
 
 def sweep_problems(sweep: Sweep) -> Iterator[str]:

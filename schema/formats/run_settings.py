@@ -7,7 +7,7 @@ from pathlib import Path
 from schema.errors import ExperimentError
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, island_experiment, island_experiments
-from schema.experiment.file import own_experiment, read_experiment
+from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.files import (
     BEST,
@@ -125,7 +125,7 @@ def _experiment_of_run(folder: Path) -> Experiment | None:
     if not (folder / DETAILS).is_file():
         return None
     allow_plugins_of(folder)
-    return own_experiment(read_description(folder).document)
+    return experiment_from_text(read_description(folder).document, is_own=True)
 
 
 def _differs(experiment: Experiment) -> bool:

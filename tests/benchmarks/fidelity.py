@@ -33,12 +33,9 @@ from schema.experiment.document import (
     island_experiment,
     steps_of,
 )
-from schema.experiment.file import (
-    experiment_from_tables,
-    own_experiment,
-    parse_toml,
-)
+from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import evaluation_settings_of, lasting
+from schema.experiment.sources import parse_toml
 from schema.plugins.permission import allow
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
@@ -89,7 +86,7 @@ def read_population(folder: Path) -> Population:
     if not runs.num_rows:
         raise RunFolderError(f"{folder}: no run is there, or none that has begun")
     allow_plugins_of(folder)
-    experiment = own_experiment(runs["document"][0].as_py())
+    experiment = experiment_from_text(runs["document"][0].as_py(), is_own=True)
     names = ["island", "birth", "genome", "robot"]
     births = read_table(folder, "births", names).to_pylist()
     born = {(row["island"], row["birth"]): row for row in births}
@@ -215,7 +212,7 @@ def changed(settings: Sequence[str], experiment: Experiment) -> Simulation:
     tables = parse_toml("[simulation]\n" + "\n".join(settings), _AGAINST)
     simulation = msgspec.to_builtins(experiment.simulation) | tables["simulation"]
     tables |= {"name": experiment.name, "simulation": simulation}
-    found = experiment_from_tables(tables, _AGAINST).simulation
+    found = read_experiment(tables, _AGAINST).simulation
     check_experiment(replace(experiment, simulation=found), _AGAINST)
     return found
 

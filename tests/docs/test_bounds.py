@@ -10,11 +10,8 @@ import pytest
 
 from docs.settings_reference import page
 from schema.errors import ExperimentError
-from schema.experiment.file import (
-    experiment_from_tables,
-    experiment_from_text,
-    parse_toml,
-)
+from schema.experiment.file import experiment_from_text, read_experiment
+from schema.experiment.sources import parse_toml
 
 _ROW = re.compile(r"^\| `(\w+)` \| ([^|]*number[^|]*) \|", re.MULTILINE)
 _BOUNDED = re.compile(r"(whole )?number >=? \S+, <=? [^\s,)]+")
@@ -53,7 +50,7 @@ def test_absurd_settings_are_refused_in_one_line(
     keys: dict[str, Any], where: str
 ) -> None:
     with pytest.raises(ExperimentError) as raised:
-        experiment_from_tables({"name": "a", **keys}, "a.toml")
+        read_experiment({"name": "a", **keys}, "a.toml")
     line = str(raised.value)
     assert line.startswith(f"a.toml: {where}")
     assert "<=" in line or ">=" in line
@@ -88,7 +85,7 @@ population_limit = 1_000_000
 cull_interval_s = 1e9
 snapshot_interval_s = 1e9
 """
-    found = experiment_from_tables(parse_toml(text, "a.toml"), "a.toml")
+    found = read_experiment(parse_toml(text, "a.toml"), "a.toml")
     assert found.fitness.limit == 1e99
 
 

@@ -44,7 +44,8 @@ from docs.studies.thesis.data import (
 )
 from docs.studies.thesis.pictures import digest_in, digests
 from docs.studies.thesis.results import tables_of
-from schema.experiment.file import experiments_of, shipped_experiments
+from schema.experiment.file import read_draft
+from schema.experiment.sources import shipped_experiments
 from tests.analysis.drawn import table
 
 STUDIES = ("ablation", "arena_settings", "equal_evaluations", "learners", "tasks",
@@ -93,7 +94,7 @@ def test_kept_rows_are_whole() -> None:
     names = {arena_settings.GRID, arena_settings.CHECK, arena_settings.LIMIT}
     for name in names:
         found = arena_settings.kept(name)
-        points = experiments_of(str(arena_settings.ROWS / f"{name}.toml"))
+        points = read_draft(str(arena_settings.ROWS / f"{name}.toml")).checked()
         for point in points:
             assert point.sweep is not None
             chosen = point.sweep.chosen

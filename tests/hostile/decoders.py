@@ -46,10 +46,7 @@ from schema.errors import (
     RunFolderError,
 )
 from schema.experiment.document import Experiment, body_space
-from schema.experiment.file import (
-    experiment_from_text,
-    experiment_text,
-)
+from schema.experiment.file import experiment_from_text, experiment_text
 from schema.experiment.identity import Origin
 from schema.experiment.settings import (
     arena_settings,

@@ -173,7 +173,7 @@ def _robots(tables: Tables) -> dict[str, Figure]:
     from analysis.figures.pictures import family_tree, gaits  # noqa: PLC0415
     from analysis.figures.robot_pictures import robot_picture  # noqa: PLC0415
     from schema.experiment.document import body_space  # noqa: PLC0415
-    from schema.experiment.file import own_experiment  # noqa: PLC0415
+    from schema.experiment.file import experiment_from_text  # noqa: PLC0415
     from schema.experiment.identity import Origin  # noqa: PLC0415
     from schema.robot.genome import develop  # noqa: PLC0415
     from schema.robot.ids import BirthId  # noqa: PLC0415
@@ -186,7 +186,7 @@ def _robots(tables: Tables) -> dict[str, Figure]:
         details = tables["runs"].filter(
             (pc.field("experiment") == name) & (pc.field("run") == run)
         )
-        experiment = own_experiment(details["document"][0].as_py())
+        experiment = experiment_from_text(details["document"][0].as_py(), is_own=True)
         types = body_space(experiment.space)
         bodies = [
             [part.gene for part in develop(decode_genome(genome), types).parts]

@@ -11,6 +11,7 @@ import pytest
 
 from coordinator.__main__ import plugin_kinds
 from coordinator.plugins.checks import check_apart, check_here, refuse_faulty
+from coordinator.storage.campaign import read_drafts
 from schema.errors import ExperimentError
 from schema.plugins import permission
 from tests.own_brains import write_module
@@ -251,7 +252,7 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
     document.write_text('name = "x"\n[fitness]\nfunction = "refused_lab:f"\n')
     expected = r"^fitness\.function: refused_lab\.py:1: must return a number, got Tr"
     with pytest.raises(ExperimentError, match=expected):
-        refuse_faulty(["scenario1", str(document)])
+        refuse_faulty(read_drafts(["scenario1", str(document)]))
     assert permission.allowed() == ()
 
 

@@ -10,7 +10,7 @@ from coordinator.network.local import LocalAgents
 from coordinator.run.history import arena_history
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
-from schema.experiment.file import experiment_text, experiments_of
+from schema.experiment.file import experiment_text, read_draft
 from worker.arena.world import World
 from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards
@@ -37,7 +37,7 @@ def advanced(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float
     """Return the folder of a run at ``SPEED``, and the arenas' times after 20 s."""
     place = tmp_path_factory.mktemp("clocks")
     (place / "clocks.toml").write_text(DOCUMENT)
-    (document,) = experiments_of(str(place / "clocks.toml"), None)
+    (document,) = read_draft(str(place / "clocks.toml"), None).checked()
     details = RunDetails(document.name, 0, 1, experiment_text(document))
     worker = Jobs(Shards(World))
     fleet = Fleet(

@@ -13,10 +13,11 @@ from coordinator.run.session import RateMeter
 from coordinator.storage.campaign import (
     Campaign,
     check_adopted,
+    checked_experiments,
     is_campaign,
     joined_name,
     read_campaign,
-    read_experiments,
+    read_drafts,
     refuse_used,
     shipped_campaigns,
     write_campaign,
@@ -57,7 +58,9 @@ def test_runs_are_ordered_repeat_by_repeat(tmp_path: Path) -> None:
 
 
 def test_the_thesis_campaign_has_five_experiments() -> None:
-    names = [experiment.name for experiment in read_experiments(["thesis"])]
+    names = [
+        experiment.name for experiment in checked_experiments(read_drafts(["thesis"]))
+    ]
     assert names == list(shipped_campaigns()["thesis"])
     assert set(names) == {
         "scenario1", "scenario2", "scenario3", "no-selection", "no-reproduction",
@@ -122,7 +125,7 @@ def test_a_damaged_campaign_is_refused(tmp_path: Path, text: str) -> None:
 )
 def test_names_must_differ(sources: list[str]) -> None:
     with pytest.raises(ExperimentError, match="must have different names"):
-        read_experiments(sources)
+        checked_experiments(read_drafts(sources))
 
 
 WANTED = RunDetails("scenario1", 1, 5, experiment_text(FIRST))

@@ -7,10 +7,7 @@ import pytest
 from schema.errors import ExperimentError, RevolveError
 from schema.experiment.brains import neuron_kinds, neuron_types
 from schema.experiment.document import NETWORK, BrainSection, Space, references
-from schema.experiment.file import (
-    experiment_from_text,
-    experiment_text,
-)
+from schema.experiment.file import experiment_from_text, experiment_text
 from schema.experiment.settings import evaluation_settings, evaluation_settings_of
 from schema.formats.files import read_robot, write_robot
 from schema.plugins import permission

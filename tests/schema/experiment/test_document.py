@@ -12,7 +12,6 @@ from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
     read_experiment,
-    shipped_experiments,
 )
 from schema.experiment.settings import (
     EvaluationSettings,
@@ -21,6 +20,7 @@ from schema.experiment.settings import (
     read_vetting_settings,
     vetting_settings,
 )
+from schema.experiment.sources import shipped_experiments
 from schema.parts import BUILT_IN
 from tests.documents import check_refused, parse, parse_experiment
 
@@ -288,3 +288,17 @@ def test_unknown_experiment_is_refused() -> None:
 @pytest.mark.parametrize("name", shipped_experiments())
 def test_shipped_experiment_is_well_formed(name: str) -> None:
     check_experiment(read_experiment(name), name)
+
+
+def test_keys_that_no_longer_exist_are_left_out_of_stored_documents() -> None:
+    plain = parse("[[islands]]\ncount = 2\n[islands.variation]\np_swap_subtree = 0.5")
+    text = experiment_text(plain)
+    old = text.replace(
+        '"p_swap_subtree"', '"hidden_rounding":"half-up","p_swap_subtree"'
+    )
+    old = old.replace('"births"', '"gone":[{"a":1}],"births"', 1)
+    assert old.count("hidden_rounding") == 2
+    assert experiment_from_text(old) == plain
+    with pytest.raises(ExperimentError, match="experiment of a run: .* `gone`"):
+        experiment_from_text(old, is_resumed=True)
+    assert experiment_from_text(text, is_resumed=True) == plain

@@ -64,7 +64,10 @@ def test_settings_and_text_round_trip() -> None:
             r"arena.birth_interval: .*'birth_interval_s'\?",
         ),
         ("arena = 3", "arena: must be a table"),
-        ("[arena]\nlight = [nan, 0.0, 1.0]", "arena.light: must be finite, got nan"),
+        (
+            "[arena]\nlight = [nan, 0.0, 1.0]",
+            r"light\[0\]: must be finite, got nan",
+        ),
         ("[arena]\npopulation_limit = 0", "arena.population_limit: .*, got 0"),
         ("[arena]\npopulation_floor = 31", r"limit: must be >= .*, 31, got 30"),
         ("[arena]\npopulation_limit = 14", r"selection.population, 15, got 14"),

@@ -219,32 +219,25 @@ def test_rough_ground_depends_on_the_ground_seed_only() -> None:
 
 
 @pytest.mark.parametrize("name", ["surfacevel", "adhesion", "fluidshape", "fluidcoef"])
-def test_attribute_without_effect_is_refused_in_new_documents_only(
-    name: str, tmp_path: Path
-) -> None:
+def test_attribute_without_effect_is_refused(name: str, tmp_path: Path) -> None:
     """A conveyor belt of MuJoCo 4 would stand still here."""
     scenery = f"<mujoco><worldbody><geom size='1' {name}='1'/></worldbody></mujoco>"
     text = f'name = "x"\n[environment]\nscenery = "{scenery}"\n'
-    message = f"environment.scenery: <geom {name}=...> is not allowed: it has no effect"
-    with pytest.raises(ExperimentError, match=rf"x\.toml: {message}"):
+    message = f"<geom {name}=...> is not allowed: it has no effect"
+    place = r"x\.toml: environment\.scenery"
+    with pytest.raises(ExperimentError, match=f"{place}: {message}"):
         parse_experiment(text, str(tmp_path / "x.toml"))
     (tmp_path / "belt.xml").write_text(scenery)
     beside = 'name = "x"\n[environment]\nscenery = "belt.xml"\n'
-    with pytest.raises(ExperimentError, match=rf"x\.toml: belt\.xml: {message}"):
+    with pytest.raises(ExperimentError, match=rf"{place}: belt\.xml: {message}"):
         parse_experiment(beside, str(tmp_path / "x.toml"))
-    plain = parse_experiment(text.replace(f" {name}='1'", ""), "x.toml")
-    environment = structs.replace(plain.environment, scenery=scenery)
-    old = experiment_text(structs.replace(plain, environment=environment))
-    assert experiment_from_text(old).environment.scenery == scenery
 
 
 @pytest.mark.parametrize(
     "attribute",
     ['size="1e300 1 1"', "pos='0 -1.1e6 1'", 'fromto = "0 0 0 0 0 2e6"'],
 )
-def test_scenery_beyond_the_greatest_length_is_refused_in_new_documents_only(
-    attribute: str,
-) -> None:
+def test_scenery_beyond_the_greatest_length_is_refused(attribute: str) -> None:
     def document(attribute: str) -> str:
         default = '<default><geom size="1 1 1"/></default>'
         inside = f"<worldbody><geom {attribute}/></worldbody>"
@@ -254,11 +247,7 @@ def test_scenery_beyond_the_greatest_length_is_refused_in_new_documents_only(
     message = f"x.toml: environment.scenery: {attribute}: lengths must be <= 1e+06 m"
     with pytest.raises(ExperimentError, match=re.escape(message)):
         parse_experiment(document(attribute), "x.toml")
-    plain = parse_experiment(document('size="1e6 1 1"'), "x.toml")
-    scenery = plain.environment.scenery.replace('size="1e6 1 1"', attribute)
-    environment = structs.replace(plain.environment, scenery=scenery)
-    old = experiment_text(structs.replace(plain, environment=environment))
-    assert experiment_from_text(old).environment.scenery == scenery
+    parse_experiment(document('size="1e6 1 1"'), "x.toml")
 
 
 def test_document_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:

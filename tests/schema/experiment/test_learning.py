@@ -3,9 +3,7 @@
 import pytest
 
 from schema.experiment.document import island_experiment
-from schema.experiment.file import (
-    read_experiment,
-)
+from schema.experiment.file import read_experiment
 from schema.experiment.learning import Learning
 from tests.documents import check_refused, parse
 

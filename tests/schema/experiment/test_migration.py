@@ -6,11 +6,7 @@ import pytest
 
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, island_count, island_experiment
-from schema.experiment.file import (
-    experiment_from_text,
-    experiment_text,
-    experiments_of,
-)
+from schema.experiment.file import experiment_from_text, experiment_text, read_draft
 from schema.experiment.migration import Migration, migrant_count
 from tests.documents import parse_experiment
 
@@ -76,10 +72,10 @@ def test_births_of_a_flag_replace_those_of_each_island(tmp_path: Path) -> None:
     """Those of the document, which the flag replaces, are invalid."""
     text = TWO_KINDS.replace("births = 90", 'births = "x"').replace("= 40", "= 1")
     (tmp_path / "two.toml").write_text(text)
-    (experiment,) = experiments_of(str(tmp_path / "two.toml"), 70)
+    (experiment,) = read_draft(str(tmp_path / "two.toml"), 70).checked()
     assert {island_experiment(experiment, each).births for each in range(5)} == {70}
     with pytest.raises(ExperimentError, match=r"two\.toml with --births 14: .*births"):
-        experiments_of(str(tmp_path / "two.toml"), 14)
+        read_draft(str(tmp_path / "two.toml"), 14).checked()
 
 
 @pytest.mark.parametrize(
@@ -121,7 +117,7 @@ def test_inconsistent_migration_is_refused_in_one_line(
     [
         ('[migration]\ntopology = "ring"', "at least two islands"),
         ("[migration]\nepoch = 30", "unconnected"),
-        ("islands = 3", "must be a table"),
+        ("islands = 3", "islands: must be a list"),
         ("[islands]\ncount = 2", r"must be \[\[islands"),
         ("[[islands]]\n[islands.migration]\nepoch = 3", "migration: is missing"),
         ("[[islands]]\ncount = 0", "count"),

@@ -10,7 +10,7 @@ from schema.errors import ExperimentError
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
-    experiments_of,
+    read_draft,
     read_experiment,
 )
 from schema.experiment.sweep import Range, Sweep, sweep_points
@@ -31,7 +31,7 @@ def _written(folder: Path, text: str) -> str:
 
 
 def test_a_grid_has_all_combinations_the_last_setting_first(tmp_path: Path) -> None:
-    found = experiments_of(_written(tmp_path, GRID))
+    found = read_draft(_written(tmp_path, GRID)).checked()
     assert [each.name for each in found] == [f"small-{number}" for number in range(6)]
     assert [
         (each.selection.population, each.variation.p_duplicate_subtree)
@@ -45,7 +45,7 @@ def test_a_grid_has_all_combinations_the_last_setting_first(tmp_path: Path) -> N
 
 
 def test_an_experiment_of_a_sweep_is_stored_and_read_as_others(tmp_path: Path) -> None:
-    one = experiments_of(_written(tmp_path, GRID))[4]
+    one = read_draft(_written(tmp_path, GRID)).checked()[4]
     assert experiment_from_text(experiment_text(one)) == one
 
 
@@ -124,7 +124,7 @@ def test_parts_of_a_logarithmic_range_grow_by_a_factor() -> None:
 def test_a_wrong_sweep_is_refused(tmp_path: Path, settings: str, message: str) -> None:
     text = f'name = "x"\nbirths = 20\n[sweep.settings]\n{settings}\n'
     with pytest.raises(ExperimentError) as caught:
-        experiments_of(_written(tmp_path, text))
+        read_draft(_written(tmp_path, text)).checked()
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -145,10 +145,10 @@ children = 5
 def test_a_sweep_of_a_setting_that_every_island_replaces_is_refused(
     tmp_path: Path,
 ) -> None:
-    assert len(experiments_of(_written(tmp_path, ISLANDS))) == 2
+    assert len(read_draft(_written(tmp_path, ISLANDS)).checked()) == 2
     own = f"{ISLANDS}[islands.selection]\npopulation = 5\nchildren = 5\n"
     with pytest.raises(ExperimentError, match="sweep: x-0 and x-1 have equal islands"):
-        experiments_of(_written(tmp_path, own))
+        read_draft(_written(tmp_path, own)).checked()
 
 
 def test_a_sweep_is_no_single_experiment(tmp_path: Path) -> None:
