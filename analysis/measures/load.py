@@ -3,7 +3,6 @@
 Everything readable is read; everything else is reported with its folder and the reason.
 """
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +16,7 @@ from pyarrow.parquet import read_schema
 
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.document import Experiment, Selection, island_experiments
-from schema.experiment.file import experiment_from_text
+from schema.experiment.file import experiment_from_text, experiment_text
 from schema.experiment.fitness_keys import fitness_text
 from schema.plugins.source import modules_named
 from schema.tables.columns import TABLES, VERSION
@@ -183,10 +182,9 @@ def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
 
 def _without_births(document: str) -> str:
     """Return a document without numbers of planned births."""
-    entries = json.loads(document)
-    for section in (entries, *(entries.get("islands") or ())):
-        section.pop("births", None)
-    return json.dumps(entries)
+    experiment = experiment_from_text(document)
+    islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
+    return experiment_text(structs.replace(experiment, births=1, islands=islands))
 
 
 def _flaws(run: Run) -> tuple[int, bool, int]:
@@ -218,7 +216,7 @@ def read_run(folder: Path) -> Run:
         islands=tuple(map(_settings, island_experiments(settings))),
         measures=settings.measures.names,
         function=settings.fitness.function,
-        fitness=fitness_text(json.loads(details["document"]), plugins),
+        fitness=fitness_text(settings, plugins),
         plugins=plugins,
         point=point,
     )

@@ -9,6 +9,7 @@ from statistics import fmean, stdev
 from coordinator.cli.status_text import duration, show, table_of
 from coordinator.storage.folder_status import folder_status
 from schema.errors import RevolveError, rounded
+from schema.experiment.file import experiment_from_text
 from schema.experiment.fitness_keys import fitness_text
 from schema.tables.files import read_table
 
@@ -47,9 +48,9 @@ def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome
     try:
         bests = [island.best for island in folder_status(folder).islands]
         (row,) = read_table(folder, "runs").to_pylist()
-        document = json.loads(row["document"])
+        document = experiment_from_text(row["document"])
         function = fitness_text(document)
-        chosen = (document.get("sweep") or {}).get("chosen") or {}
+        chosen = document.sweep.chosen if document.sweep else {}
     except (RevolveError, ValueError):
         return RunOutcome(experiment, has_failed=True)
     return RunOutcome(

@@ -9,7 +9,6 @@ from statistics import fmean
 
 import pyarrow as pa
 import pyarrow.compute as pc
-from msgspec import to_builtins
 
 from coordinator.storage.disk import replace_text, storage_errors
 from coordinator.storage.folder import read_details
@@ -159,7 +158,7 @@ def judged_apart(islands: Iterable[Experiment]) -> list[str]:
     """Return a line if the fitness of different islands cannot be compared."""
     each: dict[str, list[str]] = {}
     for number, own in enumerate(islands):
-        text = fitness_text({"fitness": to_builtins(own.fitness)})
+        text = fitness_text(own)
         text += " in an arena" * (own.arena is not None)
         each.setdefault(text, []).append(str(number))
     if len(each) == 1:

@@ -11,7 +11,7 @@ from typing import Any
 from msgspec import to_builtins
 
 from schema.errors import ExperimentError
-from schema.experiment.document import Fitness
+from schema.experiment.document import Experiment, Fitness, island_experiments
 from schema.experiment.settings import FITNESS, fitness_argument, fitness_function
 from schema.plugins.permission import ROOMS
 from schema.plugins.simple_traces import simple_traces
@@ -81,14 +81,14 @@ def _keys_read(function: Callable[..., float], fitness: Fitness) -> set[str]:
 
 
 def fitness_text(
-    document: Mapping[str, Any], digests: Mapping[str, str] | None = None
+    experiment: Experiment, digests: Mapping[str, str] | None = None
 ) -> str:
     """Return the fitness functions of an experiment, with what changes their values.
 
     Fitness has the same meaning in two experiments if these texts are equal.
 
     Args:
-        document: an experiment as JSON, perhaps of an earlier version.
+        experiment: the document, or that of one island.
         digests: of the sources of plug-ins, by module; None leaves sources out.
 
     Returns:
@@ -96,17 +96,13 @@ def fitness_text(
         (source 6f1d2a)``; several functions of islands with ``and`` between. Keys with
         default values are left out.
     """
-    sections = (
-        each.get("fitness") or document.get("fitness") or {}
-        for each in document.get("islands") or [{}]
-    )
+    sections = (each.fitness for each in island_experiments(experiment))
     return " and ".join(dict.fromkeys(_text(each, digests) for each in sections))
 
 
-def _text(section: Mapping[str, Any], digests: Mapping[str, str] | None) -> str:
-    known = {**_DEFAULTS, **section}
-    function = str(known["function"])
-    notes = list(_changed(known, _DEFAULTS))
+def _text(fitness: Fitness, digests: Mapping[str, str] | None) -> str:
+    function = fitness.function
+    notes = list(_changed(to_builtins(fitness), _DEFAULTS))
     module = function.partition(":")[0].partition(".")[0]
     if digests is not None and ":" in function and module not in ROOMS:
         notes.append(f"source {digests.get(module, 'unknown')}")

@@ -299,6 +299,6 @@ def test_keys_that_no_longer_exist_are_left_out_of_stored_documents() -> None:
     old = old.replace('"births"', '"gone":[{"a":1}],"births"', 1)
     assert old.count("hidden_rounding") == 2
     assert experiment_from_text(old) == plain
-    with pytest.raises(ExperimentError, match="experiment of a run: .* `gone`"):
+    with pytest.raises(ExperimentError, match=r"experiment of a run: .* `gone`"):
         experiment_from_text(old, is_resumed=True)
     assert experiment_from_text(text, is_resumed=True) == plain

@@ -6,10 +6,14 @@ from typing import Any
 import pytest
 
 from schema.experiment.document import Experiment, Fitness, Islands
-from schema.experiment.file import experiment_text
+from schema.experiment.file import experiment_from_text
 from schema.experiment.fitness_keys import fitness_text
 
 OWN: dict[str, Any] = {"function": "goals.fast:speed", "parameters": {"b": 2, "a": [1]}}
+
+
+def stored(document: dict[str, Any]) -> Experiment:
+    return experiment_from_text(json.dumps({"name": "e", **document}))
 
 
 @pytest.mark.parametrize(
@@ -29,15 +33,14 @@ OWN: dict[str, Any] = {"function": "goals.fast:speed", "parameters": {"b": 2, "a
     ],
 )
 def test_functions_by_hand(document: dict[str, Any], expected: str) -> None:
-    assert fitness_text(document, {"goals": "1a"}) == expected
+    assert fitness_text(stored(document), {"goals": "1a"}) == expected
 
 
 def test_sources_may_be_left_out() -> None:
-    assert fitness_text({"fitness": OWN}) == "goals.fast:speed (a = [1], b = 2)"
+    assert fitness_text(stored({"fitness": OWN})) == "goals.fast:speed (a = [1], b = 2)"
 
 
 def test_complete_documents_have_short_texts() -> None:
-    """Default values are left out, also where a document holds them all."""
     both = (Islands(), Islands(fitness=Fitness(path_weight=0.0)))
-    document = json.loads(experiment_text(Experiment("e", islands=both)))
+    document = Experiment("e", islands=both)
     assert fitness_text(document) == "locomotion and locomotion (path_weight = 0.0)"
