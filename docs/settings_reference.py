@@ -10,10 +10,10 @@ from msgspec import Struct
 
 from coordinator.evolution.kinds import KINDS as COORDINATOR_KINDS
 from docs.struct_tables import introduction, linked, rows
-from schema.experiment.calibration import Calibration
 from schema.experiment.document import Experiment, Islands
 from schema.experiment.kinds import KINDS as SCHEMA_KINDS
 from schema.experiment.kinds import Kind
+from schema.experiment.robust import Calibration
 from schema.experiment.section import Section
 from schema.experiment.sweep import Range
 from schema.parts import PartType

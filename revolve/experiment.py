@@ -7,9 +7,9 @@ from typing import Any, Self
 
 import msgspec
 
+from schema.experiment.bounded import parse_toml
 from schema.experiment.document import Experiment as Document
-from schema.experiment.file import read_experiment
-from schema.experiment.sources import parse_toml, source_text
+from schema.experiment.file import read_experiment, source_text
 
 _GIVEN = "experiment"
 """Name of a text without a file, in messages."""

@@ -14,7 +14,7 @@ from schema.agent.flags import (
     positive_number,
     share,
 )
-from schema.experiment.sources import shipped_experiments
+from schema.experiment.file import shipped_experiments
 
 _COMMANDS = {
     "run": (

@@ -25,11 +25,12 @@ from schema.experiment.check import naming
 from schema.experiment.document import Experiment
 from schema.experiment.file import (
     Draft,
+    check_source,
     experiment_from_text,
     experiment_text,
     read_draft,
+    shipped_experiments,
 )
-from schema.experiment.sources import check_source, shipped_experiments
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
 from schema.plugins.kept import KeptPlugin, keep
 from schema.tables.description import read_small

@@ -10,7 +10,7 @@ from coordinator.storage.campaign import shipped_campaigns
 from revolve.cli.commands import COMMANDS
 from revolve.cli.parsers import actions, parser_of, subparsers_of
 from schema.agent.flags import Flags
-from schema.experiment.sources import shipped_experiments
+from schema.experiment.file import shipped_experiments
 
 _SHELLS = {
     "bash": "~/.local/share/bash-completion/completions/revolve",

@@ -1,16 +1,28 @@
 """Texts of other people: read from files and parsed within limits."""
 
 import errno
+import re
+import tomllib
 from math import isfinite
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
+from schema.errors import ExperimentError, nearest, unreadable
 from schema.limits import (
+    MOST_BRACKETS,
     MOST_DEPTH,
+    MOST_DIGITS,
+    MOST_KEY_PARTS,
     MOST_NODES,
     MOST_TEXT_BYTES,
     MOST_XML_ATTRIBUTES,
 )
+
+# ``tomllib`` stores all beginnings of a dotted key. Possessive: without backtracking.
+_KEY_PART = r"""(?:[\w-]++|"(?:[^"\\\n]++|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_LONG_NUMBER = re.compile(rf"(?<!\w)[0-9][0-9A-Fa-f_xob]{{{MOST_DIGITS}}}")
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_KEY_PART}){{{MOST_KEY_PARTS}}}")
 
 
 def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
@@ -28,6 +40,59 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     if len(data) > most:
         raise OSError(errno.EFBIG, f"must have <= {most} bytes, got more")
     return data
+
+
+def text_of(path: Path, where: str, near: str = "") -> str:
+    """Return the text of a user's file.
+
+    Args:
+        path: of the file.
+        where: begins the message of an error.
+        near: ends it if the file is missing.
+
+    Raises:
+        ExperimentError: the file cannot be read, is too large, or is no text.
+    """
+    try:
+        # With the byte order mark of editors of Windows.
+        return read_bytes(path).decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        ending = near if isinstance(error, FileNotFoundError) else ""
+        raise ExperimentError(f"{where}: {unreadable(error)}{ending}") from None
+
+
+def near_files(missing: Path) -> str:
+    """Return ``; did you mean 'x'?`` for a TOML file with a similar name beside it."""
+    return nearest(str(missing), [str(each) for each in missing.parent.glob("*.toml")])
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Return the document of a TOML text.
+
+    Raises:
+        ExperimentError: not TOML, too long, nested too deeply, or a key of too many
+            parts.
+    """
+    if len(text) > MOST_TEXT_BYTES:
+        raise ExperimentError(
+            f"{where}: must have <= {MOST_TEXT_BYTES} characters, got {len(text)}"
+        )
+    if (brackets := text.count("[")) > MOST_BRACKETS:
+        raise ExperimentError(
+            f"{where}: must have <= {MOST_BRACKETS} lists and tables, got {brackets}"
+        )
+    if _LONG_KEY.search(text):
+        raise ExperimentError(f"{where}: a key must have <= {MOST_KEY_PARTS} parts")
+    if _LONG_NUMBER.search(text):
+        raise ExperimentError(f"{where}: a number must have <= {MOST_DIGITS} digits")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ExperimentError(f"{where}: not valid TOML: nested too deeply") from None
+    except ValueError as error:
+        # Too long an integer is no TOMLDecodeError.
+        reason = str(error).partition(";")[0]
+        raise ExperimentError(f"{where}: not valid TOML: {reason}") from None
 
 
 def parse_xml(

@@ -7,7 +7,6 @@ from urllib.parse import quote
 
 from schema.errors import ExperimentError, nearest, shown
 from schema.experiment.brains import neuron_kinds
-from schema.experiment.calibration import calibration_problems, delay_problems
 from schema.experiment.check_migration import migration_problems
 from schema.experiment.check_world import world_problems
 from schema.experiment.document import (
@@ -24,7 +23,11 @@ from schema.experiment.document import (
     steps_of,
 )
 from schema.experiment.learning import learning_problems
-from schema.experiment.robust import robust_problems
+from schema.experiment.robust import (
+    calibration_problems,
+    delay_problems,
+    robust_problems,
+)
 from schema.experiment.selection_rules import rule_problems
 from schema.parts import BodySpace, Sensor
 

@@ -14,11 +14,10 @@ from typing import Annotated, Literal
 from msgspec import Meta, field, structs, to_builtins
 
 from schema.errors import ExperimentError
-from schema.experiment.calibration import Calibration
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
-from schema.experiment.robust import NoiseLevel, Robust
+from schema.experiment.robust import Calibration, NoiseLevel, Robust
 from schema.experiment.section import (
     Angle,
     AtLeastOne,

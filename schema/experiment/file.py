@@ -1,21 +1,20 @@
 """The way in for experiments: TOML of users, and JSON that run folders hold."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from copy import deepcopy
 from functools import lru_cache
+from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-from msgspec.structs import replace
 
-from schema.errors import ExperimentError, shown
+from schema.errors import ExperimentError, nearest
+from schema.experiment.bounded import near_files, parse_toml, text_of
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Experiment, island_experiments, references
-from schema.experiment.sources import parse_toml, source_text
-from schema.experiment.sweep import Point, sweep_points, sweep_problems, with_point
-from schema.experiment.tables import Tables, converted, known_keys
+from schema.experiment.document import Experiment, references
+from schema.experiment.sweep import sweep_problems
+from schema.experiment.tables import Tables, at_point, converted, known_keys, swept
 from schema.plugins.permission import allow_references
 
 
@@ -54,7 +53,7 @@ class Draft(NamedTuple):
             ExperimentError: inconsistent values, at any point of the sweep.
         """
         for experiment in self.allowed():
-            with _at_point(experiment.sweep.chosen if experiment.sweep else {}):
+            with at_point(experiment.sweep.chosen if experiment.sweep else {}):
                 check_experiment(experiment, self.where)
         return self.experiments
 
@@ -92,7 +91,7 @@ def read_draft(
         return Draft((whole,), place)
     if births is not None and "births" in whole.sweep.settings:
         raise ExperimentError(f"{where}: --births: the sweep changes births itself")
-    return Draft(_swept(whole, tables, where), place)
+    return Draft(swept(whole, tables, where), place)
 
 
 def read_experiment(source: str | Tables, where: str = "") -> Experiment:
@@ -115,6 +114,64 @@ def read_experiment(source: str | Tables, where: str = "") -> Experiment:
             "and revolve check take all of them"
         )
     return draft.checked()[0]
+
+
+def source_text(source: str) -> tuple[str, str]:
+    """Return the TOML text of an experiment, and its path for ``parse_toml``.
+
+    Args:
+        source: as for ``read_experiment``.
+
+    Raises:
+        ExperimentError: no such experiment or file.
+    """
+    if source.endswith(".toml"):
+        path = Path(source)
+        near = near_files(path)
+        if not path.exists() and path.stem in shipped_experiments():
+            near = f"; did you mean {path.stem!r}, which is shipped?"
+        return text_of(path, source, near), source
+    check_source(source, shipped_experiments())
+    folder = resources.files("schema.experiment") / "shipped"
+    return (folder / f"{source}.toml").read_text(encoding="utf-8"), f"{source}.toml"
+
+
+def check_source(source: str, shipped: Collection[str]) -> None:
+    """Raise unless a source is the path of a TOML file or a shipped name.
+
+    Raises:
+        ExperimentError: neither; the message names the nearest, or says what a path
+            of another kind leads to.
+    """
+    if source.endswith(".toml") or source in shipped:
+        return
+    path = Path(source)
+    if path.is_dir():
+        raise ExperimentError(
+            f"{source}: is a folder; an experiment is a .toml file or a shipped name"
+        )
+    beside = f"{source}.toml"
+    if path.is_file() or (path.suffix and not Path(beside).is_file()):
+        and_missing = "" if path.is_file() else ", and there is no such file"
+        raise ExperimentError(
+            f"{source}: the file of an experiment must end in .toml, got "
+            f"{path.suffix!r}{and_missing}{'' if path.is_file() else near_files(path)}"
+        )
+    near = nearest(source, [*shipped, *([beside] if Path(beside).is_file() else ())])
+    raise ExperimentError(
+        f"{source}: no such experiment{near}; shipped are {', '.join(shipped)}, or "
+        "give a path to a .toml file"
+    )
+
+
+def shipped_experiments() -> list[str]:
+    """Return the names of the experiments that come with the package."""
+    folder = resources.files("schema.experiment") / "shipped"
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".toml")
+    )
 
 
 def experiment_text(experiment: Experiment) -> str:
@@ -165,46 +222,3 @@ def _with_births(tables: Tables, births: int) -> Tables:
             for each in islands
         ]
     return changed
-
-
-def _swept(whole: Experiment, tables: Tables, where: str) -> tuple[Experiment, ...]:
-    """Return the experiments of a sweep."""
-    assert whole.sweep is not None
-    try:
-        points = sweep_points(whole.sweep)
-    except ExperimentError as error:
-        raise ExperimentError(f"{where}: {error}") from None
-    width = len(str(len(points) - 1))
-    experiments = []
-    for number, point in enumerate(points):
-        with _at_point(point):
-            name = f"{whole.name}-{number:0{width}}"
-            experiments.append(converted(with_point(tables, point, name), where))
-    _refuse_equal(experiments, where)
-    return tuple(experiments)
-
-
-def _refuse_equal(experiments: Sequence[Experiment], where: str) -> None:
-    """Raise if every island replaces what the experiments of a sweep differ in."""
-    first: dict[bytes, str] = {}
-    for experiment in experiments:
-        islands = island_experiments(experiment)
-        plain = [replace(each, name="", sweep=None) for each in islands]
-        known = first.setdefault(msgspec.json.encode(plain), experiment.name)
-        if known != experiment.name:
-            raise ExperimentError(
-                f"{where}: sweep: {known} and {experiment.name} have equal islands: "
-                "[[islands]] replace the swept settings"
-            )
-
-
-@contextmanager
-def _at_point(point: Point) -> Iterator[None]:
-    """Add the values of a sweep's point to the message of an error."""
-    try:
-        yield
-    except ExperimentError as error:
-        if not point:
-            raise
-        values = ", ".join(f"{key} = {shown(value)}" for key, value in point.items())
-        raise ExperimentError(f"{error}; in the sweep at {values}") from error

@@ -8,7 +8,6 @@ import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
-from schema.experiment.calibration import Calibration
 from schema.experiment.document import (
     NETWORK,
     Arena,
@@ -30,7 +29,7 @@ from schema.experiment.environment import (
     ground_problems,
 )
 from schema.experiment.identity import Origin
-from schema.experiment.robust import Robust, robust_problems
+from schema.experiment.robust import Calibration, Robust, robust_problems
 from schema.experiment.section import Count, Section
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Vector

@@ -1,19 +1,21 @@
 """Conversion of an experiment's tables, which a user wrote, to its sections."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from schema.errors import ExperimentError, cut, expectation, nearest, shown
-from schema.experiment.document import Experiment, island_count
+from schema.experiment.bounded import near_files, parse_toml, text_of
+from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.environment import is_mjcf, scenery_problem
-from schema.experiment.sources import near_files, parse_toml, text_of
-from schema.experiment.sweep import settings_problem
+from schema.experiment.sweep import Point, settings_problem, sweep_points, with_point
 from schema.limits import MOST_ISLANDS
 
 Tables = dict[str, Any]
@@ -54,6 +56,58 @@ def converted(tables: Tables, where: str) -> Experiment:
             f"{island_count(experiment)}"
         )
     return experiment
+
+
+def swept(whole: Experiment, tables: Tables, where: str) -> tuple[Experiment, ...]:
+    """Return the experiments of a sweep.
+
+    Args:
+        whole: the converted document, with the sweep.
+        tables: of the document.
+        where: as of ``converted``.
+
+    Raises:
+        ExperimentError: as of ``converted``; too many points, or equal ones.
+    """
+    assert whole.sweep is not None
+    try:
+        points = sweep_points(whole.sweep)
+    except ExperimentError as error:
+        raise ExperimentError(f"{where}: {error}") from None
+    width = len(str(len(points) - 1))
+    experiments = []
+    for number, point in enumerate(points):
+        with at_point(point):
+            name = f"{whole.name}-{number:0{width}}"
+            experiments.append(converted(with_point(tables, point, name), where))
+    _refuse_equal(experiments, where)
+    return tuple(experiments)
+
+
+def _refuse_equal(experiments: Sequence[Experiment], where: str) -> None:
+    """Raise if every island replaces what the experiments of a sweep differ in."""
+    first: dict[bytes, str] = {}
+    for experiment in experiments:
+        islands = island_experiments(experiment)
+        plain = [replace(each, name="", sweep=None) for each in islands]
+        known = first.setdefault(msgspec.json.encode(plain), experiment.name)
+        if known != experiment.name:
+            raise ExperimentError(
+                f"{where}: sweep: {known} and {experiment.name} have equal islands: "
+                "[[islands]] replace the swept settings"
+            )
+
+
+@contextmanager
+def at_point(point: Point) -> Iterator[None]:
+    """Add the values of a sweep's point to the message of an error."""
+    try:
+        yield
+    except ExperimentError as error:
+        if not point:
+            raise
+        values = ", ".join(f"{key} = {shown(value)}" for key, value in point.items())
+        raise ExperimentError(f"{error}; in the sweep at {values}") from error
 
 
 def known_keys(value: Any, kind: Any) -> Any:  # noqa: ANN401 - any tree of plain values

@@ -26,6 +26,7 @@ from schema.errors import (
     SensorFailed,
     SimulationDiverged,
 )
+from schema.experiment.bounded import parse_toml
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     Experiment,
@@ -35,7 +36,6 @@ from schema.experiment.document import (
 )
 from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import evaluation_settings_of, lasting
-from schema.experiment.sources import parse_toml
 from schema.plugins.permission import allow
 from schema.robot.results import Floats
 from schema.robot.robot import Robot

@@ -10,8 +10,8 @@ import pytest
 
 from docs.settings_reference import page
 from schema.errors import ExperimentError
+from schema.experiment.bounded import parse_toml
 from schema.experiment.file import experiment_from_text, read_experiment
-from schema.experiment.sources import parse_toml
 
 _ROW = re.compile(r"^\| `(\w+)` \| ([^|]*number[^|]*) \|", re.MULTILINE)
 _BOUNDED = re.compile(r"(whole )?number >=? \S+, <=? [^\s,)]+")

@@ -44,8 +44,7 @@ from docs.studies.thesis.data import (
 )
 from docs.studies.thesis.pictures import digest_in, digests
 from docs.studies.thesis.results import tables_of
-from schema.experiment.file import read_draft
-from schema.experiment.sources import shipped_experiments
+from schema.experiment.file import read_draft, shipped_experiments
 from tests.analysis.drawn import table
 
 STUDIES = ("ablation", "arena_settings", "equal_evaluations", "learners", "tasks",

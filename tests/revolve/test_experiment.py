@@ -13,8 +13,8 @@ from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
     read_experiment,
+    shipped_experiments,
 )
-from schema.experiment.sources import shipped_experiments
 
 
 @pytest.mark.parametrize("name", shipped_experiments())

@@ -7,7 +7,7 @@ import pytest
 
 from revolve.cli.commands import COMMANDS
 from revolve.cli.completion import main
-from schema.experiment.sources import shipped_experiments
+from schema.experiment.file import shipped_experiments
 
 pytestmark = pytest.mark.system
 

@@ -10,9 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import Fitness
-from schema.experiment.file import read_experiment
+from schema.experiment.file import read_experiment, shipped_experiments
 from schema.experiment.settings import FITNESS, fitness_argument, fitness_function
-from schema.experiment.sources import shipped_experiments
 from schema.robot.results import Floats
 from schema.robot.trace import Trace
 from worker.fitness import thesis

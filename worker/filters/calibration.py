@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from schema.experiment.calibration import IDEAL, Calibration, Response
+from schema.experiment.robust import IDEAL, Calibration, Response
 from schema.parts import BodySpace
 from schema.robot.brain import Widths
 from schema.robot.results import Floats

@@ -23,8 +23,7 @@ from coordinator.islands.events import (
 from coordinator.islands.island import Island
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, Selection, body_space
-from schema.experiment.file import read_experiment
-from schema.experiment.sources import shipped_experiments
+from schema.experiment.file import read_experiment, shipped_experiments
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation

@@ -6,9 +6,8 @@ import pytest
 
 from coordinator.plugins.cost import cost_line, evaluation_cost
 from schema.experiment.document import island_experiments
-from schema.experiment.file import read_experiment
+from schema.experiment.file import read_experiment, shipped_experiments
 from schema.experiment.settings import evaluation_settings_of
-from schema.experiment.sources import shipped_experiments
 from schema.robot.robot import Robot
 from tests.documents import parse_experiment
 from worker.robot.evaluation import evaluate

@@ -12,6 +12,7 @@ from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
     read_experiment,
+    shipped_experiments,
 )
 from schema.experiment.settings import (
     EvaluationSettings,
@@ -20,7 +21,6 @@ from schema.experiment.settings import (
     read_vetting_settings,
     vetting_settings,
 )
-from schema.experiment.sources import shipped_experiments
 from schema.parts import BUILT_IN
 from tests.documents import check_refused, parse, parse_experiment
 

@@ -7,9 +7,9 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
-from schema.experiment.calibration import Calibration, Response
 from schema.experiment.document import Fitness, Simulation, Space, body_space
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
+from schema.experiment.robust import Calibration, Response
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
