@@ -25,9 +25,6 @@ _DEFAULTS: dict[str, Any] = to_builtins(Fitness())
 def check_fitness_keys(fitness: Fitness) -> None:
     """Raise if a key that was changed has no effect.
 
-    A run that was started before this check keeps its keys: it is not part of
-    ``check_experiment``.
-
     Args:
         fitness: the section; its function is called.
 
