@@ -1,29 +1,23 @@
 """Conversion of an experiment's tables, which a user wrote, to its sections."""
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from math import isfinite
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
 import msgspec
-from msgspec import Struct
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, cut, expectation, nearest, shown
+from schema.errors import ExperimentError, cut, shown
 from schema.experiment.bounded import near_files, parse_toml, text_of
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.environment import is_mjcf, scenery_problem
 from schema.experiment.sweep import Point, settings_problem, sweep_points, with_point
 from schema.limits import MOST_ISLANDS
+from schema.plugins.parameters import keys_of, read_parameters
 
 Tables = dict[str, Any]
 """Tables of a TOML text."""
-
-_LISTS = ("islands", "calibration")
-"""Keys that are lists of tables."""
-_UNKNOWN = re.compile("Object contains unknown field `(.*)`")
 
 
 def converted(tables: Tables, where: str) -> Experiment:
@@ -40,16 +34,9 @@ def converted(tables: Tables, where: str) -> Experiment:
     """
     if problem := settings_problem(tables):
         raise ExperimentError(f"{where}: {problem}")
-    for path, number in _numbers(tables):
-        if not isfinite(number):
-            raise ExperimentError(f"{where}: {path}: must be finite, got {number}")
     _read_calibration(tables, where)
     _read_scenery(tables, where)
-    complete = _completed(tables)
-    try:
-        experiment = msgspec.convert(complete, type=Experiment)
-    except msgspec.ValidationError as error:
-        raise ExperimentError(f"{where}: {_explain(error, complete)}") from None
+    experiment = read_parameters(_completed(tables), Experiment, where, ": ")
     if island_count(experiment) > MOST_ISLANDS:
         raise ExperimentError(
             f"{where}: islands: must be <= {MOST_ISLANDS} islands, got "
@@ -117,27 +104,14 @@ def known_keys(value: Any, kind: Any) -> Any:  # noqa: ANN401 - any tree of plai
         value: of a key of the annotation ``kind``.
         kind: a section, or any annotation.
     """
-    section = _section(kind)
     if isinstance(value, list):
         return [known_keys(each, kind) for each in value]
-    if section is None or not isinstance(value, dict):
+    kinds = keys_of(kind)
+    if not kinds or not isinstance(value, dict):
         return value
-    kinds = {field.encode_name: field.type for field in msgspec.structs.fields(section)}
     return {
         key: known_keys(each, kinds[key]) for key, each in value.items() if key in kinds
     }
-
-
-def _numbers(value: Any, path: str = "") -> Iterator[tuple[str, float]]:  # noqa: ANN401
-    """Yield path and value of each float in a tree of plain values."""
-    if isinstance(value, float):
-        yield path, value
-    elif isinstance(value, dict):
-        for key, each in value.items():
-            yield from _numbers(each, f"{path}.{cut(key)}" if path else cut(key))
-    elif isinstance(value, list):
-        for at, each in enumerate(value):
-            yield from _numbers(each, f"{path}[{at}]")
 
 
 def _read_calibration(tables: Tables, where: str) -> None:
@@ -196,56 +170,3 @@ def _tables_of(value: object) -> list[Tables]:
     """Return the tables in a list; none if it is another value."""
     found = value if isinstance(value, list) else []
     return [each for each in found if isinstance(each, dict)]
-
-
-def _section(kind: Any) -> type[Struct] | None:  # noqa: ANN401 - any annotation
-    """Return the section type of an annotation; None if it is a plain value."""
-    if isinstance(kind, type) and issubclass(kind, Struct):
-        return kind
-    inner = () if get_origin(kind) is dict else get_args(kind)
-    return next(filter(None, map(_section, inner)), None)
-
-
-def _explain(error: msgspec.ValidationError, tables: Tables) -> str:
-    """Return the message of msgspec as ``key: expected, got value``."""
-    message, _, path = str(error).partition(" - at `$.")
-    key = path.rstrip("`")
-    value: Any = tables
-    kind: Any = Experiment
-    for name in key.split(".") if key else ():
-        word, *places = name.replace("]", "").split("[")
-        fields = _fields(kind)
-        value = value.get(word) if isinstance(value, dict) else None
-        kind = fields.get(word)
-        for place in places:
-            value = value[int(place)] if isinstance(value, list) else None
-    if unknown := _UNKNOWN.fullmatch(message):
-        return _no_such_key(unknown[1], key, list(_fields(kind)))
-    message = expectation(message)
-    if not key:
-        return message
-    if key in _LISTS and isinstance(value, dict):
-        return f"{key}: must be [[{key}]], got [{key}]"
-    choices = get_args(kind) if get_origin(kind) is Literal else ()
-    if not choices:
-        return f"{key}: {message.partition(', got ')[0]}, got {shown(value)}"
-    allowed = ", ".join(map(repr, choices))
-    return (
-        f"{key}: must be one of {allowed}, got {shown(value)}{nearest(value, choices)}"
-    )
-
-
-def _no_such_key(unknown: str, section: str, known: list[str]) -> str:
-    prefix = f"{section}." if section else ""
-    own = f"; those of a plug-in are in [{prefix}parameters]"
-    return (
-        f"{prefix}{cut(unknown)}: no such key{nearest(unknown, known)}; allowed: "
-        f"{', '.join(known)}{own if 'parameters' in known else ''}"
-    )
-
-
-def _fields(kind: Any) -> dict[str, Any]:  # noqa: ANN401 - any annotation
-    """Return the annotations of a section's keys; none if it is no section."""
-    section = _section(kind)
-    fields = msgspec.structs.fields(section) if section else ()
-    return {field.encode_name: field.type for field in fields}

@@ -1,46 +1,54 @@
-"""Parameters of plug-ins: tables of an experiment, read as the plug-in's own Struct."""
+"""Tables of an experiment as Structs: sections, and parameters of plug-ins."""
 
 import inspect
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
-from schema.errors import ExperimentError, cut, expectation, nearest
+from schema.errors import ExperimentError, cut, expectation, nearest, shown
 
 T = TypeVar("T", bound=msgspec.Struct)
 
+_UNKNOWN = re.compile("Object contains unknown field `(.*)`")
 
-def read_parameters(table: Mapping[str, Any], kind: type[T], where: str) -> T:
-    """Return a plug-in's parameters as its own Struct.
+
+def read_parameters(
+    table: Mapping[str, Any], kind: type[T], where: str, separator: str = "."
+) -> T:
+    """Return a table of a user's document as a Struct.
 
     Args:
-        table: of the experiment.
-        kind: the Struct that the plug-in declares; its defaults complete the table.
-        where: the table's key, for messages, as ``fitness.parameters``.
+        table: of the document.
+        kind: of the section, or that a plug-in declares; its defaults complete the
+            table.
+        where: begins messages: the table's key, as ``fitness.parameters``, or the path
+            of the document.
+        separator: stands in messages between ``where`` and a key.
 
     Raises:
-        ExperimentError: an unknown or missing key, a value of another type or outside
-            its range, or a number that is not finite.
+        ExperimentError: an unknown key (the nearest is named) or a missing one, a value
+            of another type or outside its range, or a number that is not finite.
     """
-    names = [field.encode_name for field in msgspec.structs.fields(kind)]
-    for name in table:
-        if name not in names:
-            allowed = ", ".join(names) or "none"
+    known = list(keys_of(kind))
+    # A plug-in's own Struct may ignore unknown keys.
+    for key in table:
+        if key not in known:
+            raise ExperimentError(f"{where}{separator}{_no_such_key(key, '', known)}")
+    for path, number in _numbers(table):
+        if not math.isfinite(number):
             raise ExperimentError(
-                f"{where}.{cut(name)}: no such key{nearest(name, names)}; "
-                f"allowed: {allowed}"
+                f"{where}{separator}{path}: must be finite, got {number}"
             )
-    if path := _not_finite(table):
-        raise ExperimentError(f"{where}.{path}: must be finite")
     try:
         return msgspec.convert(dict(table), kind)
     except msgspec.ValidationError as error:
         message, _, path = str(error).partition(" - at `$.")
-        raise ExperimentError(
-            f"{where}{'.' if path else ''}{path.rstrip('`')}: {expectation(message)}"
-        ) from None
+        key = path.rstrip("`")
+        why = _explain(message, key, *_at(table, kind, key))
+        raise ExperimentError(f"{where}{separator if key else ': '}{why}") from None
 
 
 def parameters_type(
@@ -70,18 +78,63 @@ def parameters_type(
     return kind if is_struct else None
 
 
-def _not_finite(value: object) -> str:
-    """Return the path of a number that is not finite, or an empty text."""
-    inner: Mapping[Any, Any]
-    if isinstance(value, Mapping):
-        inner = value
+def section_of(kind: Any) -> type[msgspec.Struct] | None:  # noqa: ANN401 - any annotation
+    """Return the section type of an annotation; None if it is a plain value."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        return kind
+    inner = () if get_origin(kind) is dict else get_args(kind)
+    return next(filter(None, map(section_of, inner)), None)
+
+
+def keys_of(kind: Any) -> dict[str, Any]:  # noqa: ANN401 - any annotation
+    """Return the annotations of a section's keys; none if it is no section."""
+    section = section_of(kind)
+    fields = msgspec.structs.fields(section) if section else ()
+    return {field.encode_name: field.type for field in fields}
+
+
+def _numbers(value: object, path: str = "") -> Iterator[tuple[str, float]]:
+    """Yield path and value of each float in a tree of plain values."""
+    if isinstance(value, float):
+        yield path, value
+    elif isinstance(value, Mapping):
+        for key, each in value.items():
+            yield from _numbers(each, f"{path}.{cut(key)}" if path else cut(key))
     elif isinstance(value, list | tuple):
-        inner = dict(enumerate(value))
-    else:
-        return ""
-    for name, each in inner.items():
-        if isinstance(each, float) and not math.isfinite(each):
-            return str(name)
-        if path := _not_finite(each):
-            return f"{name}.{path}"
-    return ""
+        for at, each in enumerate(value):
+            yield from _numbers(each, f"{path}[{at}]")
+
+
+def _at(table: Mapping[str, Any], kind: Any, key: str) -> tuple[Any, Any]:  # noqa: ANN401
+    """Return the value and the annotation at a dotted key, as msgspec names it."""
+    value: Any = table
+    for name in key.split(".") if key else ():
+        word, *places = name.replace("]", "").split("[")
+        value = value.get(word) if isinstance(value, Mapping) else None
+        kind = keys_of(kind).get(word)
+        for place in places:
+            value = value[int(place)] if isinstance(value, list) else None
+    return value, kind
+
+
+def _explain(message: str, key: str, value: Any, kind: Any) -> str:  # noqa: ANN401
+    """Return a message of msgspec as ``key: expected, got value``."""
+    if unknown := _UNKNOWN.fullmatch(message):
+        return _no_such_key(unknown[1], f"{key}.", list(keys_of(kind)))
+    wanted = expectation(message).partition(", got ")[0]
+    if not key:
+        return wanted
+    if isinstance(value, Mapping) and wanted.startswith("must be a list"):
+        return f"{key}: must be [[{key}]], got [{key}]"
+    choices = get_args(kind) if get_origin(kind) is Literal else ()
+    if choices:
+        wanted = f"must be one of {', '.join(map(repr, choices))}"
+    return f"{key}: {wanted}, got {shown(value)}{nearest(value, choices)}"
+
+
+def _no_such_key(name: str, prefix: str, known: list[str]) -> str:
+    own = f"; those of a plug-in are in [{prefix}parameters]"
+    return (
+        f"{prefix}{cut(name)}: no such key{nearest(name, known)}; allowed: "
+        f"{', '.join(known) or 'none'}{own if 'parameters' in known else ''}"
+    )

@@ -248,7 +248,7 @@ def test_wrong_names_and_parameters_are_refused_in_one_line() -> None:
     )
     for table, error in (
         ({"directoin": "left"}, "no such key; did you mean 'direction'?"),
-        ({"direction": "up"}, "fitness.parameters.direction: Invalid enum value 'up'"),
+        ({"direction": "up"}, "fitness.parameters.direction: must be one of 'either'"),
         ({"wander_weight": -1.0}, "fitness.parameters.wander_weight: must be a number"),
     ):
         fitness = Fitness(function="turning", parameters=table)

@@ -25,9 +25,9 @@ def test_defaults_complete_the_table() -> None:
         ({"radius": 1.0, "spoke": 3}, "w.spoke: no such key; did you mean 'spokes'?"),
         ({}, "w: must have a key 'radius'"),
         ({"radius": -1.0}, "w.radius: must be a number > 0.0"),
-        ({"radius": "x"}, "w.radius: must be a number, got a text"),
+        ({"radius": "x"}, "w.radius: must be a number, got 'x'"),
         ({"radius": float("nan")}, "w.radius: must be finite"),
-        ({"radius": 1.0, "spokes": [0, {"a": float("inf")}]}, "w.spokes.1.a: must be"),
+        ({"radius": 1.0, "spokes": [0, {"a": float("inf")}]}, "w.spokes[1].a: must be"),
     ],
 )
 def test_wrong_parameters_are_named(table: dict[str, Any], message: str) -> None:
