@@ -34,7 +34,7 @@ from schema.experiment.section import Count, Section
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Vector
 from schema.plugins.load import load_function, unknown
-from schema.plugins.parameters import parameters_type, read_parameters
+from schema.plugins.parameters import known_keys, parameters_type, read_parameters
 
 T = TypeVar("T")
 
@@ -192,7 +192,7 @@ def read_vetting_settings(settings: bytes) -> VettingSettings:
 
 @lru_cache(maxsize=64)
 def read_evaluation_settings(settings: bytes) -> EvaluationSettings:
-    """Return the settings of an evaluation request.
+    """Return the settings of an evaluation request, or of a robot file.
 
     Raises:
         ExperimentError: the bytes are not such settings.
@@ -201,14 +201,18 @@ def read_evaluation_settings(settings: bytes) -> EvaluationSettings:
 
 
 def _from_json(settings: bytes, kind: type[T]) -> T:
-    """Return settings; what an experiment may not have is refused here, too."""
+    """Return settings; what an experiment may not have is refused here, too.
+
+    Keys that no longer exist, as in robot files of earlier versions, are left out.
+    """
     where = "settings of a request"
     if len(settings) > MOST_SETTINGS_BYTES:
         raise ExperimentError(
             f"{where}: must have <= {MOST_SETTINGS_BYTES} bytes, got {len(settings)}"
         )
     try:
-        found = msgspec.json.decode(settings, type=kind)
+        known = known_keys(msgspec.json.decode(settings), kind)
+        found = msgspec.convert(known, kind)
     except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise ExperimentError(f"{where}: {error}") from None
     environment = getattr(found, "environment", FLAT)

@@ -14,7 +14,7 @@ from schema.experiment.document import Experiment, island_count, island_experime
 from schema.experiment.environment import is_mjcf, scenery_problem
 from schema.experiment.sweep import Point, settings_problem, sweep_points, with_point
 from schema.limits import MOST_ISLANDS
-from schema.plugins.parameters import keys_of, read_parameters
+from schema.plugins.parameters import read_parameters
 
 Tables = dict[str, Any]
 """Tables of a TOML text."""
@@ -95,23 +95,6 @@ def at_point(point: Point) -> Iterator[None]:
             raise
         values = ", ".join(f"{key} = {shown(value)}" for key, value in point.items())
         raise ExperimentError(f"{error}; in the sweep at {values}") from error
-
-
-def known_keys(value: Any, kind: Any) -> Any:  # noqa: ANN401 - any tree of plain values
-    """Return a value of a stored document without keys that its sections lack.
-
-    Args:
-        value: of a key of the annotation ``kind``.
-        kind: a section, or any annotation.
-    """
-    if isinstance(value, list):
-        return [known_keys(each, kind) for each in value]
-    kinds = keys_of(kind)
-    if not kinds or not isinstance(value, dict):
-        return value
-    return {
-        key: known_keys(each, kinds[key]) for key, each in value.items() if key in kinds
-    }
 
 
 def _read_calibration(tables: Tables, where: str) -> None:

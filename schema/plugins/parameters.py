@@ -78,6 +78,23 @@ def parameters_type(
     return kind if is_struct else None
 
 
+def known_keys(value: Any, kind: Any) -> Any:  # noqa: ANN401 - any tree of plain values
+    """Return a value of a stored document without keys that its sections lack.
+
+    Args:
+        value: of a key of the annotation ``kind``.
+        kind: a section, or any annotation.
+    """
+    if isinstance(value, list):
+        return [known_keys(each, kind) for each in value]
+    kinds = keys_of(kind)
+    if not kinds or not isinstance(value, dict):
+        return value
+    return {
+        key: known_keys(each, kinds[key]) for key, each in value.items() if key in kinds
+    }
+
+
 def section_of(kind: Any) -> type[msgspec.Struct] | None:  # noqa: ANN401 - any annotation
     """Return the section type of an annotation; None if it is a plain value."""
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):

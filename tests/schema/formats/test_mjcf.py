@@ -1,9 +1,11 @@
 """MJCF files with a brain: round trips, and refusal of edited bodies."""
 
+import base64
 import dataclasses
 import re
 from pathlib import Path
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from schema.experiment.bounded import parse_xml
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.formats.files import read_robot, settings_of, write_robot
-from schema.formats.mjcf import robot_from_mjcf, robot_to_mjcf
+from schema.formats.mjcf import DIGEST, robot_from_mjcf, robot_to_mjcf
 from schema.formats.mjcf_export import add_sensors
 from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import solo_spec
@@ -140,6 +142,18 @@ def test_what_does_not_move_a_robot_may_be_edited() -> None:
         changed = text.replace(written, edited, 1)
         assert changed != text
         assert robot_from_mjcf(changed, "it") == (WALKER, SETTINGS)
+
+
+def test_settings_that_no_longer_exist_are_left_out() -> None:
+    """Files of versions that had them have no digest either."""
+    text = robot_to_mjcf(WALKER, SETTINGS)
+    held = msgspec.json.encode(SETTINGS)
+    old = held.replace(b'"slope_deg"', b'"gap_contacts":false,"slope_deg"')
+    present, earlier = (base64.b64encode(each).decode() for each in (held, old))
+    edited = re.sub(f'<text name="{DIGEST}"[^>]*>', "", text.replace(present, earlier))
+    assert len(edited) < len(text)
+    assert earlier in edited
+    assert robot_from_mjcf(edited, "it") == (WALKER, SETTINGS)
 
 
 @pytest.mark.parametrize(
