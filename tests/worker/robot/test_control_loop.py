@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schema.experiment.calibration import Calibration, Response
 from schema.experiment.document import Measures, Simulation
 from schema.experiment.environment import Environment
+from schema.experiment.robust import Calibration, Response
 from schema.experiment.settings import Ablation, EvaluationSettings
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
