@@ -223,13 +223,6 @@ def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:
             "arena.population_limit: must be >= arena.population_floor and "
             f"selection.population, {lowest}, got {arena.population_limit}"
         )
-    inner_m = 0.5 * arena.wall_diameter_m
-    if inner_m and arena.birth_radius_m >= inner_m:
-        yield (
-            f"arena.birth_radius_m: must be less than half of wall_diameter_m, "
-            f"{inner_m:g} m, as robots are born inside the wall; got "
-            f"{arena.birth_radius_m:g}"
-        )
     if arena.split_distance_m < arena.merge_distance_m:
         yield (
             "arena.split_distance_m: must be >= arena.merge_distance_m = "
