@@ -33,6 +33,16 @@ settings.load_profile("fixed")
 
 
 @pytest.fixture(autouse=True)
+def _own_environment() -> Iterator[None]:
+    """Undo after each test what a command has set for its process and children."""
+    before = dict(os.environ)
+    yield
+    for name in os.environ.keys() - before.keys():
+        del os.environ[name]
+    os.environ.update(before)
+
+
+@pytest.fixture(autouse=True)
 def _plain_log(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Let no test change the form of the lines that others compare."""
     monkeypatch.setenv("REVOLVE_LOG", "")

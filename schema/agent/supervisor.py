@@ -73,9 +73,9 @@ _REPEAT_S = 1.0
 def prepare_process() -> None:
     """Prepare this process and its children to share a machine with many others.
 
-    Libraries and the network use one thread, children do not import from the current
-    folder; a process that wakes up does not interrupt
-    one that computes, for a few milliseconds; unused memory is returned to the system.
+    Libraries and the network use one thread, and children do not import from the
+    current folder. A process that wakes up does not interrupt one that computes, for a
+    few milliseconds. Unused memory is returned to the system.
     """
     os.environ.update(dict.fromkeys((*_ONE_THREAD, SAFE_PATH), "1"))
     given = os.environ.pop("ZENOH_RUNTIME", None)

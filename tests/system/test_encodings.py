@@ -169,5 +169,5 @@ def test_a_broken_encoding_is_refused_before_the_first_birth(
     )
     (folder / "worms.toml").write_text(OFF_LINE + WORMS)
     said = workspace.run("run", "worms.toml", "--out", "run", code=2)
-    assert "encoding.type: my_worms.py:15: expected random: the same" in said
+    assert "encoding.type: my_worms.py:15: random: must return the same twice" in said
     assert not (folder / "run").exists()
