@@ -21,7 +21,7 @@ from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
 from analysis.measures.benchmarks import read_benchmarks
 from analysis.measures.distinct_names import with_distinct_names
-from analysis.measures.load import LeftOut, Run, read_runs
+from analysis.measures.load import LeftOut, LoadedRun, read_runs
 from analysis.measures.outputs import OUTPUTS, schema
 from analysis.measures.study import concatenated, measure_runs
 from analysis.measures.trees import SlotRule
@@ -96,7 +96,10 @@ def analyze(
 
 
 def _measured(
-    runs: list[Run], benchmark: pa.Table, options: argparse.Namespace, bar: Progress
+    runs: list[LoadedRun],
+    benchmark: pa.Table,
+    options: argparse.Namespace,
+    bar: Progress,
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     """Return the tables of all runs, and what was left out."""
     slots: SlotRule = "own" if options.slots == "own" else "parent"

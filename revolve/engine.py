@@ -17,7 +17,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from coordinator.dispatch.events import Client, Deliver, Job, JobKind, Withdrawn
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.service import Network
 from schema.agent.log import tell_user, warn_user
 from schema.agent.topics import unique_name
@@ -36,7 +36,7 @@ _CLOSED = RevolveError("the fleet is closed")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Order:
+class WantedJob:
     """A job that is wanted.
 
     Attributes:
@@ -79,13 +79,13 @@ class Engine:
         self._network = network
         self._find_fault = find_fault
         self._give_up_after_s = give_up_after_s
-        self._orders: SimpleQueue[Order] = SimpleQueue()
+        self._orders: SimpleQueue[WantedJob] = SimpleQueue()
         self._cancelled: SimpleQueue[Future[Any]] = SimpleQueue()
         self._client = Client(
             unique_name(f"python-{socket.gethostname()[:40]}"), _EPOCH
         )
-        self._open: dict[int, Order] = {}
-        self._fleet: Fleet | None = None
+        self._open: dict[int, WantedJob] = {}
+        self._fleet: JobRouter | None = None
         self._fault: RevolveError | None = None
         self._is_closing = False
         self._lock = threading.Lock()
@@ -120,7 +120,7 @@ class Engine:
         with self._lock:
             self._fault = self._fault or _CLOSED
 
-    def order(self, order: Order) -> None:
+    def order(self, order: WantedJob) -> None:
         """Order a job; its future gets the outcome.
 
         Raises:
@@ -148,7 +148,7 @@ class Engine:
         why = _CLOSED
         try:
             with self._network:
-                self._fleet = fleet = Fleet(
+                self._fleet = fleet = JobRouter(
                     self._network, warn=warn_user, faults=self._network.faults
                 )
                 self._is_open.set()
@@ -174,7 +174,7 @@ class Engine:
                 order.future.set_exception(why)
         self._open.clear()
 
-    def _serve(self, fleet: Fleet) -> None:
+    def _serve(self, fleet: JobRouter) -> None:
         """Pass on orders and answers until closed.
 
         Raises:
@@ -204,7 +204,7 @@ class Engine:
                 is_told = True
                 tell_user(self._lack(fleet))
 
-    def _lack(self, fleet: Fleet) -> str:
+    def _lack(self, fleet: JobRouter) -> str:
         """Return why no worker can do the jobs."""
         refused = {**self._network.refused, **fleet.dispatch.unfit()}
         place = self._network.address
@@ -214,7 +214,7 @@ class Engine:
         joined = f"{counted(len(refused), 'agent')} joined at {place}"
         return f"{joined} and cannot do the jobs, the last of them {agent}: {why}"
 
-    def _do_chores(self, fleet: Fleet) -> None:
+    def _do_chores(self, fleet: JobRouter) -> None:
         """Tell the user what is wrong with agents.
 
         Raises:
@@ -227,7 +227,7 @@ class Engine:
         if fault := self._find_fault():
             raise NetworkError(fault)
 
-    def _request(self, fleet: Fleet, order: Order) -> None:
+    def _request(self, fleet: JobRouter, order: WantedJob) -> None:
         if order.future.cancelled():
             return
         number = fleet.new_number()
@@ -247,7 +247,7 @@ class Engine:
         about = (self._client, order, read, order.simulated_s)
         fleet.request(Job(number, order.kind, encode(request), -1, *about))
 
-    def _withdraw(self, fleet: Fleet) -> None:
+    def _withdraw(self, fleet: JobRouter) -> None:
         """Drop the jobs of cancelled futures."""
         cancelled = set(map(id, _all_of(self._cancelled)))
         if cancelled:

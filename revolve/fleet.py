@@ -21,7 +21,7 @@ from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
 from coordinator.run.requests import Expected, failure_of, read_answer, read_evaluation
 from revolve.arguments import in_order, naming_arguments, whole_number
-from revolve.engine import Engine, Order
+from revolve.engine import Engine, WantedJob
 from revolve.evaluation import Result, result_of, settings_for
 from revolve.experiment import Experiment
 from revolve.robot import Robot, checked
@@ -255,7 +255,7 @@ class Fleet:
         except ExperimentError as error:
             raise ExperimentError(f"item {number}: {error}") from None
         settle = partial(_value, number=number)
-        return self._order(Order("call", call, settings, _read_value, settle))
+        return self._order(WantedJob("call", call, settings, _read_value, settle))
 
     def _submit(
         self,
@@ -270,10 +270,12 @@ class Fleet:
         read = partial(read_evaluation, measures=measures)
         settle = partial(_settle, settings=settings)
         return self._order(
-            Order("evaluate", work, data, read, settle, simulated_s, identity.origin)
+            WantedJob(
+                "evaluate", work, data, read, settle, simulated_s, identity.origin
+            )
         )
 
-    def _order(self, order: Order) -> "Future[T]":
+    def _order(self, order: WantedJob) -> "Future[T]":
         engine = self._opened
         with self._lock:
             engine.check()

@@ -30,7 +30,7 @@ from analysis.figures.robot_pictures import (
 from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.families import family
-from analysis.measures.load import LeftOut, Run
+from analysis.measures.load import LeftOut, LoadedRun
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
 from schema.experiment.file import experiment_from_text
@@ -149,7 +149,7 @@ def _place(one: DrawnFigure) -> tuple[bool, list[int], str]:
 
 def draw_figures(
     tables: Mapping[str, pa.Table],
-    runs: Mapping[Path, Run],
+    runs: Mapping[Path, LoadedRun],
     folder: Path,
     simulate: Callable[[], Simulate],
     bar: Progress,
@@ -205,7 +205,7 @@ def _sweeps(tables: Tables) -> Iterator[Figure]:
 
 def _robot_pictures(
     robots: pa.Table,
-    runs: Mapping[Path, Run],
+    runs: Mapping[Path, LoadedRun],
     simulate: Callable[[], Simulate],
     bar: Progress,
     lines: dict[str, pa.Table],

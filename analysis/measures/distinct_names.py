@@ -14,7 +14,7 @@ from typing import Any
 
 from msgspec import to_builtins
 
-from analysis.measures.load import Run
+from analysis.measures.load import LoadedRun
 from schema.experiment.file import experiment_from_text
 
 MARK = "~"
@@ -24,7 +24,7 @@ _SWEPT = "swept"
 """Value of a setting that a sweep chooses, as runs of a sweep are one experiment."""
 
 
-def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
+def with_distinct_names(runs: Sequence[LoadedRun]) -> list[LoadedRun]:
     """Return runs in their order, with distinct names for different settings.
 
     The settings that most runs of a name have (the first of equally many) keep the
@@ -33,13 +33,13 @@ def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
     ``differs`` lists how it differs from the earlier one that is most like it, and
     names that one.
     """
-    groups: dict[str, dict[str, list[Run]]] = {}
+    groups: dict[str, dict[str, list[LoadedRun]]] = {}
     for run in runs:
         both = (_settings(run.document), dict(run.plugins))
         text = json.dumps(both, sort_keys=True)
         groups.setdefault(run.experiment, {}).setdefault(text, []).append(run)
-    renamed: dict[int, Run] = {}
-    earlier: list[Run] = []
+    renamed: dict[int, LoadedRun] = {}
+    earlier: list[LoadedRun] = []
     for name, by_settings in groups.items():
         first, *others = sorted(by_settings.values(), key=len, reverse=True)
         lists = [(_compared(first[0], other), other) for other in earlier]
@@ -83,7 +83,7 @@ def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _compared(mine: Run, other: Run) -> list[str]:
+def _compared(mine: LoadedRun, other: LoadedRun) -> list[str]:
     """Return the differences of the settings of two runs."""
     # A plug-in that only one of them has is named by another setting.
     found = [

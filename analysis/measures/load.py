@@ -15,7 +15,7 @@ from msgspec import structs
 from pyarrow.parquet import read_schema
 
 from schema.errors import ExperimentError, RunFolderError
-from schema.experiment.document import Experiment, Selection, island_experiments
+from schema.experiment.document import Experiment, SelectionSection, island_experiments
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.experiment.fitness_keys import fitness_text
 from schema.plugins.source import modules_named
@@ -28,7 +28,7 @@ from schema.tables.segments import FINISHED, warn_once
 TABLE = "table "
 """Prefix of the name of a table that was left out."""
 
-_FOUNDERS = Selection().population
+_FOUNDERS = SelectionSection().population
 _NEEDED = (
     "births", "evaluations", "population", "fitness", "deaths", "touches",
     "migrations", "learning",
@@ -77,7 +77,7 @@ def island_settings(island: int, islands: Sequence[IslandSettings]) -> IslandSet
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class LoadedRun:
     """A run folder.
 
     Attributes:
@@ -118,7 +118,7 @@ class Run:
         return self.state == "finished"
 
 
-def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
+def read_runs(roots: Iterable[Path]) -> tuple[list[LoadedRun], list[LeftOut]]:
     """Return the runs in or below some folders, by path, and what was left out.
 
     Of several folders with the same run (experiment, repeat, seed, settings, sources
@@ -139,7 +139,7 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     if not folders:
         names = ", ".join(map(str, roots))
         raise RunFolderError(f"{names}: no run in or below this folder")
-    runs: list[Run] = []
+    runs: list[LoadedRun] = []
     left_out: list[LeftOut] = []
     for folder in sorted(folders):
         try:
@@ -154,14 +154,14 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     return _different(runs, left_out), left_out
 
 
-def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
+def _different(runs: list[LoadedRun], left_out: list[LeftOut]) -> list[LoadedRun]:
     """Return each run once; add its other folders to ``left_out``.
 
     Args:
         runs: sorted by folder.
         left_out: what was left out.
     """
-    copies: dict[tuple[object, ...], list[Run]] = {}
+    copies: dict[tuple[object, ...], list[LoadedRun]] = {}
     for run in runs:
         sources = tuple(run.plugins.items())
         settings = _without_births(run.document)
@@ -187,13 +187,13 @@ def _without_births(document: str) -> str:
     return experiment_text(structs.replace(experiment, births=1, islands=islands))
 
 
-def _flaws(run: Run) -> tuple[int, bool, int]:
+def _flaws(run: LoadedRun) -> tuple[int, bool, int]:
     """Return the sort key of folders of the same run, the best first."""
     tables, unread = read_tables(run)
     return len(unread), not run.is_finished, -tables["births"].num_rows
 
 
-def read_run(folder: Path) -> Run:
+def read_run(folder: Path) -> LoadedRun:
     """Return the run in a folder.
 
     Raises:
@@ -206,7 +206,7 @@ def read_run(folder: Path) -> Run:
         raise RunFolderError(f"{DETAILS}: cannot be read: {error}") from None
     plugins = _plugins(details)
     point = settings.sweep.chosen if settings.sweep else {}
-    run = Run(
+    run = LoadedRun(
         folder=folder,
         experiment=_experiment(details["name"], point),
         number=details["run"],
@@ -297,7 +297,7 @@ def _settings(island: Experiment) -> IslandSettings:
     )
 
 
-def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
+def read_tables(run: LoadedRun) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     """Return the tables of a run that its measures need.
 
     Args:
@@ -347,7 +347,7 @@ def _named(table: pa.Table) -> pa.Table:
     return table.set_column(index, "birth_island", full)
 
 
-def _check_there(run: Run, name: str) -> None:
+def _check_there(run: LoadedRun, name: str) -> None:
     """Raise if a table of a finished run is missing."""
     online = [island.is_online for island in run.islands]
     expected = {

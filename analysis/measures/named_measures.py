@@ -5,7 +5,7 @@ import ast
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.load import Run
+from analysis.measures.load import LoadedRun
 from analysis.measures.population_table import individual_ids, rows_of
 from analysis.measures.run_tables import RunTables
 from schema.experiment.bounded import read_bytes
@@ -86,7 +86,7 @@ def _off_line(run: RunTables) -> pa.Table:
     return named.select([*_KEYS, "robot", "value"])
 
 
-def with_docstrings(named: pa.Table, run: Run) -> pa.Table:
+def with_docstrings(named: pa.Table, run: LoadedRun) -> pa.Table:
     """Return rows of ``named_measures`` with the column ``about``.
 
     Args:
@@ -99,7 +99,7 @@ def with_docstrings(named: pa.Table, run: Run) -> pa.Table:
     return named.append_column("about", pa.array(about, pa.string()))
 
 
-def _first_line(run: Run, path: str) -> str:
+def _first_line(run: LoadedRun, path: str) -> str:
     """Return the first line of a function's docstring; empty if it is not known."""
     module, _, name = path.rpartition(":")
     file = run.folder.joinpath(PLUGINS, *module.split(".")).with_suffix(".py")

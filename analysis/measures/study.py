@@ -10,7 +10,13 @@ from multiprocessing import active_children, get_context
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import TABLE, LeftOut, Run, read_duration_s, read_tables
+from analysis.measures.load import (
+    TABLE,
+    LeftOut,
+    LoadedRun,
+    read_duration_s,
+    read_tables,
+)
 from analysis.measures.measures import measure
 from analysis.measures.named_measures import with_docstrings
 from analysis.measures.outputs import run_schema, schema
@@ -29,13 +35,13 @@ class MeasuredRun:
         left_out: tables and measures that could not be read or measured.
     """
 
-    run: Run
+    run: LoadedRun
     tables: dict[str, pa.Table]
     left_out: tuple[LeftOut, ...]
 
 
 def measure_runs(
-    runs: Sequence[Run],
+    runs: Sequence[LoadedRun],
     *,
     slots: SlotRule = "parent",
     processes: int = 1,
@@ -66,7 +72,7 @@ def measure_runs(
             raise
 
 
-def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
+def measure_run(run: LoadedRun, slots: SlotRule) -> MeasuredRun:
     """Return the measures of one run, and what was left out."""
     tables, left_out = read_tables(run)
     folder = str(run.folder)
@@ -95,7 +101,7 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
     return MeasuredRun(run, named, tuple(left_out))
 
 
-def _chosen(run: Run) -> pa.Table:
+def _chosen(run: LoadedRun) -> pa.Table:
     """Return one row per swept setting."""
     rows = [
         {
@@ -108,12 +114,12 @@ def _chosen(run: Run) -> pa.Table:
     return pa.Table.from_pylist(rows, run_schema("sweeps"))
 
 
-def planned_births(run: Run) -> int:
+def planned_births(run: LoadedRun) -> int:
     """Return the number of births of all islands in a finished run."""
     return sum(island.births for island in run.islands)
 
 
-def _wanted(run: Run) -> frozenset[str]:
+def _wanted(run: LoadedRun) -> frozenset[str]:
     wanted = set()
     if any(island.is_online for island in run.islands):
         wanted.add("variability")
@@ -129,7 +135,7 @@ def _wanted(run: Run) -> frozenset[str]:
 
 
 def _summary(
-    run: Run, tables: Mapping[str, pa.Table], unread: frozenset[str]
+    run: LoadedRun, tables: Mapping[str, pa.Table], unread: frozenset[str]
 ) -> pa.Table:
     arenas = [number for number, one in enumerate(run.islands) if one.is_online]
     has_arena = bool(arenas)
@@ -177,7 +183,7 @@ def _failures(tables: Mapping[str, pa.Table]) -> int:
     return sum(pc.sum(column).as_py() or 0 for column in (failed, diverged))
 
 
-def _named(table: pa.Table, name: str, run: Run) -> pa.Table:
+def _named(table: pa.Table, name: str, run: LoadedRun) -> pa.Table:
     """Return a table with the columns that name the run, in the types of the output."""
     for column, value in (("experiment", run.experiment), ("folder", str(run.folder))):
         table = table.append_column(column, pa.repeat(value, table.num_rows))

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from analysis.measures.load import Run
+from analysis.measures.load import LoadedRun
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
@@ -125,7 +125,7 @@ def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) 
 
 
 def _motions(
-    options: argparse.Namespace, run: Run, simulators: Simulators
+    options: argparse.Namespace, run: LoadedRun, simulators: Simulators
 ) -> list[Motion]:
     """Return the motion of the robots of ``--robot``; print if it is as recorded."""
     names = [each for each in options.robot if isinstance(each, str)]

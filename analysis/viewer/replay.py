@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import Run, read_run
+from analysis.measures.load import LoadedRun, read_run
 from schema.errors import RevolveError, RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.files import campaign, read_table
@@ -28,7 +28,7 @@ CHUNK_S = 20.0
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
 
 
-def shown_run(folder: Path) -> Run:
+def shown_run(folder: Path) -> LoadedRun:
     """Return the run in a folder.
 
     Raises:
@@ -41,7 +41,7 @@ def shown_run(folder: Path) -> Run:
         raise RunFolderError(f"{folder}: {why}") from None
 
 
-def read_news(run: Run) -> Update:
+def read_news(run: LoadedRun) -> Update:
     """Return the contents of a run's tables, except poses.
 
     Raises:

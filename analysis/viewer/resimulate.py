@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import Run
+from analysis.measures.load import LoadedRun
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
 from schema.agent.platform_tag import platform_tag
@@ -69,7 +69,7 @@ class Simulators:
 
 
 def resimulate(
-    run: Run,
+    run: LoadedRun,
     births: list[BirthId],
     simulators: Simulators,
     report: Callable[[float], None],
@@ -99,7 +99,9 @@ def resimulate(
     return [moved[birth] for birth in births]
 
 
-def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) -> Motion:
+def _alone(
+    run: LoadedRun, own: Experiment, birth: BirthId, simulators: Simulators
+) -> Motion:
     """Return the motion of a robot alone on its island, in its fittest evaluation."""
     settings = read_evaluation_settings(evaluation_settings(own))
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()

@@ -22,7 +22,7 @@ from coordinator.islands.rows import (
     named_measures,
     population_records,
 )
-from schema.experiment.document import Arena
+from schema.experiment.document import ArenaSection
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import (
@@ -101,7 +101,7 @@ class LivingRobots:
     """
 
     def __init__(
-        self, rules: Arena, labels: Sequence[str], *, seed: int, run: int
+        self, rules: ArenaSection, labels: Sequence[str], *, seed: int, run: int
     ) -> None:
         self._rules = rules
         self._labels = labels
@@ -252,7 +252,9 @@ class LivingRobots:
         return changes
 
 
-def draw_place(draws: BufferedRng, others: Sequence[Place], arena: Arena) -> Place:
+def draw_place(
+    draws: BufferedRng, others: Sequence[Place], arena: ArenaSection
+) -> Place:
     """Return a random place away from all others, or the last one tried.
 
     Places are uniform in radius, so denser in the centre (as in the

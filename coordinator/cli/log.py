@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from coordinator.cli.log_lines import HEADER, Selection, describe, line
+from coordinator.cli.log_lines import HEADER, EventFilter, describe, line
 from coordinator.islands.events import JournalledEvent
 from coordinator.storage.campaign import is_campaign
 from coordinator.storage.folder import holds_run
@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> int:
         RunFolderError: the folder holds no run, or the run no journal.
     """
     options = parser().parse_args(arguments[1:])
-    selection = Selection(options.island, *options.birth)
+    selection = EventFilter(options.island, *options.birth)
     path = _journal_of(options.folder, is_followed=options.follow)
     if not options.json:
         print(HEADER, flush=True)
@@ -57,7 +57,7 @@ def main(arguments: list[str]) -> int:
         sys.stdout.flush()
         print(f"revolve: {error}", file=sys.stderr)
         return 1
-    if not is_found and selection != Selection():
+    if not is_found and selection != EventFilter():
         sys.stdout.flush()
         tell_user(f"{path}: has no event of that birth or island")
         return 1

@@ -53,7 +53,7 @@ Fields = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Selection:
+class EventFilter:
     """Events to print; None selects all.
 
     Attributes:
@@ -76,7 +76,7 @@ class Selection:
         return is_origin and self.birth in (None, birth.number)
 
 
-def describe(event: JournalledEvent, selection: Selection) -> list[Fields]:
+def describe(event: JournalledEvent, selection: EventFilter) -> list[Fields]:
     """Return the fields of an event's lines; none if it is not selected.
 
     An advance has one line, or one for each selected robot in it.
@@ -159,7 +159,7 @@ def _advance(event: Advanced) -> Fields:
     }
 
 
-def _robots(event: Advanced, selection: Selection) -> list[Fields]:
+def _robots(event: Advanced, selection: EventFilter) -> list[Fields]:
     """Return the fields of the selected robots of an advance."""
     advance = event.advance
     robots: tuple[Judgement | Casualty, ...] = advance.judgements + advance.casualties

@@ -12,7 +12,7 @@ from pathlib import Path
 from coordinator.cli.deployment import Deployment, connected_agents
 from coordinator.cli.progress import Display
 from coordinator.cli.status_text import fault_lines
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.service import Network
 from coordinator.run.live_server import LiveServer
 from coordinator.run.operators import answer_operator
@@ -58,7 +58,7 @@ def execute_runs(
         network = agents if isinstance(agents, Network) else None
         scheduler = RunScheduler(
             planned,
-            Fleet(
+            JobRouter(
                 agents,
                 allows_drift=deployment.allows_drift,
                 warn=_LOG.warning,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from coordinator.cluster.certificates import AUTHORITY_DAYS
-from coordinator.cluster.kit import DAYS, PORT, Cluster, Kit, utc_now
+from coordinator.cluster.kit import DAYS, PORT, ClusterKit, Kit, utc_now
 from schema.agent.access import Certificate, CertificateRole, check_certificates
 from schema.agent.flags import Flags, add_count, whole_number
 
@@ -60,7 +60,7 @@ def _init(folder: Path, options: argparse.Namespace) -> None:
     names = ["hub", *(name for name, _ in _OTHERS), *workers]
     # Before the folder is made: a kit cannot be made in one that is not empty.
     check_certificates(Certificate(name, "worker") for name in names)
-    kit = Kit.new(folder, Cluster(options.hub, options.port, options.days), utc_now)
+    kit = Kit.new(folder, ClusterKit(options.hub, options.port, options.days), utc_now)
     for name, role in _OTHERS:
         kit.add(name, role)
     for name in workers:

@@ -28,7 +28,7 @@ _PLACE = "$HOME/.config/revolve"
 MemberRole = CertificateRole | Literal["hub"]
 
 
-class Member(msgspec.Struct):
+class CertificateHolder(msgspec.Struct):
     """A certificate of a lab.
 
     Attributes:
@@ -44,13 +44,13 @@ class Member(msgspec.Struct):
     is_revoked: bool = False
 
 
-class Cluster(msgspec.Struct, forbid_unknown_fields=True):
+class ClusterKit(msgspec.Struct, forbid_unknown_fields=True):
     """A lab: where its hub is, and its certificates."""
 
     hub: str
     port: int
     days: int
-    members: list[Member] = []
+    members: list[CertificateHolder] = []
 
     @property
     def address(self) -> str:
@@ -70,13 +70,13 @@ class Kit:
         cluster: its content.
     """
 
-    def __init__(self, folder: Path, cluster: Cluster, clock: Clock) -> None:
+    def __init__(self, folder: Path, cluster: ClusterKit, clock: Clock) -> None:
         self.folder = folder
         self.cluster = cluster
         self._clock = clock
 
     @classmethod
-    def new(cls, folder: Path, cluster: Cluster, clock: Clock) -> "Kit":
+    def new(cls, folder: Path, cluster: ClusterKit, clock: Clock) -> "Kit":
         """Create a kit without members but the hub.
 
         Raises:
@@ -100,7 +100,7 @@ class Kit:
         """
         file = folder / STATE
         try:
-            cluster = msgspec.json.decode(file.read_bytes(), type=Cluster)
+            cluster = msgspec.json.decode(file.read_bytes(), type=ClusterKit)
         except FileNotFoundError:
             raise RevolveError(
                 f"{folder}: no kit is there ({STATE} is missing)"
@@ -109,7 +109,7 @@ class Kit:
             raise RevolveError(f"{file}: cannot be read: {error}") from None
         return cls(folder, cluster, clock)
 
-    def member(self, name: str) -> Member:
+    def member(self, name: str) -> CertificateHolder:
         """Return a member.
 
         Raises:
@@ -142,7 +142,7 @@ class Kit:
             for known in self.cluster.members
             if not (known.name == name and known.is_revoked)
         ]
-        listed = [*others, Member(name, role, now)]
+        listed = [*others, CertificateHolder(name, role, now)]
         # The names of revoked certificates count, too.
         check_certificates(Certificate(each.name, "worker") for each in listed)
         self.cluster.members = listed
@@ -201,7 +201,7 @@ class Kit:
                 text = text.replace(word, value)
             replace_text(target / sample.name, text)
 
-    def _environment(self, member: Member) -> str:
+    def _environment(self, member: CertificateHolder) -> str:
         """Return shell commands that set a member's variables."""
         lines = [
             f"# Copy this folder to {_PLACE} on the machine of {member.name!r}, then:",

@@ -22,15 +22,15 @@ from heapq import heappop
 
 from coordinator.dispatch.events import (
     AgentKind,
-    Ask,
+    AskProgress,
     Assign,
     Cancel,
     Client,
+    ClientEnded,
     Deliver,
     Died,
     DispatchCommand,
     DispatchEvent,
-    Ended,
     Expired,
     Job,
     JobKind,
@@ -103,7 +103,7 @@ class Dispatch:
             Left: self._left,
             Requested: self._requested,
             Withdrawn: self._withdrawn,
-            Ended: self._ended,
+            ClientEnded: self._ended,
             Returned: self._returned,
             Expired: self._expired,
             Died: self._died,
@@ -249,7 +249,7 @@ class Dispatch:
         if pending := self._jobs.get(event.number):
             yield from self._close(pending)
 
-    def _ended(self, event: Ended) -> Iterator[DispatchCommand]:
+    def _ended(self, event: ClientEnded) -> Iterator[DispatchCommand]:
         jobs = [j for j in self._jobs.values() if j.job.client == event.client]
         for pending in jobs:
             yield from self._close(pending)
@@ -426,7 +426,7 @@ class Dispatch:
             others = (each for each in fit if not pool.agents[each].is_silent)
             yield from pool.tell(name, now_s - since_s, min(others, default=""))
         if pool.judge(name, since_s, limit_s, now_s) == "ask":
-            yield Ask(name)
+            yield AskProgress(name)
         if agent.is_silent:
             for number, pending in agent.held.items():
                 if number in self._jobs and not _working(pending, pool):

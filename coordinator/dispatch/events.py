@@ -99,7 +99,7 @@ class Withdrawn:
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class ClientEnded:
     """A client has ended: none of its jobs is wanted any more."""
 
     client: Client
@@ -180,7 +180,7 @@ DispatchEvent = (
     | Left
     | Requested
     | Withdrawn
-    | Ended
+    | ClientEnded
     | Returned
     | Expired
     | Died
@@ -227,7 +227,7 @@ class Cancel:
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class AskProgress:
     """Ask an agent whether it works: one of its jobs is past its deadline."""
 
     agent: str
@@ -248,7 +248,7 @@ class Overdue:
     to: str = ""
 
 
-DispatchCommand = Assign | Deliver | Cancel | Ask | Overdue
+DispatchCommand = Assign | Deliver | Cancel | AskProgress | Overdue
 
 
 # --- Shards
@@ -392,5 +392,11 @@ class Crowded:
 
 
 ShardCommand = (
-    AssignShard | ShardDone | ShardFailed | CancelShard | Ask | Overdue | Crowded
+    AssignShard
+    | ShardDone
+    | ShardFailed
+    | CancelShard
+    | AskProgress
+    | Overdue
+    | Crowded
 )

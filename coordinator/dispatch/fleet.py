@@ -12,18 +12,18 @@ from typing import Literal, Protocol
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
-    Ask,
+    AskProgress,
     Assign,
     AssignShard,
     Cancel,
     CancelShard,
     Client,
+    ClientEnded,
     Crowded,
     Deliver,
     Died,
     DispatchCommand,
     DispatchEvent,
-    Ended,
     Expired,
     Job,
     Joined,
@@ -94,7 +94,7 @@ class Fenced:
     reason: str
 
 
-class Fleet:
+class JobRouter:
     """Workers and analyzers, the jobs of all runs, and the routing between them.
 
     Attributes:
@@ -172,7 +172,7 @@ class Fleet:
 
     def leave(self, client: Client) -> None:
         """Drop all jobs and shards of a client."""
-        self._obey(self.dispatch.handle(Ended(client)))
+        self._obey(self.dispatch.handle(ClientEnded(client)))
         for shard, (owner, _) in list(self._shard_clients.items()):
             if owner == client:
                 self.release(shard)
@@ -318,7 +318,7 @@ class Fleet:
                     self._forget_advances(shard)
                     client = self._shard_clients[shard][0]
                     self._ends.setdefault(client, []).append(command)
-                case Ask(agent):
+                case AskProgress(agent):
                     self._agents.ask(agent)
                 case Crowded() | Overdue():
                     self._warn(_line(command))

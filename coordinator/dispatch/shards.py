@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 from coordinator.dispatch.events import (
     NO_CLIENT,
-    Ask,
+    AskProgress,
     AssignShard,
     CancelShard,
     Client,
@@ -254,7 +254,7 @@ class ShardDispatch:
             limit_s *= 2 ** min(shard.misses, _MOST_DOUBLINGS)
             verdict = pool.judge(shard.holder, shard.since_s, limit_s, self._now_s)
             if verdict == "ask":
-                yield Ask(shard.holder)
+                yield AskProgress(shard.holder)
             elif verdict == "silent":
                 late.append((number, shard))
         for number, shard in late:

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from coordinator.evolution.brains import brain_genes
 from coordinator.evolution.check_encoding import check_encoding
 from schema.errors import shown
-from schema.experiment.document import Encoding, Experiment
+from schema.experiment.document import EncodingSection, Experiment
 from schema.plugins.contract import broken
 from schema.robot.brain import NeuronKinds
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
@@ -33,7 +33,7 @@ def check_brain_genes(experiment: Experiment) -> None:
             _check_types(node)
             _check_genes(node, kinds, is_random=is_random)
 
-    check_encoding(replace(experiment, encoding=Encoding()), look)
+    check_encoding(replace(experiment, encoding=EncodingSection()), look)
 
 
 def _check_types(node: Node) -> None:

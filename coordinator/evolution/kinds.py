@@ -28,9 +28,9 @@ from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     BrainSection,
-    Encoding,
+    EncodingSection,
     Experiment,
-    Selection,
+    SelectionSection,
     island_experiments,
 )
 from schema.experiment.kinds import Kind, is_class, sections_of, takes
@@ -119,7 +119,7 @@ def check_rule(rule: Rule, labels: Labels = None) -> str:
 class _Ruled(NamedTuple):
     """A section of selection, and the measures that the experiment records."""
 
-    selection: Selection
+    selection: SelectionSection
     labels: Labels
 
 
@@ -139,7 +139,9 @@ def _selection_kind(
         f"selection.{name}",
         built_in,
         is_one=partial(takes, arguments),
-        section=lambda path: _Ruled(replace_struct(Selection(), **{name: path}), None),
+        section=lambda path: _Ruled(
+            replace_struct(SelectionSection(), **{name: path}), None
+        ),
         sections=partial(_rules, name),
         path=lambda ruled: str(getattr(ruled.selection, name)),
         load=lambda ruled: rule_of(ruled.selection, name).function,
@@ -161,7 +163,7 @@ def _load_encoding(encoded: _Encoded) -> object:
 
 
 def _by_hand(path: str) -> _Encoded:
-    experiment = Experiment("by hand", encoding=Encoding(type=path))
+    experiment = Experiment("by hand", encoding=EncodingSection(type=path))
     return _Encoded(experiment, experiment)
 
 

@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from coordinator.evolution.random_streams import BufferedRng
 from schema.errors import ExperimentError, shown
-from schema.experiment.document import Arena, Culling, Selection
+from schema.experiment.document import ArenaSection, Culling, SelectionSection
 from schema.experiment.selection_rules import own_rule
 from schema.plugins.contract import broken
 from schema.plugins.origin import naming_plugin
@@ -99,7 +99,7 @@ def _whole_numbers(answer: object) -> list[int]:
     return [int(at) for at in answer] if is_whole else []
 
 
-def rule_of(selection: Selection, name: str) -> Rule:
+def rule_of(selection: SelectionSection, name: str) -> Rule:
     """Return the rule that selects ``parents`` or ``survivors``.
 
     That of the parents of ``none`` is never called.
@@ -137,7 +137,7 @@ def select_survivors(
     parents: Sequence[S],
     children: Sequence[S],
     rng: np.random.Generator,
-    selection: Selection,
+    selection: SelectionSection,
     rule: Rule,
 ) -> tuple[S, ...]:
     """Return the next population of constant size, in birth order.
@@ -254,7 +254,9 @@ def cull_population(
     return tuple(one for one in living if one not in culled)
 
 
-def select_culled(mature: Sequence[S], rules: Arena | Culling) -> tuple[str, list[S]]:
+def select_culled(
+    mature: Sequence[S], rules: ArenaSection | Culling
+) -> tuple[str, list[S]]:
     """Return the robots to cull and the reason, the least fit first.
 
     Robots below a share of the mean fitness are culled ("selection"). The limit is as

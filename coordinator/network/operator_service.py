@@ -9,7 +9,7 @@ from schema.limits import MOST_QUERIES, MOST_QUERY_BYTES, OPERATOR_REQUEST_BYTES
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class OperatorQuery:
     """A query of an operator or a viewer; call ``reply`` once."""
 
     data: bytes
@@ -35,9 +35,9 @@ class Queries:
         """
         self._viewers_key = viewers_key
         self._faults = faults
-        self._orders: list[Order] = []
+        self._orders: list[OperatorQuery] = []
         self._order_bytes = 0
-        self._onlookers: list[Order] = []
+        self._onlookers: list[OperatorQuery] = []
 
     def add(self, query: zenoh.Query, key: str) -> None:
         """Keep a query until it is asked for; drop and count it beyond the limits."""
@@ -53,17 +53,17 @@ class Queries:
         else:
             data = b"" if payload is None else payload.to_bytes()
             self._order_bytes += len(data)
-            asked.append(Order(data, query, key))
+            asked.append(OperatorQuery(data, query, key))
             return
         query.drop()  # type: ignore[no-untyped-call]
 
-    def orders(self) -> list[Order]:
+    def orders(self) -> list[OperatorQuery]:
         """Return the operators' queries since the last call."""
         orders, self._orders = self._orders, []
         self._order_bytes = 0
         return orders
 
-    def onlookers(self) -> list[Order]:
+    def onlookers(self) -> list[OperatorQuery]:
         """Return the viewers' queries for the state of the run since the last call."""
         onlookers, self._onlookers = self._onlookers, []
         return onlookers

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced, Append, JournalledEvent, Record
 from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
@@ -74,7 +74,7 @@ def replayed(
     loop = Loop(
         archipelago(experiment_from_text(details.document), details.seed, details.run),
         context=context,
-        fleet=Fleet(LocalAgents({}, "")),
+        fleet=JobRouter(LocalAgents({}, "")),
         log=_Nothing(),
         rows=_Nothing(),
         snapshot_store=store,

@@ -8,8 +8,8 @@ import subprocess
 from math import inf
 
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.fleet import Fleet
-from coordinator.network.operator_service import Order
+from coordinator.dispatch.fleet import JobRouter
+from coordinator.network.operator_service import OperatorQuery
 from coordinator.network.service import Network
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
@@ -31,7 +31,9 @@ _MOST_REPLIES, _MOST_PAGES = 8, 6
 class LiveServer:
     """Server of the viewers of one run."""
 
-    def __init__(self, feed: Feed, loop: Loop, fleet: Fleet, network: Network) -> None:
+    def __init__(
+        self, feed: Feed, loop: Loop, fleet: JobRouter, network: Network
+    ) -> None:
         """Initialise the server; ``feed`` and ``loop`` are those of its run."""
         self._feed = feed
         self._loop = loop
@@ -56,7 +58,7 @@ class LiveServer:
         for order in self._network.queries.onlookers()[:_MOST_REPLIES]:
             order.reply(*self._pages_for(order, now_s))
 
-    def _pages_for(self, order: Order, now_s: float) -> list[bytes]:
+    def _pages_for(self, order: OperatorQuery, now_s: float) -> list[bytes]:
         """Return the pages that a viewer requests, or the first ones of a new state."""
         try:
             wanted = decode_page(order.data)

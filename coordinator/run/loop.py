@@ -13,7 +13,7 @@ from typing import Protocol
 
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import Deliver, ShardFailed
-from coordinator.dispatch.fleet import End, Fleet
+from coordinator.dispatch.fleet import End, JobRouter
 from coordinator.islands.events import (
     Advanced,
     Answered,
@@ -102,7 +102,7 @@ class Loop:
     islands: Mapping[int, Island | Arena]
     _: KW_ONLY
     context: RunContext
-    fleet: Fleet
+    fleet: JobRouter
     log: Log
     rows: Rows
     snapshot_store: SnapshotStore

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from coordinator.dispatch.events import Deliver, ShardFailed
-from coordinator.dispatch.fleet import End, Fleet
+from coordinator.dispatch.fleet import End, JobRouter
 from coordinator.islands.events import Advanced, Append, JournalledEvent
 from coordinator.run.history import replayed
 from coordinator.run.run_context import RunContext
@@ -55,7 +55,7 @@ class PoseRecovery:
         context: RunContext,
         events: Sequence[JournalledEvent],
         *,
-        fleet: Fleet,
+        fleet: JobRouter,
         recorder: Recorder,
         snapshots: Snapshots,
     ) -> None:

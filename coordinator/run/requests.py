@@ -11,7 +11,7 @@ from types import UnionType
 from msgspec import structs
 
 from coordinator.dispatch.events import Deliver, Job, JobKind
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import (
     QUARANTINED,
     Advanced,
@@ -55,7 +55,7 @@ Expected = tuple[int, int]
 class Requests:
     """The vetting and evaluation requests of all islands of a run."""
 
-    def __init__(self, context: RunContext, fleet: Fleet, audit: float) -> None:
+    def __init__(self, context: RunContext, fleet: JobRouter, audit: float) -> None:
         """Initialise without requests.
 
         Args:

@@ -14,7 +14,7 @@ from functools import partial
 from msgspec.structs import replace
 
 from coordinator.dispatch.events import KINDS, AgentKind, Client
-from coordinator.dispatch.fleet import End, Fleet
+from coordinator.dispatch.fleet import End, JobRouter
 from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunFolder
 from schema.errors import RevolveError
@@ -57,7 +57,7 @@ class RunScheduler:
     """
 
     planned: Sequence[Planned]
-    fleet: Fleet
+    fleet: JobRouter
     _: KW_ONLY
     open_run: Callable[[RunFolder, bool], RunSession]
     most: int
@@ -230,7 +230,7 @@ class RunScheduler:
         return len(set().union(*fit))
 
 
-def _queues(fleet: Fleet) -> tuple[Queue, ...]:
+def _queues(fleet: JobRouter) -> tuple[Queue, ...]:
     """Return how many requests of each kind wait, and how many agents have."""
     jobs = (
         Queue(kind, fleet.dispatch.waiting(kind), fleet.dispatch.assigned(kind))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import KINDS, AgentKind
-from coordinator.dispatch.fleet import End, Fleet
+from coordinator.dispatch.fleet import End, JobRouter
 from coordinator.islands.events import JournalledEvent, Record
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
@@ -84,7 +84,7 @@ class RunSession:
     def __init__(
         self,
         held: RunFolder,
-        fleet: Fleet,
+        fleet: JobRouter,
         *,
         fsync: bool = False,
         speed: float | None = None,

@@ -12,7 +12,7 @@ from typing import Protocol
 from msgspec import structs
 
 from coordinator.dispatch.events import AssignShard, Read, ShardFailed
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
@@ -105,7 +105,7 @@ class ShardRequests:
     """The advances of all arenas of a run."""
 
     def __init__(
-        self, context: RunContext, snapshot_store: SnapshotStore, fleet: Fleet
+        self, context: RunContext, snapshot_store: SnapshotStore, fleet: JobRouter
     ) -> None:
         """Initialise without shards; ``fleet`` has the workers."""
         self._context = context

@@ -10,7 +10,7 @@ from analysis.figures.ablation import ablation as ablation_figure
 from analysis.figures.robustness import robustness as robustness_figure
 from coordinator.evolution.generation import random_brain
 from coordinator.evolution.random_streams import Purpose, stream
-from revolve.cli.reevaluation import Job, Study
+from revolve.cli.reevaluation import ReevaluationJob, Study
 from revolve.cli.winners import Chosen, chosen_robots
 from revolve.robot import plain
 from schema.experiment.document import REVOLVE_ANGLE, body_space
@@ -38,11 +38,11 @@ def study_of(command: str) -> Study:
     )
 
 
-def _change_jobs(options: Namespace) -> list[Job]:
+def _change_jobs(options: Namespace) -> list[ReevaluationJob]:
     return [job for one in chosen_robots(options.runs) for job in _changes(one)]
 
 
-def _ablation_jobs(options: Namespace) -> list[Job]:
+def _ablation_jobs(options: Namespace) -> list[ReevaluationJob]:
     chosen = chosen_robots(options.runs, options.robots)
     for name in dict.fromkeys(one.document.encoding.type for one in chosen):
         if options.brains and name != REVOLVE_ANGLE:
@@ -53,19 +53,19 @@ def _ablation_jobs(options: Namespace) -> list[Job]:
     return [job for one in chosen for job in _ablations(one, options.brains)]
 
 
-def _changes(one: Chosen) -> Iterator[Job]:
+def _changes(one: Chosen) -> Iterator[ReevaluationJob]:
     """Yield the evaluations of a robot, without ``[robust]``."""
     settings = replace(one.settings, robust=None)
-    yield Job(one, None, settings, one.robot)
+    yield ReevaluationJob(one, None, settings, one.robot)
     for change in all_changes(settings):
         columns = {"group": change.group, "change": change.name}
-        yield Job(one, columns, change.settings, one.robot)
+        yield ReevaluationJob(one, columns, change.settings, one.robot)
 
 
-def _ablations(one: Chosen, brains: int) -> Iterator[Job]:
+def _ablations(one: Chosen, brains: int) -> Iterator[ReevaluationJob]:
     """Yield the evaluations of a robot, and of its body with some random brains."""
     settings, robot = one.settings, plain(one.robot)
-    yield Job(one, None, settings, robot)
+    yield ReevaluationJob(one, None, settings, robot)
     for change in all_ablations(robot, body_space(settings.space)):
         columns = {
             "group": change.group,
@@ -75,7 +75,9 @@ def _ablations(one: Chosen, brains: int) -> Iterator[Job]:
             "channel": change.channel,
             "change": change.name,
         }
-        yield Job(one, columns, replace(settings, ablation=change.ablation), robot)
+        yield ReevaluationJob(
+            one, columns, replace(settings, ablation=change.ablation), robot
+        )
     # Other encodings make body and brain of one genome.
     if one.document.encoding.type != REVOLVE_ANGLE:
         return
@@ -90,4 +92,6 @@ def _ablations(one: Chosen, brains: int) -> Iterator[Job]:
             "channel": number,
             "change": f"random brain {number + 1}",
         }
-        yield Job(one, columns, settings, random_brain(rng, robot, one.document))
+        yield ReevaluationJob(
+            one, columns, settings, random_brain(rng, robot, one.document)
+        )

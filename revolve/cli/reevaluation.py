@@ -27,7 +27,7 @@ from schema.tables.description import make_folder
 Row = dict[str, Any]
 
 
-class Job(NamedTuple):
+class ReevaluationJob(NamedTuple):
     """Evaluation of a robot, or of another one in its place.
 
     Attributes:
@@ -44,7 +44,7 @@ class Job(NamedTuple):
     robot: Robot | PlainRobot
 
 
-def _reevaluated(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
+def _reevaluated(jobs: Sequence[ReevaluationJob], workers: int) -> Iterator[Row]:
     """Yield a row for each job with columns, in their order; show progress.
 
     Equal evaluations are computed once.
@@ -93,7 +93,7 @@ class Study(NamedTuple):
     columns: Columns
     summary: Callable[[pa.Table], str]
     figure: Callable[[pa.Table], Any]
-    jobs: Callable[[Namespace], list[Job]]
+    jobs: Callable[[Namespace], list[ReevaluationJob]]
 
 
 def write_results(options: Namespace, study: Study) -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
-from schema.agent.supervision import JobWatch, ProcessSlot, Task, thread_clock
+from schema.agent.supervision import JobWatch, ProcessSlot, RunningJob, thread_clock
 from schema.errors import (
     MalformedMessage,
     PluginDiffers,
@@ -120,8 +120,10 @@ class Server:
     _fenced: dict[tuple[str, int], None] = field(default_factory=dict)
     _cancelled: dict[bytes, None] = field(default_factory=dict)
     _skipped: dict[bytes, None] = field(default_factory=dict)
-    _answers: dict[Task, bytes] = field(default_factory=dict)
-    _advances: dict[tuple[str, int], tuple[Task, bytes]] = field(default_factory=dict)
+    _answers: dict[RunningJob, bytes] = field(default_factory=dict)
+    _advances: dict[tuple[str, int], tuple[RunningJob, bytes]] = field(
+        default_factory=dict
+    )
 
     @property
     def info(self) -> bytes:
@@ -171,7 +173,7 @@ class Server:
             request = decode(Request, data, most)
             self._check(request)
             name = (request.run, request.epoch, request.number)
-            task = Task(self.agent.name, *name, fingerprint(data))
+            task = RunningJob(self.agent.name, *name, fingerprint(data))
             if known := self._known(task, request):
                 return Reply(known)
             # A job that comes again is wanted, whatever cancelled it before.
@@ -201,7 +203,7 @@ class Server:
             _remember(task, answered, self._answers, _MOST_LONG)
         return Reply(answered)
 
-    def _known(self, task: Task, request: Request) -> bytes | None:
+    def _known(self, task: RunningJob, request: Request) -> bytes | None:
         """Return the answer to a request if it is kept."""
         if not isinstance(request.work, AdvanceShard):
             return self._answers.get(task)

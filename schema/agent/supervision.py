@@ -49,7 +49,7 @@ _OWN_DOING = (
 )
 
 
-class Task(msgspec.Struct, frozen=True):
+class RunningJob(msgspec.Struct, frozen=True):
     """A process and its current job.
 
     Attributes:
@@ -67,10 +67,10 @@ class Task(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True, slots=True)
-class Death:
+class ProcessCrash:
     """A process that its job crashed, with the cause, such as "SIGSEGV"."""
 
-    task: Task
+    task: RunningJob
     cause: str
 
 
@@ -87,7 +87,7 @@ class CurrentJob:
     def _view(self) -> memoryview:
         return memoryview(self._memory).cast("B")
 
-    def begin(self, task: Task) -> None:
+    def begin(self, task: RunningJob) -> None:
         """Note a job before it starts; names longer than those of ours are cut."""
         cut = msgspec.structs.replace(task, agent=task.agent[:255], run=task.run[:1000])
         data = msgspec.msgpack.encode(cut)
@@ -99,11 +99,11 @@ class CurrentJob:
         """Note that the job is done."""
         _LENGTH.pack_into(self._view, 0, 0)
 
-    def read(self) -> Task | None:
+    def read(self) -> RunningJob | None:
         """Return the job that was started and has not ended, if there is one."""
         (length,) = _LENGTH.unpack_from(self._view)
         data = self._view[_LENGTH.size :][:length]
-        return msgspec.msgpack.decode(data, type=Task) if length else None
+        return msgspec.msgpack.decode(data, type=RunningJob) if length else None
 
 
 def crash_cause(exit_code: int) -> str:
@@ -135,7 +135,7 @@ class ProcessSlot:
 
     index: int = 0
     note: CurrentJob | None = None
-    deaths: tuple[Death, ...] = ()
+    deaths: tuple[ProcessCrash, ...] = ()
 
     def end_process(self, *, is_blamed: bool) -> None:
         """End this process, whose job waits without end; its supervisor restarts it.
@@ -150,7 +150,7 @@ class ProcessSlot:
         os.kill(os.getpid(), _WAITED if is_blamed else signal.SIGKILL)
 
     @contextmanager
-    def doing(self, task: Task, cpu_limit_s: float) -> Iterator[None]:
+    def doing(self, task: RunningJob, cpu_limit_s: float) -> Iterator[None]:
         """Note a job while it is done.
 
         Args:
@@ -193,12 +193,12 @@ class JobWatch:
             cpu_s: clock of the CPU time of the thread that does the jobs [s].
             now_s: monotonic clock [s].
         """
-        self.task: Task | None = None
+        self.task: RunningJob | None = None
         self._cpu_s, self._now_s = cpu_s, now_s
         self._measured = (now_s(), cpu_s())
         self._active_s = 0.0
 
-    def begin(self, task: Task) -> None:
+    def begin(self, task: RunningJob) -> None:
         """Note the start of a job."""
         self._active_s = self._now_s()
         self.task = task

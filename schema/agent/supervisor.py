@@ -28,7 +28,7 @@ from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import (
     LAST_DEATHS,
     CurrentJob,
-    Death,
+    ProcessCrash,
     ProcessSlot,
     crash_cause,
 )
@@ -218,7 +218,7 @@ class ProcessPool:
         cause = crash_cause(code)
         if task is None or not cause:
             return ""
-        deaths = (*slot.deaths, Death(task, cause))[-LAST_DEATHS:]
+        deaths = (*slot.deaths, ProcessCrash(task, cause))[-LAST_DEATHS:]
         place.slot = replace(slot, deaths=deaths)
         return f": {task.agent} died of job {task.number} of {task.run}: {cause}"
 

@@ -10,11 +10,11 @@ from schema.experiment.brains import neuron_kinds
 from schema.experiment.check_migration import migration_problems
 from schema.experiment.check_world import world_problems
 from schema.experiment.document import (
-    Arena,
+    ArenaSection,
     Culling,
     Experiment,
     Measures,
-    Selection,
+    SelectionSection,
     Simulation,
     body_space,
     island_experiment,
@@ -209,7 +209,7 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
         )
 
 
-def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:
+def _arena_problems(experiment: Experiment, arena: ArenaSection) -> Iterator[str]:
     selection = experiment.selection
     if selection.survivors != "best" or not selection.keep_parents:
         yield (
@@ -237,7 +237,7 @@ def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:
         )
 
 
-def _arena_clock_problems(arena: Arena, clock: Simulation) -> Iterator[str]:
+def _arena_clock_problems(arena: ArenaSection, clock: Simulation) -> Iterator[str]:
     """Yield which interval does not end on both a brain tick and a pose."""
     for name in ("founder", "birth", "cull", "sample", "snapshot"):
         seconds: float = getattr(arena, f"{name}_interval_s")
@@ -293,7 +293,7 @@ def _culling_problems(experiment: Experiment) -> Iterator[str]:
 
 
 def _floor_problems(
-    where: str, selection: Selection, rules: Arena | Culling
+    where: str, selection: SelectionSection, rules: ArenaSection | Culling
 ) -> Iterator[str]:
     needed = selection.parents_needed
     if rules.population_floor < needed:

@@ -154,7 +154,7 @@ class Variation(Section, frozen=True):
     brain_epsilon: Probability = 0.1
 
 
-class Encoding(PluginSection, frozen=True):
+class EncodingSection(PluginSection, frozen=True):
     """How genomes describe robots.
 
     Attributes:
@@ -211,7 +211,7 @@ SURVIVORS = ("best", "random")
 """Names of the built-in rules of selection."""
 
 
-class Selection(PluginSection, frozen=True):
+class SelectionSection(PluginSection, frozen=True):
     """Parent and survivor selection (thesis section 5.3).
 
     Attributes:
@@ -366,7 +366,7 @@ class Measures(PluginSection, frozen=True, dict=True):
         return tuple(name.rpartition(":")[2] for name in self.names)
 
 
-class Arena(Section, frozen=True):
+class ArenaSection(Section, frozen=True):
     """An on-line world: robots are born, evaluated all the time and die in it.
 
     Times are simulated. Source: Hupkes 2016, section 5.3.3, and the intervals of its
@@ -451,11 +451,11 @@ class Islands(Section, frozen=True):
     births: AtLeastOne | None = None
     generation: Generation | None = None
     variation: Variation | None = None
-    selection: Selection | None = None
+    selection: SelectionSection | None = None
     simulation: Simulation | None = None
     environment: Environment | None = None
     fitness: Fitness | None = None
-    arena: Arena | None = None
+    arena: ArenaSection | None = None
     migration: Migration | None = None
     robust: Robust | None = None
     learning: Learning | None = None
@@ -499,16 +499,16 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
     space: Space = Space()
     generation: Generation = Generation()
     variation: Variation = Variation()
-    selection: Selection = Selection()
+    selection: SelectionSection = SelectionSection()
     vetting: Vetting = Vetting()
     simulation: Simulation = Simulation()
     environment: Environment = FLAT
     fitness: Fitness = Fitness()
-    arena: Arena | None = None
+    arena: ArenaSection | None = None
     islands: Annotated[tuple[Islands, ...], Meta(max_length=MOST_ISLAND_TABLES)] = ()
     migration: Migration | None = None
     measures: Measures = Measures()
-    encoding: Encoding = Encoding()
+    encoding: EncodingSection = EncodingSection()
     brain: BrainSection = NETWORK
     robust: Robust | None = None
     calibration: tuple[Calibration, ...] = ()
@@ -553,7 +553,7 @@ def island_experiments(experiment: Experiment) -> tuple[Experiment, ...]:
     return tuple(island_experiment(experiment, number) for number in numbers)
 
 
-def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
+def light_of(environment: Environment, arena: ArenaSection | None) -> Vector | None:
     """Return the position of the light of a world [m]; None is no light."""
     own = None if arena is None else arena.light
     return own or environment.light

@@ -9,7 +9,7 @@ from typing import Any
 from msgspec import Struct
 
 from schema.errors import ExperimentError, nearest, shown
-from schema.experiment.document import PARENTS, SURVIVORS, Selection
+from schema.experiment.document import PARENTS, SURVIVORS, SelectionSection
 from schema.plugins.load import load_function
 from schema.plugins.origin import where_defined
 from schema.plugins.parameters import parameters_type, read_parameters
@@ -18,7 +18,9 @@ _ARGUMENTS = {"parents": 3, "survivors": 4}
 _NAMES = {"parents": PARENTS, "survivors": SURVIVORS}
 
 
-def own_rule(selection: Selection, name: str) -> tuple[Callable[..., Any], Any] | None:
+def own_rule(
+    selection: SelectionSection, name: str
+) -> tuple[Callable[..., Any], Any] | None:
     """Return an own function and its parameters; None for a built-in rule.
 
     Args:
@@ -54,7 +56,7 @@ def _parameters(
     return None
 
 
-def rule_problems(selection: Selection) -> Iterator[str]:
+def rule_problems(selection: SelectionSection) -> Iterator[str]:
     """Yield what is wrong with the rules of a section.
 
     Raises:

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError
 from schema.experiment.document import (
     NETWORK,
-    Arena,
+    ArenaSection,
     BrainSection,
     Experiment,
     Fitness,
@@ -107,7 +107,7 @@ class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
     space: Space
     simulation: Simulation
     fitness: Fitness
-    arena: Arena
+    arena: ArenaSection
     environment: Environment = FLAT
     origin: Origin = Origin()
     measures: Measures = Measures()

@@ -22,7 +22,7 @@ import numpy as np
 
 import analyzer.service
 from coordinator.dispatch.events import AgentKind, Client, Deliver, Job
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
@@ -82,7 +82,7 @@ class Stream:
         done: number of finished evaluations.
     """
 
-    def __init__(self, fleet: Fleet, in_flight: int) -> None:
+    def __init__(self, fleet: JobRouter, in_flight: int) -> None:
         """Request the first evaluations.
 
         Args:
@@ -124,7 +124,7 @@ class Stream:
 @contextmanager
 def real_fleet(
     bodies: dict[AgentKind, tuple[Body, int]],
-) -> Iterator[Fleet]:
+) -> Iterator[JobRouter]:
     """Start a fleet of processes on this machine and wait until all have joined.
 
     Args:
@@ -135,7 +135,7 @@ def real_fleet(
     """
     with ExitStack() as stack:
         network = stack.enter_context(Network(name=unique_name("bench")))
-        fleet = Fleet(network)
+        fleet = JobRouter(network)
         for kind, (body, size) in bodies.items():
             agent = Agent(kind, kind, network.address)
             stack.enter_context(ProcessPool(body, (agent,), size=size))

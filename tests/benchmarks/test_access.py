@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tests.null_workers
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.service import Network
 from schema.agent.access import Certificate
 from schema.agent.network import Agent
@@ -84,7 +84,7 @@ def test_access_rules_and_tls_cost_little_throughput(tmp_path: Path) -> None:
             stack.enter_context(
                 ProcessPool(tests.null_workers.process, (agent,), size=1)
             )
-            fleets[name] = Turns(Fleet(network), 0)
+            fleets[name] = Turns(JobRouter(network), 0)
         for turn in range(2 * PAIRS):
             name = ("plain", "tls")[(turn + turn // 2) % 2]
             found = fleets[name].turn(TURN_S)

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 import analyzer.service
 import worker.serve.service
 from coordinator.dispatch.events import DispatchEvent, Returned
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.service import Network
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
@@ -93,7 +93,7 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, TimedNetwork]]:
             ProcessPool(worker.serve.service.process, (evaluation,), size=2)
         )
         timed = TimedNetwork(network)
-        fleet = Fleet(timed)
+        fleet = JobRouter(timed)
         scheduler = RunScheduler(
             planned,
             fleet,

@@ -5,7 +5,7 @@ import time
 import msgspec
 import pytest
 
-from schema.experiment.document import Experiment, Islands, Selection
+from schema.experiment.document import Experiment, Islands, SelectionSection
 from schema.experiment.migration import Migration
 from tests.coordinator.archipelago_run import ArchipelagoRun
 
@@ -22,7 +22,7 @@ def per_generation(migration: Migration | None) -> float:
     document = Experiment(
         name="small",
         births=5 + BROODS,
-        selection=Selection(population=5, children=1),
+        selection=SelectionSection(population=5, children=1),
         islands=(Islands(count=ISLANDS),),
         migration=migration,
     )

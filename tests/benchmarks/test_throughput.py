@@ -15,7 +15,7 @@ import analyzer.service
 import tests.null_workers
 import worker.serve.service
 from coordinator.dispatch.events import Joined, Left
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.dispatch.pool import AHEAD_S
 from coordinator.evolution.generation import generate
 from coordinator.islands.events import (
@@ -125,7 +125,7 @@ def cpu_time_s(pid: int) -> float:
 class Bench:
     """Running experiment: its fleet, its loop, its journal, its analyzer's process."""
 
-    fleet: Fleet
+    fleet: JobRouter
     loop: Loop
     journal: CountingJournal
     analyzer: int
@@ -168,7 +168,7 @@ def started(
         agent = Agent("worker", "worker", network.address)
         stack.enter_context(ProcessPool(body, (agent,), size=workers))
         journal = CountingJournal(stack.enter_context(Journal.open(folder)))
-        fleet = Fleet(network)
+        fleet = JobRouter(network)
         loop = Loop(
             {0: island},
             context=RunContext.of(str(folder), held.epoch, experiment, details.origin),

@@ -17,7 +17,7 @@ from analysis.viewer.recording import Recording
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import LiveView
-from schema.experiment.document import Arena, Experiment
+from schema.experiment.document import ArenaSection, Experiment
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
@@ -103,7 +103,7 @@ def test_viewer_of_an_arena_of_thirty_uses_at_most_a_fifth_of_a_core(
     update, tables = moving_spiders()
     messages = [message(poses) for poses in tables]
     file = tmp_path / "watched.rrd"
-    scene = scene_of(Experiment(name="watched", arena=Arena()))
+    scene = scene_of(Experiment(name="watched", arena=ArenaSection()))
     with Recording("watched", layout(scene), file=file) as recording:
         view = LiveView(Show(recording, scene.space), "run", scene)
         view.tell([update])

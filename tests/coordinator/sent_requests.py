@@ -10,7 +10,7 @@ from coordinator.dispatch.events import (
     Returned,
     Ticked,
 )
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Answered, Audited
 from coordinator.run.requests import Requests
 from coordinator.run.run_context import RunContext
@@ -58,7 +58,7 @@ class SentRequests(SentJobs):
 
     def __init__(self, evaluation: bytes = b'"evaluation"', audit: float = 0.0) -> None:
         super().__init__()
-        self.fleet = Fleet(self)
+        self.fleet = JobRouter(self)
         self.now_s = 0.0
         experiment = Experiment(name="requests")
         context = RunContext(

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import revolve as rv
-from coordinator.cluster.kit import Cluster, Kit
+from coordinator.cluster.kit import ClusterKit, Kit
 from coordinator.network.service import Network
 from revolve.workers import Workers
 from schema.agent.supervisor import cores
@@ -240,7 +240,7 @@ def test_a_fleet_without_workers_gives_up_if_it_is_told_to() -> None:
 def test_certificates_come_from_the_environment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kit = Kit.new(tmp_path / "lab", Cluster("h", 1, 90), lambda: datetime.now(UTC))
+    kit = Kit.new(tmp_path / "lab", ClusterKit("h", 1, 90), lambda: datetime.now(UTC))
     kit.add("ada", "coordinator")
     needs = r"^tls/h:1 needs \$REVOLVE_TLS_CA, \$REVOLVE_TLS_CERTIFICATE and"
     with pytest.raises(rv.NetworkError, match=needs):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from coordinator.cluster.kit import Cluster, Kit
+from coordinator.cluster.kit import ClusterKit, Kit
 from coordinator.storage.compare import compare
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import Member, agents_alive, member_of
@@ -204,7 +204,7 @@ def test_hub_closes_links_when_their_certificate_expires(workspace: Workspace) -
     folder = workspace.folder / "lab"
     start = datetime.now(UTC)
     clock = [start]
-    kit = Kit.new(folder, Cluster("127.0.0.1", 7447, 1), lambda: clock[0])
+    kit = Kit.new(folder, ClusterKit("127.0.0.1", 7447, 1), lambda: clock[0])
     kit.add("good", "worker")
     for name, left_s in (("late", -5.0), ("brief", 20.0)):
         clock[0] = start - timedelta(days=1) + timedelta(seconds=left_s)

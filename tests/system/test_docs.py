@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from revolve.cli.commands import COMMANDS
-from schema.experiment.document import Arena
+from schema.experiment.document import ArenaSection
 from schema.parts import ACTIVE_HINGE, PartType
 from tests.documents import parse_experiment
 from tests.own_brains import write_module
@@ -239,7 +239,7 @@ def test_arenas_page_lists_all_keys_with_their_defaults() -> None:
     listed = re.findall(r"^\| `(\w+)` \| (\S+) \|", page, re.MULTILINE)
     assert listed == [
         (field.name, str(field.default).lower())
-        for field in msgspec.structs.fields(Arena)
+        for field in msgspec.structs.fields(ArenaSection)
     ]
 
 

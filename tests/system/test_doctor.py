@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.cluster.kit import Cluster, Kit
+from coordinator.cluster.kit import ClusterKit, Kit
 from tests.system.test_agents import free_address
 from tests.system.workspace import (
     PATIENCE_S,
@@ -78,7 +78,7 @@ def test_rights_of_certificates(workspace: Workspace) -> None:
     port = int(address.rsplit(":", 1)[1])
     kit = Kit.new(
         workspace.folder / "lab",
-        Cluster("127.0.0.1", port, 90),
+        ClusterKit("127.0.0.1", port, 90),
         lambda: datetime.now(UTC).replace(microsecond=0),
     )
     kit.add("a", "worker")

@@ -14,7 +14,7 @@ import pytest
 import analyzer.service
 import worker.serve.service
 from coordinator.dispatch.events import AgentKind
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
@@ -104,7 +104,7 @@ window = 1
 """
 
 
-def longest_stall_s(run: RunSession, fleet: Fleet) -> float:
+def longest_stall_s(run: RunSession, fleet: JobRouter) -> float:
     """Finish a run; return the longest time without a birth [s]."""
     longest_s, births = 0.0, -1
     run.start()
@@ -159,7 +159,7 @@ def test_each_silent_agent_costs_an_offline_run_a_small_delay(
 class Counting:
     """Agents of a fleet; counts the advances that rebuild a state."""
 
-    def __init__(self, fleet: Fleet) -> None:
+    def __init__(self, fleet: JobRouter) -> None:
         self.rebuilt = 0
         self._agents = fleet._agents
         fleet._agents = self

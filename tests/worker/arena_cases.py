@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from schema.experiment.document import Arena, Experiment
+from schema.experiment.document import ArenaSection, Experiment
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -26,7 +26,7 @@ def settings_of(**arena: Any) -> ArenaSettings:  # noqa: ANN401 - any of its key
         space=EXPERIMENT.space,
         simulation=replace(EXPERIMENT.simulation, warmup_steps=600),
         fitness=EXPERIMENT.fitness,
-        arena=Arena(**arena),
+        arena=ArenaSection(**arena),
     )
 
 

@@ -23,7 +23,7 @@ _ROBOTS = 7
 _TICKS = 12
 
 
-class Controls(Protocol):
+class CheckedControls(Protocol):
     """Brains of one experiment; see ``worker.robot.brains``."""
 
     width: Widths
@@ -36,7 +36,7 @@ class Controls(Protocol):
         """Return brains at rest that are updated together."""
 
 
-def check_controls(controls: Controls) -> None:
+def check_controls(controls: CheckedControls) -> None:
     """Raise unless brains keep the contract of ``BrainControl`` on random brains.
 
     Args:
@@ -69,7 +69,7 @@ def check_controls(controls: Controls) -> None:
 
 
 def _run(
-    controls: Controls,
+    controls: CheckedControls,
     rows: Sequence[int],
     moved_at: int = _TICKS,
     *,
@@ -121,7 +121,7 @@ def _require(what: str, array: object, shape: tuple[int, int]) -> None:
         raise broken(what, "be finite", came=str(array[~np.isfinite(array)][0]))
 
 
-def _brain(controls: Controls, number: int) -> Brain:
+def _brain(controls: CheckedControls, number: int) -> Brain:
     """Return a random brain of a fourth of the neurons to all of them."""
     rng = np.random.default_rng(number)
     width, kinds = controls.width, controls.neurons

@@ -36,7 +36,7 @@ Key = tuple[str, int]
 """Name of a shard: its run and its number."""
 
 
-class World(Protocol):
+class ShardWorld(Protocol):
     """Interface of ``worker.arena.world.World``."""
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
@@ -70,7 +70,7 @@ class World(Protocol):
         """Stop its threads."""
 
 
-class Outlet(Protocol):
+class LiveOutlet(Protocol):
     """Interface of ``schema.agent.service.Outlet``."""
 
     def has_listeners(self, key: str) -> bool:
@@ -90,7 +90,7 @@ class _Held:
         digest: of its state; empty before the first advance.
     """
 
-    world: World
+    world: ShardWorld
     settings: bytes
     digest: bytes
 
@@ -100,11 +100,11 @@ class Shards:
 
     def __init__(
         self,
-        world: type[World],
+        world: type[ShardWorld],
         *,
         most_held: int = 16,
         threads: int = 1,
-        outlet: Outlet | None = None,
+        outlet: LiveOutlet | None = None,
         key_of: Callable[[int], str] = str,
     ) -> None:
         """Initialise without shards.
@@ -187,7 +187,7 @@ class Shards:
         if len(self._held) > self._most_held:
             self._held.popitem(last=False)[1].world.close()
 
-    def _rebuilt(self, data: bytes, work: AdvanceShard, rebuild: Rebuild) -> World:
+    def _rebuilt(self, data: bytes, work: AdvanceShard, rebuild: Rebuild) -> ShardWorld:
         """Return the arena in the state that an advance starts from.
 
         Raises:
@@ -215,7 +215,7 @@ class Shards:
 
 
 @contextmanager
-def _closed_on_error(world: World) -> Iterator[World]:
+def _closed_on_error(world: ShardWorld) -> Iterator[ShardWorld]:
     """Close a world if an error occurs."""
     try:
         yield world
@@ -233,7 +233,7 @@ def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
 _types_of = lru_cache(maxsize=64)(types_of)
 
 
-def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
+def _repeat(world: ShardWorld, history: Sequence[PastAdvance]) -> None:
     """Repeat a history of the same platform, equal to the last bit.
 
     Raises:
@@ -246,7 +246,7 @@ def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
 
 
 def _approximate(
-    world: World, history: Sequence[PastAdvance], living: Sequence[BirthId]
+    world: ShardWorld, history: Sequence[PastAdvance], living: Sequence[BirthId]
 ) -> None:
     """Repeat a history of another platform as exactly as this platform can.
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from coordinator.evolution.cppn.network import Network, evaluate, queries
+from coordinator.evolution.cppn.network import CppnGenome, evaluate, queries
 from schema.experiment.document import Space
 from schema.parts import BodySpace, Parameter, PartType, Shape
 from schema.robot.frames import attach
@@ -69,7 +69,7 @@ class Grown:
     children: "dict[int, Grown]" = field(default_factory=dict)
 
 
-def grow(network: Network, space: Space, types: BodySpace) -> list[Grown]:
+def grow(network: CppnGenome, space: Space, types: BodySpace) -> list[Grown]:
     """Return the parts of a body in the order of their growth, the core first."""
     names = body_outputs(types)
     core = next(kind for kind in types.values() if kind.is_root)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coordinator.evolution.cppn.body import Grown, parameters_from, point
-from coordinator.evolution.cppn.network import Network, evaluate, queries
+from coordinator.evolution.cppn.network import CppnGenome, evaluate, queries
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, NeuronKinds
 
 HIDDEN, LINK, WEIGHT = "hidden", "link", "weight"
@@ -23,7 +23,7 @@ def brain_outputs(types: NeuronKinds) -> tuple[str, ...]:
 
 
 def grow_brain(
-    network: Network, parts: Sequence[Grown], max_hidden: int, types: NeuronKinds
+    network: CppnGenome, parts: Sequence[Grown], max_hidden: int, types: NeuronKinds
 ) -> Brain:
     """Return the brain of a body.
 
@@ -71,7 +71,7 @@ def grow_brain(
 
 
 def _connections(
-    network: Network, neurons: Sequence[Neuron], at: np.ndarray[tuple[int, int]]
+    network: CppnGenome, neurons: Sequence[Neuron], at: np.ndarray[tuple[int, int]]
 ) -> tuple[Connection, ...]:
     """Return the connections whose output ``link`` is above 0.
 

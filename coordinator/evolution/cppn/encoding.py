@@ -8,7 +8,7 @@ from coordinator.evolution.cppn import network as cppn
 from coordinator.evolution.cppn import variation
 from coordinator.evolution.cppn.body import body_outputs, grow, parts_of
 from coordinator.evolution.cppn.brain import brain_outputs, grow_brain
-from coordinator.evolution.cppn.network import Network
+from coordinator.evolution.cppn.network import CppnGenome
 from schema.errors import ExperimentError
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment
@@ -37,7 +37,7 @@ class Cppn:
         # The robot is asked for once by mutation and once by the run.
         self._developed = lru_cache(maxsize=_CACHED)(self._grown)
 
-    def random(self, rng: np.random.Generator, _birth: BirthId) -> Network:
+    def random(self, rng: np.random.Generator, _birth: BirthId) -> CppnGenome:
         """Return a random network with a viable robot.
 
         Raises:
@@ -52,28 +52,28 @@ class Cppn:
             f"a motor and space.min_parts = {self._space.min_parts} parts"
         )
 
-    def develop(self, genome: Network) -> Robot:
+    def develop(self, genome: CppnGenome) -> Robot:
         """Return the robot that a network describes."""
         return self._developed(genome)
 
     def crossover(
-        self, first: Network, second: Network, rng: np.random.Generator
-    ) -> Network:
+        self, first: CppnGenome, second: CppnGenome, rng: np.random.Generator
+    ) -> CppnGenome:
         """Return the first network with matching genes of either."""
         return variation.crossover(first, second, rng)
 
     def mutate(
-        self, genome: Network, rng: np.random.Generator, _birth: BirthId
-    ) -> Network | None:
+        self, genome: CppnGenome, rng: np.random.Generator, _birth: BirthId
+    ) -> CppnGenome | None:
         """Return a mutated network, None without a viable robot."""
         network = variation.mutate(genome, rng, self._outputs, self._rules)
         return network if self._is_viable(network) else None
 
-    def to_bytes(self, genome: Network) -> bytes:
+    def to_bytes(self, genome: CppnGenome) -> bytes:
         """Return a network as bytes."""
         return cppn.to_bytes(genome)
 
-    def from_bytes(self, data: bytes) -> Network:
+    def from_bytes(self, data: bytes) -> CppnGenome:
         """Return the network of some bytes.
 
         Raises:
@@ -81,12 +81,12 @@ class Cppn:
         """
         return cppn.from_bytes(data, self._outputs)
 
-    def _is_viable(self, network: Network) -> bool:
+    def _is_viable(self, network: CppnGenome) -> bool:
         robot = self.develop(network)
         has_motor = robot.brain.count("output") > 0
         return has_motor and len(robot.parts) >= self._space.min_parts
 
-    def _grown(self, network: Network) -> Robot:
+    def _grown(self, network: CppnGenome) -> Robot:
         grown = grow(network, self._space, self._types)
         parts, order = parts_of(grown[0])
         hidden = self._space.max_hidden

@@ -49,7 +49,7 @@ FUNCTIONS: dict[str, Callable[[Floats], Floats]] = {
 """Functions of hidden nodes, of the weighted sum of their inputs."""
 
 
-class Node(Struct, frozen=True, array_like=True):
+class HiddenNode(Struct, frozen=True, array_like=True):
     """Hidden node; ``id`` is its historical marking."""
 
     id: str
@@ -70,7 +70,7 @@ class Link(Struct, frozen=True, array_like=True):
         return self.source, self.target
 
 
-class Network(Struct, frozen=True, array_like=True):
+class CppnGenome(Struct, frozen=True, array_like=True):
     """Genome: a network without cycles.
 
     Attributes:
@@ -78,15 +78,15 @@ class Network(Struct, frozen=True, array_like=True):
         links: by source and target, at most one for each pair.
     """
 
-    nodes: tuple[Node, ...]
+    nodes: tuple[HiddenNode, ...]
     links: tuple[Link, ...]
 
 
-_DECODER = msgspec.msgpack.Decoder(tuple[Literal["cppn-1"], Network])
+_DECODER = msgspec.msgpack.Decoder(tuple[Literal["cppn-1"], CppnGenome])
 
 
 def evaluate(
-    network: Network, inputs: Mapping[str, Floats], outputs: Sequence[str]
+    network: CppnGenome, inputs: Mapping[str, Floats], outputs: Sequence[str]
 ) -> dict[str, Floats]:
     """Return outputs of a network for N queries.
 
@@ -147,12 +147,12 @@ def reaches(links: Sequence[Link], start: str, goal: str) -> bool:
     return False
 
 
-def to_bytes(network: Network) -> bytes:
+def to_bytes(network: CppnGenome) -> bytes:
     """Return a network as bytes (MessagePack)."""
     return msgspec.msgpack.encode((_FORM, network))
 
 
-def from_bytes(data: bytes, outputs: Sequence[str]) -> Network:
+def from_bytes(data: bytes, outputs: Sequence[str]) -> CppnGenome:
     """Return the network that `to_bytes` wrote.
 
     Args:
@@ -168,7 +168,7 @@ def from_bytes(data: bytes, outputs: Sequence[str]) -> Network:
     return network
 
 
-def _problems(network: Network, outputs: Sequence[str]) -> Iterator[str]:
+def _problems(network: CppnGenome, outputs: Sequence[str]) -> Iterator[str]:
     """Yield which rules a network breaks."""
     ids = [node.id for node in network.nodes]
     if ids != sorted(set(ids)) or {*ids} & {*INPUTS, *outputs}:

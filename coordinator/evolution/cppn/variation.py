@@ -17,9 +17,9 @@ from coordinator.evolution.cppn.network import (
     FUNCTIONS,
     GREATEST_WEIGHT,
     INPUTS,
+    CppnGenome,
+    HiddenNode,
     Link,
-    Network,
-    Node,
     reaches,
 )
 from schema.experiment.section import Probability
@@ -61,7 +61,7 @@ class Parameters(Struct, frozen=True):
 
 def random_network(
     rng: np.random.Generator, outputs: Sequence[str], rules: Parameters
-) -> Network:
+) -> CppnGenome:
     """Return a random network."""
     links = [
         Link(source, target, _weight(rng))
@@ -70,7 +70,7 @@ def random_network(
         if rng.random() < rules.p_connect
     ]
     links = sorted(links, key=_marking)[: rules.max_connections]
-    network = Network((), tuple(links))
+    network = CppnGenome((), tuple(links))
     for _ in range(rules.first_nodes):
         network = add_node(network, rng, rules)
         network = add_link(network, rng, outputs, rules)
@@ -78,11 +78,11 @@ def random_network(
 
 
 def mutate(
-    network: Network,
+    network: CppnGenome,
     rng: np.random.Generator,
     outputs: Sequence[str],
     rules: Parameters,
-) -> Network:
+) -> CppnGenome:
     """Return a network with changed weights, functions and structure."""
     links = []
     for old in network.links:
@@ -100,7 +100,7 @@ def mutate(
         else node
         for node in network.nodes
     ]
-    network = Network(tuple(nodes), tuple(links))
+    network = CppnGenome(tuple(nodes), tuple(links))
     if rng.random() < rules.p_add_node:
         network = add_node(network, rng, rules)
     if rng.random() < rules.p_add_connection:
@@ -108,7 +108,9 @@ def mutate(
     return network
 
 
-def add_node(network: Network, rng: np.random.Generator, rules: Parameters) -> Network:
+def add_node(
+    network: CppnGenome, rng: np.random.Generator, rules: Parameters
+) -> CppnGenome:
     """Return a network in which a new node splits an enabled connection.
 
     The old connection is disabled; the new ones have weight 1 and its weight. A network
@@ -119,7 +121,7 @@ def add_node(network: Network, rng: np.random.Generator, rules: Parameters) -> N
     if not enabled or not has_room or len(network.nodes) >= rules.max_nodes:
         return network
     split = _pick(rng, enabled)
-    node = Node(
+    node = HiddenNode(
         new_id(split, {each.id for each in network.nodes}), _pick(rng, list(FUNCTIONS))
     )
     links = [
@@ -132,11 +134,11 @@ def add_node(network: Network, rng: np.random.Generator, rules: Parameters) -> N
 
 
 def add_link(
-    network: Network,
+    network: CppnGenome,
     rng: np.random.Generator,
     outputs: Sequence[str],
     rules: Parameters,
-) -> Network:
+) -> CppnGenome:
     """Return a network with a new connection that closes no cycle.
 
     The pair of nodes is uniform; a pair that is connected, or would close a cycle,
@@ -154,7 +156,9 @@ def add_link(
     return _sorted(network.nodes, [*network.links, link])
 
 
-def crossover(first: Network, second: Network, rng: np.random.Generator) -> Network:
+def crossover(
+    first: CppnGenome, second: CppnGenome, rng: np.random.Generator
+) -> CppnGenome:
     """Return the first network with half of the genes that both have from the second.
 
     Genes with equal markings are the same innovation. Nodes and connections of the
@@ -163,7 +167,7 @@ def crossover(first: Network, second: Network, rng: np.random.Generator) -> Netw
     """
     nodes = {node.id: node for node in second.nodes}
     links = {link.marking: link for link in second.links}
-    return Network(
+    return CppnGenome(
         tuple(_either(rng, node, nodes.get(node.id)) for node in first.nodes),
         tuple(_either(rng, link, links.get(link.marking)) for link in first.links),
     )
@@ -189,9 +193,9 @@ def _either(rng: np.random.Generator, ours: T, theirs: T | None) -> T:
     return ours if theirs is None or rng.random() < 0.5 else theirs  # noqa: PLR2004
 
 
-def _sorted(nodes: Sequence[Node], links: Sequence[Link]) -> Network:
+def _sorted(nodes: Sequence[HiddenNode], links: Sequence[Link]) -> CppnGenome:
     ordered = sorted(nodes, key=lambda node: node.id)
-    return Network(tuple(ordered), tuple(sorted(links, key=_marking)))
+    return CppnGenome(tuple(ordered), tuple(sorted(links, key=_marking)))
 
 
 def _marking(link: Link) -> tuple[str, str]:

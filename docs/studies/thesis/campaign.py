@@ -16,7 +16,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from analysis.measures.load import Run, read_runs
+from analysis.measures.load import LoadedRun, read_runs
 from docs.studies.pages import ROOT
 from docs.studies.thesis.check import check, problems_of
 from docs.studies.thesis.data import (
@@ -205,7 +205,7 @@ def collect(
     return 1 if failed else 0
 
 
-def _finished(root: Path, part: Part) -> list[Run]:
+def _finished(root: Path, part: Part) -> list[LoadedRun]:
     """Return the finished runs of a part of the campaign; print unexpected runs."""
     try:
         runs, left_out = read_runs([root])

@@ -8,7 +8,7 @@ import pyarrow.compute as pc
 
 from analysis.comparison.outcomes import outcome
 from analysis.measures.families import family
-from analysis.measures.load import Run
+from analysis.measures.load import LoadedRun
 from analysis.measures.study import measure_run, reach
 from docs.studies.thesis.data import SPACING, TABLES
 from schema.errors import RunFolderError
@@ -26,7 +26,7 @@ _PLATFORMS = (
 """Columns that name the platforms of a run."""
 
 
-def measured_rows(one: Run, commit: str | None) -> dict[str, pa.Table]:
+def measured_rows(one: LoadedRun, commit: str | None) -> dict[str, pa.Table]:
     """Return the rows of a finished run by table, in the order of ``TABLES``.
 
     Raises:
@@ -104,7 +104,7 @@ def _family(measured: Mapping[str, pa.Table], births: pa.Table) -> pa.Table:
     )
 
 
-def _details(one: Run, commit: str | None, births: int) -> pa.Table:
+def _details(one: LoadedRun, commit: str | None, births: int) -> pa.Table:
     """Return the description of a run with its platforms and commit."""
     platforms: set[str] = set()
     for table, column in _PLATFORMS:
@@ -124,7 +124,7 @@ def _details(one: Run, commit: str | None, births: int) -> pa.Table:
     return pa.Table.from_pylist([row], TABLES["runs"])
 
 
-def _kept(table: pa.Table, name: str, one: Run) -> pa.Table:
+def _kept(table: pa.Table, name: str, one: LoadedRun) -> pa.Table:
     """Return a table with the columns that are kept; NaN becomes null."""
     columns = {"experiment": one.experiment, "run": one.number}
     arrays = []

@@ -14,7 +14,7 @@ from analysis.comparison.comparison import comparison, outcomes_of
 from analysis.comparison.findings import findings, with_benchmark
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
-from analysis.measures.load import IslandSettings, Run
+from analysis.measures.load import IslandSettings, LoadedRun
 from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
 from analysis.measures.study import MeasuredRun
 
@@ -50,7 +50,9 @@ def measured(
 ) -> MeasuredRun:
     settings = SETTINGS[:1]
     folder = Path(f"{name}-{number}")
-    return MeasuredRun(Run(folder, name, number, 1, state, "", settings), made, ())
+    return MeasuredRun(
+        LoadedRun(folder, name, number, 1, state, "", settings), made, ()
+    )
 
 
 def runs(name: str, values: list[float], *, births: int = 100) -> list[MeasuredRun]:

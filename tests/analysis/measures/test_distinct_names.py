@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from analysis.measures.distinct_names import with_distinct_names
-from analysis.measures.load import IslandSettings, Run
-from schema.experiment.document import Experiment, Islands, Selection
+from analysis.measures.load import IslandSettings, LoadedRun
+from schema.experiment.document import Experiment, Islands, SelectionSection
 from schema.experiment.file import experiment_text, read_experiment
 
 Document = Mapping[str, Any]
@@ -40,15 +40,17 @@ def changed(**sections: Any) -> dict[str, Any]:  # noqa: ANN401 - of JSON
     return {**SCENARIO, **merged}
 
 
-def runs(*documents: Document, name: str = "scenario1") -> list[Run]:
+def runs(*documents: Document, name: str = "scenario1") -> list[LoadedRun]:
     settings = (IslandSettings(60, is_online=False, records_touches=False),)
     return [
-        Run(Path(f"{number}"), name, 0, number, "finished", json.dumps(each), settings)
+        LoadedRun(
+            Path(f"{number}"), name, 0, number, "finished", json.dumps(each), settings
+        )
         for number, each in enumerate(documents)
     ]
 
 
-def named(some: list[Run]) -> list[tuple[str, str]]:
+def named(some: list[LoadedRun]) -> list[tuple[str, str]]:
     return [(run.experiment, run.differs) for run in with_distinct_names(some)]
 
 
@@ -107,7 +109,7 @@ def test_most_runs_keep_the_name_or_the_first_of_equally_many() -> None:
         "scenario1", "scenario1~3", "scenario1~4", "scenario1~2",
     ]  # fmt: skip
     # Each name is numbered separately.
-    fewer = document_of(Experiment("mine", selection=Selection(population=4)))
+    fewer = document_of(Experiment("mine", selection=SelectionSection(population=4)))
     mine = (changed(births=5), document_of(Experiment("mine")), fewer)
     found = named([*runs(SCENARIO), *runs(*mine, name="mine")])
     assert [name for name, _ in found] == ["scenario1", "mine", "mine", "mine~2"]

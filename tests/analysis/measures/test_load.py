@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.measures.load import LeftOut, Run, read_runs, read_tables
+from analysis.measures.load import LeftOut, LoadedRun, read_runs, read_tables
 from analysis.measures.study import MeasuredRun, measure_run, measure_runs
 from schema.errors import RunFolderError
 from schema.tables.description import run_columns
@@ -66,7 +66,7 @@ def made(tmp_path: Path) -> Maker:
     return make
 
 
-def names(folders: Iterable[Run | LeftOut]) -> list[str]:
+def names(folders: Iterable[LoadedRun | LeftOut]) -> list[str]:
     return [Path(one.folder).name for one in folders]
 
 
@@ -74,7 +74,7 @@ def whys(measured: MeasuredRun) -> dict[str, str]:
     return {one.what: one.why for one in measured.left_out}
 
 
-def found_in(folder: Path) -> Run:
+def found_in(folder: Path) -> LoadedRun:
     (run,), left_out = read_runs([folder])
     assert not left_out
     return run

@@ -5,7 +5,7 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from analysis.measures.load import IslandSettings, Run
+from analysis.measures.load import IslandSettings, LoadedRun
 from analysis.measures.named_measures import with_docstrings
 
 SOURCE = '''\
@@ -28,7 +28,7 @@ NAMES = ("flight", "speed", "bare", "gone")
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Run:
+def run(tmp_path: Path) -> LoadedRun:
     (tmp_path / "plugins" / "lab").mkdir(parents=True)
     (tmp_path / "plugins" / "gaits.py").write_text(SOURCE)
     (tmp_path / "plugins" / "lab" / "ropes.py").write_text(SOURCE)
@@ -38,17 +38,19 @@ def run(tmp_path: Path) -> Run:
     return run_of(tmp_path, names)
 
 
-def run_of(folder: Path, names: list[str]) -> Run:
+def run_of(folder: Path, names: list[str]) -> LoadedRun:
     islands = (IslandSettings(30, is_online=False, records_touches=False),)
-    return Run(folder, "a", 0, 1, "finished", "{}", islands, measures=tuple(names))
+    return LoadedRun(
+        folder, "a", 0, 1, "finished", "{}", islands, measures=tuple(names)
+    )
 
 
-def described(run: Run, *names: str) -> dict[str, str]:
+def described(run: LoadedRun, *names: str) -> dict[str, str]:
     rows = with_docstrings(pa.table({"measure": list(names)}), run).to_pylist()
     return {row["measure"]: row["about"] for row in rows}
 
 
-def test_first_lines_of_docstrings(run: Run) -> None:
+def test_first_lines_of_docstrings(run: LoadedRun) -> None:
     assert described(run, *NAMES) == {
         "flight": "Return the share of samples in the air [1].",
         "speed": "Greatest speed <b>[m/s]</b>.",
@@ -57,7 +59,7 @@ def test_first_lines_of_docstrings(run: Run) -> None:
     }
 
 
-def test_modules_of_a_package(run: Run) -> None:
+def test_modules_of_a_package(run: LoadedRun) -> None:
     found = described(run_of(run.folder, ["lab.ropes:flight"]), "flight", "turning")
     assert found == {
         "flight": "Return the share of samples in the air [1].",
@@ -65,12 +67,12 @@ def test_modules_of_a_package(run: Run) -> None:
     }
 
 
-def test_sources_that_cannot_be_read_give_nothing(run: Run) -> None:
+def test_sources_that_cannot_be_read_give_nothing(run: LoadedRun) -> None:
     assert described(run, "none", "far") == {"none": "", "far": ""}
 
 
 @pytest.mark.parametrize("name", ["{0}/plugins/gaits:flight", ":flight", "a..b:flight"])
-def test_only_modules_of_the_run_are_read(run: Run, name: str) -> None:
+def test_only_modules_of_the_run_are_read(run: LoadedRun, name: str) -> None:
     """A run folder may be somebody else's."""
     hostile = run_of(run.folder / "other", [name.format(run.folder)])
     assert described(hostile, "flight") == {"flight": ""}

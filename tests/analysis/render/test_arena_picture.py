@@ -5,7 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from analysis.render.arena_picture import ArenaRenderer, Poses
-from schema.experiment.document import Arena
+from schema.experiment.document import ArenaSection
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import arena_settings_of
 from schema.robot.ids import BirthId
@@ -65,12 +65,12 @@ def test_robots_are_at_their_places_while_they_live() -> None:
     ("place", "arena"),
     [
         # Between the camera, which looks along (-0.64, 0.77), and the robot.
-        ((0.2, -0.2), Arena(wall_diameter_m=0.9, wall_height_m=2.0)),
-        ((0.0, 0.0), Arena(wall_diameter_m=0.6)),
+        ((0.2, -0.2), ArenaSection(wall_diameter_m=0.9, wall_height_m=2.0)),
+        ((0.0, 0.0), ArenaSection(wall_diameter_m=0.6)),
     ],
 )
 def test_the_wall_is_rendered_and_hides_no_robot(
-    place: tuple[float, float], arena: Arena
+    place: tuple[float, float], arena: ArenaSection
 ) -> None:
     frame = {RED: pose(*place)}
     pictures = []

@@ -28,7 +28,7 @@ from analysis.viewer.resimulate import Simulators
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from schema.errors import RunFolderError
-from schema.experiment.document import Arena, Experiment
+from schema.experiment.document import ArenaSection, Experiment
 from schema.experiment.file import read_experiment
 from schema.mjcf.model import add_walls, ring_wall
 from schema.parts import BUILT_IN
@@ -52,7 +52,7 @@ class Recorded:
 
 
 def test_a_ring_wall_is_where_mujoco_has_it() -> None:
-    arena = Arena(wall_diameter_m=3.0, wall_segments=5)
+    arena = ArenaSection(wall_diameter_m=3.0, wall_segments=5)
     spec = mujoco.MjSpec()
     add_walls(spec, ring_wall(arena))
     model = spec.compile()

@@ -13,7 +13,7 @@ from analysis.viewer.blueprint import layout
 from analysis.viewer.ground import Relief, surfaces
 from analysis.viewer.recording import Recording
 from analysis.viewer.scene import Scene, scene_of
-from schema.experiment.document import Arena, Experiment, Islands, Simulation
+from schema.experiment.document import ArenaSection, Experiment, Islands, Simulation
 from schema.experiment.environment import FLAT, Environment, relief
 from schema.experiment.scenery import Solid
 from schema.robot.ids import BirthId
@@ -36,7 +36,9 @@ def recorded(scene: Scene, folder: Path) -> dict[str, pa.RecordBatch]:
 def shown(geom: str, folder: Path) -> dict[str, Any]:
     """Return what is recorded of the one geom of an arena's scenery."""
     environment = Environment(scenery=SCENERY.format(geom))
-    scene = scene_of(Experiment(name="a", arena=Arena(), environment=environment))
+    scene = scene_of(
+        Experiment(name="a", arena=ArenaSection(), environment=environment)
+    )
     (rows,) = recorded(scene, folder).values()
     (row,) = rows.to_pylist()
     return {name.partition(":")[2]: value for name, value in row.items()}
@@ -81,7 +83,7 @@ def test_the_light_is_a_ball_at_its_place() -> None:
     assert tuple(ball.centre) == place
     scenes = [
         scene_of(Experiment(name="alone", environment=Environment(light=place))),
-        scene_of(Experiment(name="arena", arena=Arena(light=place))),
+        scene_of(Experiment(name="arena", arena=ArenaSection(light=place))),
         scene_of(Experiment(name="dark")),
     ]
     assert [len(each.surfaces[0]) for each in scenes] == [1, 1, 0]
@@ -102,7 +104,10 @@ def test_rough_ground_is_drawn_node_by_node() -> None:
 def test_ground_is_below_robots_at_their_recorded_places() -> None:
     """Robots of one arena, and a single off-line robot, have ground below them."""
     rough = Environment(roughness_m=0.1, patch_m=0.5, extent_m=1.0)
-    islands = (Islands(environment=rough), Islands(environment=rough, arena=Arena()))
+    islands = (
+        Islands(environment=rough),
+        Islands(environment=rough, arena=ArenaSection()),
+    )
     scene = scene_of(Experiment(name="a", islands=islands))
     hermit, other, here, there = (BirthId(k // 2, k % 2) for k in range(4))
     assert len(scene.below([hermit])) == len(scene.below([here, there])) == 1
@@ -125,7 +130,7 @@ def test_an_arena_shows_its_recorded_ground(tmp_path: Path) -> None:
         roughness_m=0.1, patch_m=0.5, extent_m=1.0, scenery=scenery
     )
     # Island 0 is off-line: its robots hang side by side, with no ground below them.
-    islands = (Islands(), Islands(arena=Arena()))
+    islands = (Islands(), Islands(arena=ArenaSection()))
     scene = scene_of(Experiment(name="a", environment=environment, islands=islands))
     found = recorded(scene, tmp_path)
     assert list(found) == ["/islands/1/ground/0", "/islands/1/ground/1"]

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 from msgspec.structs import replace
 
-from analysis.measures.load import Run
+from analysis.measures.load import LoadedRun
 from analysis.viewer import resimulate
 from analysis.viewer.resimulate import Simulators
 from schema.experiment.document import Experiment
@@ -60,7 +60,7 @@ def shown_again(
         return Evaluation(max(known), 0.1, 0.1, 12.0), pa.table({})
 
     simulators = Simulators(alone, lambda *_: (b"", None), lambda *_: iter(()))  # type: ignore[arg-type]
-    run = Run(Path(), "e", 0, 1, "finished", experiment_text(experiment), ())
+    run = LoadedRun(Path(), "e", 0, 1, "finished", experiment_text(experiment), ())
     with (
         patch.object(
             resimulate,

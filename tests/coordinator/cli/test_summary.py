@@ -10,7 +10,7 @@ from msgspec import structs
 from coordinator.cli import summary
 from schema.errors import RunFolderError
 from schema.experiment.document import (
-    Arena,
+    ArenaSection,
     Experiment,
     Fitness,
     Islands,
@@ -50,7 +50,7 @@ def judged_apart(*islands: Islands) -> list[str]:
 def test_islands_that_judge_in_other_ways_are_said() -> None:
     alike = (Islands(count=2), Islands(fitness=Fitness()))
     assert judged_apart(*alike) == []
-    others = (Islands(fitness=Fitness(limit=0.5)), Islands(arena=Arena()))
+    others = (Islands(fitness=Fitness(limit=0.5)), Islands(arena=ArenaSection()))
     (line,) = judged_apart(*alike, *others)
     assert line == (
         "fitness of different islands is not comparable: locomotion on islands 0, 1, "
@@ -60,8 +60,8 @@ def test_islands_that_judge_in_other_ways_are_said() -> None:
 
 def test_windows_of_all_arenas_are_said() -> None:
     slow = Simulation(timestep_s=0.01, window_steps=600)
-    own = Islands(arena=Arena(), simulation=slow)
-    experiment = Experiment("e", arena=Arena(), islands=(Islands(), own))
+    own = Islands(arena=ArenaSection(), simulation=slow)
+    experiment = Experiment("e", arena=ArenaSection(), islands=(Islands(), own))
     arenas = [island_experiment(experiment, number) for number in range(2)]
     (line,) = summary._windows(arenas)
     what = "a robot's last 6 or 12 s before the last birth"
@@ -85,7 +85,7 @@ def test_run_is_extinct_if_all_of_its_arenas_have_too_few_births(
     *,
     is_extinct: bool,
 ) -> None:
-    experiment = Experiment("e", births=births, arena=Arena(), islands=islands)
+    experiment = Experiment("e", births=births, arena=ArenaSection(), islands=islands)
     assert summary._is_extinct(experiment, {0: 2, 1: 0}) is is_extinct
     off_line = structs.replace(experiment, arena=None)
     assert not summary._is_extinct(off_line, {0: 2, 1: 0})
@@ -108,7 +108,7 @@ def write_tables(folder: Path, rows: dict[str, list[dict[str, Any]]]) -> None:
 def test_a_run_with_all_of_its_births_is_not_extinct(
     tmp_path: Path, births: int, line: str
 ) -> None:
-    experiment = Experiment("e", births=3, arena=Arena())
+    experiment = Experiment("e", births=3, arena=ArenaSection())
     rows: list[dict[str, Any]] = [{"birth": number} for number in range(births)]
     write_tables(tmp_path, {"births": rows, "population": []})
     assert summary._results(tmp_path, experiment) == [line]

@@ -14,7 +14,7 @@ import yaml
 from cryptography import x509
 
 from coordinator.cluster.command import main
-from coordinator.cluster.kit import Cluster, Kit
+from coordinator.cluster.kit import ClusterKit, Kit
 from schema.agent.access import read_certificates
 from schema.agent.certificate import certificate_name
 from schema.errors import RevolveError
@@ -37,7 +37,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def kit(tmp_path: Path, clock: Clock) -> Kit:
-    made = Kit.new(tmp_path / "lab", Cluster("hub.example", 7447, 90), clock)
+    made = Kit.new(tmp_path / "lab", ClusterKit("hub.example", 7447, 90), clock)
     made.add("a", "worker")
     made.add("boss", "operator")
     return made
@@ -74,7 +74,7 @@ def test_certificates_are_valid_for_both_sides(kit: Kit, clock: Clock) -> None:
 
 
 def test_hub_is_named_by_its_address(tmp_path: Path, clock: Clock) -> None:
-    kit = Kit.new(tmp_path / "lab", Cluster("10.0.0.1", 7447, 90), clock)
+    kit = Kit.new(tmp_path / "lab", ClusterKit("10.0.0.1", 7447, 90), clock)
     text = openssl("x509", "-in", kit.folder / "members/hub/certificate.pem", "-text")
     assert "IP Address:10.0.0.1" in text
 
@@ -144,7 +144,7 @@ def test_hub_cannot_be_revoked(kit: Kit) -> None:
 
 def test_used_folder_is_refused(kit: Kit, clock: Clock) -> None:
     with pytest.raises(RevolveError, match="not empty"):
-        Kit.new(kit.folder, Cluster("h", 1, 1), clock)
+        Kit.new(kit.folder, ClusterKit("h", 1, 1), clock)
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b'{"hub": 1}', b"\xff"])

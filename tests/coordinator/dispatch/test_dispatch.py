@@ -22,15 +22,15 @@ from coordinator.dispatch.dispatch import (
 )
 from coordinator.dispatch.events import (
     AgentKind,
-    Ask,
+    AskProgress,
     Assign,
     Cancel,
     Client,
+    ClientEnded,
     Deliver,
     Died,
     DispatchCommand,
     DispatchEvent,
-    Ended,
     Expired,
     Job,
     JobKind,
@@ -449,7 +449,7 @@ def test_first_job_of_all_is_duplicated_though_no_duration_is_known() -> None:
 def silent(dispatch: Dispatch, now_s: float) -> list[DispatchCommand]:
     """Let agents be asked from a time on, and not answer; return what follows."""
     asked = dispatch.handle(Ticked(now_s))
-    assert {type(command) for command in asked} <= {Ask}
+    assert {type(command) for command in asked} <= {AskProgress}
     return dispatch.handle(Ticked(now_s + REPLY_S + 0.3))
 
 
@@ -458,10 +458,10 @@ def test_a_third_copy_needs_a_silent_agent() -> None:
     assert given_out(dispatch.handle(Ticked(FIRST_S + 1.0))) == [(0, "b")]
     dispatch.handle(worker("c"))
     dispatch.handle(worker("d"))
-    assert dispatch.handle(Ticked(2 * FIRST_S)) == [Ask("a")]
+    assert dispatch.handle(Ticked(2 * FIRST_S)) == [AskProgress("a")]
     # Both work: the third has no cause to help.
     dispatch.handle(Progressed("a"))
-    assert dispatch.handle(Ticked(3 * FIRST_S + 1.0)) == [Ask("b")]
+    assert dispatch.handle(Ticked(3 * FIRST_S + 1.0)) == [AskProgress("b")]
     dispatch.handle(Progressed("b"))
     assert given_out(dispatch.handle(Ticked(4 * FIRST_S))) == []
     assert given_out(silent(dispatch, 4 * FIRST_S + 1.0)) == [(0, "c")]
@@ -469,8 +469,8 @@ def test_a_third_copy_needs_a_silent_agent() -> None:
     told_s = 5 * FIRST_S + 1.0
     assert dispatch.handle(Ticked(told_s)) == [
         Overdue("a", told_s, "b"),
-        Ask("a"),
-        Ask("b"),
+        AskProgress("a"),
+        AskProgress("b"),
     ]
     assert given_out(dispatch.handle(Ticked(told_s + REPLY_S - 0.1))) == []
     assert given_out(dispatch.handle(Ticked(told_s + REPLY_S + 1.0))) == [(0, "d")]
@@ -484,7 +484,7 @@ def test_user_is_told_once_of_a_silent_agent_without_a_substitute() -> None:
     assert dispatch.handle(Ticked(130.0)) == [Overdue("a", 130.0)]
     for more in range(1, 9):
         commands = dispatch.handle(Ticked(130.0 + more * FIRST_S))
-        assert {type(command) for command in commands} <= {Ask}
+        assert {type(command) for command in commands} <= {AskProgress}
     # It was only slow; if it falls silent again, the user is told again.
     dispatch.handle(ok(0, "a"))
     silent(dispatch, 9000.0)
@@ -613,7 +613,7 @@ def test_agents_that_report_progress_and_never_answer_end_no_run() -> None:
     at_s = [0.0]
     for tick in range(1, 1700):
         for command in dispatch.handle(Ticked(0.2 * tick)):
-            if isinstance(command, Ask):
+            if isinstance(command, AskProgress):
                 dispatch.handle(Progressed(command.agent))
             else:
                 given += given_out([command])
@@ -632,7 +632,7 @@ def test_slow_agents_that_report_progress_keep_their_jobs() -> None:
     copies = 0
     for second in range(1, 600):
         for command in dispatch.handle(Ticked(float(second))):
-            assert isinstance(command, Ask)
+            assert isinstance(command, AskProgress)
             copies += len(dispatch.handle(Progressed(command.agent)))
     assert copies == 0
     assert dispatch.silent() == {}
@@ -670,7 +670,7 @@ def test_calls_keep_their_wait() -> None:
         assert dispatch.handle(Ticked(float(second))) == []
     assert given_out(dispatch.handle(Ticked(61.0))) == [(0, "b")]
     assert dispatch.handle(Ticked(119.0)) == []
-    assert dispatch.handle(Ticked(121.0)) == [Ask("a")]
+    assert dispatch.handle(Ticked(121.0)) == [AskProgress("a")]
 
 
 def test_the_second_of_two_paired_jobs_does_not_wait_for_a_silent_worker() -> None:
@@ -727,7 +727,7 @@ def test_many_waiting_jobs_are_withdrawn_in_linear_time() -> None:
     def seconds(jobs: int) -> float:
         dispatch = told(*requests(*range(jobs)))
         began_s = time.process_time()
-        dispatch.handle(Ended(Client("run", 1)))
+        dispatch.handle(ClientEnded(Client("run", 1)))
         assert dispatch.pending == dispatch.waiting("worker") == 0
         return time.process_time() - began_s
 
@@ -739,7 +739,7 @@ def test_an_agent_that_works_is_never_called_silent() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     for minute in range(1, 100):
         commands = dispatch.handle(Ticked(FIRST_S * minute + 1.0))
-        assert {type(command) for command in commands} <= {Ask}
+        assert {type(command) for command in commands} <= {AskProgress}
         if commands:
             dispatch.handle(Progressed("a"))
 
@@ -847,7 +847,7 @@ class World:
 
     def tell(self, event: DispatchEvent) -> None:
         for command in self.dispatch.handle(event):
-            if isinstance(command, Ask | Overdue):
+            if isinstance(command, AskProgress | Overdue):
                 assert command.agent in self.agents
                 continue
             number, agent = command.job.number, command.agent

@@ -18,7 +18,7 @@ from coordinator.dispatch.events import (
     ShardFailed,
     Ticked,
 )
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.dispatch.pool import FIRST_S, LEAST_WAIT_S, LONGEST_WAIT_S, REPLY_S
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.codec import fingerprint
@@ -48,23 +48,23 @@ def agents() -> SentJobs:
 
 
 @pytest.fixture
-def fleet(agents: SentJobs) -> Fleet:
-    made = Fleet(agents)
+def fleet(agents: SentJobs) -> JobRouter:
+    made = JobRouter(agents)
     assert made.listen(0.0, 0.0) == {}
     return made
 
 
-def request(fleet: Fleet, client: Client = CLIENT) -> int:
+def request(fleet: JobRouter, client: Client = CLIENT) -> int:
     number = fleet.new_number()
     fleet.request(Job(number, "evaluate", b"", client=client))
     return number
 
 
-def new_shard(fleet: Fleet, client: Client = ARENA) -> int:
+def new_shard(fleet: JobRouter, client: Client = ARENA) -> int:
     return fleet.new_shard(client, encode, "")
 
 
-def test_an_answer_goes_to_its_client(fleet: Fleet, agents: SentJobs) -> None:
+def test_an_answer_goes_to_its_client(fleet: JobRouter, agents: SentJobs) -> None:
     numbers = [request(fleet, client) for client in (CLIENT, OTHER, CLIENT)]
     assert fleet.open == 3
     agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[:2]]
@@ -77,7 +77,7 @@ def test_an_answer_goes_to_its_client(fleet: Fleet, agents: SentJobs) -> None:
     assert fleet.listen(0.0, 2.0) == {}
 
 
-def test_credits_count_the_workers_that_joined(fleet: Fleet) -> None:
+def test_credits_count_the_workers_that_joined(fleet: JobRouter) -> None:
     assert fleet.dispatch.credits == 5
     fleet.tell(Joined("judge", "analyzer", 4, "p"))
     fleet.tell(Left("two"))
@@ -85,7 +85,7 @@ def test_credits_count_the_workers_that_joined(fleet: Fleet) -> None:
 
 
 def test_jobs_of_a_client_that_left_are_withdrawn(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     request(fleet)
     fleet.leave(CLIENT)
@@ -101,7 +101,7 @@ def test_jobs_of_a_client_that_left_are_withdrawn(
 
 
 def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     request(fleet)
     waiting = [request(fleet, each) for each in (CLIENT, OTHER, OTHER, OTHER, CLIENT)][
@@ -120,7 +120,7 @@ def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
 
 
 def test_deaths_by_jobs_of_other_coordinators_do_not_count(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     number = request(fleet)
     names = ["one", "two", "x"]
@@ -142,7 +142,7 @@ def test_deaths_by_jobs_of_other_coordinators_do_not_count(
 
 @pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
 def test_a_job_that_its_agent_declined_is_given_to_another(
-    fleet: Fleet, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
+    fleet: JobRouter, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
 ) -> None:
     """Nobody's word about epochs ends a job, and it never counts as an error."""
     request(fleet)
@@ -162,7 +162,7 @@ def test_a_job_that_its_agent_declined_is_given_to_another(
 
 
 def test_a_job_whose_wait_is_over_stays_with_its_worker(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     request(fleet)
     shard = new_shard(fleet)
@@ -184,7 +184,7 @@ def test_a_job_whose_wait_is_over_stays_with_its_worker(
 
 
 def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     request(fleet)
     ((number, agent, _),) = agents.sent
@@ -196,7 +196,7 @@ def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
 
 
 def test_a_job_that_was_sent_again_took_all_the_time(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     request(fleet)
     ((number, agent, _),) = agents.sent
@@ -214,7 +214,9 @@ def test_a_job_that_was_sent_again_took_all_the_time(
     assert agents.waits_s[-1] == pytest.approx(100.0 * typical_s)
 
 
-def advance_until(fleet: Fleet, agents: SentJobs, shard: int, *times_s: float) -> None:
+def advance_until(
+    fleet: JobRouter, agents: SentJobs, shard: int, *times_s: float
+) -> None:
     """Advance a shard several times; the answers come at these times."""
     for now_s in times_s:
         fleet.advance(shard)
@@ -224,7 +226,7 @@ def advance_until(fleet: Fleet, agents: SentJobs, shard: int, *times_s: float) -
 
 
 def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
     advance_until(fleet, agents, shard, 20.0, 40.0)
@@ -234,7 +236,7 @@ def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
 
 
 def test_advances_after_one_that_expired_wait_longer(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
     advance_until(fleet, agents, shard, 1.0, 2.0)
@@ -255,7 +257,7 @@ def test_advances_after_one_that_expired_wait_longer(
 
 
 def test_a_state_that_cannot_be_read_ends_only_its_own_run(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     def unreadable(_command: AssignShard) -> tuple[bytes, Read]:
         raise RunFolderError("island-0-5.bin: is missing")
@@ -276,7 +278,7 @@ def test_a_state_that_cannot_be_read_ends_only_its_own_run(
 
 @pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
 def test_an_advance_that_its_worker_declined_is_repeated(
-    fleet: Fleet, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
+    fleet: JobRouter, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
 ) -> None:
     fleet.advance(new_shard(fleet))
     for now_s in range(1, 7):
@@ -290,7 +292,7 @@ def test_an_advance_that_its_worker_declined_is_repeated(
 
 
 def test_a_cancelled_copy_that_is_not_wanted_is_no_fault(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     request(fleet)
     fleet.leave(CLIENT)
@@ -300,7 +302,9 @@ def test_a_cancelled_copy_that_is_not_wanted_is_no_fault(
     assert fleet.faults.counts == ()
 
 
-def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: SentJobs) -> None:
+def test_arenas_of_all_runs_share_the_workers(
+    fleet: JobRouter, agents: SentJobs
+) -> None:
     shards = [new_shard(fleet, ARENA), new_shard(fleet, OTHER)]
     for shard in shards:
         fleet.advance(shard)
@@ -316,7 +320,7 @@ def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: SentJobs) ->
 
 @pytest.mark.parametrize("is_answer", [True, False])
 def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
-    fleet: Fleet, agents: SentJobs, *, is_answer: bool
+    fleet: JobRouter, agents: SentJobs, *, is_answer: bool
 ) -> None:
     shard = new_shard(fleet)
     fleet.advance(shard)
@@ -343,7 +347,7 @@ def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
 
 
 def test_an_unfit_worker_gets_jobs_of_other_clients_only(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     """Jobs, and an arena, of a client; an agent that joins again is tried again."""
     shard = new_shard(fleet, CLIENT)
@@ -372,7 +376,7 @@ def test_an_unfit_worker_gets_jobs_of_other_clients_only(
 
 @pytest.mark.parametrize("is_late", [False, True])
 def test_an_unfit_worker_gets_no_copy_of_an_overdue_job(
-    fleet: Fleet, agents: SentJobs, *, is_late: bool
+    fleet: JobRouter, agents: SentJobs, *, is_late: bool
 ) -> None:
     first = request(fleet)
     agents.news = [Returned(first, agents.sent[0][1], "unfit", reason="no plug-in")]
@@ -385,7 +389,7 @@ def test_an_unfit_worker_gets_no_copy_of_an_overdue_job(
 
 
 def test_a_worker_is_fit_again_for_a_client_that_has_ended(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     number = request(fleet)
     agent = agents.sent[0][1]
@@ -398,7 +402,9 @@ def test_a_worker_is_fit_again_for_a_client_that_has_ended(
     assert fleet.dispatch.unfit() == {}
 
 
-def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: SentJobs) -> None:
+def test_a_worker_without_the_state_is_given_it(
+    fleet: JobRouter, agents: SentJobs
+) -> None:
     shard = new_shard(fleet)
     for data in (b"answer", b"stateless"):
         fleet.advance(shard)
@@ -411,7 +417,7 @@ def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: SentJobs) 
 
 
 def test_an_advance_that_crashes_three_workers_is_given_up(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
     fleet.advance(shard)
@@ -434,7 +440,7 @@ def test_an_advance_that_crashes_three_workers_is_given_up(
 
 
 def test_a_released_arena_leaves_room_for_another(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     fleet.advance(new_shard(fleet, ARENA))
     fleet.advance(new_shard(fleet, OTHER))
@@ -449,7 +455,7 @@ def test_a_released_arena_leaves_room_for_another(
 
 
 def test_fleet_pauses_while_all_workers_have_spare_jobs(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     numbers = [request(fleet) for _ in range(200)]
     fleet.listen(0.2, 0.0)
@@ -474,7 +480,7 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
     agents: SentJobs,
 ) -> None:
     lines: list[str] = []
-    fleet = Fleet(agents, warn=lines.append)
+    fleet = JobRouter(agents, warn=lines.append)
     fleet.listen(0.0, 0.0)
     fleet.advance(new_shard(fleet))
     ((number, agent, payload),) = agents.sent
@@ -502,7 +508,7 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
 
 
 def test_an_advance_is_timed_from_its_own_assignment(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     """Also the first one of all, of a coordinator that has run for long."""
     fleet.listen(0.0, 1000.0)
@@ -514,7 +520,7 @@ def test_an_advance_is_timed_from_its_own_assignment(
 
 
 def test_jobs_and_advances_share_one_account_of_load(
-    fleet: Fleet, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs
 ) -> None:
     fleet.advance(new_shard(fleet))
     assert [agent for _, agent, _ in agents.sent] == ["one"]

@@ -7,7 +7,7 @@ import pytest
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
-    Ask,
+    AskProgress,
     AssignShard,
     CancelShard,
     Crowded,
@@ -345,7 +345,7 @@ def test_silent_worker_loses_its_advance_to_an_idle_one() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(ShardRequested(0))
     assert dispatch.handle(Ticked(FIRST_S - 1.0)) == []
-    assert dispatch.handle(Ticked(FIRST_S)) == [Ask("a")]
+    assert dispatch.handle(Ticked(FIRST_S)) == [AskProgress("a")]
     assert dispatch.handle(Ticked(FIRST_S + REPLY_S - 1.0)) == []
     assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == [
         Overdue("a", FIRST_S + REPLY_S, "b"),
@@ -369,7 +369,7 @@ def test_deadline_follows_the_duration_of_earlier_advances() -> None:
         dispatch.handle(Ticked(200.0))
         dispatch.handle(ShardRequested(0))
         assert dispatch.handle(Ticked(199.0 + limit_s)) == []
-        assert dispatch.handle(Ticked(200.0 + limit_s)) == [Ask("a")]
+        assert dispatch.handle(Ticked(200.0 + limit_s)) == [AskProgress("a")]
 
 
 def test_worker_that_reports_progress_keeps_its_advance() -> None:
@@ -379,7 +379,7 @@ def test_worker_that_reports_progress_keeps_its_advance() -> None:
     while now_s < 100 * FIRST_S:
         now_s += 1.0
         commands = dispatch.handle(Ticked(now_s))
-        assert commands in ([], [Ask("a")])
+        assert commands in ([], [AskProgress("a")])
         if commands:
             asked += 1
             dispatch.handle(Progressed("a"))
@@ -442,7 +442,7 @@ def test_deadlines_of_advances_follow_their_simulated_time(advance_s: float) -> 
     dispatch.handle(ShardRequested(0, 40.0))
     # The first: ten times faster than real time.
     assert dispatch.handle(Ticked(3.9)) == []
-    assert dispatch.handle(Ticked(4.1)) == [Ask("a")]
+    assert dispatch.handle(Ticked(4.1)) == [AskProgress("a")]
     dispatch.handle(ShardReturned(1, "done"))
     dispatch.handle(ShardRequested(0, 10.0))
     dispatch.handle(Ticked(4.1 + advance_s))
@@ -451,7 +451,7 @@ def test_deadlines_of_advances_follow_their_simulated_time(advance_s: float) -> 
     dispatch.handle(ShardRequested(0, 20.0))
     limit_s = max(LEAST_S, PATIENCE * 2.0 * advance_s)
     assert dispatch.handle(Ticked(99.9 + limit_s)) == []
-    assert dispatch.handle(Ticked(100.2 + limit_s)) == [Ask("a")]
+    assert dispatch.handle(Ticked(100.2 + limit_s)) == [AskProgress("a")]
 
 
 def test_silent_worker_keeps_its_advance_while_no_other_is_idle() -> None:
@@ -471,7 +471,7 @@ def test_silent_worker_keeps_its_advance_while_no_other_is_idle() -> None:
         for minute in range(2, 50)
         for command in dispatch.handle(Ticked(minute * FIRST_S))
     ]
-    assert {type(command) for command in told} == {Ask}
+    assert {type(command) for command in told} == {AskProgress}
     assert [dispatch.holder(0), dispatch.holder(1)] == ["a", "b"]
 
 
@@ -483,7 +483,7 @@ def test_single_worker_never_loses_its_advance() -> None:
         for second in range(5000)
         for command in dispatch.handle(Ticked(float(second)))
     ]
-    assert [each for each in commands if not isinstance(each, Ask)] == [
+    assert [each for each in commands if not isinstance(each, AskProgress)] == [
         Overdue("a", FIRST_S + REPLY_S)
     ]
     assert dispatch.handle(ShardReturned(1, "done")) == [ShardDone(0, "a")]

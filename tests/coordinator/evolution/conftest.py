@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from schema.experiment.document import Encoding, Experiment
+from schema.experiment.document import EncodingSection, Experiment
 from schema.plugins import permission
 
 PAGE = Path(__file__).parents[3] / "docs" / "encodings.md"
@@ -36,7 +36,7 @@ def own_encoding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Own:
         made.append(name)
         (tmp_path / f"{name}.py").write_text(text)
         permission.allow([str(tmp_path / f"{name}.py")])
-        section = Encoding(type=f"{name}:Worms", parameters=parameters)
+        section = EncodingSection(type=f"{name}:Worms", parameters=parameters)
         return Experiment(name="test", encoding=section)
 
     return experiment

@@ -8,7 +8,7 @@ import pytest
 
 from coordinator.evolution.breeding import Breeder, Individual, failed_last
 from schema.errors import ExperimentError
-from schema.experiment.document import Culling, Experiment, Selection, Space
+from schema.experiment.document import Culling, Experiment, SelectionSection, Space
 from schema.robot.genome import NeuronGene, Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
@@ -19,7 +19,7 @@ CHILD = BirthId(0, 40)
 
 def breeder(space: Space | None = None, **selection: Any) -> Breeder:  # noqa: ANN401 - any setting
     experiment = Experiment(
-        name="test", space=space or Space(), selection=Selection(**selection)
+        name="test", space=space or Space(), selection=SelectionSection(**selection)
     )
     return Breeder(experiment, 1, 0)
 

@@ -7,7 +7,7 @@ import pytest
 from coordinator.evolution.check_encoding import check_encoding
 from coordinator.evolution.kinds import ENCODING
 from schema.errors import ExperimentError
-from schema.experiment.document import Encoding, Experiment
+from schema.experiment.document import EncodingSection, Experiment
 from schema.experiment.kinds import Use
 
 Own = Callable[..., Experiment]
@@ -15,7 +15,7 @@ Own = Callable[..., Experiment]
 
 @pytest.mark.parametrize("name", ["revolve-angle", "cppn"])
 def test_built_in_encodings_pass(name: str) -> None:
-    check_encoding(Experiment(name="test", encoding=Encoding(type=name)))
+    check_encoding(Experiment(name="test", encoding=EncodingSection(type=name)))
 
 
 def test_the_encoding_of_the_page_passes(own_encoding: Own) -> None:

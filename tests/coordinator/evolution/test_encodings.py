@@ -13,7 +13,7 @@ from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, UnknownPlugin
-from schema.experiment.document import Encoding, Experiment, Space
+from schema.experiment.document import EncodingSection, Experiment, Space
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
@@ -75,7 +75,7 @@ def test_an_unknown_name_is_refused_with_the_nearest(name: str, nearest: str) ->
     with pytest.raises(
         UnknownPlugin, match=f"^encoding.type: must be one of .*{nearest}"
     ):
-        encoding_of(Experiment(name="test", encoding=Encoding(type=name)))
+        encoding_of(Experiment(name="test", encoding=EncodingSection(type=name)))
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_an_unknown_name_is_refused_with_the_nearest(name: str, nearest: str) ->
 def test_wrong_parameters_are_refused(
     name: str, parameters: dict[str, float], problem: str
 ) -> None:
-    section = Encoding(type=name, parameters=parameters)
+    section = EncodingSection(type=name, parameters=parameters)
     with pytest.raises(ExperimentError) as caught:
         encoding_of(Experiment(name="test", encoding=section))
     assert problem in str(caught.value)
@@ -155,7 +155,7 @@ def test_errors_of_own_code_are_one_line(own_encoding: Own, name: str) -> None:
 
 
 def test_bytes_of_another_encoding_are_refused(own_encoding: Own) -> None:
-    cppn = encoding_of(Experiment(name="test", encoding=Encoding(type="cppn")))
+    cppn = encoding_of(Experiment(name="test", encoding=EncodingSection(type="cppn")))
     encodings = [encoding_of(own_encoding()), encoding_of(THESIS), cppn]
     for one in encodings:
         data = one.to_bytes(one.random(rng(), BIRTH))

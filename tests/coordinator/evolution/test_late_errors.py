@@ -15,9 +15,9 @@ from coordinator.run.learners import Learners
 from schema.errors import ExperimentError
 from schema.experiment.document import (
     BrainSection,
-    Encoding,
+    EncodingSection,
     Experiment,
-    Selection,
+    SelectionSection,
 )
 from schema.experiment.identity import Origin
 from schema.experiment.learning import Learning
@@ -103,31 +103,31 @@ CASES: dict[str, Case] = {
         parents,
         "selection.parents",
         "selection",
-        lambda lab: Selection(parents=f"{lab}:fails"),
+        lambda lab: SelectionSection(parents=f"{lab}:fails"),
     ),
     "parents that end": (
         parents,
         "selection.parents",
         "selection",
-        lambda lab: Selection(parents=f"{lab}:ends"),
+        lambda lab: SelectionSection(parents=f"{lab}:ends"),
     ),
     "survivors": (
         survivors,
         "selection.survivors",
         "selection",
-        lambda lab: Selection(population=4, survivors=f"{lab}:fails"),
+        lambda lab: SelectionSection(population=4, survivors=f"{lab}:fails"),
     ),
     "encoding": (
         parents,
         "encoding.type",
         "encoding",
-        lambda lab: Encoding(type=f"{lab}:Crossing"),
+        lambda lab: EncodingSection(type=f"{lab}:Crossing"),
     ),
     "genome": (
         row,
         "encoding.type",
         "encoding",
-        lambda lab: Encoding(type=f"{lab}:Writing"),
+        lambda lab: EncodingSection(type=f"{lab}:Writing"),
     ),
     "brain": (parents, "", "brain", lambda lab: BrainSection(type=f"{lab}:Wave")),
     "learner": (

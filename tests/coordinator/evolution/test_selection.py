@@ -16,7 +16,7 @@ from coordinator.evolution.selection import (
     select_parents,
     select_survivors,
 )
-from schema.experiment.document import Arena, Culling, Selection
+from schema.experiment.document import ArenaSection, Culling, SelectionSection
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 
@@ -36,7 +36,7 @@ def numbers(chosen: Any) -> list[int]:  # noqa: ANN401 - any individuals
 
 
 def couples(population: list[Individual], **settings: Any) -> list[list[int]]:  # noqa: ANN401 - any setting
-    selection = Selection(**settings)
+    selection = SelectionSection(**settings)
     rng, rule = np.random.default_rng(2), rule_of(selection, "parents")
     return [numbers(select_parents(population, rng, rule)) for _ in range(N)]
 
@@ -86,7 +86,7 @@ def survivors(
     seed: int = 0,
     **settings: Any,  # noqa: ANN401 - any setting
 ) -> list[int]:
-    rng, selection = np.random.default_rng(seed), Selection(**settings)
+    rng, selection = np.random.default_rng(seed), SelectionSection(**settings)
     rule = rule_of(selection, "survivors")
     return numbers(select_survivors(parents, children, rng, selection, rule))
 
@@ -124,7 +124,7 @@ def test_all_founders_survive() -> None:
 
 
 def culled(fitness: list[float], **rules: float) -> tuple[str, list[int]]:
-    arena = msgspec.structs.replace(Arena(), **rules)
+    arena = msgspec.structs.replace(ArenaSection(), **rules)
     reason, found = select_culled(individuals(*fitness), arena)
     return reason, [one.birth.number for one in found]
 

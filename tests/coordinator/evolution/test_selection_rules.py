@@ -19,7 +19,7 @@ from coordinator.evolution.selection import (
     select_survivors,
 )
 from schema.errors import ExperimentError, UnknownPlugin
-from schema.experiment.document import Selection
+from schema.experiment.document import SelectionSection
 from schema.plugins import permission
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
@@ -96,7 +96,7 @@ def test_built_in_rules_keep_their_contract() -> None:
 
 def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
     path = f"{lab(LAB)}:ends"
-    selection = Selection(parents=path, parents_parameters={"first": 2})
+    selection = SelectionSection(parents=path, parents_parameters={"first": 2})
     rule = rule_of(selection, "parents")
     living = population(3, 3, 3, 3, 3)
     first, second = select_parents(living, np.random.default_rng(0), rule)
@@ -120,7 +120,7 @@ def test_any_sequence_of_places_is_an_answer(
     text = (
         f"import numpy as np\ndef some(population, count, rng, _):\n    return {answer}"
     )
-    selection = Selection(population=2, survivors=f"{lab(text)}:some")
+    selection = SelectionSection(population=2, survivors=f"{lab(text)}:some")
     everybody = population(9, 5, 7, 4)
     rng = np.random.default_rng(0)
     rule = rule_of(selection, "survivors")
@@ -135,7 +135,7 @@ def test_other_answers_are_refused_in_one_line(
     answer: str, lab: Callable[[str], str]
 ) -> None:
     text = f"def some(population, count, rng, _):\n    return {answer}"
-    selection = Selection(population=2, survivors=f"{lab(text)}:some")
+    selection = SelectionSection(population=2, survivors=f"{lab(text)}:some")
     everybody = population(9, 5, 7, 4)
     rng = np.random.default_rng(0)
     with pytest.raises(ExperimentError, match="must return 2 different whole numbers"):
@@ -143,7 +143,7 @@ def test_other_answers_are_refused_in_one_line(
 
 
 def test_own_survivors_come_in_birth_order(lab: Callable[[str], str]) -> None:
-    selection = Selection(population=2, survivors=f"{lab(LAB)}:smallest")
+    selection = SelectionSection(population=2, survivors=f"{lab(LAB)}:smallest")
     everybody = population(9, 5, 7, 4)
     chosen = select_survivors(
         everybody[:2],
@@ -163,8 +163,8 @@ def rules(lab: Callable[[str], str], change: str) -> tuple[Rule, Rule]:
         f"def live(population, count, rng, parameters):\n    {change}\n"
         "    return list(range(count))\n"
     )
-    parents = rule_of(Selection(parents=f"{name}:mate"), "parents")
-    return parents, rule_of(Selection(survivors=f"{name}:live"), "survivors")
+    parents = rule_of(SelectionSection(parents=f"{name}:mate"), "parents")
+    return parents, rule_of(SelectionSection(survivors=f"{name}:live"), "survivors")
 
 
 def test_rule_that_replaces_individuals_is_refused(lab: Callable[[str], str]) -> None:
@@ -175,7 +175,7 @@ def test_rule_that_replaces_individuals_is_refused(lab: Callable[[str], str]) ->
         lambda: check_rule(survivors),
         lambda: select_parents(everybody, rng, parents),
         lambda: select_survivors(
-            everybody[:2], everybody[2:], rng, Selection(population=2), survivors
+            everybody[:2], everybody[2:], rng, SelectionSection(population=2), survivors
         ),
     ):
         with pytest.raises(ExperimentError, match=r"\.py:\d: must not replace"):
@@ -192,7 +192,7 @@ def test_rule_that_sorts_its_list_chooses_from_the_sorted_one(
     # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
     couple = select_parents(everybody, rng, parents)
     assert couple == (everybody[3], everybody[1])
-    two = Selection(population=2)
+    two = SelectionSection(population=2)
     chosen = select_survivors(everybody[:2], everybody[2:], rng, two, survivors)
     assert chosen == (everybody[1], everybody[3])
 
@@ -202,7 +202,7 @@ def test_bad_rule_is_refused_with_file_and_line(
     lab: Callable[[str], str], answer: str
 ) -> None:
     name = lab(f"COUNT = [0]\ndef rule(population, rng, parameters):\n    {answer}\n")
-    rule = rule_of(Selection(parents=f"{name}:rule"), "parents")
+    rule = rule_of(SelectionSection(parents=f"{name}:rule"), "parents")
     expected = ANSWERS[answer].replace("NAME", name)
     with pytest.raises(ExperimentError) as caught:
         check_rule(rule)
@@ -212,7 +212,7 @@ def test_bad_rule_is_refused_with_file_and_line(
 
 def test_survivors_of_wrong_number_are_refused(lab: Callable[[str], str]) -> None:
     name = lab("def few(population, count, rng, parameters):\n    return [0, 1]\n")
-    rule = rule_of(Selection(survivors=f"{name}:few"), "survivors")
+    rule = rule_of(SelectionSection(survivors=f"{name}:few"), "survivors")
     expected = rf"survivors: {name}\.py:1: must return 15 different .* 0 to 15, got \[0"
     with pytest.raises(ExperimentError, match=expected):
         check_rule(rule)
@@ -247,4 +247,4 @@ def test_experiment_with_a_bad_rule_is_refused(
 
 def test_module_that_is_not_allowed_is_refused() -> None:
     with pytest.raises(UnknownPlugin, match="is not allowed"):
-        rule_of(Selection(parents="no_lab:rule"), "parents")
+        rule_of(SelectionSection(parents="no_lab:rule"), "parents")

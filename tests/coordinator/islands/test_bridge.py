@@ -26,7 +26,7 @@ from schema.experiment.document import (
     Culling,
     Experiment,
     Reevaluation,
-    Selection,
+    SelectionSection,
     Simulation,
 )
 from schema.experiment.file import read_experiment
@@ -38,7 +38,7 @@ from tests.coordinator.reports import VIABLE
 BRIDGE = Experiment(
     name="test",
     births=40,
-    selection=Selection(
+    selection=SelectionSection(
         population=6,
         children=2,
         reevaluation=Reevaluation(interval=4, share=0.5),

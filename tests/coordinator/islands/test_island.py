@@ -22,7 +22,7 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.island import Island
 from schema.errors import ExperimentError, UnexpectedEvent
-from schema.experiment.document import Experiment, Selection, body_space
+from schema.experiment.document import Experiment, SelectionSection, body_space
 from schema.experiment.file import read_experiment, shipped_experiments
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
@@ -39,7 +39,7 @@ Answer = Callable[[Vet | Evaluate], Answered]
 
 def small(**selection: Any) -> Experiment:  # noqa: ANN401 - any setting
     wanted: dict[str, Any] = {"population": 6, "children": 4, **selection}
-    return Experiment(name="test", births=18, selection=Selection(**wanted))
+    return Experiment(name="test", births=18, selection=SelectionSection(**wanted))
 
 
 def fitness_of(birth: BirthId) -> float:

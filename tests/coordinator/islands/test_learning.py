@@ -26,9 +26,9 @@ from coordinator.run.learners import Learners
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import (
     BrainSection,
-    Encoding,
+    EncodingSection,
     Experiment,
-    Selection,
+    SelectionSection,
     body_space,
 )
 from schema.experiment.identity import Origin
@@ -44,7 +44,7 @@ from tests.coordinator.reports import PROVENANCE, VIABLE
 
 FIRST = BirthId(0, 0)
 PLAIN = Experiment(
-    name="test", births=14, selection=Selection(population=6, children=4)
+    name="test", births=14, selection=SelectionSection(population=6, children=4)
 )
 
 
@@ -263,7 +263,7 @@ def test_nothing_to_learn_is_one_trial() -> None:
 
 
 def test_own_encodings_without_from_robot_inherit_nothing() -> None:
-    patterns = Encoding(type="cppn")
+    patterns = EncodingSection(type="cppn")
     experiment = replace(learning(inherit="lamarckian"), encoding=patterns)
     with pytest.raises(ExperimentError, match="it has no method from_robot"):
         Island(experiment, 1, 0)

@@ -16,7 +16,7 @@ from coordinator.islands.events import (
 from coordinator.islands.island import Island
 from schema.errors import UnexpectedEvent
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
@@ -28,7 +28,7 @@ Names = list[tuple[int, int]]
 
 def small_islands(
     *births: int,
-    selection: Selection | None = None,
+    selection: SelectionSection | None = None,
     **migration: Any,  # noqa: ANN401 - any setting
 ) -> ArchipelagoRun:
     """Return islands of four with broods of two; fitness rises with the name.
@@ -37,7 +37,8 @@ def small_islands(
     """
     document = Experiment(
         name="test",
-        selection=selection or Selection(population=4, children=2, parents="random"),
+        selection=selection
+        or SelectionSection(population=4, children=2, parents="random"),
         islands=tuple(Islands(births=each) for each in births),
         migration=Migration(**{"topology": "ring", "epoch": 4, **migration}),
     )
@@ -115,7 +116,7 @@ def test_migrants_have_no_births_and_change_no_rank() -> None:
 
 def test_an_immigrant_that_lives_on_the_island_already_is_dropped() -> None:
     # Broods are no better than immigrants: 1:3 stays the best of both islands.
-    worst = Selection(population=4, children=2, parents="random")
+    worst = SelectionSection(population=4, children=2, parents="random")
     lived = small_islands(8, 8, epoch=2, selection=worst)
     lived.fit = lambda birth, _: 0.9 if birth == (1, 3) else 0.5 - birth.number / 99
     lived.live()

@@ -5,8 +5,8 @@ from typing import Any
 
 from coordinator.arena.arena import Arena
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Arena as Rules
-from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.document import ArenaSection as Rules
+from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
@@ -16,7 +16,7 @@ from schema.wire.protobuf import decode_robot
 from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import World
 
-FEW = Selection(population=5, tournament_size=2)
+FEW = SelectionSection(population=5, tournament_size=2)
 CALM = Simulation(warmup_steps=600)
 """Robots mature 15 s after they were dropped."""
 

@@ -15,8 +15,8 @@ from coordinator.islands.events import Evaluated, EvaluationFailed
 from coordinator.run.requests import requester_of
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Arena as Rules
-from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.document import ArenaSection as Rules
+from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
@@ -32,7 +32,7 @@ ON_LINE = Islands(
     arena=Rules(population_limit=9, population_floor=4),
 )
 INFANTS = replace(ON_LINE, learning=Learning(learner="(1+1)-es", budget=2))
-SELECTION = Selection(population=5, children=3, tournament_size=2)
+SELECTION = SelectionSection(population=5, children=3, tournament_size=2)
 
 
 def document(*islands: Islands, **migration: Any) -> Experiment:  # noqa: ANN401

@@ -12,7 +12,7 @@ from schema.errors import UnexpectedEvent
 from schema.experiment.document import (
     Experiment,
     Reevaluation,
-    Selection,
+    SelectionSection,
     Simulation,
     body_space,
 )
@@ -29,7 +29,7 @@ ROBOT = develop(CORE, SPACE)
 def reevaluations(**rules: Any) -> Reevaluations:  # noqa: ANN401 - any setting
     """Return re-evaluations that are due every 5 births after 4 founders."""
     wanted = Reevaluation(**{"interval": 5, "share": 0.5, **rules})
-    selection = Selection(population=4, reevaluation=wanted)
+    selection = SelectionSection(population=4, reevaluation=wanted)
     experiment = Experiment(name="test", selection=selection)
     return Reevaluations(experiment, 0)
 

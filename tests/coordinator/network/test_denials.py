@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from coordinator.cluster.kit import Cluster, Kit
+from coordinator.cluster.kit import ClusterKit, Kit
 from coordinator.network.hub_service import watch_unlisted
 from schema.agent.access import read_certificates
 from schema.agent.network import Tls, client_config, hub_config
@@ -33,7 +33,9 @@ class Lab:
         port = int(self.address.rpartition(":")[2])
         now = datetime.now(UTC)
         clock = [now - timedelta(days=91)]
-        kit = Kit.new(folder / "lab", Cluster("127.0.0.1", port, 90), lambda: clock[0])
+        kit = Kit.new(
+            folder / "lab", ClusterKit("127.0.0.1", port, 90), lambda: clock[0]
+        )
         kit.add("late", "worker")
         clock[0] = now
         kit.renew("hub")
@@ -46,7 +48,7 @@ class Lab:
         listed = [each for each in listed if each.name != "unlisted"]
         self.config = hub_config((self.address,), self.tls("hub"), listed)
         foreign = Kit.new(
-            folder / "foreign", Cluster("127.0.0.1", port, 90), lambda: now
+            folder / "foreign", ClusterKit("127.0.0.1", port, 90), lambda: now
         )
         foreign.add("alien", "worker")
 

@@ -18,7 +18,7 @@ import zenoh
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
-    Ask,
+    AskProgress,
     Assign,
     Deliver,
     DispatchEvent,
@@ -32,7 +32,7 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.network.client_service import ask_coordinators
-from coordinator.network.operator_service import Order
+from coordinator.network.operator_service import OperatorQuery
 from coordinator.network.service import Network
 from schema.agent.network import client_config
 from schema.agent.service import session_config
@@ -128,7 +128,7 @@ class Driver:
 
     def tell(self, event: DispatchEvent) -> None:
         for command in self.dispatch.handle(event):
-            if isinstance(command, Ask | Overdue):
+            if isinstance(command, AskProgress | Overdue):
                 continue
             job = command.job
             if isinstance(command, Assign):
@@ -484,7 +484,7 @@ def test_a_query_with_a_wildcard_gets_a_reply_of_each_key(
     keys = {each for each in (member.command, member.state) if fnmatch(each, pattern)}
     with zenoh.open(config) as session:
         replies = session.get(key, consolidation=zenoh.ConsolidationMode.NONE)
-        asked: list[Order] = []
+        asked: list[OperatorQuery] = []
         while len(asked) < len(keys):
             network.receive(0.1)
             asked += network.queries.orders() + network.queries.onlookers()

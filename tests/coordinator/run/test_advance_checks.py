@@ -21,7 +21,7 @@ from coordinator.dispatch.events import (
     Returned,
     ShardDone,
 )
-from coordinator.dispatch.fleet import End, Fleet
+from coordinator.dispatch.fleet import End, JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
@@ -94,7 +94,7 @@ class Two(SentJobs):
     def __init__(self, *, has_touches: bool = False) -> None:
         super().__init__()
         self.now_s = 0.0
-        self.fleet = Fleet(self)
+        self.fleet = JobRouter(self)
         rules = experiment(9, record_touches=has_touches)
         context = RunContext.of("run", 3, rules, Origin())
         self.requests = ShardRequests(context, Kept(), self.fleet)

@@ -17,7 +17,7 @@ from msgspec import structs
 import analyzer.report
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import DispatchEvent, Returned
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
 from coordinator.run.operators import reply_to
@@ -121,7 +121,7 @@ class Run:
         document = other.pop("document", EXPERIMENT)
         self.arena = Arena(document, DETAILS.seed, DETAILS.run)
         platform = other.pop("platform", "any")
-        self.fleet = Fleet(
+        self.fleet = JobRouter(
             other.pop("agents", LocalAgents)(agents, platform),
             allows_drift=other.pop("allows_drift", False),
         )

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import analyzer.report
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
 from coordinator.run.history import arena_history
 from coordinator.run.session import RunSession
@@ -40,7 +40,7 @@ def advanced(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float
     (document,) = read_draft(str(place / "clocks.toml"), None).checked()
     details = RunDetails(document.name, 0, 1, experiment_text(document))
     worker = Jobs(Shards(World))
-    fleet = Fleet(
+    fleet = JobRouter(
         LocalAgents(
             {"analyzer": analyzer.report.answer, "worker": worker.answer}, "any"
         )

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 import analyzer.report
 import tests.null_workers
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Commanded, Remove, ReplaceBrain
 from coordinator.network.local import LocalAgents
 from coordinator.run.operators import _run, answer_operator, reply_to
@@ -20,8 +20,8 @@ from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import unbegun_status
-from schema.experiment.document import Arena as Rules
-from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.document import ArenaSection as Rules
+from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
 from schema.experiment.file import experiment_text
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
@@ -54,7 +54,7 @@ def planned(path: Path, *, is_finished: bool = False) -> Planned:
 def started(*runs: Planned) -> Iterator[RunScheduler]:
     """Start runs; a run starts when few requests of those before it are open."""
     answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
-    fleet = Fleet(LocalAgents(answers, "any"))  # type: ignore[arg-type]
+    fleet = JobRouter(LocalAgents(answers, "any"))  # type: ignore[arg-type]
     scheduler = RunScheduler(
         runs,
         fleet,
@@ -112,7 +112,7 @@ def test_the_name_of_a_finished_run_is_not_the_end_of_another(tmp_path: Path) ->
 
 TWO_ARENAS = Experiment(
     name="two",
-    selection=Selection(population=5, tournament_size=2),
+    selection=SelectionSection(population=5, tournament_size=2),
     simulation=Simulation(warmup_steps=600),
     arena=Rules(population_limit=12, population_floor=4),
     islands=(Islands(births=24), Islands(births=24)),

@@ -13,7 +13,7 @@ from msgspec import structs
 
 import analyzer.report
 from coordinator.dispatch.events import AgentKind, Joined
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
 from coordinator.run.session import RunSession
 from coordinator.storage.compare import compare
@@ -60,7 +60,7 @@ def execute(
         "worker": Jobs(Shards(world)).answer,
     }
     local = LocalAgents(agents, platforms[0])
-    fleet = Fleet(local, allows_drift=True)
+    fleet = JobRouter(local, allows_drift=True)
     for other in platforms[1:]:
         local._agents[f"worker-{other}"] = Jobs(Shards(world)).answer
         fleet.tell(Joined(f"worker-{other}", "worker", 1, other))

@@ -13,7 +13,7 @@ import pytest
 from msgspec import structs
 
 import analyzer.report
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Ask, Asked
 from coordinator.islands.island import Island
 from coordinator.network.local import LocalAgents
@@ -25,7 +25,7 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
-from schema.experiment.document import Experiment, Selection
+from schema.experiment.document import Experiment, SelectionSection
 from schema.experiment.file import experiment_text
 from schema.experiment.learning import Learning
 from schema.robot.results import Evaluation
@@ -34,7 +34,7 @@ from schema.wire.messages import Evaluate, Failure, Request
 from schema.wire.protobuf import encode_robot
 
 EXPERIMENT = Experiment(
-    name="resume", births=40, selection=Selection(population=8, children=6)
+    name="resume", births=40, selection=SelectionSection(population=8, children=6)
 )
 LEARNING = structs.replace(
     EXPERIMENT,
@@ -76,7 +76,7 @@ def run(
     details = None if (path / NAME).exists() else replace(DETAILS, document=text)
     with RunFolder(path, details) as folder, Journal.open(path) as journal:
         rows = Recorder(path, DETAILS)
-        fleet = Fleet(
+        fleet = JobRouter(
             LocalAgents(
                 {"analyzer": analyzer.report.answer, "worker": worker.answer}, "any"
             )

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 import analyzer.report
 import tests.null_workers
 from coordinator.dispatch.events import DispatchEvent, Joined, Returned
-from coordinator.dispatch.fleet import Agents, Fleet
+from coordinator.dispatch.fleet import Agents, JobRouter
 from coordinator.network.local import LocalAgents
 from coordinator.run.scheduler import SLACK, Planned, RunScheduler
 from coordinator.run.session import RunSession
@@ -56,7 +56,7 @@ def scheduler_of(
     agents: Agents,
     report: Callable[[RunStatus, RevolveError], None] = lambda *_: None,
 ) -> RunScheduler:
-    fleet = Fleet(agents)
+    fleet = JobRouter(agents)
     return RunScheduler(
         planned,
         fleet,

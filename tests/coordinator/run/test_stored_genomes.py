@@ -11,14 +11,14 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.run import stored_genomes
 from coordinator.run.stored_genomes import check_stored_genomes
 from schema.errors import RunFolderError
-from schema.experiment.document import Encoding, Experiment, Space
+from schema.experiment.document import EncodingSection, Experiment, Space
 from schema.experiment.learning import Learning
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.protobuf import decode_robot, encode_robot
 
-CPPN = Experiment(name="test", encoding=Encoding(type="cppn"))
+CPPN = Experiment(name="test", encoding=EncodingSection(type="cppn"))
 SMALL = Space(max_parts=3)
 FOLDER = Path("runs/a")
 

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import LONG_S, Compute, Reply, Server
-from schema.agent.supervision import CurrentJob, Death, JobWatch, ProcessSlot, Task
+from schema.agent.supervision import (
+    CurrentJob,
+    JobWatch,
+    ProcessCrash,
+    ProcessSlot,
+    RunningJob,
+)
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.limits import (
     ANSWER_BYTES,
@@ -261,7 +267,7 @@ def test_any_bytes_get_a_reply(data: bytes) -> None:
 
 
 def test_agent_info_holds_the_deaths() -> None:
-    death = Death(Task("v", "r", 3, 7, b"12345678"), "SIGSEGV")
+    death = ProcessCrash(RunningJob("v", "r", 3, 7, b"12345678"), "SIGSEGV")
     agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
     made = Server(lambda _: ANSWER, agent, ProcessSlot(0, None, (death,)))
     info = decode(AgentInfo, made.info, INFO_BYTES)
@@ -289,7 +295,7 @@ def test_job_that_waits_too_long_loses_its_process(
     monkeypatch.setattr(os, "kill", lambda _, number: sent.append(number))
     now_s = 0.0
     slot = ProcessSlot(0, CurrentJob())
-    noted: list[Task | None] = []
+    noted: list[RunningJob | None] = []
 
     def compute(_: Request) -> Result:
         nonlocal now_s
@@ -312,7 +318,7 @@ def test_job_that_waits_too_long_loses_its_process(
     made.reply(request(1))
     assert sent == signals
     is_blamed = sent != [signal.SIGKILL]
-    doing = Task("w", "r", 1, 1, fingerprint(request(1)))
+    doing = RunningJob("w", "r", 1, 1, fingerprint(request(1)))
     assert noted == [doing if is_blamed else None]
     now_s += 1000.0
     made.look()

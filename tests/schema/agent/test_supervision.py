@@ -15,13 +15,13 @@ from schema.agent.supervision import (
     CurrentJob,
     JobWatch,
     ProcessSlot,
-    Task,
+    RunningJob,
     crash_cause,
     thread_clock,
 )
 from schema.agent.supervisor import ProcessPool
 
-TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40, b"12345678")
+TASK = RunningJob("worker-0.ab", "host:some/folder", 3, 2**40, b"12345678")
 PATIENCE_S = 30.0
 
 
@@ -36,7 +36,7 @@ def test_note_is_readable_from_begin_to_end() -> None:
 
 def test_note_of_a_long_name_is_cut() -> None:
     note = CurrentJob()
-    note.begin(Task("a" * 999, "r" * 9999, 1, 2))
+    note.begin(RunningJob("a" * 999, "r" * 9999, 1, 2))
     held = note.read()
     assert held is not None
     assert (held.agent, held.number) == ("a" * 255, 2)

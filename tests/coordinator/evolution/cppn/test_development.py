@@ -11,11 +11,11 @@ from msgspec.structs import replace
 from analyzer.report import analyze
 from coordinator.evolution.cppn.body import body_outputs, share
 from coordinator.evolution.cppn.encoding import Cppn
-from coordinator.evolution.cppn.network import Link, Network
+from coordinator.evolution.cppn.network import CppnGenome, Link
 from coordinator.evolution.cppn.variation import Parameters
 from coordinator.evolution.encodings import outside_limits
 from schema.errors import ExperimentError
-from schema.experiment.document import Encoding, Experiment, Space, body_space
+from schema.experiment.document import EncodingSection, Experiment, Space, body_space
 from schema.robot.brain import Neuron
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.ids import BirthId
@@ -27,13 +27,15 @@ RULES = Parameters()
 
 def encoding(space: Space | None = None, parameters: Parameters = RULES) -> Cppn:
     space = space or Space()
-    experiment = Experiment(name="test", space=space, encoding=Encoding(type="cppn"))
+    experiment = Experiment(
+        name="test", space=space, encoding=EncodingSection(type="cppn")
+    )
     return Cppn(experiment, body_space(space), parameters)
 
 
 def developed(*links: Link, **space: Any) -> Robot:  # noqa: ANN401 - any limit
     ordered = tuple(sorted(links, key=lambda link: link.marking))
-    return encoding(Space(**space)).develop(Network((), ordered))
+    return encoding(Space(**space)).develop(CppnGenome((), ordered))
 
 
 PART = Link("bias", "part", 3.0)
@@ -201,7 +203,7 @@ def test_a_network_of_another_space_is_refused() -> None:
     small = replace(
         Space(), part_types=("schema.parts:CORE", "schema.parts:ACTIVE_HINGE")
     )
-    bricks = Network((), (Link("bias", "type FixedBrick", 1.0),))
+    bricks = CppnGenome((), (Link("bias", "type FixedBrick", 1.0),))
     data = encoding().to_bytes(bricks)
     assert encoding().from_bytes(data) == bricks
     with pytest.raises(ValueError, match="no node of its own"):

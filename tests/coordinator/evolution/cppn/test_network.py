@@ -6,9 +6,9 @@ import pytest
 
 from coordinator.evolution.cppn.network import (
     INPUTS,
+    CppnGenome,
+    HiddenNode,
     Link,
-    Network,
-    Node,
     evaluate,
     from_bytes,
     queries,
@@ -23,9 +23,9 @@ def asked(x: float) -> dict[str, np.ndarray[tuple[int], np.dtype[np.float64]]]:
     return queries(np.array([[x, 0.0, 0.0, 0.0]]), np.array([[0.0, 3.0, 4.0, 2.0]]))
 
 
-def value(*links: Link, nodes: tuple[Node, ...] = (), x: float = 0.5) -> float:
+def value(*links: Link, nodes: tuple[HiddenNode, ...] = (), x: float = 0.5) -> float:
     """Return output ``a`` for x1 = x."""
-    return float(evaluate(Network(nodes, links), asked(x), ("a",))["a"][0])
+    return float(evaluate(CppnGenome(nodes, links), asked(x), ("a",))["a"][0])
 
 
 def test_inputs_of_a_query() -> None:
@@ -71,7 +71,7 @@ def test_a_hidden_node_applies_its_function(
     function: str, x: float, inner: float
 ) -> None:
     links = Link("#1", "a", 1.0), Link("x1", "#1", 1.0)
-    got = value(*links, nodes=(Node("#1", function),), x=x)
+    got = value(*links, nodes=(HiddenNode("#1", function),), x=x)
     assert got == pytest.approx(inner / (1.0 + abs(inner)), abs=1e-15)
 
 
@@ -83,7 +83,7 @@ def test_disabled_connections_and_unconnected_outputs_give_0() -> None:
 def test_a_chain_of_nodes_stays_finite() -> None:
     ids = [f"#{number:03}" for number in range(60)]
     ends = zip(["bias", *ids], [*ids, "a"], strict=True)
-    nodes = tuple(Node(each, "line") for each in ids)
+    nodes = tuple(HiddenNode(each, "line") for each in ids)
     links = [Link(source, target, 3.0) for source, target in ends]
     # The sum 3 * 100 is limited to 100.
     assert value(*links, nodes=nodes) == 100.0 / 101.0
@@ -92,7 +92,7 @@ def test_a_chain_of_nodes_stays_finite() -> None:
 def test_rows_are_independent() -> None:
     points = np.random.default_rng(1).uniform(-3, 3, (50, 4))
     links = tuple(Link(name, "#1", 0.7) for name in sorted(INPUTS))
-    network = Network((Node("#1", "wave"),), (Link("#1", "a", 1.3), *links))
+    network = CppnGenome((HiddenNode("#1", "wave"),), (Link("#1", "a", 1.3), *links))
     together = evaluate(network, queries(points, points[::-1]), ("a",))["a"]
     for row in range(50):
         pair = points[row : row + 1], points[49 - row : 50 - row]
@@ -106,8 +106,8 @@ def test_a_path_counts_disabled_connections() -> None:
     assert reaches(links, "#1", "#1")
 
 
-GOOD = Network(
-    (Node("#1", "bell"), Node("#2", "wave")),
+GOOD = CppnGenome(
+    (HiddenNode("#1", "bell"), HiddenNode("#2", "wave")),
     (Link("#1", "#2", 0.1), Link("#2", "a", -3.0), Link("x1", "#1", 1 / 3, False)),
 )
 
@@ -119,23 +119,23 @@ def test_bytes_give_the_network_back() -> None:
 @pytest.mark.parametrize(
     ("network", "problem"),
     [
-        (Network(GOOD.nodes[::-1], GOOD.links), "sorted by id"),
-        (Network((Node("a", "bell"),), ()), "apart from all others"),
-        (Network((Node("#1", "cosine"),), ()), "must be one of line, wave"),
-        (Network(GOOD.nodes, GOOD.links[::-1]), "sorted by source and target"),
-        (Network((), (Link("x1", "c", 1.0),)), "no node of its own"),
-        (Network((), (Link("a", "b", 1.0),)), "no node of its own"),
-        (Network((), (Link("x1", "a", 3.1),)), "weight must be in"),
-        (Network((), (Link("x1", "a", float("nan")),)), "weight must be in"),
+        (CppnGenome(GOOD.nodes[::-1], GOOD.links), "sorted by id"),
+        (CppnGenome((HiddenNode("a", "bell"),), ()), "apart from all others"),
+        (CppnGenome((HiddenNode("#1", "cosine"),), ()), "must be one of line, wave"),
+        (CppnGenome(GOOD.nodes, GOOD.links[::-1]), "sorted by source and target"),
+        (CppnGenome((), (Link("x1", "c", 1.0),)), "no node of its own"),
+        (CppnGenome((), (Link("a", "b", 1.0),)), "no node of its own"),
+        (CppnGenome((), (Link("x1", "a", 3.1),)), "weight must be in"),
+        (CppnGenome((), (Link("x1", "a", float("nan")),)), "weight must be in"),
         (
-            Network(GOOD.nodes, (Link("#1", "#2", 1.0), Link("#2", "#1", 1.0))),
+            CppnGenome(GOOD.nodes, (Link("#1", "#2", 1.0), Link("#2", "#1", 1.0))),
             "part of a cycle",
         ),
-        (Network(GOOD.nodes, (Link("#1", "#1", 1.0),)), "part of a cycle"),
+        (CppnGenome(GOOD.nodes, (Link("#1", "#1", 1.0),)), "part of a cycle"),
     ],
 )
 def test_a_network_that_breaks_a_rule_is_refused(
-    network: Network, problem: str
+    network: CppnGenome, problem: str
 ) -> None:
     with pytest.raises(ValueError, match=problem):
         from_bytes(to_bytes(network), OUTPUTS)

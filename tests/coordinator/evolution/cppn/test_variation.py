@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from coordinator.evolution.cppn.network import (
     GREATEST_WEIGHT,
+    CppnGenome,
+    HiddenNode,
     Link,
-    Network,
-    Node,
     from_bytes,
     to_bytes,
 )
@@ -33,7 +33,7 @@ def rng(seed: int = 1) -> np.random.Generator:
 
 def test_a_new_node_splits_a_connection() -> None:
     link = Link("x1", "a", -0.75)
-    network = add_node(Network((), (link,)), rng(), RULES)
+    network = add_node(CppnGenome((), (link,)), rng(), RULES)
     (node,) = network.nodes
     assert node.id == new_id(link, set())
     assert sorted(network.links, key=lambda link: link.marking) == [*network.links]
@@ -46,7 +46,10 @@ def test_a_new_node_splits_a_connection() -> None:
 
 def test_the_same_innovation_has_the_same_marking_in_all_networks() -> None:
     common = Link("x1", "a", 0.5)
-    others = Network((), (common,)), Network((Node("#0", "bell"),), (common,))
+    others = (
+        CppnGenome((), (common,)),
+        CppnGenome((HiddenNode("#0", "bell"),), (common,)),
+    )
     ids = [
         {node.id for node in add_node(each, rng(seed), RULES).nodes} - {"#0"}
         for seed, each in enumerate(others)
@@ -63,7 +66,7 @@ def test_a_connection_can_be_split_again() -> None:
 
 
 def test_limits_stop_growth() -> None:
-    network = Network((), (Link("x1", "a", 0.5),))
+    network = CppnGenome((), (Link("x1", "a", 0.5),))
     for rules in Parameters(max_nodes=0), Parameters(max_connections=2):
         assert add_node(network, rng(), rules) == network
     full = Parameters(max_connections=1)
@@ -71,8 +74,8 @@ def test_limits_stop_growth() -> None:
 
 
 def test_a_new_connection_closes_no_cycle() -> None:
-    nodes = Node("#1", "bell"), Node("#2", "bell")
-    network = Network(nodes, (Link("#1", "#2", 1.0),))
+    nodes = HiddenNode("#1", "bell"), HiddenNode("#2", "bell")
+    network = CppnGenome(nodes, (Link("#1", "#2", 1.0),))
     found = [add_link(network, rng(seed), OUTPUTS, RULES) for seed in range(400)]
     markings = {link.marking for each in found for link in each.links}
     assert {("x1", "#1"), ("bias", "a"), ("#2", "c")} <= markings
@@ -106,12 +109,12 @@ def test_mutation_of_weights_keeps_structure_and_steps() -> None:
 
 
 def test_crossover_takes_matching_genes_of_both_and_other_genes_of_the_first() -> None:
-    first = Network(
-        (Node("#1", "bell"), Node("#2", "wave")),
+    first = CppnGenome(
+        (HiddenNode("#1", "bell"), HiddenNode("#2", "wave")),
         (Link("#1", "a", 1.0), Link("#2", "a", 1.0), Link("x1", "#1", 1.0)),
     )
-    second = Network(
-        (Node("#1", "line"), Node("#3", "line")),
+    second = CppnGenome(
+        (HiddenNode("#1", "line"), HiddenNode("#3", "line")),
         (Link("#1", "a", 2.0, is_enabled=False), Link("#3", "a", 2.0),
          Link("x1", "#1", 2.0)),
     )  # fmt: skip
@@ -153,7 +156,7 @@ def test_all_networks_keep_their_rules(seed: int, generations: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_equal_streams_give_equal_networks(seed: int) -> None:
-    def made() -> Network:
+    def made() -> CppnGenome:
         draws = rng(seed)
         network = random_network(draws, OUTPUTS, RULES)
         return mutate(network, draws, OUTPUTS, RULES)
