@@ -36,6 +36,7 @@ from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.settings import evaluation_settings
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
+from schema.tables.arrow import skip_pandas
 from schema.wire.codec import encode
 from schema.wire.messages import Evaluate, Request
 from tests import null_workers
@@ -261,4 +262,5 @@ if __name__ == "__main__":
     flags.add_argument("--workers", type=int, default=8)
     flags.add_argument("--births", type=int, default=1500)
     prepare_process()  # before the first session is opened
+    skip_pandas()  # as the command does
     main(**vars(flags.parse_args()))
