@@ -4,6 +4,7 @@ An advance that passes names exactly the robots that live, and its steps follow 
 request; so no state machine raises for it. A plausible number that is wrong passes.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
@@ -117,17 +118,17 @@ def _check_touches(touches: Sequence[Touch], expected: ExpectedAdvance) -> None:
         raise impossible("advance: touches must ascend by pair")
 
 
-def read_poses(columns: bytes, expected: ExpectedAdvance) -> pa.Table:
+def read_poses(advance: Advance, expected: ExpectedAdvance) -> pa.Table:
     """Return the poses of an advance.
 
     Raises:
         MalformedMessage: not the columns of poses; poses at other times, of robots that
-            do not live here, repeated or not finite; too many angles.
+            do not live here, repeated, missing or not finite; too many angles.
     """
     samples = expected.samples
     rows = received_columns(
         "poses",
-        columns,
+        advance.poses,
         most_bytes=ADVANCE_BYTES,
         most_rows=len(samples) * len(expected.living),
     )
@@ -149,6 +150,13 @@ def read_poses(columns: bytes, expected: ExpectedAdvance) -> pa.Table:
         raise impossible("poses: times must ascend")
     if len(set(zip(robots, times, strict=True))) < len(robots):
         raise impossible("poses: must have one row per robot and time")
+    counts = Counter(robots)
+    for judgement in advance.judgements:
+        if counts[judgement.birth] != len(samples):
+            raise impossible(
+                f"poses: robot {_names([judgement.birth])} must have {len(samples)}, "
+                f"got {counts[judgement.birth]}"
+            )
     return rows
 
 

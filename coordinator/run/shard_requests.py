@@ -325,7 +325,7 @@ def _read_answer(
     if complete is not None:
         advance = complete(advance)
     check_advance(advance, expected)
-    rows = read_poses(advance.poses, expected)
+    rows = read_poses(advance, expected)
     if repeats is not None:
         _check_repeated(advance, rows.num_rows, repeats)
     shard, snapshot = requested.island, advance.snapshot

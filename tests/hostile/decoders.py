@@ -270,7 +270,7 @@ def _answers(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
         read = partial(_read_advance, expected=expected)
         samples = (answer(advance), answer(StateMissing()))
         yield Target(f"advance checks {number}", read, samples, share=20)
-        poses = partial(read_poses, expected=expected)
+        poses = partial(_read_poses, advance=advance, expected=expected)
         yield Target(f"pose checks {number}", poses, (advance.poses,))
 
 
@@ -280,8 +280,13 @@ def _read_advance(data: bytes, expected: ExpectedAdvance) -> None:
     advance = answer.result
     if isinstance(advance, Advance):
         check_advance(advance, expected)
-        rows = read_poses(advance.poses, expected)
+        rows = read_poses(advance, expected)
         place_poses(advance.poses, rows, 0)
+
+
+def _read_poses(data: bytes, advance: Advance, expected: ExpectedAdvance) -> None:
+    """Check columns in place of those of an advance."""
+    read_poses(replace(advance, poses=data), expected)
 
 
 def _viewers(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:

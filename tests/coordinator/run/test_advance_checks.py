@@ -232,6 +232,8 @@ LIES: dict[str, AdvanceChange] = {
     "no snapshot": having(snapshot=b""),
     "a snapshot of another state": having(snapshot=b"{}"),
     "a pose twice": posed(lambda rows: pa.concat_tables([rows, rows.slice(49)])),
+    "no poses": having(poses=b""),
+    "a pose too few": posed(lambda rows: rows.slice(1)),
     "poses in another order": posed(lambda rows: rows.take(np.arange(50)[::-1])),
     "a pose of a stranger": column("birth", 9),
     "a pose on another island": column("island", 7),

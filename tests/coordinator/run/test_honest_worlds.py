@@ -72,7 +72,7 @@ def check(advance: Advance, expected: ExpectedAdvance) -> int:
     received = decode(Advance, encode(advance), ADVANCE_BYTES)
     assert received == advance
     check_advance(received, expected)
-    return int(read_poses(received.poses, expected).num_rows)
+    return int(read_poses(received, expected).num_rows)
 
 
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
