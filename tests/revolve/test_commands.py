@@ -178,11 +178,13 @@ def test_a_run_shows_at_once_on_a_terminal_that_it_starts(
 
 
 def test_a_process_with_too_few_files_says_so(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def fail(_: list[str]) -> int:
         raise OSError(errno.EMFILE, "Too many open files", "run/segments")
 
     monkeypatch.setattr("coordinator.cli.status.main", fail)
     assert main(["status", "run"]) == 2
-    assert "revolve: too many open files: raise the limit (ulimit -n)" in caplog.text
+    assert "revolve: too many open files: raise the limit (ulimit -n)" in (
+        capsys.readouterr().err
+    )
