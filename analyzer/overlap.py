@@ -24,8 +24,8 @@ import numpy.typing as npt
 from schema.experiment.document import Vetting
 from schema.parts import IDENTITY, BodySpace, Vector
 from schema.robot.frames import place_parts, round_reach, shapes_of
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]

@@ -15,9 +15,8 @@ from msgspec import Meta, Struct
 from schema.errors import ExperimentError
 from schema.experiment.section import Angle, Coordinate, Extent, Limit, NotNegative
 from schema.plugins.needs import needs
-from schema.robot.results import Floats
 from schema.robot.sums import sum_in_order
-from schema.robot.trace import Trace
+from schema.robot.trace import Floats, Trace
 
 _Place = tuple[Coordinate, Coordinate]
 

@@ -19,8 +19,8 @@ from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from schema.wire.born import robot_of_birth
 
 FRAMES = 6

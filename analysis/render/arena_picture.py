@@ -17,8 +17,8 @@ from analysis.render.stage import (
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 Poses = Mapping[BirthId, Floats]
 """Pose of each living robot, (7 + joints,): place of the core x, y, z [m], attitude w,

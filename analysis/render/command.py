@@ -18,7 +18,7 @@ from analysis.render.picture import (
 from schema.experiment.document import Simulation
 from schema.formats.run_settings import read_with_settings
 from schema.plugins.permission import allow
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 FILM_ENDING = ".gif"
 PICTURE_ENDING = ".png"

@@ -21,8 +21,8 @@ from schema.errors import RevolveError
 from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
-from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats, Trace
 
 _COLOURS = 256
 _SAMPLES = 6
@@ -245,5 +245,5 @@ class Simulate(Protocol):
         *,
         identity: Identity = NO_IDENTITY,
         watch: Callable[[Any], None],
-    ) -> Track:
+    ) -> Trace:
         """Return the robot's track; each tick calls ``watch`` with ``MjData``."""

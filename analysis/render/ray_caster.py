@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 _VISIBLE = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 """Groups of geoms that MuJoCo shows by default."""

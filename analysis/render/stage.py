@@ -21,7 +21,7 @@ from schema.agent.log import tell_user
 from schema.errors import one_line
 from schema.experiment.environment import LIGHT_COLOUR, LIGHT_M
 from schema.parts import Vector
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 Picture = npt.NDArray[np.uint8]
 """(H, W, 3) red, green, blue."""

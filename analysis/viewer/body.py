@@ -21,8 +21,8 @@ from schema.errors import MalformedMessage
 from schema.mjcf.model import quaternion
 from schema.parts import BodySpace, Box, Matrix
 from schema.robot.frames import place_parts, shapes_of
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 Float32s = npt.NDArray[np.float32]
 

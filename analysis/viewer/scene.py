@@ -16,7 +16,7 @@ from schema.experiment.document import island_experiment as of_island
 from schema.mjcf.model import ring_wall
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 _MARGIN = 1.3
 _GALLERY_M = 2.0

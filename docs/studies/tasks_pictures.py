@@ -15,8 +15,8 @@ from analysis.render.stage import choose_engine
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 PICTURES = Path(__file__).resolve().parents[1] / "pictures" / "tasks"
 SIZE = (280, 210)

@@ -14,7 +14,7 @@ from schema.errors import cut
 from schema.experiment.section import Count, Extent, Length, Place, Positive, Section
 from schema.limits import MOST_LENGTH_M
 from schema.parts import Vector
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 MOST_PATCHES = 400
 """Most patches of rough ground per axis; each robot's model holds all of them."""

@@ -16,7 +16,7 @@ from schema.experiment.bounded import is_finite, parse_xml
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.limits import MOST_GEOMS, MOST_OBJECTS, MOST_OTHERS, MOST_SCENERY_DEPTH
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 _ALLOWED = (
     *("mujoco", "compiler", "default", "worldbody"),

@@ -14,8 +14,8 @@ from schema.errors import InvalidRobot, one_line
 from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
 from schema.parts import BodySpace
-from schema.robot.results import Floats
 from schema.robot.robot import Robot, check_body, check_tree
+from schema.robot.trace import Floats
 
 _FREE = (0.0, 1e6)
 """Effort [N m] and velocity [rad/s] of a joint without a motor, or [N] and [m/s] of a

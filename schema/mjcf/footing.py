@@ -17,7 +17,7 @@ from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.experiment.scenery import add_scenery
 from schema.robot.frames import round_reach
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 _FINE_M = 1e-5
 """A robot stands less than twice this distance above an obstacle [m]."""

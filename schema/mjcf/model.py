@@ -26,8 +26,8 @@ from schema.experiment.scenery import add_scenery, object_count
 from schema.mjcf.footing import footprint, standing_height
 from schema.parts import IDENTITY, BodySpace, Joint, PartType, Sensor
 from schema.robot.frames import place_parts, round_reach, shapes_of
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 MEMORY_BYTES = 1 << 20
 """Size of the memory arena of one robot's MjData, up to ``_USUAL_PARTS``.

@@ -13,7 +13,7 @@ from schema.plugins.contract import broken, repeated
 from schema.plugins.protocols import NeuronType
 from schema.robot.brain import INPUT
 from schema.robot.neurons import Tick
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 _COUNT = 101
 _BATCHES = ((0, 1), (1, 3), (3, 10), (_COUNT - 1, _COUNT))

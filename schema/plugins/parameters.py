@@ -26,7 +26,7 @@ def read_parameters(
             table.
         where: begins messages: the table's key, as ``fitness.parameters``, or the path
             of the document.
-        separator: stands in messages between ``where`` and a key.
+        separator: text between ``where`` and a key in messages.
 
     Raises:
         ExperimentError: an unknown key (the nearest is named) or a missing one, a value

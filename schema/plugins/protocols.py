@@ -11,9 +11,8 @@ from schema.robot.brain import Brain, Layer, NeuronKinds, Widths
 from schema.robot.genome import ConnectionGene, NeuronGene
 from schema.robot.ids import BirthId
 from schema.robot.neurons import Tick
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from schema.robot.trace import Trace
+from schema.robot.trace import Floats, Trace
 
 T = TypeVar("T")
 

@@ -11,7 +11,7 @@ import numpy as np
 from schema.errors import ExperimentError, cut, error_text, shown
 from schema.parts import Box, OwnSensor, Shape, Vector
 from schema.plugins.contract import broken, repeated
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 MOST_INPUTS = 1000
 """Most inputs of one sensor."""

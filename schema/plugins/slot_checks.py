@@ -9,7 +9,7 @@ from schema.errors import shown
 from schema.parts import Box, PartType, Sensor, Slot
 from schema.plugins.contract import broken
 from schema.plugins.part_checks import ROUNDING, extremes
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 _OFF_SURFACE_M = 0.001
 """Distance of a slot from the surface above which it gets a warning."""

@@ -13,8 +13,8 @@ from itertools import chain
 import numpy as np
 
 from schema.parts import BodySpace, Shape, Slot
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 _UPRIGHT = np.eye(3)
 _TURNS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}

@@ -13,7 +13,7 @@ import numpy as np
 
 from schema.parts import Parameter
 from schema.robot.brain import NEURON_TYPES
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 SHORTEST_PERIOD_S = 1e-6
 """Least period of an oscillator, against a division by zero."""

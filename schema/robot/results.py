@@ -3,22 +3,26 @@
 from collections.abc import Iterable
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
 from msgspec import Meta, Struct
 
 from schema.limits import LONGEST_WALL_S, MOST_MEASURES, MOST_PAIRS, Finite
 from schema.parts import Vector
-from schema.robot.trace import Trace
 
-Floats = npt.NDArray[np.float64]
 Measures = Annotated[tuple[Finite, ...], Meta(max_length=MOST_MEASURES)]
 WallTime = Annotated[float, Meta(ge=0, le=LONGEST_WALL_S)]
 """Duration by the clock [s]; information only."""
 
 
-Track = Trace
-"""Former name of ``Trace``, which fitness functions of users import."""
+def __getattr__(name: str) -> type:
+    """Return ``Trace`` by its former name, which fitness functions of users import.
+
+    Not imported before it is used: hubs and pools of agents do without NumPy.
+    """
+    if name == "Track":
+        from schema.robot.trace import Trace  # noqa: PLC0415
+
+        return Trace
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 class Evaluation(Struct, frozen=True, forbid_unknown_fields=True, tag="evaluation"):

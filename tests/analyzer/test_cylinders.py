@@ -17,8 +17,8 @@ from analyzer.overlap import (
 from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, IDENTITY, Matrix, PartType, Shape, Slot, cylinder
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 
 OVERLAP = Vetting(mode="overlap", tolerance_m=1e-6)
 CONTACT = Vetting(mode="contact", tolerance_m=1e-6)

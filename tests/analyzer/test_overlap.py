@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 from analyzer.overlap import Boxes, intersecting_parts, place_boxes, separation
 from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, Box, Shape
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 
 OVERLAP = Vetting(mode="overlap", tolerance_m=1e-6)
 CONTACT = Vetting(mode="contact", tolerance_m=1e-6)

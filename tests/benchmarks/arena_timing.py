@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from schema.wire.arena import Changes, Insertion
 from worker.arena.threads import ThreadTeam
 from worker.arena.world import World

@@ -37,8 +37,8 @@ from schema.experiment.document import (
 from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import evaluation_settings_of, lasting
 from schema.plugins.permission import allow
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth

@@ -6,7 +6,7 @@ import numpy as np
 from schema.experiment.document import body_space
 from schema.mjcf.model import robot_spec, shared_model
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.arena.world import World
 from worker.clusters.states import Rollout, StateColumns
 

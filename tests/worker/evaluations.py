@@ -6,7 +6,7 @@ from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
-from schema.robot.results import Track
+from schema.robot.trace import Trace
 
 ORIGIN = Origin(seed=7, run=1, island=2)
 IDENTITY = Identity(ORIGIN, BirthId(2, 5), 0)
@@ -24,5 +24,5 @@ def with_simulation(simulation: Simulation) -> EvaluationSettings:
     return EvaluationSettings(space=Space(), simulation=simulation, fitness=Fitness())
 
 
-def bits(track: Track) -> bytes:
+def bits(track: Trace) -> bytes:
     return track.core_position.tobytes()

@@ -10,7 +10,6 @@ from schema.errors import ExperimentError, FitnessUndefined
 from schema.experiment.document import Experiment, Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
 from schema.plugins.simple_traces import check_function
-from schema.robot.results import Track
 from schema.robot.trace import Trace
 from worker.fitness import (
     FitnessFunction,
@@ -24,9 +23,9 @@ from worker.kinds import check_fitness
 WEIGHTS = Fitness()
 
 
-def track(*points: tuple[float, float, float], interval_s: float = 0.25) -> Track:
+def track(*points: tuple[float, float, float], interval_s: float = 0.25) -> Trace:
     """Return a track through some points."""
-    return Track(interval_s, np.array(points))
+    return Trace(interval_s, np.array(points))
 
 
 def test_both_velocities_are_equal_along_a_line() -> None:
@@ -76,34 +75,34 @@ def test_default_function_keeps_the_contract() -> None:
     check_fitness(fitness)
 
 
-def _writes(track: Track, fitness: Fitness) -> float:
+def _writes(track: Trace, fitness: Fitness) -> float:
     track.core_position[0] += 1.0
     return fitness.limit
 
 
-def _is_text(_track: Track, _fitness: Fitness) -> float:
+def _is_text(_track: Trace, _fitness: Fitness) -> float:
     return cast("float", "fast")
 
 
-def _is_array(track: Track, _fitness: Fitness) -> float:
+def _is_array(track: Trace, _fitness: Fitness) -> float:
     return cast("float", track.core_position)
 
 
-def _is_endless(_track: Track, _fitness: Fitness) -> float:
+def _is_endless(_track: Trace, _fitness: Fitness) -> float:
     return float("inf")
 
 
 def _counts_calls() -> FitnessFunction:
     calls: list[int] = []
 
-    def count(track: Track, fitness: Fitness) -> float:
+    def count(track: Trace, fitness: Fitness) -> float:
         calls.append(len(track.core_position))
         return float(len(calls)) + fitness.limit
 
     return count
 
 
-def _always_raises(_track: Track, _fitness: Fitness) -> float:
+def _always_raises(_track: Trace, _fitness: Fitness) -> float:
     raise ZeroDivisionError("by nothing")
 
 

@@ -12,8 +12,7 @@ from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import Fitness
 from schema.experiment.file import read_experiment, shipped_experiments
 from schema.experiment.settings import FITNESS, fitness_argument, fitness_function
-from schema.robot.results import Floats
-from schema.robot.trace import Trace
+from schema.robot.trace import Floats, Trace
 from worker.fitness import thesis
 from worker.kinds import check_fitness
 from worker.tasks import (

@@ -10,7 +10,7 @@ import numpy as np
 
 from schema.experiment.settings import ArenaSettings
 from schema.plugins.protocols import Bank
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.clusters.robot import ArenaRobot
 from worker.filters.filters import Filter, filtered_outputs, filtered_readings
 from worker.filters.noise import Noise

@@ -9,8 +9,8 @@ import numpy as np
 from schema.errors import SimulationDiverged, UnexpectedEvent, one_line
 from schema.experiment.document import body_space
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot, check_robot
+from schema.robot.trace import Floats
 from schema.wire.arena import Casualty, Changes, Insertion
 from worker.clusters.cluster import Cluster
 from worker.clusters.population import ArenaPopulation

@@ -9,8 +9,7 @@ import pyarrow as pa
 
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
-from schema.robot.trace import NEIGHBOUR_M
+from schema.robot.trace import NEIGHBOUR_M, Floats
 from schema.tables.columns import ROWS
 from schema.wire.arena import Touch
 from worker.clusters.cluster import Cluster

@@ -16,8 +16,9 @@ from schema.experiment.identity import Identity
 from schema.experiment.scenery import object_count
 from schema.experiment.settings import EvaluationSettings, read_arena_settings
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Floats
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from schema.tables.columns import ROWS
 from schema.tables.received import read_columns
 from schema.wire.arena import Rebuild

@@ -20,8 +20,8 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot, check_types
+from schema.robot.trace import Floats
 from schema.wire.arena import Casualty
 from schema.wire.protobuf import decode_robot
 from worker.clusters.population import ArenaPopulation

@@ -16,7 +16,7 @@ from typing import Self
 from schema.errors import SimulationDiverged, UnexpectedEvent
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from schema.wire.arena import (
     Advance,
     BrainChange,

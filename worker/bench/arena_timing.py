@@ -11,8 +11,8 @@ import numpy as np
 
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from schema.wire.arena import Changes, Insertion
 from worker.arena.world import World
 

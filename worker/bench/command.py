@@ -28,8 +28,8 @@ from schema.experiment.file import (
 )
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from worker.bench import arena_bench
 from worker.robot import evaluation
 

@@ -14,8 +14,8 @@ import numpy as np
 from schema.errors import one_line
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from worker.robot.contacts import contact_reader
 from worker.robot.engine_view import EngineView
 from worker.robot.recording import probed_channels, step_with

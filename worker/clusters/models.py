@@ -29,8 +29,8 @@ from schema.mjcf.model import (
     solo_spec,
 )
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from worker.clusters.cluster import Cluster
 from worker.robot.brains import controls_of
 from worker.robot.recording import Channels

@@ -12,7 +12,7 @@ import numpy as np
 
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.models import ModelCache
 from worker.clusters.proximity import Proximity, RobotBounds

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.clusters.models import Indices
 from worker.clusters.states import Layout, Pairs
 

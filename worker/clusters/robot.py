@@ -10,9 +10,9 @@ from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Floats
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
-from schema.robot.trace import Trace
+from schema.robot.trace import Floats, Trace
 from schema.wire.arena import Casualty, Judgement
 from schema.wire.protobuf import encode_robot
 from worker.clusters.models import Body

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.models import Indices
 from worker.clusters.robot import ArenaRobot

@@ -9,8 +9,8 @@ import numpy as np
 from schema.errors import InvalidRobot
 from schema.experiment.settings import Ablation, ablation_problems
 from schema.parts import BodySpace, Sensor
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from worker.filters.calibration import NEUTRAL
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from schema.experiment.robust import IDEAL, Calibration, Response
 from schema.parts import BodySpace
 from schema.robot.brain import Widths
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 NEUTRAL = 0.5
 """Output at which a joint is in the middle of its range, or at rest."""

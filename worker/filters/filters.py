@@ -9,8 +9,8 @@ from schema.experiment.brains import widths
 from schema.experiment.document import body_space
 from schema.experiment.identity import Identity
 from schema.experiment.settings import EvaluationSettings
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from worker.filters.ablation import Ablated
 from worker.filters.calibration import Calibrated
 from worker.filters.noise import Noise

@@ -14,7 +14,7 @@ from schema.experiment.document import Simulation
 from schema.experiment.identity import Origin
 from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.filters.random_streams import DrawPurpose, stream
 
 BLOCK_TICKS = 64

@@ -8,7 +8,7 @@ import mujoco
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import Identity
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.filters.random_streams import DrawPurpose, stream
 
 

@@ -30,7 +30,7 @@ from schema.robot.brain import (
     check_widths,
 )
 from schema.robot.neurons import BUILT_IN_NEURONS, SHORTEST_PERIOD_S
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.robot.check_controls import check_controls
 from worker.robot.cpg import CpgControl
 from worker.robot.own_neurons import STATE_LIMIT, OwnNeuron, OwnNeurons

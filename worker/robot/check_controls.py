@@ -17,7 +17,7 @@ from schema.robot.brain import (
     NeuronKinds,
     Widths,
 )
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 _ROBOTS = 7
 _TICKS = 12

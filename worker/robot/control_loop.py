@@ -15,9 +15,8 @@ from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.mjcf.model import solo_spec
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from schema.robot.trace import Trace
+from schema.robot.trace import Floats, Trace
 from worker.filters.filters import filtered_outputs, filtered_readings, filters_of
 from worker.measures.functions import functions_of
 from worker.robot.brains import controls_of

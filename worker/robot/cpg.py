@@ -9,7 +9,7 @@ import numpy as np
 from schema.plugins.protocols import NeuronType
 from schema.robot.brain import Brain, NeuronKinds, Widths
 from schema.robot.cpg import CpgParameters, cpg_neurons
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 LONGEST_STEP_S = 0.05
 """Longest step of the integration (Runge-Kutta of order 4)."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from schema.errors import ExperimentError
 from schema.parts import Sensor, Vector
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.robot.contacts import contact_reader
 from worker.robot.light import brightness
 from worker.robot.own_sensors import OwnSensors, Surroundings

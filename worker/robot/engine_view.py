@@ -6,8 +6,8 @@ import mujoco
 
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from worker.robot.devices import Sensors, Servos
 from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Channels, Probe, probed_channels

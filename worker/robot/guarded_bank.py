@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from schema.plugins.protocols import Bank
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.robot.brains import Controls, outputs_of, story_of
 
 _DIVERGED = "brain diverged: state not finite"

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from schema.parts import Vector
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 State = tuple[mujoco.MjModel, mujoco.MjData]
 """Model and data of some robots."""

@@ -13,7 +13,7 @@ from schema.errors import SimulationDiverged, cut, error_text
 from schema.plugins.check_neuron_type import states_problem
 from schema.plugins.protocols import NeuronType
 from schema.robot.neurons import Tick
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 STATE_LIMIT = 1e6
 """Bound on the states of neurons, which may feed back on themselves."""

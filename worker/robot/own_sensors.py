@@ -10,7 +10,7 @@ from schema.errors import SensorFailed, cut, error_text
 from schema.parts import OwnSensor, Vector
 from schema.plugins.protocols import SensorView
 from schema.plugins.sensor_checks import ray_problem, values_of
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.robot.light import State, ray_share
 from worker.robot.placed import PlacedRobot
 

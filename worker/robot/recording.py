@@ -14,9 +14,8 @@ import numpy.typing as npt
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.frames import place_parts, shapes_of
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from schema.robot.trace import RECORDED, Trace
+from schema.robot.trace import RECORDED, Floats, Trace
 from worker.measures.functions import functions_of
 from worker.robot.contacts import contact_reader
 from worker.robot.placed import FREE, FREE_DOFS, PlacedRobot

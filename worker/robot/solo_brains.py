@@ -4,7 +4,7 @@ import numpy as np
 
 from schema.plugins.protocols import Bank
 from schema.robot.brain import Brain, Widths
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.robot.brains import HIGHEST, LOWEST, Controls, PackedNetwork
 from worker.robot.guarded_bank import guarded_bank
 

@@ -16,8 +16,8 @@ from coordinator.evolution.cppn.network import CppnGenome, evaluate, queries
 from schema.experiment.document import Space
 from schema.parts import BodySpace, Parameter, PartType, Shape
 from schema.robot.frames import attach
-from schema.robot.results import Floats
 from schema.robot.robot import ORIENTATIONS, Part
+from schema.robot.trace import Floats
 
 UNIT_M = 0.1
 """Unit of positions in queries [m]."""

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 INPUTS = ("bias", "x1", "y1", "z1", "n1", "x2", "y2", "z2", "n2", "distance")
 """Inputs: 1; two points with a number each; distance of the second from the origin."""

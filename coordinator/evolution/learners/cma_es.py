@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, Struct
 
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 
 class CmaEs:

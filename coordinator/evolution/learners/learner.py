@@ -16,7 +16,7 @@ from schema.plugins.load import load_object
 from schema.plugins.origin import naming_plugin, where_defined
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Learner
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 WHERE = "learning.learner"
 METHODS = ("ask", "tell")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 
 class OnePlusOne:

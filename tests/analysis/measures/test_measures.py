@@ -500,5 +500,5 @@ def test_a_run_without_births_has_no_measures() -> None:
     found, problems = measure(RunTables(tables), wanted)
     assert not problems
     assert {rows.num_rows for rows in found.values()} == {0}
-    nobody = population_table(tables["population"], tables["births"])
-    assert nobody.mean(np.zeros(0)).size == 0
+    empty = population_table(tables["population"], tables["births"])
+    assert empty.mean(np.zeros(0)).size == 0

@@ -24,8 +24,8 @@ from schema.parts import (
 from schema.robogen_parts import ACTIVE_WHEEL
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 from schema.tables.received import read_columns
 from tests.coordinator.arena_world import poses
 

@@ -228,7 +228,7 @@ LIES: dict[str, AdvanceChange] = {
     "a measure not a number": first(measures=(math.nan,)),
     "a place not finite": first(place=(0.0, math.inf, 0.0)),
     "a casualty at no place": fallen(SECOND, z=math.nan),
-    "touches that nobody asked for": having(touches=(Touch(SECOND, THIRD, 0.5),)),
+    "touches that are not recorded": having(touches=(Touch(SECOND, THIRD, 0.5),)),
     "no snapshot": having(snapshot=b""),
     "a snapshot of another state": having(snapshot=b"{}"),
     "a pose twice": posed(lambda rows: pa.concat_tables([rows, rows.slice(49)])),

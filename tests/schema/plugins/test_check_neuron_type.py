@@ -10,7 +10,7 @@ from schema.errors import ExperimentError
 from schema.parts import Parameter
 from schema.plugins.check_neuron_type import check_neuron_type
 from schema.robot.neurons import BUILT_IN_NEURONS, StatelessNeuron, Tick
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 
 
 def plain(inputs: Floats, parameters: Floats, tick: Tick) -> Floats:

@@ -12,8 +12,8 @@ from hypothesis.strategies import DataObject, SearchStrategy
 from schema.parts import BUILT_IN, Slot
 from schema.robot.frames import attach, place_parts, shapes_of
 from schema.robot.genome import Genome, Node, develop
-from schema.robot.results import Floats
 from schema.robot.robot import ORIENTATIONS, Part, Robot
+from schema.robot.trace import Floats
 
 GREY = (0.5, 0.5, 0.5)
 NodeMaker = Callable[..., Node]

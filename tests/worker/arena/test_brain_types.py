@@ -16,8 +16,8 @@ from schema.robot.brain import Brain, Connection, Neuron, Widths
 from schema.robot.cpg import PHASE_OSCILLATOR
 from schema.robot.ids import BirthId
 from schema.robot.neurons import Tick
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from schema.wire.arena import BrainChange, Changes, Insertion
 from tests.worker.arena_cases import SETTINGS, populated, seconds, state_of
 from worker.arena.world import World

@@ -14,8 +14,8 @@ from schema.parts import LIGHT_SENSOR
 from schema.plugins.protocols import Bank
 from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 from schema.tables.received import read_columns
 from schema.wire.arena import BrainChange, Changes, Insertion
 from tests.worker.arena_cases import (

@@ -8,8 +8,8 @@ from schema.experiment.environment import FLAT
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
 from schema.robogen_parts import ACTIVE_WHEEL
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 from tests.plugins.crawlers import PISTON
 from worker.clusters.models import bounding_spheres
 

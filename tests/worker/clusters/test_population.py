@@ -12,8 +12,8 @@ from schema.experiment.document import Space
 from schema.plugins.permission import allow
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 from schema.wire.arena import Casualty, Changes, Insertion, Touch
 from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of
 from tests.worker.arena_oracle import Oracle

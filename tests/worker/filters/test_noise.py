@@ -14,8 +14,8 @@ from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.settings import ArenaSettings
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import (
     SETTINGS,

@@ -11,8 +11,8 @@ from schema.experiment.settings import EvaluationSettings
 from schema.mjcf.model import solo_spec
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 from tests.worker.evaluations import IDENTITY, ORIGIN, OTHERS
 from worker.robot.evaluation import simulate
 

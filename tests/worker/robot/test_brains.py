@@ -12,8 +12,8 @@ from schema.errors import InvalidRobot
 from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
-from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 from worker.robot.brains import Controls, NetworkBank, PackedNetwork, pack
 from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_neurons import STATE_LIMIT

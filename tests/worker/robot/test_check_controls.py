@@ -10,7 +10,7 @@ from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.plugins.protocols import Bank
 from schema.robot.brain import NEURON_TYPES, Brain, NeuronKinds
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.robot.check_controls import check_controls
 
 Change = Callable[["Leaking", Floats, Floats], Floats]

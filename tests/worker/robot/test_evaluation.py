@@ -21,8 +21,8 @@ from schema.errors import (
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import NOBODY
-from schema.robot.results import Track
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Trace
 from schema.wire.messages import Evaluate, Request
 from schema.wire.protobuf import encode_robot
 from tests.worker.evaluations import bits, with_simulation
@@ -217,11 +217,11 @@ def test_limits_of_a_search_refuse_no_robot_that_exists(turtle: Robot) -> None:
     assert bits(found) == bits(expected)
 
 
-def not_a_number(_track: Track, _fitness: Fitness) -> float:
+def not_a_number(_track: Trace, _fitness: Fitness) -> float:
     return float("nan")
 
 
-def raises(_track: Track, _fitness: Fitness) -> float:
+def raises(_track: Trace, _fitness: Fitness) -> float:
     raise ZeroDivisionError("by nothing")
 
 

@@ -12,8 +12,8 @@ from schema.mjcf.model import solo_spec
 from schema.parts import Vector
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.robot.trace import Floats
 from schema.wire.arena import Insertion
 from tests.worker.arena_cases import populated, settings_of
 from worker.robot.devices import Sensors

@@ -15,7 +15,7 @@ from schema.parts import Parameter
 from schema.plugins.protocols import NeuronType
 from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
 from schema.robot.neurons import BUILT_IN_NEURONS, Tick
-from schema.robot.results import Floats
+from schema.robot.trace import Floats
 from worker.robot.brains import Controls, NetworkBank, NetworkControl, pack
 from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_neurons import STATE_LIMIT
