@@ -62,8 +62,6 @@ MOST_NEURON_PARAMETERS = 32
 """Evolving parameters of a neuron."""
 MOST_NEURON_STATES = 16
 """State variables of a neuron."""
-MOST_LIVE_ROWS = 500_000
-"""Poses in a message to viewers."""
 MOST_LIVING = 100_000
 """Living robots of an arena."""
 MOST_TOUCHES = 500_000

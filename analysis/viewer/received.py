@@ -7,20 +7,17 @@ from analysis.viewer.scene import Scene
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.limits import (
     GREATEST_COORDINATE,
-    LIVE_BYTES,
     LONGEST_REASON,
     LONGEST_WALL_S,
-    MOST_LIVE_ROWS,
 )
 from schema.parts import BodySpace
 from schema.robot.robot import Part, check_body, check_tree
-from schema.tables.received import received_columns
 from schema.wire.arena import Live
+from schema.wire.poses import PoseArrays
 from schema.wire.updates import Update
 
 _LATEST_S = LONGEST_WALL_S
 """Simulated time; the recording has 64 bits of nanoseconds [s]."""
-_PLACES = ("x", "y", "z")
 
 
 def check_update(news: Update, scene: Scene) -> None:
@@ -73,22 +70,14 @@ def received_poses(live: Live, scene: Scene) -> pa.Table:
     """
     if live.shard not in scene.arenas:
         raise MalformedMessage(f"poses: the run has no arena {live.shard}")
-    poses = received_columns(
-        "poses",
-        live.advance.poses,
-        most_bytes=LIVE_BYTES,
-        most_rows=MOST_LIVE_ROWS,
-    )
-    times = poses["sim_time_s"].to_numpy()
+    poses = PoseArrays.received(live.advance.poses)
+    times = poses.times_s
     if not ((times >= 0.0) & (times <= _LATEST_S)).all() or (np.diff(times) < 0).any():
         raise MalformedMessage(
             f"poses: times must ascend from 0 to {_LATEST_S:g} s at most"
         )
-    for name in _PLACES:
-        if not (np.abs(poses[name].to_numpy()) <= GREATEST_COORDINATE).all():
-            raise MalformedMessage(f"poses: {name} must be a finite position")
-    turns = [poses[f"q{axis}"].to_numpy() for axis in "wxyz"]
-    turns.append(poses["angles"].combine_chunks().flatten().to_numpy())
-    if not all(np.isfinite(each).all() for each in turns):
+    if not (np.abs(poses.cores[:, :3]) <= GREATEST_COORDINATE).all():
+        raise MalformedMessage("poses: x, y and z must be a finite position")
+    if not (np.isfinite(poses.cores).all() and np.isfinite(poses.angles).all()):
         raise MalformedMessage("poses: attitudes and angles must be finite")
-    return poses
+    return poses.rows()

@@ -203,7 +203,7 @@ class Arena:
         self.step = advance.step
         commands: list[ArenaCommand] = []
         if event.pose_rows:
-            commands.append(Append("poses", event.pose_rows, advance.poses))
+            commands.append(Append(event))
         commands += touch_records(advance.touches, self._moment, over_s)
         for casualty in advance.casualties:
             died_s = self.clock.seconds(casualty.step)

@@ -282,18 +282,13 @@ class Record(Message, frozen=True):
 
 
 class Append(Message, frozen=True):
-    """Append rows to a bulk table, given as columns.
+    """Append the poses of an advance to their table.
 
     Attributes:
-        table: name of the table.
-        rows: number of rows.
-        columns: Arrow IPC stream of all columns but ``record``; empty in a replay,
-            where the rows are on disk already.
+        event: the advance; without poses in a replay, where they are on disk already.
     """
 
-    table: str
-    rows: int
-    columns: bytes
+    event: Advanced
 
 
 class Emigrate(Message, frozen=True):

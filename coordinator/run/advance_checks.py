@@ -12,16 +12,12 @@ from hashlib import sha256
 from itertools import pairwise
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute
 
 from coordinator.run.requests import check_count, impossible
-from schema.errors import MalformedMessage
 from schema.experiment.document import Experiment
-from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
-from schema.tables.received import received_columns
 from schema.wire.arena import Advance, Touch
+from schema.wire.poses import PoseArrays
 
 _SHOWN = 3
 """Robots that a message names."""
@@ -118,28 +114,23 @@ def _check_touches(touches: Sequence[Touch], expected: ExpectedAdvance) -> None:
         raise impossible("advance: touches must ascend by pair")
 
 
-def read_poses(advance: Advance, expected: ExpectedAdvance) -> pa.Table:
-    """Return the poses of an advance.
+def check_poses(advance: Advance, expected: ExpectedAdvance) -> int:
+    """Raise unless poses are those of an advance; return their number.
 
     Raises:
-        MalformedMessage: not the columns of poses; poses at other times, of robots that
-            do not live here, repeated, missing or not finite; too many angles.
+        MalformedMessage: columns of different lengths; poses at other times, of robots
+            that do not live here, repeated, missing or not finite; too many angles.
     """
-    samples = expected.samples
-    rows = received_columns(
-        "poses",
-        advance.poses,
-        most_bytes=ADVANCE_BYTES,
-        most_rows=len(samples) * len(expected.living),
-    )
-    if rows["birth_island"].null_count < rows.num_rows:
-        raise impossible("poses: birth_island must be null")
-    _check_numbers(rows, expected.experiment.space.max_parts)
-    islands, births = rows["island"].to_pylist(), rows["birth"].to_pylist()
-    robots = [BirthId(*name) for name in zip(islands, births, strict=True)]
+    poses = PoseArrays.received(advance.poses)
+    if not (np.isfinite(poses.cores).all() and np.isfinite(poses.angles).all()):
+        raise impossible("poses: must be finite")
+    most = expected.experiment.space.max_parts
+    if (poses.joints > most).any():
+        raise impossible(f"poses: must have <= {most} angles each")
+    robots, times = poses.robots, poses.times_s.tolist()
     if unknown := set(robots) - expected.living:
         raise impossible(f"poses: robots {_names(unknown)} do not live here")
-    times = rows["sim_time_s"].to_pylist()
+    samples = expected.samples
     timestep_s = expected.experiment.simulation.timestep_s
     if not {step * timestep_s for step in samples} >= set(times):
         raise impossible(
@@ -157,47 +148,7 @@ def read_poses(advance: Advance, expected: ExpectedAdvance) -> pa.Table:
                 f"poses: robot {_names([judgement.birth])} must have {len(samples)}, "
                 f"got {counts[judgement.birth]}"
             )
-    return rows
-
-
-def _check_numbers(poses: pa.Table, most_joints: int) -> None:
-    """Raise unless poses are finite, with at most so many angles each on average."""
-    coordinates = [poses[name].to_numpy() for name in ("x", "y", "z")]
-    attitudes = [poses[f"q{axis}"].to_numpy() for axis in "wxyz"]
-    angles = pyarrow.compute.list_flatten(poses["angles"]).to_numpy()
-    if not all(np.isfinite(c).all() for c in (*coordinates, *attitudes, angles)):
-        raise impossible("poses: must be finite")
-    most = poses.num_rows * most_joints
-    if len(angles) > most:
-        raise MalformedMessage(
-            f"poses: must have <= {most} angles, got {len(angles)}", "too large"
-        )
-
-
-def place_poses(columns: bytes, poses: pa.Table, island: int) -> bytes:
-    """Return the poses of an arena as the table has them.
-
-    Args:
-        columns: Arrow IPC stream; ``island`` is where each robot was born.
-        poses: the rows of the columns.
-        island: where the robots live; ``birth_island`` is set for immigrants only.
-    """
-    born = poses["island"]
-    if pa.compute.all(pa.compute.equal(born, island), min_count=0).as_py():
-        return columns
-    is_immigrant = pa.compute.not_equal(born, island)
-    absent = pa.scalar(None, pa.int32())
-    schema = poses.schema
-    here = pa.repeat(pa.scalar(island, pa.int32()), poses.num_rows)
-    poses = poses.set_column(
-        schema.get_field_index("birth_island"),
-        schema.field("birth_island"),
-        pa.compute.if_else(is_immigrant, born, absent),
-    ).set_column(schema.get_field_index("island"), schema.field("island"), here)
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, schema) as writer:
-        writer.write_table(poses)
-    return bytes(sink.getvalue().to_pybytes())
+    return len(robots)
 
 
 def _names(births: Iterable[BirthId]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from coordinator.dispatch.fleet import JobRouter
-from coordinator.islands.events import Advanced, Append, JournalledEvent, Record
+from coordinator.islands.events import Advanced, JournalledEvent, Record
 from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
@@ -96,8 +96,8 @@ class _Nothing:
     def write(self, record: Record) -> None:
         """Write nothing."""
 
-    def store(self, rows: Append) -> None:
+    def store(self, event: Advanced) -> None:
         """Store nothing."""
 
-    def append(self, rows: Append | Sequence[JournalledEvent]) -> None:
+    def append(self, events: Advanced | Sequence[JournalledEvent]) -> None:
         """Append nothing."""

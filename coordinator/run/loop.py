@@ -73,11 +73,11 @@ class Rows(Protocol):
     def write(self, record: Record) -> None:
         """Take one row."""
 
-    def store(self, rows: Append) -> None:
-        """Bring bulk rows to disk before the journal has their event."""
+    def store(self, event: Advanced) -> None:
+        """Bring the poses of an event to disk before the journal has it."""
 
-    def append(self, rows: Append) -> None:
-        """Take bulk rows whose event the journal has."""
+    def append(self, event: Advanced) -> None:
+        """Take the poses of an event that the journal has."""
 
 
 @dataclass(eq=False)
@@ -214,8 +214,7 @@ class Loop:
             self.confirm()
             for event in events:
                 if isinstance(event, Advanced) and event.pose_rows:
-                    poses = event.advance.poses
-                    self.rows.store(Append("poses", event.pose_rows, poses))
+                    self.rows.store(event)
             self.log.append(events)
             answers: list[Asked] = []
             for request in chain.from_iterable(map(self._act_on, events)):
@@ -276,8 +275,8 @@ class Loop:
                 match command:
                     case Record():
                         self._write(command)
-                    case Append():
-                        self.rows.append(command)
+                    case Append(advanced):
+                        self.rows.append(advanced)
                     case Vet() | Evaluate() | AdvanceShard() | Ask():
                         requests.append(command)
                     case Emigrate(island, to, epoch, migrants):

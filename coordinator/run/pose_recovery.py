@@ -12,7 +12,7 @@ from pathlib import Path
 
 from coordinator.dispatch.events import Deliver, ShardFailed
 from coordinator.dispatch.fleet import End, JobRouter
-from coordinator.islands.events import Advanced, Append, JournalledEvent
+from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.run.history import replayed
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
@@ -21,7 +21,6 @@ from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.wire.arena import AdvanceShard
 
-TABLE = "poses"
 MOST_AHEAD = 64
 """Advances of an arena whose poses are kept until those before are written."""
 
@@ -76,12 +75,12 @@ class PoseRecovery:
         self._client = context.client
         self._fleet = fleet
         self._recorder = recorder
-        self._order = deque(_lost(events, recorder.stored(TABLE)))
+        self._order = deque(_lost(events, recorder.stored_poses))
         self._snapshots = snapshots
         self._requests = ShardRequests(context, snapshots, fleet)
         self._arenas: dict[int, _Arena] = {}
         if self._order:
-            recorder.keep(TABLE, _rows(events) - sum(e.pose_rows for e in self._order))
+            recorder.keep_poses(_rows(events) - sum(e.pose_rows for e in self._order))
             self._plan(_advances(details, context, events))
         self._total = sum(len(arena.left) for arena in self._arenas.values())
 
@@ -170,9 +169,7 @@ class PoseRecovery:
             reached = self._arenas[self._order[0].island].reached
             if not reached:
                 return
-            event = reached.popleft()
-            poses = event.advance.poses
-            self._recorder.restore(Append(TABLE, event.pose_rows, poses))
+            self._recorder.restore(reached.popleft())
             self._order.popleft()
 
 

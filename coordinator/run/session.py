@@ -18,7 +18,6 @@ from coordinator.run.archipelago import archipelago
 from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
-from coordinator.run.pose_recovery import TABLE as POSES
 from coordinator.run.pose_recovery import PoseRecovery, has_lost_poses
 from coordinator.run.run_context import RunContext
 from coordinator.run.stored_genomes import check_stored_genomes
@@ -151,7 +150,7 @@ class RunSession:
         """
         check_stored_genomes(self.held.path, self.experiment)
         self._events = self._journal.replay()
-        if has_lost_poses(self._events, self._recorder.stored(POSES)):
+        if has_lost_poses(self._events, self._recorder.stored_poses):
             self._recover()
         else:
             self.loop.start(self._replay())

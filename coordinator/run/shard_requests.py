@@ -17,8 +17,7 @@ from coordinator.islands.events import Advanced
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
     check_advance,
-    place_poses,
-    read_poses,
+    check_poses,
 )
 from coordinator.run.drift import Drift, with_losses
 from coordinator.run.requests import Expected, impossible, read_answer
@@ -325,18 +324,17 @@ def _read_answer(
     if complete is not None:
         advance = complete(advance)
     check_advance(advance, expected)
-    rows = read_poses(advance, expected)
+    rows = check_poses(advance, expected)
     if repeats is not None:
-        _check_repeated(advance, rows.num_rows, repeats)
-    shard, snapshot = requested.island, advance.snapshot
+        _check_repeated(advance, rows, repeats)
     casualties = tuple(
         structs.replace(one, reason=printable(one.reason, LONGEST_REASON) or NO_MESSAGE)
         for one in advance.casualties
     )
-    poses = place_poses(advance.poses, rows, shard)
-    advance = structs.replace(advance, casualties=casualties, poses=poses, snapshot=b"")
+    snapshot = advance.snapshot
+    advance = structs.replace(advance, casualties=casualties, snapshot=b"")
     signed = structs.replace(provenance, wall_s=answer.wall_s)
-    event = Advanced(shard, requested.number, advance, rows.num_rows, signed)
+    event = Advanced(requested.island, requested.number, advance, rows, signed)
     return Reached(event, snapshot)
 
 

@@ -26,6 +26,7 @@ from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.storage.disk import AppendedFile
 from schema.errors import MalformedMessage, RunFolderError
 from schema.limits import ADVANCE_BYTES
+from schema.wire.arena import NO_POSES
 from schema.wire.codec import decode, encode
 
 NAME = "journal.bin"
@@ -254,6 +255,6 @@ def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
 def encode_event(event: JournalledEvent) -> bytes:
     """Return an event as bytes; what of an advance is stored elsewhere is left out."""
     if isinstance(event, Advanced):
-        advance = replace(event.advance, poses=b"", snapshot=b"")
+        advance = replace(event.advance, poses=NO_POSES, snapshot=b"")
         event = replace(event, advance=advance)
     return encode(event)

@@ -14,11 +14,11 @@ from zlib import crc32
 import pyarrow as pa
 import pyarrow.parquet
 
-from coordinator.islands.events import Append, Record
+from coordinator.islands.events import Advanced, Record
 from coordinator.storage.disk import AppendedFile, storage_errors
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.removal import cut_segment, remove_rows, remove_segment
-from schema.errors import MalformedMessage, RunFolderError
+from schema.errors import RunFolderError
 from schema.tables.checksums import CHECK, FIELDS, MAGIC, digest_of, sums_path
 from schema.tables.columns import ROWS, TABLES
 from schema.tables.description import run_columns
@@ -30,9 +30,10 @@ from schema.tables.files import (
     read_table,
     stored_rows,
 )
-from schema.tables.received import read_columns
 from schema.tables.replacement import install_new, new_path, write_new
 from schema.tables.segments import SEGMENTS, segment_path, segments_of
+from schema.wire.arena import NO_POSES
+from schema.wire.poses import PoseArrays
 
 _LOG = logging.getLogger(__name__)
 
@@ -77,6 +78,7 @@ class Recorder:
             )
             for name in TABLES
         }
+        self._poses = self._tables["poses"]
 
     def write(self, record: Record) -> None:
         """Add one row; it may be buffered before it is written to disk.
@@ -92,48 +94,46 @@ class Recorder:
         if len(table.buffered) >= BUFFERED:
             table.flush()
 
-    def store(self, rows: Append) -> None:
-        """Write bulk rows to disk before the journal gets the event they belong to.
+    def store(self, event: Advanced) -> None:
+        """Write the poses of an advance to disk before the journal gets it.
 
-        Rows that an earlier process stored without their event in the journal are
+        Poses that an earlier process stored without their event in the journal are
         removed first.
 
         Raises:
-            MalformedMessage: the columns are not those of the table.
             RunFolderError: the disk is full or failed.
         """
-        self._tables[rows.table].store(rows.rows, rows.columns)
+        self._poses.store(event)
 
-    def append(self, rows: Append) -> None:
-        """Add bulk rows whose event is in the journal; stored rows are only counted.
+    def append(self, event: Advanced) -> None:
+        """Add the poses of an advance in the journal; stored ones are only counted.
 
         Raises:
-            MalformedMessage: the columns are not those of the table.
-            RunFolderError: rows are missing on disk and the journal does not hold
+            RunFolderError: poses are missing on disk and the event does not hold
                 them, or the disk is full or failed.
         """
-        self._tables[rows.table].take_columns(rows.rows, rows.columns)
+        self._poses.take_advance(event)
 
-    def stored(self, table: str) -> int:
-        """Return how many rows of a table are on disk."""
-        return self._tables[table].stored
+    @property
+    def stored_poses(self) -> int:
+        """Number of poses on disk."""
+        return self._poses.stored
 
-    def keep(self, table: str, rows: int) -> None:
-        """Remove the bulk rows on disk from a number on, which must start a batch.
+    def keep_poses(self, rows: int) -> None:
+        """Remove the poses on disk from a number on, which must start a batch.
 
         Raises:
             RunFolderError: it does not start a batch, or the disk failed.
         """
-        self._tables[table].keep(rows)
+        self._poses.keep(rows)
 
-    def restore(self, rows: Append) -> None:
-        """Write bulk rows that are missing on disk, before a replay counts any.
+    def restore(self, event: Advanced) -> None:
+        """Write poses that are missing on disk, before a replay counts any.
 
         Raises:
-            MalformedMessage: the columns are not those of the table.
             RunFolderError: the disk is full or failed.
         """
-        self._tables[rows.table].restore(rows.rows, rows.columns)
+        self._poses.restore(event)
 
     def flush(self) -> None:
         """Write all buffered rows to disk.
@@ -177,7 +177,7 @@ class Recorder:
 class TableFile:
     """Writer of one table.
 
-    A table gets either single rows, which are buffered, or bulk rows as columns.
+    A table gets single rows, which are buffered, or the poses of whole advances.
 
     Attributes:
         buffered: rows that are not on disk yet.
@@ -228,30 +228,32 @@ class TableFile:
             self.buffered.append(row)
         self._seen += 1
 
-    def store(self, rows: int, columns: bytes) -> None:
-        """Write bulk rows ahead of the count; remove rows on disk that do not count."""
+    def store(self, event: Advanced) -> None:
+        """Write poses ahead of the count; remove rows on disk that do not count."""
         self.keep(self._seen + self._ahead)
-        if rows:
-            self._write(self._bulk(rows, columns))
-            self._ahead += rows
+        if event.pose_rows:
+            self.restore(event)
+            self._ahead += event.pose_rows
 
-    def take_columns(self, rows: int, columns: bytes) -> None:
-        """Count the next bulk rows; write them unless they are already on disk."""
-        end = self._seen + rows
+    def take_advance(self, event: Advanced) -> None:
+        """Count the next poses; write them unless they are already on disk."""
+        end = self._seen + event.pose_rows
         if self._stored < end:
-            if not columns:
+            if event.advance.poses == NO_POSES:
                 raise RunFolderError(
                     f"{self._folder / SEGMENTS}: {self._name}: rows {self._stored} to "
                     f"{end - 1} are missing, and the journal does not hold them: "
                     "resume the run to compute them again"
                 )
-            self.store(rows, columns)
+            self.store(event)
         self._seen = end
-        self._ahead = max(0, self._ahead - rows)
+        self._ahead = max(0, self._ahead - event.pose_rows)
 
-    def restore(self, rows: int, columns: bytes) -> None:
-        """Write the next bulk rows behind those on disk, before any is counted."""
-        self._write(self._bulk(rows, columns))
+    def restore(self, event: Advanced) -> None:
+        """Write the next poses behind those on disk, before any is counted."""
+        rows = PoseArrays.received(event.advance.poses).rows(event.island)
+        columns = {name: rows[name].combine_chunks() for name in rows.column_names}
+        self._write(self._numbered(columns, rows.num_rows))
 
     def keep(self, rows: int) -> None:
         """Remove all rows on disk from a number on, which must start a batch."""
@@ -316,17 +318,6 @@ class TableFile:
             self._segment = self._opened()
         self._segment.append(batch)
         self._stored += batch.num_rows
-
-    def _bulk(self, rows: int, columns: bytes) -> pa.RecordBatch:
-        """Return bulk rows as one batch with record numbers."""
-        table = read_columns(self._name, columns)
-        if table.num_rows != rows:
-            raise MalformedMessage(
-                f"{self._name}: must be {rows} rows, got {table.num_rows}"
-            )
-        return self._numbered(
-            {name: table[name].combine_chunks() for name in table.column_names}, rows
-        )
 
     def _opened(self) -> "Segment":
         """Return a new segment that contains the schema."""

@@ -173,6 +173,29 @@ class Touch(Message, frozen=True, array_like=True):
     duration_s: Finite
 
 
+class Poses(Message, frozen=True, array_like=True):
+    """N samples of robots' poses, as columns of little-endian numbers.
+
+    Attributes:
+        islands: islands on which the robots were born, N int32.
+        births: their numbers there, N int64.
+        times_s: simulated times [s], N float64.
+        cores: position [m] and quaternion, core to world, of each core, N x 7 float32.
+        joints: numbers of joint angles, N int32.
+        angles: joint angles, sample by sample [rad], float32.
+    """
+
+    islands: bytes = b""
+    births: bytes = b""
+    times_s: bytes = b""
+    cores: bytes = b""
+    joints: bytes = b""
+    angles: bytes = b""
+
+
+NO_POSES = Poses()
+
+
 class Advance(Message, frozen=True, tag="advance"):
     """Result of an advance.
 
@@ -182,8 +205,7 @@ class Advance(Message, frozen=True, tag="advance"):
         judgements: of all living robots, by birth.
         casualties: in the order in which they diverged.
         touches: by pair; empty unless the experiment records them.
-        poses: Arrow IPC stream of samples (schema.tables.columns.POSES without record);
-            empty in a journal.
+        poses: samples of the robots' poses; empty in a journal.
         snapshot: the state at that step; empty if it was not wanted, and in a journal.
     """
 
@@ -192,7 +214,7 @@ class Advance(Message, frozen=True, tag="advance"):
     judgements: Annotated[tuple[Judgement, ...], Meta(max_length=MOST_LIVING)]
     casualties: Annotated[tuple[Casualty, ...], Meta(max_length=MOST_LIVING)]
     touches: Annotated[tuple[Touch, ...], Meta(max_length=MOST_TOUCHES)]
-    poses: bytes
+    poses: Poses = NO_POSES
     snapshot: bytes = b""
 
 

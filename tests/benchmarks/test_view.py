@@ -25,6 +25,7 @@ from schema.limits import LIVE_BYTES
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Live
 from schema.wire.codec import decode, encode
+from schema.wire.poses import PoseArrays
 from schema.wire.updates import Birth, Update
 from worker.arena.replay import alone
 from worker.bench.spider import spider
@@ -88,12 +89,22 @@ def moving_spiders() -> tuple[Update, list[pa.Table]]:
     return update, tables
 
 
+CORE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+
+
 def message(poses: pa.Table) -> bytes:
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, poses.schema) as writer:
-        writer.write_table(poses.combine_chunks())
-    columns = bytes(sink.getvalue().to_pybytes())
-    return encode(Live("run", 0, Advance(1, bytes(32), (), (), (), columns)))
+    rows = poses.combine_chunks()
+    angles = rows["angles"].combine_chunks()
+    arrays = PoseArrays(
+        islands=rows["island"].to_numpy(),
+        births=rows["birth"].to_numpy(),
+        times_s=rows["sim_time_s"].to_numpy(),
+        cores=np.stack([rows[name].to_numpy() for name in CORE], axis=1),
+        joints=angles.value_lengths().to_numpy(),
+        angles=angles.flatten().to_numpy(),
+    )
+    advance = Advance(1, bytes(32), (), (), (), arrays.message())
+    return encode(Live("run", 0, advance))
 
 
 def test_viewer_of_an_arena_of_thirty_uses_at_most_a_fifth_of_a_core(

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import msgspec
-import pyarrow as pa
+import numpy as np
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
@@ -26,9 +26,9 @@ from coordinator.islands.events import (
 from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
-from schema.tables.columns import ROWS
 from schema.wire.arena import Advance, AdvanceShard, Casualty, Judgement, Touch
 from schema.wire.messages import Vet
+from schema.wire.poses import PoseArrays
 from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
 
 DT = 0.005
@@ -119,7 +119,7 @@ class World:
             judgements=tuple(self.judged(one) for one in living),
             casualties=casualties,
             touches=tuple(Touch(a, b, 0.25) for a, b in pairwise(living[:3])),
-            poses=poses(living, self.step * DT),
+            poses=poses(living, self.step * DT).message(),
         )
         return Advanced(
             command.island, command.number, advance, len(living), PROVENANCE
@@ -135,20 +135,18 @@ class World:
 
 def poses(
     births: list[BirthId], *times_s: float, joints: Mapping[BirthId, int] | None = None
-) -> bytes:
-    """Return a pose for each time and robot as columns; one joint by default."""
-    schema = ROWS["poses"]
-    rows = [
-        {"island": one.island, "birth": one.number, "sim_time_s": time_s}
-        | dict.fromkeys(("x", "y", "z", "qx", "qy", "qz"), 0.0)
-        | {"qw": 1.0, "angles": [0.5] * (joints[one] if joints else 1)}
-        for time_s in times_s
-        for one in births
-    ]
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, schema) as writer:
-        writer.write_batch(pa.RecordBatch.from_pylist(rows, schema=schema))
-    return bytes(sink.getvalue().to_pybytes())
+) -> PoseArrays:
+    """Return a pose for each time and robot; one joint by default."""
+    robots = births * len(times_s)
+    counts = [joints[birth] if joints else 1 for birth in robots]
+    return PoseArrays(
+        islands=np.array([birth.island for birth in robots], np.int32),
+        births=np.array([birth.number for birth in robots], np.int64),
+        times_s=np.repeat(np.array(times_s, np.float64), len(births)),
+        cores=np.tile(np.array([[0, 0, 0, 1, 0, 0, 0]], np.float32), (len(robots), 1)),
+        joints=np.array(counts, np.int32),
+        angles=np.full(sum(counts), 0.5, np.float32),
+    )
 
 
 @dataclass

@@ -13,6 +13,8 @@ from typing import Any
 from msgspec.structs import replace
 
 import analyzer.report
+from analysis.viewer.received import received_poses
+from analysis.viewer.scene import Scene, scene_of
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.islands.events import (
     Advanced,
@@ -29,8 +31,7 @@ from coordinator.network.membership import Membership
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
     check_advance,
-    place_poses,
-    read_poses,
+    check_poses,
 )
 from coordinator.run.requests import read_answer, read_evaluation, read_vetting
 from coordinator.storage.journal import decode_record, encode_event
@@ -46,7 +47,11 @@ from schema.errors import (
     RunFolderError,
 )
 from schema.experiment.document import Experiment, body_space
-from schema.experiment.file import experiment_from_text, experiment_text
+from schema.experiment.file import (
+    experiment_from_text,
+    experiment_text,
+    read_experiment,
+)
 from schema.experiment.identity import Origin
 from schema.experiment.settings import (
     arena_settings,
@@ -65,7 +70,6 @@ from schema.limits import (
     ADVANCE_BYTES,
     ADVANCE_REQUEST_BYTES,
     LIVE_BYTES,
-    MOST_LIVE_ROWS,
     OPERATOR_REQUEST_BYTES,
     UPDATE_BYTES,
 )
@@ -75,7 +79,6 @@ from schema.robot.brain import check_brain
 from schema.robot.inverse_development import genome_of
 from schema.robot.results import Provenance
 from schema.robot.robot import Robot, check_tree, check_types
-from schema.tables.received import received_columns
 from schema.wire.arena import (
     Advance,
     AdvanceShard,
@@ -270,8 +273,6 @@ def _answers(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
         read = partial(_read_advance, expected=expected)
         samples = (answer(advance), answer(StateMissing()))
         yield Target(f"advance checks {number}", read, samples, share=20)
-        poses = partial(_read_poses, advance=advance, expected=expected)
-        yield Target(f"pose checks {number}", poses, (advance.poses,))
 
 
 def _read_advance(data: bytes, expected: ExpectedAdvance) -> None:
@@ -280,22 +281,18 @@ def _read_advance(data: bytes, expected: ExpectedAdvance) -> None:
     advance = answer.result
     if isinstance(advance, Advance):
         check_advance(advance, expected)
-        rows = read_poses(advance, expected)
-        place_poses(advance.poses, rows, 0)
+        check_poses(advance, expected)
 
 
-def _read_poses(data: bytes, advance: Advance, expected: ExpectedAdvance) -> None:
-    """Check columns in place of those of an advance."""
-    read_poses(replace(advance, poses=data), expected)
+def _show_poses(data: bytes, scene: Scene) -> None:
+    received_poses(decode(Live, data, LIVE_BYTES), scene)
 
 
 def _viewers(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
     lives = [replace(advance, snapshot=b"") for advance, _ in made]
-    yield _of(Live, LIVE_BYTES, *(encode(Live("run", 0, each)) for each in lives))
-    columns = partial(
-        received_columns, "poses", most_bytes=LIVE_BYTES, most_rows=MOST_LIVE_ROWS
-    )
-    yield Target("received_columns", columns, tuple(each.poses for each in lives))
+    scene = scene_of(read_experiment("scenario3"))
+    sent = tuple(encode(Live("run", 0, each)) for each in lives)
+    yield Target("received_poses", partial(_show_poses, scene=scene), sent)
     yield _of(Update, UPDATE_BYTES, encode(update()))
     yield Target("decode_page", decode_page, tuple(pages_of(update())))
 

@@ -13,9 +13,9 @@ from coordinator.storage.journal import Journal
 from schema.agent.network import client_config
 from schema.limits import LIVE_BYTES
 from schema.tables.files import read_table
-from schema.tables.received import read_columns
 from schema.wire.arena import Live
 from schema.wire.codec import decode
+from schema.wire.poses import PoseArrays
 from tests.system.workspace import Until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
@@ -93,7 +93,7 @@ def test_pause_list_insert_remove_snapshot_resume(
     for live in received:
         event = known[live.advance.step]
         assert live.advance.digest == event.advance.digest
-        assert read_columns("poses", live.advance.poses).num_rows == event.pose_rows
+        assert len(PoseArrays.received(live.advance.poses).births) == event.pose_rows
 
 
 def test_robot_with_its_own_part_types_is_inserted(

@@ -81,7 +81,7 @@ class FakeWorld:
                 living,
                 *(one * POSE_STEPS * DT for one in samples),
                 joints=self.joints,
-            ),
+            ).message(),
         )
 
     def snapshot(self) -> bytes:

@@ -4,21 +4,17 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
-import pyarrow as pa
 
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.trace import NEIGHBOUR_M, Floats
-from schema.tables.columns import ROWS
-from schema.wire.arena import Touch
+from schema.wire.arena import NO_POSES, Touch
+from schema.wire.poses import PoseArrays
 from worker.clusters.cluster import Cluster
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Layout
 from worker.measures.functions import functions_of
-
-_SCHEMA = ROWS["poses"]
 
 
 class Samples:
@@ -102,7 +98,7 @@ class Samples:
         return counts
 
 
-class Poses:
+class PoseLog:
     """Samples of all robots' poses."""
 
     def __init__(self, timestep_s: float) -> None:
@@ -122,34 +118,24 @@ class Poses:
             roots, angles = state[layout.roots], state[layout.joints]
             self._samples.append((step, layout, roots, angles))
 
-    def take(self) -> bytes:
-        """Return all samples as an Arrow IPC stream and forget them.
-
-        Without samples there are no bytes.
-
-        The columns name robots by birth only. The requester of the advance adds the
-        arena.
-        """
+    def take(self) -> PoseArrays:
+        """Return all samples and forget them."""
         if not self._samples:
-            return b""
+            return PoseArrays.received(NO_POSES)
         steps, layouts, roots, angles = zip(*self._samples, strict=True)
         self._samples = []
         rows = [layout.robot_rows for layout in layouts]
-        batch = pose_batch(
-            islands=np.concatenate([each.islands for each in rows]),
-            numbers=np.concatenate([each.numbers for each in rows]),
+        return PoseArrays(
+            islands=np.concatenate([row.islands for row in rows]),
+            births=np.concatenate([row.numbers for row in rows]),
             times_s=np.repeat(
                 [step * self._timestep_s for step in steps],
-                [len(each.robots) for each in rows],
+                [len(row.robots) for row in rows],
             ),
-            roots=np.concatenate(roots),
-            joint_counts=np.concatenate([each.joint_counts for each in rows]),
-            angles=np.concatenate(angles),
+            cores=np.concatenate(roots).astype(np.float32),
+            joints=np.concatenate([row.joint_counts for row in rows]),
+            angles=np.concatenate(angles).astype(np.float32),
         )
-        sink = pa.BufferOutputStream()
-        with pa.ipc.new_stream(sink, _SCHEMA) as writer:
-            writer.write_batch(batch)
-        return bytes(sink.getvalue().to_pybytes())
 
 
 class Contacts:
@@ -172,38 +158,3 @@ class Contacts:
         counts = sorted(self._counts.items())
         self._counts.clear()
         return tuple(Touch(*pair, count * self._interval_s) for pair, count in counts)
-
-
-def pose_batch(
-    *,
-    islands: npt.NDArray[np.int32],
-    numbers: npt.NDArray[np.int64],
-    times_s: Floats,
-    roots: Floats,
-    joint_counts: npt.NDArray[np.int32],
-    angles: Floats,
-) -> pa.RecordBatch:
-    """Return N rows of the poses table, with the columns in ``ROWS``.
-
-    Args:
-        islands: (N,) of the robots' births.
-        numbers: (N,) of the robots' births.
-        times_s: (N,) simulated time [s].
-        roots: (N, 7) position [m] and quaternion of the core.
-        joint_counts: (N,) joint angles of each row.
-        angles: of all joints, row by row [rad].
-    """
-    ends = np.concatenate([[0], np.cumsum(joint_counts)]).astype(np.int32)
-    columns = [
-        islands,
-        pa.nulls(len(times_s), pa.int32()),
-        numbers,
-        times_s,
-        *roots.astype(np.float32).T,
-        pa.ListArray.from_arrays(
-            pa.array(ends),
-            pa.array(angles.astype(np.float32)),
-            type=_SCHEMA.field("angles").type,
-        ),
-    ]
-    return pa.record_batch(columns, schema=_SCHEMA)

@@ -20,10 +20,9 @@ from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
 from schema.tables.columns import ROWS
-from schema.tables.received import read_columns
 from schema.wire.arena import Rebuild
+from schema.wire.poses import PoseArrays
 from worker.arena.changes import possible
-from worker.arena.records import pose_batch
 from worker.arena.world import World
 from worker.clusters.states import Schedule
 from worker.robot.evaluation import evaluate, simulate
@@ -73,15 +72,15 @@ def alone(
     count, qpos = len(times), np.array(positions)
     objects = object_count(settings.environment, settings.simulation)
     joints = qpos.shape[1] - 7 * (1 + objects)
-    rows = pose_batch(
+    poses = PoseArrays(
         islands=np.full(count, identity.birth.island, dtype=np.int32),
-        numbers=np.full(count, identity.birth.number, dtype=np.int64),
+        births=np.full(count, identity.birth.number, dtype=np.int64),
         times_s=np.array(times),
-        roots=qpos[:, :7],
-        joint_counts=np.full(count, joints, dtype=np.int32),
-        angles=qpos[:, 7 : 7 + joints].ravel(),
+        cores=qpos[:, :7].astype(np.float32),
+        joints=np.full(count, joints, dtype=np.int32),
+        angles=qpos[:, 7 : 7 + joints].ravel().astype(np.float32),
     )
-    return evaluate(robot, settings, identity), pa.Table.from_batches([rows])
+    return evaluate(robot, settings, identity), poses.rows()
 
 
 def together(
@@ -115,7 +114,8 @@ def together(
                 for stop in range(next_tick(world.step), advance.until, tick):
                     world.step_to(stop)
                     motion.append(_motion(world, births))
-            samples = read_columns("poses", world.advance(advance.until).poses)
+            poses = world.advance(advance.until).poses
+            samples = PoseArrays.received(poses).rows()
             if is_shown:
                 motion.append(_motion(world, births))
             yield ReplayedAdvance(
@@ -130,7 +130,6 @@ def together(
 
 def _motion(world: World, births: frozenset[BirthId]) -> pa.Table:
     """Return the present poses of some robots."""
-    poses = read_columns("poses", world.poses())
-    names = zip(poses["island"].to_pylist(), poses["birth"].to_pylist(), strict=True)
-    is_chosen = [BirthId(*name) in births for name in names]
-    return poses.filter(pa.array(is_chosen, pa.bool_()))
+    poses = world.poses()
+    is_chosen = [robot in births for robot in poses.robots]
+    return poses.rows().filter(pa.array(is_chosen, pa.bool_()))

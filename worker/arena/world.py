@@ -25,10 +25,11 @@ from schema.wire.arena import (
     Insertion,
     Judgement,
 )
+from schema.wire.poses import PoseArrays
 from worker.arena.batched_control import BatchedControllers
 from worker.arena.changes import check_changes, diverged, newborn
 from worker.arena.looking import look
-from worker.arena.records import Contacts, Poses, Samples
+from worker.arena.records import Contacts, PoseLog, Samples
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import ThreadTeam
 from worker.clusters.population import ArenaPopulation
@@ -67,7 +68,7 @@ class World:
         self._controllers = BatchedControllers(settings, controls)
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
-        self._poses = Poses(clock.timestep_s)
+        self._poses = PoseLog(clock.timestep_s)
         self._samples = Samples(settings, self.population)
 
     def close(self) -> None:
@@ -79,9 +80,9 @@ class World:
         """Births of the living robots, ascending."""
         return tuple(robot.birth for robot in self.population.robots)
 
-    def poses(self) -> bytes:
-        """Return the present poses: Arrow IPC of ``columns.POSES``."""
-        now = Poses(self._settings.simulation.timestep_s)
+    def poses(self) -> PoseArrays:
+        """Return the present poses."""
+        now = PoseLog(self._settings.simulation.timestep_s)
         now.add(self.step, self.population.layout, self.population.layout.read())
         return now.take()
 
@@ -295,5 +296,5 @@ class World:
             judgements=tuple(each for each in found if isinstance(each, Judgement)),
             casualties=casualties,
             touches=() if self._contacts is None else self._contacts.take(),
-            poses=self._poses.take(),
+            poses=self._poses.take().message(),
         )

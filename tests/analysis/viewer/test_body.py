@@ -26,7 +26,6 @@ from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
-from schema.tables.received import read_columns
 from tests.coordinator.arena_world import poses
 
 GREY = (0.2, 0.4, 0.6)
@@ -177,8 +176,8 @@ def test_poses_of_another_body_are_refused() -> None:
     births = [BirthId(0, 0), BirthId(0, 1)]
     for joints in ((1, 1), (1, 3), (2, 1)):
         rows = dict(zip(births, joints, strict=True))
-        columns = read_columns("poses", poses(births, 0.2, joints=rows))
+        columns = poses(births, 0.2, joints=rows).rows()
         with pytest.raises(MalformedMessage, match="must have 2 angles each"):
             place_rows(model, columns)
-    two = read_columns("poses", poses(births, 0.2, joints=dict.fromkeys(births, 2)))
+    two = poses(births, 0.2, joints=dict.fromkeys(births, 2)).rows()
     assert place_rows(model, two)[0].shape[0] == 2

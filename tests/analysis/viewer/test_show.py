@@ -6,7 +6,6 @@ from analysis.viewer.show import Show
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part
-from schema.tables.received import read_columns
 from schema.wire.updates import Birth, Update
 from tests.coordinator.arena_world import poses
 
@@ -30,6 +29,6 @@ def test_births_so_far_are_right_after_a_lost_message() -> None:
     first = BirthId(0, 0)
     times_s = (5.0, 10.0, 25.0, 35.0, 45.0, 55.0, 65.0)
     rows = poses([first], *times_s, joints={first: 0})
-    show.move(0, read_columns("poses", rows))
+    show.move(0, rows.rows())
     births = recording.log_poses.call_args.args[2]
     assert births.tolist() == [0, 1, 2, 3, 4, 5, 6]

@@ -219,8 +219,7 @@ def test_an_arena_with_too_few_robots_to_mate_is_extinct() -> None:
 
 def test_touches_and_poses_are_recorded() -> None:
     lived = life().live(15)
-    assert {append.table for append in lived.bulk} == {"poses"}
-    assert [append.rows for append in lived.bulk] == [*range(1, 16)]
+    assert [append.event.pose_rows for append in lived.bulk] == [*range(1, 16)]
     row = lived.rows("touches")[0]
     assert row == {
         "island": 0, "birth_island": None, "birth": 13,
@@ -239,7 +238,7 @@ def test_rows_have_the_columns_of_their_tables() -> None:
 
 
 def advanced(step: int, number: int) -> Advanced:
-    return Advanced(0, number, Advance(step, bytes(32), (), (), (), b""), 0, PROVENANCE)
+    return Advanced(0, number, Advance(step, bytes(32), (), (), ()), 0, PROVENANCE)
 
 
 def test_an_old_advance_is_ignored() -> None:

@@ -44,7 +44,6 @@ ADVANCE = Advance(
     (Judgement(BirthId(0, 3), 15.0, 0.1, 0.2, 0.1, is_mature=True, place=ZERO),),
     (Casualty(BirthId(0, 2), 5999, "height 1e9 m", ZERO),),
     (Touch(BirthId(0, 2), BirthId(0, 3), 0.25),),
-    b"",
 )
 FAILED = EvaluationFailed(BirthId(0, 1), "diverged\nat 3.2 s", WORKER, 2, 1)
 EVENTS: list[JournalledEvent] = [

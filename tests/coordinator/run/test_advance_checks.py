@@ -1,13 +1,12 @@
 """Answers about arenas that contradict their requests or the arena's state."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from hashlib import sha256
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,19 +29,20 @@ from schema.errors import MalformedMessage
 from schema.experiment.identity import Origin
 from schema.limits import ADVANCE_BYTES, ADVANCE_REQUEST_BYTES
 from schema.robot.ids import BirthId
-from schema.tables.columns import POSES
-from schema.tables.received import read_columns
 from schema.wire.arena import (
+    NO_POSES,
     Advance,
     AdvanceShard,
     Casualty,
     Changes,
     Insertion,
     Judgement,
+    Poses,
     Touch,
 )
 from schema.wire.codec import decode, encode
 from schema.wire.messages import Answer, Request, StateMissing
+from schema.wire.poses import PoseArrays
 from tests.coordinator.arena_world import DT, experiment
 from tests.coordinator.sent_jobs import SentJobs
 from tests.coordinator.sent_requests import JUDGED, ROBOT
@@ -175,33 +175,37 @@ def fallen(
     return change
 
 
-def stream(rows: pa.Table) -> bytes:
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, rows.schema) as writer:
-        writer.write_table(rows.combine_chunks())
-    return bytes(sink.getvalue().to_pybytes())
-
-
-def posed(change: Callable[[pa.Table], pa.Table]) -> AdvanceChange:
-    """Return a change of the rows of the poses."""
+def posed(order: Sequence[int]) -> AdvanceChange:
+    """Return a change of the poses to some of them; each has one angle."""
 
     def made(advance: Advance) -> Advance:
-        rows = read_columns("poses", advance.poses)
-        return replace(advance, poses=stream(change(rows)))
+        poses = PoseArrays.received(advance.poses)._asdict()
+        chosen = PoseArrays(**{name: poses[name][list(order)] for name in poses})
+        return replace(advance, poses=chosen.message())
 
     return made
 
 
-def column(name: str, value: object) -> AdvanceChange:
-    """Return a change of the last value of a column of the poses."""
+def column(name: str, value: float, place: int = 0) -> AdvanceChange:
+    """Return a change of a number of the last pose."""
 
-    def change(rows: pa.Table) -> pa.Table:
-        field = POSES.field(name)
-        values = [*rows[name].to_pylist()[:-1], value]
-        place = rows.schema.get_field_index(name)
-        return rows.set_column(place, field, pa.array(values, field.type))
+    def made(advance: Advance) -> Advance:
+        columns = PoseArrays.received(advance.poses)._asdict()
+        columns[name] = columns[name].copy()
+        columns[name][-1:, ...].flat[place] = value
+        return replace(advance, poses=PoseArrays(**columns).message())
 
-    return posed(change)
+    return made
+
+
+def many_angles(advance: Advance) -> Advance:
+    """Give the last pose more joints than a body has parts."""
+    poses = PoseArrays.received(advance.poses)
+    joints = np.array([*poses.joints[:-1], 1000], np.int32)
+    angles = np.zeros(joints.sum(), np.float32)
+    return replace(
+        advance, poses=poses._replace(joints=joints, angles=angles).message()
+    )
 
 
 LIES: dict[str, AdvanceChange] = {
@@ -231,21 +235,20 @@ LIES: dict[str, AdvanceChange] = {
     "touches that are not recorded": having(touches=(Touch(SECOND, THIRD, 0.5),)),
     "no snapshot": having(snapshot=b""),
     "a snapshot of another state": having(snapshot=b"{}"),
-    "a pose twice": posed(lambda rows: pa.concat_tables([rows, rows.slice(49)])),
-    "no poses": having(poses=b""),
-    "a pose too few": posed(lambda rows: rows.slice(1)),
-    "poses in another order": posed(lambda rows: rows.take(np.arange(50)[::-1])),
-    "a pose of a stranger": column("birth", 9),
-    "a pose on another island": column("island", 7),
-    "a pose of an immigrant by name": column("birth_island", 7),
-    "a pose at another time": column("sim_time_s", NEXT * DT - DT),
-    "a pose before the advance": column("sim_time_s", 0.2),
-    "a pose at no time": column("sim_time_s", math.nan),
-    "a pose not finite": column("y", math.inf),
-    "an attitude not a number": column("qw", math.nan),
-    "an angle not a number": column("angles", [math.nan]),
-    "more angles than a body has joints": column("angles", [0.5] * 2000),
-    "damaged poses": having(poses=b"\xff" * 100),
+    "a pose twice": posed([*range(50), 49]),
+    "no poses": having(poses=NO_POSES),
+    "a pose too few": posed(range(1, 50)),
+    "poses in another order": posed(range(50)[::-1]),
+    "a pose of a stranger": column("births", 9),
+    "a pose on another island": column("islands", 7),
+    "a pose at another time": column("times_s", NEXT * DT - DT),
+    "a pose before the advance": column("times_s", 0.2),
+    "a pose at no time": column("times_s", math.nan),
+    "a pose not finite": column("cores", math.inf, 1),
+    "an attitude not a number": column("cores", math.nan, 3),
+    "an angle not a number": column("angles", math.nan),
+    "more angles than a body has joints": many_angles,
+    "columns of different lengths": having(poses=Poses(b"\0" * 4)),
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from coordinator.evolution.generation import generate
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
     check_advance,
-    read_poses,
+    check_poses,
 )
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.identity import Origin
@@ -72,7 +72,7 @@ def check(advance: Advance, expected: ExpectedAdvance) -> int:
     received = decode(Advance, encode(advance), ADVANCE_BYTES)
     assert received == advance
     check_advance(received, expected)
-    return int(read_poses(received, expected).num_rows)
+    return check_poses(received, expected)
 
 
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {

@@ -53,7 +53,7 @@ def saying(result: Result) -> Lie:
 
 
 DEAD = Casualty(BirthId(0, 0), 1, "x", (0.0, 0.0, 0.0))
-ENDLESS = Advance(1, bytes(32), (), (DEAD,) * (MOST_LIVING + 1), (), b"")
+ENDLESS = Advance(1, bytes(32), (), (DEAD,) * (MOST_LIVING + 1), ())
 
 
 def with_liar(kind: AgentKind, lie: Lie) -> type[LocalAgents]:

@@ -44,7 +44,7 @@ from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
-from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.arena import NO_POSES, Advance, Casualty, Judgement, Poses, Touch
 from schema.wire.protobuf import encode_genome
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
@@ -68,7 +68,6 @@ ADVANCE = Advance(
     (JUDGED,),
     (Casualty(BirthId(0, 2), 5999, "diverged", (0.0, 0.0, 1e9)),),
     (Touch(BirthId(0, 2), BirthId(0, 3), 0.25),),
-    b"",
 )
 ORDERS: list[Order] = [
     Pause(),
@@ -320,9 +319,9 @@ def test_an_event_is_read_as_it_was_written(kind: Any, data: st.DataObject) -> N
     event = data.draw(values_of(inspect.type_info(kind)))
     if isinstance(event, Advanced):
         # They are stored elsewhere.
-        bulk = replace(event.advance, poses=b"bulk", snapshot=b"bulk")
+        bulk = replace(event.advance, poses=Poses(b"bulk"), snapshot=b"bulk")
         written = encode_event(replace(event, advance=bulk))
-        event = replace(event, advance=replace(bulk, poses=b"", snapshot=b""))
+        event = replace(event, advance=replace(bulk, poses=NO_POSES, snapshot=b""))
     else:
         written = encode_event(event)
     assert decode_record(Path("journal"), written) == event

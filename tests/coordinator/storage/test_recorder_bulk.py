@@ -2,31 +2,34 @@
 
 from pathlib import Path
 
-import pyarrow as pa
 import pytest
+from msgspec.structs import replace
 
-from coordinator.islands.events import Append
+from coordinator.islands.events import Advanced
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
-from schema.errors import MalformedMessage, RunFolderError
+from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.columns import POSES, ROWS
+from schema.tables.columns import POSES
 from schema.tables.files import read_table
-from schema.tables.received import read_columns
 from schema.tables.segments import segment_path, segments_of
+from schema.wire.arena import NO_POSES, Advance
 from tests.coordinator.arena_world import poses
+from tests.coordinator.reports import PROVENANCE
 
 DETAILS = RunDetails("scenario3", 0, 1, "{}")
 
 
-def bulk(number: int, rows: int = 3) -> Append:
+def bulk(number: int, rows: int = 3) -> Advanced:
     births = [BirthId(0, each) for each in range(rows)]
-    return Append("poses", rows, poses(births, float(number)))
+    sent = poses(births, float(number)).message()
+    advance = Advance(number, bytes(32), (), (), (), sent)
+    return Advanced(0, number, advance, rows, PROVENANCE)
 
 
-def bare(append: Append) -> Append:
-    """Return the replayed command for rows that are on disk."""
-    return Append(append.table, append.rows, b"")
+def bare(event: Advanced) -> Advanced:
+    """Return the replayed event of rows that are on disk."""
+    return replace(event, advance=replace(event.advance, poses=NO_POSES))
 
 
 def times(folder: Path) -> list[float]:
@@ -118,41 +121,6 @@ def test_missing_rows_are_refused(tmp_path: Path) -> None:
 
 def test_no_rows_make_no_segment(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, DETAILS)
-    recorder.store(Append("poses", 0, b""))
-    recorder.append(Append("poses", 0, b""))
+    recorder.store(bulk(1, rows=0))
+    recorder.append(bulk(1, rows=0))
     assert segments_of(tmp_path, "poses") == []
-
-
-@pytest.mark.parametrize(
-    ("append", "message"),
-    [
-        (Append("poses", 4, bulk(1).columns), "must be 4 rows, got 3"),
-        (Append("poses", 3, b"no stream"), "not an Arrow stream"),
-        (Append("poses", 3, bulk(1).columns[:-40]), "not an Arrow stream"),
-        (Append("touches", 3, bulk(1).columns), "touches: columns must be island"),
-    ],
-)
-def test_wrong_columns_are_refused_and_nothing_is_written(
-    tmp_path: Path, append: Append, message: str
-) -> None:
-    recorder = written(tmp_path, 1)
-    with pytest.raises(MalformedMessage, match=message):
-        recorder.store(append)
-    recorder.store(bulk(2))
-    assert times(tmp_path)[::3] == [1.0, 2.0]
-
-
-def test_empty_bytes_are_no_rows() -> None:
-    table = read_columns("poses", b"")
-    assert table.num_rows == 0
-    assert table.schema == ROWS["poses"]
-
-
-def test_columns_of_several_batches_become_one() -> None:
-    schema = ROWS["poses"]
-    sink = pa.BufferOutputStream()
-    batches = read_columns("poses", bulk(1).columns).to_batches()
-    with pa.ipc.new_stream(sink, schema) as writer:
-        for batch in batches * 2:
-            writer.write_batch(batch)
-    assert read_columns("poses", bytes(sink.getvalue())).num_rows == 6

@@ -38,7 +38,7 @@ def _advance(*removals: BirthId, history: tuple[PastAdvance, ...] = ()) -> Reque
 
 
 def _answer() -> tuple[Answer, bytes]:
-    advance = Advance(0, bytes(32), (), (), (), b"")
+    advance = Advance(0, bytes(32), (), (), ())
     return Answer(1, 1, 0.0, advance), encode("judgements") + b"\x90"
 
 

@@ -71,7 +71,6 @@ ADVANCE = Advance(
     (JUDGEMENT,),
     (Casualty(BIRTH, 7, "fell", (0.0, 0.0, 0.0)),),
     (Touch(BIRTH, BirthId(0, 4), 0.1),),
-    b"",
 )
 REPORT = Report(False, "no motor", ((1, 2),), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.3, 0)
 COMMANDED = OperatorRequest("id", 2, InsertRobot(ROBOT, (0.0, -1.5)), "run")

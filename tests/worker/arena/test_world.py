@@ -16,8 +16,8 @@ from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
-from schema.tables.received import read_columns
 from schema.wire.arena import BrainChange, Changes, Insertion
+from schema.wire.poses import PoseArrays
 from tests.worker.arena_cases import (
     EXPERIMENT,
     SECOND,
@@ -125,14 +125,13 @@ def test_poses_are_recorded_for_all_robots(turtle: Robot) -> None:
         [Insertion(A, turtle, (1.0, 2.0), 0.5), Insertion(B, turtle, (9.0, 2.0))],
     )
     advance = world.advance(80)
-    rows = read_columns("poses", advance.poses)
+    rows = PoseArrays.received(advance.poses).rows()
     assert rows["birth"].to_pylist() == [0, 1, 0, 1]
     assert rows["sim_time_s"].to_pylist() == [0.2, 0.2, 0.4, 0.4]
     assert rows["x"].to_pylist() == pytest.approx([1.0, 9.0] * 2, abs=0.01)
     assert rows["qz"][0].as_py() == pytest.approx(math.sin(0.25), abs=0.01)
     assert [len(angles) for angles in rows["angles"].to_pylist()] == [2] * 4
-    present = read_columns("poses", world.poses())
-    assert present.equals(rows.slice(2).combine_chunks())
+    assert world.poses().rows().equals(rows.slice(2))
 
 
 def test_replaced_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:

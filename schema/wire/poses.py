@@ -1,0 +1,107 @@
+"""Poses of an arena's robots: as they travel, as arrays, as rows of their table."""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from schema.errors import MalformedMessage
+from schema.robot.ids import BirthId
+from schema.tables.columns import ROWS
+from schema.wire.arena import Poses
+
+_SCHEMA = ROWS["poses"]
+_TYPES = {
+    "islands": "<i4",
+    "births": "<i8",
+    "times_s": "<f8",
+    "cores": "<f4",
+    "joints": "<i4",
+    "angles": "<f4",
+}
+"""Types of the numbers of ``Poses``."""
+_CORE = 7
+"""Numbers of a core: position and quaternion."""
+
+
+class PoseArrays(NamedTuple):
+    """N samples of robots' poses.
+
+    Attributes:
+        islands: (N,) islands on which the robots were born.
+        births: (N,) their numbers there.
+        times_s: (N,) simulated times [s].
+        cores: (N, 7) positions of the cores [m] and their quaternions, core to world.
+        joints: (N,) numbers of joint angles.
+        angles: joint angles, sample by sample [rad].
+    """
+
+    islands: npt.NDArray[np.int32]
+    births: npt.NDArray[np.int64]
+    times_s: npt.NDArray[np.float64]
+    cores: npt.NDArray[np.float32]
+    joints: npt.NDArray[np.int32]
+    angles: npt.NDArray[np.float32]
+
+    @classmethod
+    def received(cls, poses: Poses) -> Self:
+        """Return the samples of a message.
+
+        Raises:
+            MalformedMessage: columns of different lengths.
+        """
+        try:
+            columns = {
+                name: np.frombuffer(getattr(poses, name), kind)
+                for name, kind in _TYPES.items()
+            }
+            columns["cores"] = columns["cores"].reshape(-1, _CORE)
+        except ValueError as error:
+            raise MalformedMessage(f"poses: {error}") from None
+        arrays = cls(**columns)
+        rows = {len(column) for column in arrays[:-1]}
+        joints = arrays.joints
+        counted = int(joints.sum(dtype=np.int64)) if (joints >= 0).all() else -1
+        if len(rows) > 1 or counted != len(arrays.angles):
+            raise MalformedMessage("poses: columns must have one length")
+        return arrays
+
+    def message(self) -> Poses:
+        """Return the samples as they travel."""
+        columns: dict[str, npt.NDArray[np.generic]] = self._asdict()
+        return Poses(
+            **{
+                name: columns[name].astype(kind).tobytes()
+                for name, kind in _TYPES.items()
+            }
+        )
+
+    @property
+    def robots(self) -> list[BirthId]:
+        """The robot of each sample."""
+        pairs = zip(self.islands.tolist(), self.births.tolist(), strict=True)
+        return [BirthId(*pair) for pair in pairs]
+
+    def rows(self, island: int | None = None) -> pa.Table:
+        """Return the rows of the poses table, without ``record``.
+
+        Args:
+            island: of the arena, so that robots from elsewhere are immigrants; None
+                if all were born where they are.
+        """
+        here = self.islands if island is None else np.full_like(self.islands, island)
+        ends = np.concatenate([[0], np.cumsum(self.joints)]).astype(np.int32)
+        columns = [
+            here,
+            pa.array(self.islands, mask=self.islands == here),
+            self.births,
+            self.times_s,
+            *self.cores.T,
+            pa.ListArray.from_arrays(
+                pa.array(ends),
+                pa.array(self.angles),
+                type=_SCHEMA.field("angles").type,
+            ),
+        ]
+        return pa.Table.from_arrays(columns, schema=_SCHEMA)
