@@ -23,6 +23,7 @@ from schema.agent.request_handler import Compute
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
+from schema.plugins.permission import allowed
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +114,8 @@ def connected_agents(
                 role=kind,
                 name=f"own-{kind}",
                 connect=network.own_address,
+                # The run's copies, which are there by now.
+                plugins=allowed(),
                 processes=size,
             )
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size, role=kind)
