@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from hashlib import sha256
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +16,7 @@ from coordinator.run.requests import check_count, impossible
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Touch
+from schema.wire.arena_state import state_digest
 from schema.wire.poses import PoseArrays
 
 _SHOWN = 3
@@ -63,7 +63,7 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
     if bool(advance.snapshot) != expected.wants_snapshot:
         wanted, got = ("a", "none") if expected.wants_snapshot else ("no", "one")
         raise impossible(f"advance: {wanted} snapshot was wanted, got {got}")
-    if advance.snapshot and sha256(advance.snapshot).digest() != advance.digest:
+    if advance.snapshot and state_digest(advance.snapshot) != advance.digest:
         raise impossible("advance: the snapshot must have the digest of the state")
     _check_robots(advance, expected.living)
     measures = len(expected.experiment.measures.names)

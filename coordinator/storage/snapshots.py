@@ -8,11 +8,11 @@ therefore its digest, may differ.
 """
 
 import re
-from hashlib import sha256
 from pathlib import Path
 
 from coordinator.storage.disk import replace_bytes, storage_errors
-from schema.errors import RunFolderError, unreadable
+from schema.errors import MalformedMessage, RunFolderError, unreadable
+from schema.wire.arena_state import state_digest
 
 FOLDER = "snapshots"
 
@@ -42,7 +42,10 @@ class Snapshots:
         is_later = self._until is not None and step > self._until
         if is_later or not self._path(shard, step).exists():
             return False
-        return sha256(self.read(shard, step)).digest() == digest
+        try:
+            return state_digest(self.read(shard, step)) == digest
+        except MalformedMessage:
+            return False
 
     def write(self, shard: int, step: int, data: bytes) -> None:
         """Write the state of a shard at a step durably.

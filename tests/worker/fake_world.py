@@ -11,6 +11,8 @@ from schema.experiment.settings import ArenaSettings
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Changes, Judgement
+from schema.wire.arena_state import ArenaState, state_digest
+from schema.wire.codec import decode, encode
 from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, WINDOW, poses
 
 
@@ -34,7 +36,8 @@ class FakeWorld:
     @classmethod
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
         world = cls(settings, threads)
-        world.step, born, world.past = json.loads(data)
+        (_, state), *_ = decode(ArenaState, data, len(data)).robots
+        world.step, born, world.past = json.loads(state)
         for island, number, step, joints, window in born:
             world.born[BirthId(island, number)] = step
             world.joints[BirthId(island, number)] = joints
@@ -89,10 +92,13 @@ class FakeWorld:
             (*b, step, self.joints[b], self.windows[b])
             for b, step in sorted(self.born.items())
         ]
-        return json.dumps([self.step, born, self.past]).encode()
+        data = json.dumps([self.step, born, self.past]).encode()
+        return encode(
+            ArenaState(bytes(32), self.step, ((BirthId(0, 0), data),), (), ())
+        )
 
     def digest(self) -> bytes:
-        return hashlib.sha256(self.snapshot()).digest()
+        return state_digest(self.snapshot())
 
     def close(self) -> None:
         self.is_closed = True

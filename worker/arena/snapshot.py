@@ -9,33 +9,36 @@ pose samples, so there are none between two advances.
 import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import chain
 
 import msgspec
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import astuple
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
+from schema.limits import ADVANCE_BYTES
 from schema.parts import Vector
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_types
 from schema.robot.trace import Floats
 from schema.wire.arena import Casualty
+from schema.wire.arena_state import ArenaState
+from schema.wire.codec import decode, encode
 from schema.wire.protobuf import decode_robot
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, FitnessWindow
-from worker.measures.functions import functions_of
-
-FORMAT = 2
-"""Increases when the meaning of a field changes."""
 
 
 class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """State of one robot: phenotype, physics, sensors, network, window."""
+    """State of one robot: phenotype, physics, sensors, network, window.
 
-    birth: BirthId
+    Attributes:
+        rows: recorded channels of its window; empty if none is needed.
+        probe: numbers of its probe; empty without one.
+    """
+
     robot: bytes
     born: int
     brain_start: int
@@ -47,43 +50,16 @@ class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     states: bytes
     window: bytes
     place: Vector
-
-
-class _Recording(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Recorded channels of one robot: rows of its window, numbers of its probe."""
-
     rows: bytes
     probe: bytes
 
 
-class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """State of an arena between two advances.
-
-    Attributes:
-        settings: SHA-256 of the arena's settings.
-        robots: by birth.
-        clusters: members of each, as indices into the robots.
-        casualties: birth, step, reason and place of robots that diverged and are not
-            yet reported by an advance.
-        recordings: of the robots, by birth; only of an arena whose fitness or measures
-            need recorded channels.
-    """
-
-    format: int
-    settings: bytes
-    step: int
-    robots: list[_RobotState]
-    clusters: list[list[int]]
-    casualties: list[tuple[BirthId, int, str, Vector]]
-    recordings: list[_Recording] = []
-
-
-def write_snapshot(
+def state_of(
     settings: ArenaSettings,
     step: int,
     population: ArenaPopulation,
     casualties: Sequence[Casualty],
-) -> bytes:
+) -> ArenaState:
     """Return an arena's whole state; equal states give equal bytes.
 
     Args:
@@ -92,18 +68,15 @@ def write_snapshot(
         population: the living robots.
         casualties: not yet reported.
     """
-    rows = population.robot_rows.rows
-    state = _ArenaState(
-        format=FORMAT,
+    return ArenaState(
         settings=_digest(settings),
         step=step,
-        robots=[_robot_state(robot) for robot in population.robots],
-        clusters=[[rows[b] for b in c.members] for c in population.clusters],
-        casualties=[(c.birth, c.step, c.reason, c.place) for c in casualties],
-        recordings=[_recording(robot) for robot in population.robots],
+        robots=tuple(
+            (robot.birth, encode(_robot_state(robot))) for robot in population.robots
+        ),
+        clusters=tuple(cluster.members for cluster in population.clusters),
+        casualties=tuple(casualties),
     )
-    fields = astuple(state)
-    return msgspec.msgpack.encode(fields if _is_recorded(settings) else fields[:-1])
 
 
 def read_snapshot(
@@ -120,34 +93,24 @@ def read_snapshot(
         The arena's step, and the casualties not yet reported.
 
     Raises:
-        MalformedMessage: not a snapshot's bytes, another format, of an arena with
-            other settings, or a robot that breaks their rules.
+        MalformedMessage: not a snapshot's bytes, of an arena with other settings, or
+            a robot that breaks their rules.
     """
-    try:
-        state = msgspec.msgpack.decode(data, type=_ArenaState)
-    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
-        raise MalformedMessage(f"snapshot: {error}") from None
-    if state.format != FORMAT:
-        raise MalformedMessage(f"snapshot: format must be {FORMAT}, got {state.format}")
+    state = decode(ArenaState, data, ADVANCE_BYTES)
     if state.settings != _digest(settings):
         raise MalformedMessage("snapshot: of an arena with other settings")
-    members = sorted(row for group in state.clusters for row in group)
-    if members != list(range(len(state.robots))):
+    births = [birth for birth, _ in state.robots]
+    if sorted(chain.from_iterable(state.clusters)) != births:
         raise MalformedMessage("snapshot: every robot must be in one cluster")
-    robots = [_restored(robot, population) for robot in state.robots]
-    if len(state.recordings) != len(robots) * _is_recorded(settings):
-        raise MalformedMessage("snapshot: every robot must have a recording")
-    for robot, recording in zip(robots, state.recordings, strict=False):
-        _restore_recording(robot, recording)
-    population.add(robots)
-    births = [robot.birth for robot in population.robots]
-    population.regroup([tuple(births[row] for row in g) for g in state.clusters])
+    population.add(
+        [
+            _restored(birth, decode(_RobotState, robot, ADVANCE_BYTES), population)
+            for birth, robot in state.robots
+        ]
+    )
+    population.regroup(list(state.clusters))
     population.merges = population.splits = 0
-    return state.step, [Casualty(*fields) for fields in state.casualties]
-
-
-def _is_recorded(settings: ArenaSettings) -> bool:
-    return bool(functions_of(settings).channels)
+    return state.step, list(state.casualties)
 
 
 @lru_cache(maxsize=8)
@@ -157,9 +120,8 @@ def _digest(settings: ArenaSettings) -> bytes:
 
 
 def _robot_state(robot: ArenaRobot) -> _RobotState:
-    view, sensors = robot.view, robot.view.sensors
+    view, sensors, probe = robot.view, robot.view.sensors, robot.view.probe
     return _RobotState(
-        birth=robot.birth,
         robot=robot.encoded,
         born=robot.window.born,
         brain_start=robot.brain_start,
@@ -171,17 +133,21 @@ def _robot_state(robot: ArenaRobot) -> _RobotState:
         states=_pack(robot.states),
         window=_pack(np.array(robot.window.positions)),
         place=robot.place,
+        rows=_pack(np.array(robot.window.rows)),
+        probe=b"" if probe is None else _pack(probe.numbers),
     )
 
 
-def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
+def _restored(
+    birth: BirthId, state: _RobotState, population: ArenaPopulation
+) -> ArenaRobot:
     cache = population.model_cache
-    body = cache.body(state.birth, _robot(state.robot, cache.settings))
+    body = cache.body(birth, _robot(state.robot, cache.settings))
     window = FitnessWindow(cache.settings.simulation, state.born)
     for x, y, z in _unpack(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
     try:
-        robot = ArenaRobot(state.birth, body, cache.controls, window, state.place)
+        robot = ArenaRobot(birth, body, cache.controls, window, state.place)
     except InvalidRobot as error:
         raise MalformedMessage(f"snapshot: {error}") from None
     view, sensors = robot.view, robot.view.sensors
@@ -194,24 +160,12 @@ def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
     ]
     robot.states = _unpack(state.states, *robot.states.shape)
     robot.brain_start = state.brain_start
-    return robot
-
-
-def _recording(robot: ArenaRobot) -> _Recording:
-    probe = robot.view.probe
-    return _Recording(
-        rows=_pack(np.array(robot.window.rows)),
-        probe=b"" if probe is None else _pack(probe.numbers),
-    )
-
-
-def _restore_recording(robot: ArenaRobot, recording: _Recording) -> None:
-    width, probe = robot.body.channels.width, robot.view.probe
-    if width:
+    if width := robot.body.channels.width:
         shape = len(robot.window.positions), width
-        robot.window.rows.extend(_unpack(recording.rows, *shape))
-    if probe is not None:
-        probe.numbers[:] = _unpack(recording.probe, *probe.numbers.shape)
+        robot.window.rows.extend(_unpack(state.rows, *shape))
+    if view.probe is not None:
+        view.probe.numbers[:] = _unpack(state.probe, *view.probe.numbers.shape)
+    return robot
 
 
 def _robot(data: bytes, settings: ArenaSettings) -> Robot:

@@ -7,7 +7,6 @@ interruption, to the next such moment. A state between two advances is therefore
 complete, and the way of an arena does not depend on the number of advances.
 """
 
-import hashlib
 import itertools
 from collections.abc import Sequence
 from functools import partial
@@ -25,12 +24,14 @@ from schema.wire.arena import (
     Insertion,
     Judgement,
 )
+from schema.wire.arena_state import ArenaState
+from schema.wire.codec import encode
 from schema.wire.poses import PoseArrays
 from worker.arena.batched_control import BatchedControllers
 from worker.arena.changes import check_changes, diverged, newborn
 from worker.arena.looking import look
 from worker.arena.records import Contacts, PoseLog, Samples
-from worker.arena.snapshot import read_snapshot, write_snapshot
+from worker.arena.snapshot import read_snapshot, state_of
 from worker.arena.threads import ThreadTeam
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
@@ -142,13 +143,14 @@ class World:
 
     def snapshot(self) -> bytes:
         """Return the whole state, for ``restore``."""
-        return write_snapshot(
-            self._settings, self.step, self.population, self._casualties
-        )
+        return encode(self._state())
 
     def digest(self) -> bytes:
-        """Return the SHA-256 of the state."""
-        return hashlib.sha256(self.snapshot()).digest()
+        """Return the digest of the state."""
+        return self._state().digest
+
+    def _state(self) -> ArenaState:
+        return state_of(self._settings, self.step, self.population, self._casualties)
 
     @classmethod
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -40,6 +39,7 @@ from schema.wire.arena import (
     Poses,
     Touch,
 )
+from schema.wire.arena_state import state_digest
 from schema.wire.codec import decode, encode
 from schema.wire.messages import Answer, Request, StateMissing
 from schema.wire.poses import PoseArrays
@@ -73,7 +73,7 @@ class Kept:
 
     def has(self, shard: int, step: int, digest: bytes) -> bool:
         data = self.data.get((shard, step))
-        return data is not None and sha256(data).digest() == digest
+        return data is not None and state_digest(data) == digest
 
     def write(self, shard: int, step: int, data: bytes) -> None:
         self.data[shard, step] = data
@@ -391,4 +391,4 @@ def test_mutated_answers_are_refused_or_fit_the_request(data: DataObject) -> Non
         assert [one.birth for one in advance.judgements] == [SECOND, THIRD]
         assert all(math.isfinite(one.fitness) for one in advance.judgements)
         assert reached.event.pose_rows <= 50
-        assert sha256(reached.snapshot).digest() == advance.digest
+        assert state_digest(reached.snapshot) == advance.digest

@@ -6,7 +6,6 @@ snapshots.
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +35,8 @@ from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
+from schema.wire.arena_state import ArenaState, state_digest
+from schema.wire.codec import encode
 from schema.wire.operator import (
     InsertRobot,
     ListRobots,
@@ -392,17 +393,19 @@ def test_orders_for_other_islands_are_refused(tmp_path: Path) -> None:
 
 def test_missing_snapshot_is_named(tmp_path: Path) -> None:
     snapshots = Snapshots(tmp_path)
-    snapshots.write(0, 5, b"five")
-    snapshots.write(0, 9, b"nine")
-    snapshots.write(1, 2, b"two")
+    five, nine, two, other = (
+        encode(ArenaState(bytes(32), step, (), (), ())) for step in (5, 9, 2, 7)
+    )
+    snapshots.write(0, 5, five)
+    snapshots.write(0, 9, nine)
+    snapshots.write(1, 2, two)
+    snapshots.write(1, 3, two[:-1])
     snapshots.drop_before(0, 9)
     again = Snapshots(tmp_path)
-    kept = [(0, 5, b"five"), (0, 9, b"nine"), (1, 2, b"two"), (1, 2, b"other")]
-    found = [
-        again.has(shard, step, sha256(data).digest()) for shard, step, data in kept
-    ]
-    assert found == [False, True, True, False]
-    assert again.read(0, 9) == b"nine"
+    kept = [(0, 5, five), (0, 9, nine), (1, 2, two), (1, 2, other), (1, 3, two)]
+    found = [again.has(shard, step, state_digest(data)) for shard, step, data in kept]
+    assert found == [False, True, True, False, False]
+    assert again.read(0, 9) == nine
     with pytest.raises(RunFolderError, match=r"island-0-5\.bin: is missing: resume"):
         again.read(0, 5)
 

@@ -3,16 +3,19 @@
 import sys
 import time
 from collections.abc import Callable
-from hashlib import sha256
 
 import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from schema.errors import MalformedMessage
+from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.arena import Changes, Insertion
+from schema.wire.arena import Casualty, Changes, Insertion
+from schema.wire.arena_state import ArenaState, state_digest
+from schema.wire.codec import decode
 from tests.worker.arena_cases import (
     SECOND,
     SETTINGS,
@@ -73,7 +76,25 @@ def test_advance_has_the_digest_of_its_snapshot(robot_of: Robots) -> None:
     world = populated(RECORDING, crowd(robot_of, 14, 0.5))
     advance = seconds(world, 2.0)
     assert advance.touches
-    assert sha256(world.snapshot()).digest() == advance.digest
+    assert state_digest(world.snapshot()) == advance.digest
+
+
+def test_a_digest_depends_on_the_state_only(robot_of: Robots) -> None:
+    """Parts of an arena give the same digest in any order of clusters and deaths."""
+    world = populated(SETTINGS, crowd(robot_of, 4, 0.5))
+    state = decode(ArenaState, world.snapshot(), ADVANCE_BYTES)
+    lost = [Casualty(b, 7, "fell", (0.0, 0.0, 1.0)) for b in world.births[:2]]
+    orders = [
+        replace(state, clusters=state.clusters[::turn], casualties=tuple(lost[::turn]))
+        for turn in (1, -1)
+    ]
+    assert len(state.clusters) > 1
+    assert orders[0].digest == orders[1].digest != state.digest
+    (birth, data), *others = state.robots
+    changed = replace(state, robots=((birth, data[:-1] + b"\1"), *others))
+    assert changed.digest != state.digest
+    joined = (*state.clusters[2:], state.clusters[0] + state.clusters[1])
+    assert replace(state, clusters=joined).digest != state.digest
 
 
 def test_snapshot_right_after_changes_continues_equally(robot_of: Robots) -> None:
@@ -120,7 +141,7 @@ def test_a_snapshot_with_a_robot_of_unknown_parts_is_refused(turtle: Robot) -> N
 
 def test_a_snapshot_with_text_that_is_not_utf_8_is_refused() -> None:
     fallen = [((0, 1), 2, "reason", (0.0, 0.0, 0.0))]
-    state = [2, bytes(32), 3, [], [], fallen]
+    state = [bytes(32), 3, [], [], fallen]
     data = msgspec.msgpack.encode(state).replace(b"reason", b"reas\xff\xff")
     with pytest.raises(MalformedMessage):
         World.restore(SETTINGS, data)

@@ -1,0 +1,54 @@
+"""State of an arena between two advances, and its digest.
+
+A digest is the same however the robots were distributed when they were simulated.
+"""
+
+from hashlib import sha256
+
+from schema.experiment.section import Count
+from schema.limits import ADVANCE_BYTES
+from schema.robot.ids import BirthId
+from schema.wire.arena import Casualty
+from schema.wire.codec import Message, decode, encode
+
+
+class ArenaState(Message, frozen=True, array_like=True):
+    """State of an arena between two advances.
+
+    Attributes:
+        settings: SHA-256 of the arena's settings.
+        step: steps since its start.
+        robots: birth of each robot, ascending, and its state.
+        clusters: robots that are simulated in one model.
+        casualties: robots that diverged and are not yet reported by an advance.
+    """
+
+    settings: bytes
+    step: Count
+    robots: tuple[tuple[BirthId, bytes], ...]
+    clusters: tuple[tuple[BirthId, ...], ...]
+    casualties: tuple[Casualty, ...]
+
+    @property
+    def digest(self) -> bytes:
+        """SHA-256 of the content, in an order that depends on births and steps only."""
+        return sha256(
+            encode(
+                (
+                    self.settings,
+                    self.step,
+                    [(birth, sha256(data).digest()) for birth, data in self.robots],
+                    sorted(self.clusters),
+                    sorted(self.casualties, key=lambda lost: (lost.step, lost.birth)),
+                )
+            )
+        ).digest()
+
+
+def state_digest(snapshot: bytes) -> bytes:
+    """Return the digest of the state that a snapshot holds.
+
+    Raises:
+        MalformedMessage: no snapshot.
+    """
+    return decode(ArenaState, snapshot, ADVANCE_BYTES).digest
