@@ -28,7 +28,6 @@ from coordinator.dispatch.events import (
     Client,
     ClientEnded,
     Deliver,
-    Died,
     DispatchCommand,
     DispatchEvent,
     Expired,
@@ -54,6 +53,7 @@ from coordinator.dispatch.pool import (
 )
 from schema.errors import MalformedMessage, UnexpectedEvent
 from schema.wire.codec import fingerprint
+from schema.wire.messages import Crash
 
 AGENT_OF: dict[JobKind, AgentKind] = {
     "vet": "analyzer",
@@ -106,7 +106,7 @@ class Dispatch:
             ClientEnded: self._ended,
             Returned: self._returned,
             Expired: self._expired,
-            Died: self._died,
+            Crash: self._crashed,
             Ticked: self._ticked,
             Progressed: self._progressed,
         }
@@ -365,22 +365,23 @@ class Dispatch:
         for agent in pending.holders:
             yield Cancel(job, agent)
 
-    def _died(self, event: Died) -> Iterator[DispatchCommand]:
-        pending = self._jobs.get(event.number)
-        if pending is None or pending.job.client != (event.run, event.epoch):
+    def _crashed(self, event: Crash) -> Iterator[DispatchCommand]:
+        crashed = event.job
+        pending = self._jobs.get(crashed.number)
+        if pending is None or pending.job.client != (crashed.run, crashed.epoch):
             return
-        is_same = event.request == fingerprint(pending.job.payload)
-        if event.agent not in pending.lost or not is_same:
+        is_same = crashed.request == fingerprint(pending.job.payload)
+        if crashed.agent not in pending.lost or not is_same:
             # A job crashes only a process that had it. That process may have died of
             # another one's request with the name of this job.
-            self._faults.note("death", event.agent, f"job {event.number}")
+            self._faults.note("death", crashed.agent, f"job {crashed.number}")
             return
-        pending.killed[event.agent] = event.cause
+        pending.killed[crashed.agent] = event.cause
         if len(pending.killed) < MAX_DEATHS:
             return
         causes = ", ".join(sorted(set(pending.killed.values())))
         reason = f"ended its own process {MAX_DEATHS} times, by {causes}"
-        yield Deliver(pending.job, event.agent, reason=reason, is_deadly=True)
+        yield Deliver(pending.job, crashed.agent, reason=reason, is_deadly=True)
         yield from self._close(pending)
 
     def _ticked(self, event: Ticked) -> Iterator[DispatchCommand]:

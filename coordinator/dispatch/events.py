@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from schema.wire.messages import Crash
+
 AgentKind = Literal["worker", "analyzer"]
 KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 
@@ -142,26 +144,6 @@ class Expired:
 
 
 @dataclass(frozen=True, slots=True)
-class Died:
-    """A job crashed the process that did it.
-
-    Attributes:
-        run, epoch: of the client that requested the job.
-        number: of the job.
-        agent: name of the process, which is never used again.
-        cause: such as "SIGSEGV".
-        request: fingerprint of the request that it did.
-    """
-
-    run: str
-    epoch: int
-    number: int
-    agent: str
-    cause: str
-    request: bytes = b""
-
-
-@dataclass(frozen=True, slots=True)
 class Ticked:
     """Time passed: the time now, of a monotonic clock [s]."""
 
@@ -183,7 +165,7 @@ DispatchEvent = (
     | ClientEnded
     | Returned
     | Expired
-    | Died
+    | Crash
     | Ticked
     | Progressed
 )

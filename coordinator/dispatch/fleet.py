@@ -21,7 +21,6 @@ from coordinator.dispatch.events import (
     ClientEnded,
     Crowded,
     Deliver,
-    Died,
     DispatchCommand,
     DispatchEvent,
     Expired,
@@ -48,6 +47,7 @@ from coordinator.dispatch.pool import longer_s
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.codec import fingerprint
+from schema.wire.messages import Crash
 
 
 class Agents(Protocol):
@@ -213,8 +213,8 @@ class JobRouter:
             event = replace(event, outcome="lost")
         if isinstance(event, Returned) and event.outcome in ("fenced", "cancelled"):
             self._note_declined(event)
-        if isinstance(event, Died):
-            shard = self.shards.shard_that_lost(event.number)
+        if isinstance(event, Crash):
+            shard = self.shards.shard_that_lost(event.job.number)
             if shard is not None:
                 self._advance_killed(event, shard)
                 return
@@ -250,16 +250,17 @@ class JobRouter:
             self._move(expired)
         return True
 
-    def _advance_killed(self, event: Died, shard: int) -> None:
+    def _advance_killed(self, event: Crash, shard: int) -> None:
         """Pass on that an advance crashed its worker, if it was this client's."""
         client, _ = self._shard_clients[shard]
-        if client != (event.run, event.epoch):
+        crashed = event.job
+        if client != (crashed.run, crashed.epoch):
             return
-        of, payload = self._advances.get(event.number, (-1, b""))
-        if (of, fingerprint(payload)) == (shard, event.request):
-            self._move(Killed(event.number, event.agent, event.cause))
+        of, payload = self._advances.get(crashed.number, (-1, b""))
+        if (of, fingerprint(payload)) == (shard, crashed.request):
+            self._move(Killed(crashed.number, crashed.agent, event.cause))
         else:
-            self.faults.note("death", event.agent, f"job {event.number}")
+            self.faults.note("death", crashed.agent, f"job {crashed.number}")
 
     def fenced(self) -> list[Fenced]:
         """Return the jobs refused since the last call as of replaced coordinators."""

@@ -10,7 +10,7 @@ from heapq import heappop, heappush
 from itertools import count
 from math import inf
 
-from coordinator.dispatch.events import AgentKind, Died, Joined, Left, Progressed
+from coordinator.dispatch.events import AgentKind, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
 from schema.agent.topics import Member, member_of, slot_of
 from schema.errors import MalformedMessage
@@ -21,7 +21,7 @@ from schema.limits import (
     printable,
 )
 from schema.wire.codec import decode
-from schema.wire.messages import AgentInfo
+from schema.wire.messages import AgentInfo, Crash
 
 SHARE = 0.1
 """Greatest share of the coordinator's time that asking takes."""
@@ -116,7 +116,7 @@ class Membership:
         """Return how often an agent was asked without an answer."""
         return self._silent.get(member, 0)
 
-    def introduce(self, member: Member, data: bytes) -> list[Died | Joined]:
+    def introduce(self, member: Member, data: bytes) -> list[Crash | Joined]:
         """Take an agent's description of itself and of the processes it replaces.
 
         Args:
@@ -176,24 +176,22 @@ class Membership:
             del self._gone[next(iter(self._gone))]
         return Left(member.name)
 
-    def _new_deaths(self, member: Member, info: AgentInfo) -> list[Died]:
+    def _new_deaths(self, member: Member, info: AgentInfo) -> list[Crash]:
         """Return the deaths of an agent's predecessors, each once.
 
         Deaths of agents that never joined happened before this coordinator began.
         """
-        died: list[Died] = []
+        crashes: list[Crash] = []
         for death in info.deaths:
-            is_same_slot = slot_of(death.agent) == slot_of(member.name) != ""
-            if death.agent in self.joined or (
-                death.agent in self._gone and not is_same_slot
-            ):
-                self._faults.note("death", member.name, f"of {death.agent}")
-            elif death.agent in self._gone:
-                del self._gone[death.agent]
+            agent = death.job.agent
+            is_same_slot = slot_of(agent) == slot_of(member.name) != ""
+            if agent in self.joined or (agent in self._gone and not is_same_slot):
+                self._faults.note("death", member.name, f"of {agent}")
+            elif agent in self._gone:
+                del self._gone[agent]
                 cause = printable(death.cause, _CAUSE_LENGTH)
-                job = (death.run, death.epoch, death.number)
-                died.append(Died(*job, death.agent, cause, death.request))
-        return died
+                crashes.append(Crash(death.job, cause))
+        return crashes
 
 
 class InfoQueue:

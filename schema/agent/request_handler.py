@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
-from schema.agent.supervision import JobWatch, ProcessSlot, RunningJob, thread_clock
+from schema.agent.supervision import JobWatch, ProcessSlot, thread_clock
 from schema.errors import (
     MalformedMessage,
     PluginDiffers,
@@ -33,7 +33,7 @@ from schema.limits import (
 from schema.plugins.source import check_plugins
 from schema.wire.arena import AdvanceShard
 from schema.wire.codec import decode, encode, fingerprint
-from schema.wire.messages import AgentInfo, Answer, Crash, Request, Result
+from schema.wire.messages import AgentInfo, Answer, Request, Result, RunningJob
 
 _MOST_REMEMBERED = 1000
 LONG_S = 60.0
@@ -129,17 +129,6 @@ class Server:
     def info(self) -> bytes:
         """Bytes of the ``AgentInfo`` of this agent."""
         agent = self.agent
-        deaths = [
-            Crash(
-                death.task.agent,
-                death.task.run,
-                death.task.epoch,
-                death.task.number,
-                death.cause,
-                death.task.request,
-            )
-            for death in self.slot.deaths
-        ]
         return encode(
             AgentInfo(
                 agent=agent.name,
@@ -147,7 +136,7 @@ class Server:
                 slots=agent.slots,
                 platform=agent.platform,
                 version=agent.version,
-                deaths=tuple(deaths),
+                deaths=self.slot.deaths,
                 shards=agent.shards,
                 cores=agent.threads,
                 quiet_s=self.watch.quiet_s,

@@ -18,6 +18,9 @@ from multiprocessing import get_context, heap
 
 import msgspec
 
+from schema.wire.codec import decode, encode
+from schema.wire.messages import Crash, RunningJob
+
 CPU_LIMIT_S = 3600.0
 """CPU time limit of one job [s]: far above that of any job that ends."""
 WAIT_LIMIT_S = 600.0
@@ -49,31 +52,6 @@ _OWN_DOING = (
 )
 
 
-class RunningJob(msgspec.Struct, frozen=True):
-    """A process and its current job.
-
-    Attributes:
-        agent: the process's name.
-        run, epoch, number: of the job.
-        request: fingerprint of the job's request. Any process can send a request with
-            the name of another one's job.
-    """
-
-    agent: str
-    run: str
-    epoch: int
-    number: int
-    request: bytes = b""
-
-
-@dataclass(frozen=True, slots=True)
-class ProcessCrash:
-    """A process that its job crashed, with the cause, such as "SIGSEGV"."""
-
-    task: RunningJob
-    cause: str
-
-
 class CurrentJob:
     """The current job of a process, in memory that it shares with its parent."""
 
@@ -90,7 +68,7 @@ class CurrentJob:
     def begin(self, task: RunningJob) -> None:
         """Note a job before it starts; names longer than those of ours are cut."""
         cut = msgspec.structs.replace(task, agent=task.agent[:255], run=task.run[:1000])
-        data = msgspec.msgpack.encode(cut)
+        data = encode(cut)
         # The length comes last: half a note does not count.
         self._view[_LENGTH.size :][: len(data)] = data
         _LENGTH.pack_into(self._view, 0, len(data))
@@ -103,7 +81,7 @@ class CurrentJob:
         """Return the job that was started and has not ended, if there is one."""
         (length,) = _LENGTH.unpack_from(self._view)
         data = self._view[_LENGTH.size :][:length]
-        return msgspec.msgpack.decode(data, type=RunningJob) if length else None
+        return decode(RunningJob, bytes(data), length) if length else None
 
 
 def crash_cause(exit_code: int) -> str:
@@ -135,7 +113,7 @@ class ProcessSlot:
 
     index: int = 0
     note: CurrentJob | None = None
-    deaths: tuple[ProcessCrash, ...] = ()
+    deaths: tuple[Crash, ...] = ()
 
     def end_process(self, *, is_blamed: bool) -> None:
         """End this process, whose job waits without end; its supervisor restarts it.

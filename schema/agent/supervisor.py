@@ -28,11 +28,11 @@ from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import (
     LAST_DEATHS,
     CurrentJob,
-    ProcessCrash,
     ProcessSlot,
     crash_cause,
 )
 from schema.errors import shown
+from schema.wire.messages import Crash
 
 # Results must not depend on a library's number of threads. These count only if set
 # before numpy is imported: in the parent of the pool.
@@ -218,7 +218,7 @@ class ProcessPool:
         cause = crash_cause(code)
         if task is None or not cause:
             return ""
-        deaths = (*slot.deaths, ProcessCrash(task, cause))[-LAST_DEATHS:]
+        deaths = (*slot.deaths, Crash(task, cause))[-LAST_DEATHS:]
         place.slot = replace(slot, deaths=deaths)
         return f": {task.agent} died of job {task.number} of {task.run}: {cause}"
 

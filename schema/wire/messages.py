@@ -140,22 +140,33 @@ class Answer(Message, frozen=True):
     result: Result
 
 
-class Crash(Message, frozen=True):
-    """A process that its job crashed.
+class RunningJob(Message, frozen=True):
+    """A process and its current job.
 
     Attributes:
         agent: name of the process.
         run, epoch, number: names of the job.
-        cause: reason, such as "SIGSEGV".
-        request: fingerprint of the job's request.
+        request: fingerprint of the job's request. Any process can send a request with
+            the name of another one's job.
     """
 
     agent: str
     run: str
     epoch: Count
     number: Count
+    request: bytes = b""
+
+
+class Crash(Message, frozen=True):
+    """A process that its job crashed; its name is never used again.
+
+    Attributes:
+        job: the process and its job.
+        cause: reason, such as "SIGSEGV".
+    """
+
+    job: RunningJob
     cause: str
-    request: bytes
 
 
 class AgentInfo(Message, frozen=True):

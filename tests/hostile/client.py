@@ -39,6 +39,7 @@ from schema.wire.messages import (
     Crash,
     Failure,
     Request,
+    RunningJob,
     StateMissing,
 )
 from schema.wire.operator import (
@@ -347,7 +348,7 @@ def _info(liar: Member) -> bytes:
         slots=1,
         platform="liar",
         version=wire_version(),
-        deaths=(Crash("w", "run", 1, 1, "SIGSEGV", b""),),
+        deaths=(Crash(RunningJob("w", "run", 1, 1), "SIGSEGV"),),
         quiet_s=0.1,
     )
     return encode(info)

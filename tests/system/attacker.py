@@ -16,7 +16,7 @@ from schema.agent.topics import Member, Role, agents_alive, member_of
 from schema.limits import ADVANCE_REQUEST_BYTES
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode, fingerprint
-from schema.wire.messages import Answer, Call, Crash, Evaluate, Request
+from schema.wire.messages import Answer, Call, Crash, Evaluate, Request, RunningJob
 from tests.system.introduction import introduce
 
 _NOW = zenoh.ConsolidationMode.NONE
@@ -139,7 +139,8 @@ class Attacker:
                 fake = Member("default", "worker", f"{member.name[:-8]}{number:08}")
                 config = session_config(client_config(self._address), fake)
                 session = self._stack.enter_context(zenoh.open(config))
-                crash = Crash(member.name, self.run, 1, number, "SIGSEGV", bytes(8))
+                job = RunningJob(member.name, self.run, 1, number, bytes(8))
+                crash = Crash(job, "SIGSEGV")
                 self._held += [
                     introduce(session, fake, crash),
                     session.liveliness().declare_token(fake.alive),

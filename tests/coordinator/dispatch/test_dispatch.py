@@ -28,7 +28,6 @@ from coordinator.dispatch.events import (
     Client,
     ClientEnded,
     Deliver,
-    Died,
     DispatchCommand,
     DispatchEvent,
     Expired,
@@ -59,6 +58,7 @@ from coordinator.dispatch.pool import (
 )
 from schema.errors import UnexpectedEvent
 from schema.wire.codec import fingerprint
+from schema.wire.messages import Crash, RunningJob
 
 
 def job(number: int, kind: JobKind = "evaluate") -> Job:
@@ -81,8 +81,10 @@ def lost(number: int, agent: str) -> Returned:
     return Returned(number, agent, "lost")
 
 
-def died(number: int, agent: str, cause: str = "SIGSEGV") -> Died:
-    return Died("run", 1, number, agent, cause, fingerprint(b"%d" % number))
+def died(number: int, agent: str, cause: str = "SIGSEGV") -> Crash:
+    return Crash(
+        RunningJob(agent, "run", 1, number, fingerprint(b"%d" % number)), cause
+    )
 
 
 def told(*events: DispatchEvent, faults: PeerFaults | None = None) -> Dispatch:
@@ -787,7 +789,7 @@ def test_a_death_by_another_request_with_the_jobs_name_does_not_count() -> None:
     for name in ("a", "b", "c", "d"):
         dispatch.handle(worker(name))
         dispatch.handle(Left(name))
-        event = Died("run", 1, 0, name, "SIGSEGV", fingerprint(b"deadly"))
+        event = Crash(RunningJob(name, "run", 1, 0, fingerprint(b"deadly")), "SIGSEGV")
         assert dispatch.handle(event) == []
     assert faults.total("death") == 4
     assert dispatch.pending == 1

@@ -8,7 +8,6 @@ from coordinator.dispatch.events import (
     AssignShard,
     Client,
     Deliver,
-    Died,
     Job,
     Joined,
     Left,
@@ -22,6 +21,7 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.dispatch.pool import FIRST_S, LEAST_WAIT_S, LONGEST_WAIT_S, REPLY_S
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.codec import fingerprint
+from schema.wire.messages import Crash, RunningJob
 from tests.coordinator.sent_jobs import SentJobs
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
@@ -111,7 +111,7 @@ def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
     fleet.leave(CLIENT)
     (number, agent, _), *rest = agents.sent
     fleet.tell(Left(agent))
-    fleet.tell(Died("run", 1, number, agent, "SIGSEGV", EMPTY))
+    fleet.tell(Crash(RunningJob(agent, "run", 1, number, EMPTY), "SIGSEGV"))
     fleet.tell(Joined("three", "worker", 9, "p"))
     again = [each for each, _, _ in agents.sent[1 + len(rest) :]]
     assert number not in again
@@ -130,10 +130,10 @@ def test_deaths_by_jobs_of_other_coordinators_do_not_count(
     fleet.tell(Left("x"))
     assert [agent for _, agent, _ in agents.sent] == names
     for name in names:
-        fleet.tell(Died("another run", 1, number, name, "SIGSEGV", EMPTY))
+        fleet.tell(Crash(RunningJob(name, "another run", 1, number, EMPTY), "SIGSEGV"))
     assert fleet.listen(0.0, 1.0) == {}
     for name in names:
-        fleet.tell(Died("run", 1, number, name, "SIGSEGV", EMPTY))
+        fleet.tell(Crash(RunningJob(name, "run", 1, number, EMPTY), "SIGSEGV"))
     (end,) = fleet.listen(0.0, 1.0)[CLIENT]
     assert isinstance(end, Deliver)
     assert end.is_deadly
@@ -427,13 +427,13 @@ def test_an_advance_that_crashes_three_workers_is_given_up(
         fleet.tell(Left(agent))
         same = fingerprint(payload)
         for died in (
-            Died("another run", 1, number, agent, "SIGSEGV", same),
-            Died("arena", 1, number, f"not {agent}", "SIGSEGV", same),
-            Died("arena", 1, number, agent, "SIGSEGV", EMPTY),
+            Crash(RunningJob(agent, "another run", 1, number, same), "SIGSEGV"),
+            Crash(RunningJob(f"not {agent}", "arena", 1, number, same), "SIGSEGV"),
+            Crash(RunningJob(agent, "arena", 1, number, EMPTY), "SIGSEGV"),
         ):
             fleet.tell(died)
         assert fleet.listen(0.0, 1.0) == {}
-        fleet.tell(Died("arena", 1, number, agent, "SIGSEGV", same))
+        fleet.tell(Crash(RunningJob(agent, "arena", 1, number, same), "SIGSEGV"))
     (end,) = fleet.listen(0.0, 1.0)[ARENA]
     assert isinstance(end, ShardFailed)
     assert (end.shard, end.agent) == (shard, agent)

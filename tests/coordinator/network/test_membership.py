@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coordinator.dispatch.events import Died, Joined, Left, Progressed
+from coordinator.dispatch.events import Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.network.membership import (
     LONGEST_PAUSE_S,
@@ -28,7 +28,7 @@ from schema.limits import (
     MOST_SLOTS,
 )
 from schema.wire.codec import encode
-from schema.wire.messages import AgentInfo, Crash
+from schema.wire.messages import AgentInfo, Crash, RunningJob
 
 WORKER = Member("f", "worker", "host-0.w")
 NAME = WORKER.name
@@ -85,7 +85,7 @@ def test_agent_of_another_version_is_refused_until_it_vanishes(
 
 
 def with_death(member: Member, of: str, cause: str = "SIGSEGV") -> bytes:
-    crash = Crash(of, "r", 3, 7, cause, bytes(8))
+    crash = Crash(RunningJob(of, "r", 3, 7, bytes(8)), cause)
     return info(agent=member.name, kind=member.role, deaths=(crash,))
 
 
@@ -103,8 +103,8 @@ def test_each_death_is_reported_once_and_before_the_successor_joins(
         membership.appear(member.alive)
     cause = "SIG\x1b[31m" + "x" * 999
     (died, after) = membership.introduce(second, with_death(second, NAME, cause))
-    assert isinstance(died, Died)
-    assert (died.run, died.epoch, died.number, died.agent) == ("r", 3, 7, NAME)
+    assert isinstance(died, Crash)
+    assert died.job == RunningJob(NAME, "r", 3, 7, bytes(8))
     assert len(died.cause) == 100
     assert died.cause.isprintable()
     assert after == joined(second.name)
@@ -199,7 +199,9 @@ def test_an_agent_that_stops_answering_leaves_and_may_join_again(
         info(version="1" * INFO_BYTES),
         info(platform="p" * 1000),
         info(platform="\x1b[2J"),
-        info(deaths=(Crash(NAME, "r", 1, 1, "SIGSEGV", b""),) * (MOST_DEATHS + 1)),
+        info(
+            deaths=(Crash(RunningJob(NAME, "r", 1, 1), "SIGSEGV"),) * (MOST_DEATHS + 1)
+        ),
     ],
 )
 def test_false_info_is_malformed_and_changes_nothing(

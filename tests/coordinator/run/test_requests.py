@@ -7,7 +7,6 @@ from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
     AgentKind,
-    Died,
     Joined,
     Left,
     Returned,
@@ -24,7 +23,7 @@ from schema.experiment.identity import NO_ORIGIN
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.codec import fingerprint
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Crash, Evaluate, RunningJob, Vet
 from tests.coordinator.sent_requests import (
     BIRTH,
     EPOCH,
@@ -115,9 +114,14 @@ def test_robot_that_crashes_three_processes_is_quarantined(
     killed = [agent for _, agent, _ in sent_requests.sent[:3]]
     _, agent, payload = sent_requests.sent[3]
     same = fingerprint(payload)
-    of_others = [Died("another", EPOCH, number, killed[0], "SIGBUS", same)]
-    of_others += [Died("run", EPOCH - 1, number, killed[0], "SIGBUS", same)]
-    own = [Died("run", EPOCH, number, each, "SIGSEGV", same) for each in killed]
+    of_others = [Crash(RunningJob(killed[0], "another", EPOCH, number, same), "SIGBUS")]
+    of_others += [
+        Crash(RunningJob(killed[0], "run", EPOCH - 1, number, same), "SIGBUS")
+    ]
+    own = [
+        Crash(RunningJob(each, "run", EPOCH, number, same), "SIGSEGV")
+        for each in killed
+    ]
     told = [sent_requests.tell(event) for event in (*of_others, *own)]
     assert told[:-1] == [[]] * 4
     ((event,),) = told[-1:]

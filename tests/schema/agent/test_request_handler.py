@@ -14,9 +14,7 @@ from schema.agent.request_handler import LONG_S, Compute, Reply, Server
 from schema.agent.supervision import (
     CurrentJob,
     JobWatch,
-    ProcessCrash,
     ProcessSlot,
-    RunningJob,
 )
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.limits import (
@@ -41,6 +39,7 @@ from schema.wire.messages import (
     Failure,
     Request,
     Result,
+    RunningJob,
     Work,
 )
 
@@ -267,11 +266,11 @@ def test_any_bytes_get_a_reply(data: bytes) -> None:
 
 
 def test_agent_info_holds_the_deaths() -> None:
-    death = ProcessCrash(RunningJob("v", "r", 3, 7, b"12345678"), "SIGSEGV")
+    death = Crash(RunningJob("v", "r", 3, 7, b"12345678"), "SIGSEGV")
     agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
     made = Server(lambda _: ANSWER, agent, ProcessSlot(0, None, (death,)))
     info = decode(AgentInfo, made.info, INFO_BYTES)
-    assert info.deaths == (Crash("v", "r", 3, 7, "SIGSEGV", b"12345678"),)
+    assert info.deaths == (death,)
 
 
 @pytest.mark.parametrize(

@@ -15,11 +15,11 @@ from schema.agent.supervision import (
     CurrentJob,
     JobWatch,
     ProcessSlot,
-    RunningJob,
     crash_cause,
     thread_clock,
 )
 from schema.agent.supervisor import ProcessPool
+from schema.wire.messages import RunningJob
 
 TASK = RunningJob("worker-0.ab", "host:some/folder", 3, 2**40, b"12345678")
 PATIENCE_S = 30.0
