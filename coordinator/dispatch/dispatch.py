@@ -15,10 +15,15 @@ Overdue jobs are duplicated on idle agents; the first answer counts. An agent wi
 overdue job that reports no progress when it is asked is silent: the jobs that only
 silent agents have are assigned to others as well, as lost ones are. A silent agent gets
 no more jobs until it is heard. A job that crashed several processes is given up.
+
+An advance of a shard goes to the worker that keeps the shard's state, and has a number
+of its own each time that it is assigned. A silent worker loses it to one with room.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from heapq import heappop
+from itertools import count
 
 from coordinator.dispatch.events import (
     AgentKind,
@@ -27,6 +32,7 @@ from coordinator.dispatch.events import (
     Cancel,
     Client,
     ClientEnded,
+    Crowded,
     Deliver,
     DispatchCommand,
     DispatchEvent,
@@ -36,14 +42,17 @@ from coordinator.dispatch.events import (
     Joined,
     Left,
     Progressed,
+    Released,
     Requested,
     Returned,
+    ShardSeen,
     Ticked,
     Withdrawn,
 )
-from coordinator.dispatch.faults import PeerFaults
+from coordinator.dispatch.homes import Home, Homes
 from coordinator.dispatch.pool import (
     FIRST_S,
+    LONGEST_WAIT_S,
     LOOK_S,
     AgentState,
     Deadlines,
@@ -51,14 +60,14 @@ from coordinator.dispatch.pool import (
     Pending,
     Pool,
 )
-from schema.errors import MalformedMessage, UnexpectedEvent
-from schema.wire.codec import fingerprint
+from schema.errors import UnexpectedEvent
 from schema.wire.messages import Crash
 
 AGENT_OF: dict[JobKind, AgentKind] = {
     "vet": "analyzer",
     "evaluate": "worker",
     "call": "worker",
+    "advance": "worker",
 }
 MAX_ERRORS = 3
 MAX_DEATHS = 3
@@ -76,18 +85,24 @@ class Dispatch:
     """State machine of jobs; events enter only through ``handle``.
 
     Attributes:
-        workers: the workers and their load, which the arenas share.
+        workers: the workers and their load.
+        homes: the workers of arena shards.
     """
 
-    def __init__(self, faults: PeerFaults | None = None) -> None:
+    def __init__(
+        self, numbers: Iterator[int] | None = None, *, allows_drift: bool = False
+    ) -> None:
         """Initialise without agents and jobs.
 
         Args:
-            faults: counts unfit and late answers; None: counts of its own.
+            numbers: of jobs, each used once; None: from 1 on, for advances alone.
+            allows_drift: a shard may move to another platform if its own is gone.
         """
-        self._faults = faults or PeerFaults()
+        self._numbers = numbers or count(1)
         self._jobs: dict[int, Pending] = {}
+        self._earlier: dict[int, Pending] = {}
         self.workers = Pool()
+        self.homes = Homes(self.workers, allows_drift=allows_drift)
         self._pools: dict[AgentKind, Pool] = {
             "worker": self.workers,
             "analyzer": Pool(VETS_AT_HAND),
@@ -109,6 +124,8 @@ class Dispatch:
             Crash: self._crashed,
             Ticked: self._ticked,
             Progressed: self._progressed,
+            ShardSeen: self._seen,
+            Released: self._released,
         }
 
     @property
@@ -116,10 +133,20 @@ class Dispatch:
         """Number of jobs that are requested and not delivered."""
         return len(self._jobs)
 
-    def client(self, number: int) -> Client | None:
-        """Return the client of a job; None if the job has ended."""
+    def job(self, number: int) -> Job | None:
+        """Return a job, also by a number that it had before; None if it has ended."""
+        pending = self._jobs.get(number) or self._earlier.get(number)
+        return pending.job if pending else None
+
+    def has(self, agent: str, number: int) -> bool:
+        """Return whether an agent has a job that is not delivered yet."""
         pending = self._jobs.get(number)
-        return pending.job.client if pending else None
+        return pending is not None and agent in pending.holders
+
+    def has_lost(self, agent: str, number: int) -> bool:
+        """Return whether an agent had a job and gave no reply."""
+        pending = self._jobs.get(number) or self._earlier.get(number)
+        return pending is not None and (number, agent) in pending.lost
 
     def agents(self, kind: AgentKind) -> int:
         """Return the number of agents of a kind."""
@@ -166,16 +193,17 @@ class Dispatch:
         pool = self._pool_of.get(agent)
         return pool.agents[agent].joined.platform if pool else ""
 
-    def wait_s(self, job: Job) -> float:
+    def wait_s(self, assigned: Assign) -> float:
         """Return for how long the network waits for the reply to a job [s]."""
+        job = assigned.job
+        # A rebuild may take very much longer than an advance.
+        if assigned.is_whole:
+            return LONGEST_WAIT_S
+        if job.shard >= 0:
+            return self.homes.deadlines.wait_s(job.shard, job.simulated_s)
         # Calls differ in duration. One that takes longer is sent again, and its worker
         # goes on with it.
         return self._deadlines.wait_s(job.kind, job.simulated_s)
-
-    def payload(self, number: int, agent: str) -> bytes | None:
-        """Return the request of a job that an agent has; None: it has no such job."""
-        pending = self._jobs.get(number)
-        return pending.job.payload if pending and agent in pending.holders else None
 
     @property
     def pause_s(self) -> float:
@@ -186,6 +214,7 @@ class Dispatch:
     def wake_s(self) -> float | None:
         """Time at which the next ``Ticked`` is needed [s]; None: it is not."""
         wakes = [pool.wake_s for pool in self._pools.values()]
+        wakes.append(self.homes.wake_s)
         return min((wake_s for wake_s in wakes if wake_s is not None), default=None)
 
     def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
@@ -196,8 +225,8 @@ class Dispatch:
 
         Raises:
             UnexpectedEvent: a job number that does not ascend or belongs to another
-                job, an agent with less than one slot, an agent that joins again with
-                other properties, or a clock that runs backwards.
+                job, a second advance of a shard, an agent with less than one slot, one
+                that joins again with other properties, or a clock that runs backwards.
         """
         return list(self._handlers[type(event)](event))
 
@@ -213,37 +242,75 @@ class Dispatch:
         pool.agents[event.agent] = AgentState(event)
         pool.offer(event.agent)
         yield from self._assign(pool)
+        if event.kind == "worker":
+            yield from self._assign_advances()
+            yield from self._share(event.agent)
 
     def _left(self, event: Left) -> Iterator[DispatchCommand]:
         pool = self._pool_of.pop(event.agent, None)
         if pool is None:
             return
-        for number, pending in pool.agents.pop(event.agent).held.items():
-            if number in self._jobs:
-                pending.lost[event.agent] += 1
+        agent = pool.agents.pop(event.agent)
+        for home in self.homes.shards.values():
+            if home.successor == event.agent:
+                home.successor = ""
+            if home.holder == event.agent and not (
+                home.advance and event.agent in home.advance.holders
+            ):
+                home.unbind()
+        for number, pending in (*agent.held.items(), *agent.advances.items()):
+            if self._jobs.get(number) is pending and event.agent in pending.holders:
+                pending.lost.add((number, event.agent))
                 self._put_back(pending, event.agent)
         yield from self._assign(pool)
+        yield from self._assign_advances()
 
     def _put_back(self, pending: Pending, agent: str) -> None:
         """Take a job from an agent; it waits again if no other agent works at it."""
         del pending.holders[agent]
+        if home := self._home(pending.job):
+            home.unbind()
+            return
         pool = self._pools[AGENT_OF[pending.job.kind]]
         if not _working(pending, pool):
             pool.wait(pending)
 
+    def _home(self, job: Job) -> Home | None:
+        return self.homes.of(job.shard) if job.shard >= 0 else None
+
     def _requested(self, event: Requested) -> Iterator[DispatchCommand]:
-        number = event.job.number
-        if (known := self._jobs.get(number)) and known.job == event.job:
+        job = event.job
+        if (known := self._jobs.get(job.number)) and known.job == job:
             return
-        if number <= self._highest:
+        home = self._home(job)
+        if home and home.advance:
+            raise UnexpectedEvent(f"shard {job.shard}: is requested already")
+        if job.number <= self._highest:
             raise UnexpectedEvent(
-                f"job numbers must ascend: got {number} after {self._highest}"
+                f"job numbers must ascend: got {job.number} after {self._highest}"
             )
-        pool = self._pools[AGENT_OF[event.job.kind]]
-        self._highest = number
-        pending = self._jobs[number] = Pending(event.job)
+        self._highest = job.number
+        pending = self._jobs[job.number] = Pending(job)
+        if home:
+            home.advance = pending
+            yield from self._assign_advances()
+            return
+        pool = self._pools[AGENT_OF[job.kind]]
         pool.wait(pending)
         yield from self._assign(pool)
+
+    def _seen(self, event: ShardSeen) -> Iterator[DispatchCommand]:
+        home = self.homes.of(event.shard)
+        home.platform, home.may_drift = event.platform, event.may_drift
+        home.client = event.client
+        yield from self._assign_advances()
+
+    def _released(self, event: Released) -> Iterator[DispatchCommand]:
+        if advance := self.homes.of(event.shard).advance:
+            yield from self._close(advance)
+        self.homes.deadlines.forget(event.shard)
+        del self.homes.shards[event.shard]
+        yield from self._assign_advances()
 
     def _withdrawn(self, event: Withdrawn) -> Iterator[DispatchCommand]:
         if pending := self._jobs.get(event.number):
@@ -263,61 +330,69 @@ class Dispatch:
         agent = pool.agents[event.agent]
         if event.outcome != "lost":
             pool.hear(event.agent)
-        is_advance = event.number in agent.advances
-        if is_advance:
+        if event.number in agent.advances:
             del agent.advances[event.number]
             agent.occupy()
         elif event.number in agent.held:
             del agent.held[event.number]
         else:
-            self._note_late(event)
             return
-        # A late copy only shows that the agent is free.
+        # A late copy, or an advance that moved, only shows that the agent is free.
         pending = self._jobs.get(event.number)
-        if pending and event.outcome == "unfit":
-            self._faults.note("refused", event.agent, event.reason)
-            agent.unfit_for[pending.job.client] = event.reason
-            self._put_back(pending, event.agent)
-        elif pending:
-            answer, reason = self._read(pending.job, event)
-            if event.outcome == "ok" and not reason:
-                agent.failures = 0
-                self._learn(pending, agent, event.took_s)
-                platform = agent.joined.platform
-                yield Deliver(pending.job, event.agent, platform, answer)
-                yield from self._close(pending)
-            else:
-                is_declined = event.outcome in ("fenced", "cancelled")
-                is_fault = not is_declined or event.agent in pending.avoid
-                yield from self._fail(pending, event, reason)
-                if is_fault:
-                    pool.back_off(event.agent, self._now_s or 0.0)
-        elif not is_advance:
-            self._note_late(event)
+        if pending and event.agent in pending.holders:
+            yield from self._came_back(pending, event, agent)
         pool.offer(event.agent)
         yield from self._assign(pool)
+        if pending and pending.job.shard >= 0:
+            yield from self._assign_advances()
+
+    def _came_back(
+        self, pending: Pending, event: Returned, agent: AgentState
+    ) -> Iterator[DispatchCommand]:
+        """Deliver a job that came back, or give it to another agent."""
+        home, outcome = self._home(pending.job), event.outcome
+        if outcome == "ok":
+            agent.failures = 0
+            self._learn(pending, agent, event.took_s)
+            platform = agent.joined.platform
+            if home:
+                home.has_state, home.platform = True, platform
+                if home.successor:
+                    home.unbind()
+            yield Deliver(pending.job, event.agent, platform, event.answer)
+            yield from self._close(pending)
+        elif outcome == "unfit":
+            agent.unfit_for[pending.job.client] = event.reason
+            self._put_back(pending, event.agent)
+        elif outcome == "unsent":
+            self._put_back(pending, event.agent)
+            yield Deliver(pending.job, "", reason=event.reason)
+            yield from self._close(pending)
+        elif home and outcome == "stateless" and not home.is_whole:
+            del pending.holders[event.agent]
+            home.has_state = False
+        else:
+            is_declined = outcome in ("fenced", "cancelled")
+            is_fault = not is_declined or event.agent in pending.avoid
+            yield from self._fail(pending, event)
+            if is_fault:
+                self._pool_of[event.agent].back_off(event.agent, self._now_s or 0.0)
 
     def _expired(self, event: Expired) -> Iterator[DispatchCommand]:
         pending = self._jobs.get(event.number)
         if pending and event.agent in pending.holders:
             pending.repeated.add(event.agent)
+            # It may wait in a queue: the next ones wait longer, also if it is lost.
+            self._learn_advance(pending, event.agent)
         yield from ()
 
-    def _note_late(self, event: Returned) -> None:
-        if event.outcome == "ok":
-            self._faults.note("late", event.agent, f"job {event.number}")
-
-    def _read(self, job: Job, event: Returned) -> tuple[object, str]:
-        """Return the decoded answer, or the reason why there is none."""
-        if event.outcome != "ok":
-            if event.outcome == "error":
-                self._faults.note("refused", event.agent, event.reason)
-            return None, event.reason
-        try:
-            return job.read(event.answer), ""
-        except MalformedMessage as error:
-            self._faults.note("malformed", event.agent, str(error))
-            return None, str(error)
+    def _learn_advance(self, pending: Pending, agent: str) -> None:
+        """Note how long an advance took, or has taken so far, unless it is rebuilt."""
+        job, home = pending.job, self._home(pending.job)
+        if home and not home.is_whole:
+            since_s, _ = pending.holders[agent]
+            took_s = (self._now_s or 0.0) - since_s
+            self.homes.deadlines.learn(job.shard, took_s, job.simulated_s)
 
     def _learn(self, pending: Pending, agent: AgentState, took_s: float | None) -> None:
         """Note how long an agent took for a job, which it no longer holds.
@@ -327,28 +402,28 @@ class Dispatch:
         the coordinator and is too long for short jobs.
         """
         name = agent.joined.agent
+        self._learn_advance(pending, name)
         since_s, place = pending.holders.pop(name)
         # An agent that is back may have the answer in memory.
-        if self._now_s is None or name in pending.lost:
+        is_back = (pending.job.number, name) in pending.lost
+        if self._now_s is None or is_back or pending.job.shard >= 0:
             return
         if took_s is None or name in pending.repeated:
             took_s = self._now_s - since_s
         self._deadlines.learn(pending.job.kind, took_s, pending.job.simulated_s)
         agent.learn(took_s / place)
 
-    def _fail(
-        self, pending: Pending, event: Returned, reason: str
-    ) -> Iterator[DispatchCommand]:
+    def _fail(self, pending: Pending, event: Returned) -> Iterator[DispatchCommand]:
         """Give a job to another agent, or give it up after several errors.
 
         A malformed answer is a fault of its agent alone, so it is no such error.
         """
         if event.outcome == "lost":
-            pending.lost[event.agent] += 1
-        pending.errors += event.outcome == "error"
+            pending.lost.add((event.number, event.agent))
+        pending.errors += event.outcome in ("error", "stateless")
         if pending.errors == MAX_ERRORS:
-            del pending.holders[event.agent]
-            yield Deliver(pending.job, event.agent, reason=reason)
+            self._put_back(pending, event.agent)
+            yield Deliver(pending.job, event.agent, reason=event.reason)
             yield from self._close(pending)
             return
         if event.agent not in pending.avoid:
@@ -359,29 +434,28 @@ class Dispatch:
         """Remove a job that has ended, and cancel its copies."""
         job = pending.job
         del self._jobs[job.number]
+        for number in pending.earlier:
+            del self._earlier[number]
         self._pools[AGENT_OF[job.kind]].drop(job.number)
         if job.paired not in self._jobs:
             self._pairs.forget(job)
+        if home := self._home(job):
+            home.advance, home.misses = None, 0
         for agent in pending.holders:
             yield Cancel(job, agent)
 
     def _crashed(self, event: Crash) -> Iterator[DispatchCommand]:
-        crashed = event.job
-        pending = self._jobs.get(crashed.number)
-        if pending is None or pending.job.client != (crashed.run, crashed.epoch):
+        number, agent = event.job.number, event.job.agent
+        pending = self._jobs.get(number) or self._earlier.get(number)
+        # A job crashes only a process that had it.
+        if pending is None or (number, agent) not in pending.lost:
             return
-        is_same = crashed.request == fingerprint(pending.job.payload)
-        if crashed.agent not in pending.lost or not is_same:
-            # A job crashes only a process that had it. That process may have died of
-            # another one's request with the name of this job.
-            self._faults.note("death", crashed.agent, f"job {crashed.number}")
-            return
-        pending.killed[crashed.agent] = event.cause
+        pending.killed[agent] = event.cause
         if len(pending.killed) < MAX_DEATHS:
             return
         causes = ", ".join(sorted(set(pending.killed.values())))
         reason = f"ended its own process {MAX_DEATHS} times, by {causes}"
-        yield Deliver(pending.job, crashed.agent, reason=reason, is_deadly=True)
+        yield Deliver(pending.job, agent, reason=reason, is_deadly=True)
         yield from self._close(pending)
 
     def _ticked(self, event: Ticked) -> Iterator[DispatchCommand]:
@@ -391,9 +465,12 @@ class Dispatch:
         for pool in self._pools.values():
             if pool.end_backoffs(event.now_s):
                 yield from self._assign(pool)
+        self.homes.tick(event.now_s)
         if event.now_s >= self._next_look_s:
             self._next_look_s = event.now_s + LOOK_S
             yield from self._look(event.now_s)
+            yield from self._look_at_advances(event.now_s)
+        yield from self._assign_advances()
 
     def _progressed(self, event: Progressed) -> Iterator[DispatchCommand]:
         if pool := self._pool_of.get(event.agent):
@@ -410,8 +487,78 @@ class Dispatch:
             yield from self._assign(pool)
             idle = pool.idle()
             for pending in list(self._jobs.values()) if idle else ():
-                if AGENT_OF[pending.job.kind] == kind:
+                if AGENT_OF[pending.job.kind] == kind and pending.job.shard < 0:
                     yield from self._copy(pending, pool, idle, now_s)
+
+    def _look_at_advances(self, now_s: float) -> Iterator[DispatchCommand]:
+        """Move advances from silent workers to others with room."""
+        pool, late = self.workers, list[tuple[int, Home, float]]()
+        for shard, home in sorted(self.homes.shards.items()):
+            if home.advance is None or home.is_waiting:
+                continue
+            since_s, _ = home.advance.holders[home.holder]
+            limit_s = self.homes.limit_s(shard)
+            verdict = pool.judge(home.holder, since_s, limit_s, now_s)
+            if verdict == "ask":
+                yield AskProgress(home.holder)
+            elif verdict == "silent":
+                late.append((shard, home, since_s))
+        for shard, home, since_s in late:
+            to = self.homes.with_room(home)
+            yield from pool.tell(home.holder, now_s - since_s, to)
+            if to and (advance := home.advance):
+                home.misses += to in advance.avoid
+                advance.avoid = (*advance.avoid, home.holder)
+                yield from self._move(shard, to)
+
+    def _move(self, shard: int, to: str) -> Iterator[DispatchCommand]:
+        """Take a shard from its worker, with the advance that is assigned."""
+        home = self.homes.shards[shard]
+        home.successor = to
+        if home.advance and home.holder in home.advance.holders:
+            yield Cancel(home.advance.job, home.holder)
+            self._put_back(home.advance, home.holder)
+        else:
+            home.unbind()
+
+    def _share(self, newcomer: str) -> Iterator[DispatchCommand]:
+        """Give a worker that has joined shards of those that hold more."""
+        while (shard := self.homes.excess(newcomer)) is not None:
+            home = self.homes.shards[shard]
+            if home.has_state and home.advance and not home.is_waiting:
+                home.successor = newcomer
+            else:
+                yield from self._move(shard, newcomer)
+                yield from self._assign_advances()
+
+    def _assign_advances(self) -> Iterator[DispatchCommand]:
+        """Assign the advances whose shards have a worker."""
+        for shard in self.homes.settle():
+            if isinstance(shard, Crowded):
+                yield shard
+            else:
+                yield self._give_advance(self.homes.shards[shard])
+
+    def _give_advance(self, home: Home) -> Assign:
+        """Send a shard's advance to its holder."""
+        pending, name = home.advance, home.holder
+        assert pending is not None
+        if pending.has_been_assigned:
+            number = next(self._numbers)
+            self._earlier[pending.job.number] = self._jobs.pop(pending.job.number)
+            pending.earlier.append(pending.job.number)
+            pending.job = replace(pending.job, number=number)
+            self._jobs[number] = pending
+        pending.has_been_assigned = True
+        home.drifts_at_s = None
+        home.is_whole = not home.has_state
+        self.homes.rebuilt += home.is_whole and bool(home.platform)
+        worker = self.workers.agents[name]
+        pending.holders[name] = (self._now_s or 0.0, 1.0)
+        worker.advances[pending.job.number] = pending
+        worker.occupy()
+        self.workers.offer(name)
+        return Assign(pending.job, name, worker.joined.platform, home.is_whole)
 
     def _judge(self, pool: Pool, name: str, now_s: float) -> Iterator[DispatchCommand]:
         """Ask an agent if its oldest job is overdue; give up on it if it is silent."""

@@ -1,19 +1,19 @@
 """Events that dispatch handles, and the commands that it returns.
 
-Jobs are single requests, to any agent of a kind; shards are arenas, each of which
-lives in one worker.
+A job goes to any agent of a kind, unless it advances a shard: an arena, which lives in
+one worker.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from schema.wire.messages import Crash
 
 AgentKind = Literal["worker", "analyzer"]
 KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 
-JobKind = Literal["vet", "evaluate", "call"]
+JobKind = Literal["vet", "evaluate", "call", "advance"]
 
 Read = Callable[[bytes], object]
 """Decodes an answer and checks it; raises ``MalformedMessage`` if it is unfit."""
@@ -28,17 +28,17 @@ class Client(NamedTuple):
 
 NO_CLIENT = Client("", 0)
 
-# --- Jobs
-
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One piece of work, a pure function of its payload.
+    """One piece of work, a pure function of its request.
 
     Attributes:
-        number: unique within the process, ascending.
-        kind: "vet" goes to analyzers, "evaluate" and "call" to workers.
-        payload: the encoded request.
+        number: unique within the process, ascending; an advance gets another one each
+            time that it is assigned.
+        kind: "vet" goes to analyzers, the others to workers.
+        payload: the encoded request; empty for an advance, whose request depends on
+            its worker.
         paired: number of the same request's other job, which another agent does if
             there is one; -1 if there is no other job.
         client: the run that requested it.
@@ -46,16 +46,23 @@ class Job:
         read: decodes and checks an answer.
         simulated_s: time that it simulates [s]; 0.0 if it is no simulation, None if its
             work is unknown, as that of a call.
+        shard: that it advances; -1 if it advances none.
+        sent: request that each agent was sent, by its number then, and what reads the
+            answer; noted by who sends it.
     """
 
     number: int
     kind: JobKind
-    payload: bytes
+    payload: bytes = b""
     paired: int = -1
     client: Client = NO_CLIENT
     subject: object = None
     read: Read = field(default=bytes, compare=False)
     simulated_s: float | None = None
+    shard: int = -1
+    sent: dict[tuple[int, str], tuple[bytes, Read]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +114,25 @@ class ClientEnded:
     client: Client
 
 
+Outcome = Literal[
+    "ok",
+    "stateless",
+    "error",
+    "malformed",
+    "unfit",
+    "lost",
+    "expired",
+    "fenced",
+    "cancelled",
+    "unsent",
+]
+"""How a job came back: with an answer; its worker lacks the state of the shard; the
+agent could not do it; its answer is not believed; the agent cannot do any job of this
+client; no reply (it died, froze or was cut off); no reply in the time that the network
+waits for one; the agent knows a later coordinator of the run; it was cancelled; its
+request could not be made."""
+
+
 @dataclass(frozen=True, slots=True)
 class Returned:
     """A job came back from an agent.
@@ -114,20 +140,16 @@ class Returned:
     Attributes:
         number: of the job.
         agent: that had it.
-        outcome: "ok" with an answer, "error" with a reason (the agent could not
-            do it), "unfit" with a reason (it cannot do any job of this client),
-            "lost" (no reply: the agent died, froze or was cut off), "expired" (no
-            reply in the time that the network waits for one), "fenced" (it knows a
-            later coordinator of the run) or "cancelled".
-        answer: encoded answer; empty unless ok.
-        reason: of the agent; empty if ok, lost or expired.
+        outcome: how it came back.
+        answer: of an "ok": encoded, decoded once the router has read it.
+        reason: of an error, a malformed answer, an unfit agent or an unsent request.
         took_s: time from sending the job to its answer or end [s]; None: not measured.
     """
 
     number: int
     agent: str
-    outcome: Literal["ok", "error", "unfit", "lost", "expired", "fenced", "cancelled"]
-    answer: bytes = b""
+    outcome: Outcome
+    answer: Any = b""
     reason: str = ""
     took_s: float | None = None
 
@@ -157,6 +179,31 @@ class Progressed:
     agent: str
 
 
+@dataclass(frozen=True, slots=True)
+class ShardSeen:
+    """A shard was advanced on a platform, according to the journal.
+
+    Attributes:
+        shard: its number.
+        platform: empty if it was never advanced.
+        may_drift: it may move to another platform, provided that drift is allowed at
+            all.
+        client: the run of the arena.
+    """
+
+    shard: int
+    platform: str
+    may_drift: bool = True
+    client: Client = NO_CLIENT
+
+
+@dataclass(frozen=True, slots=True)
+class Released:
+    """A shard needs no more advances; its holder is free for another one."""
+
+    shard: int
+
+
 DispatchEvent = (
     Joined
     | Left
@@ -168,15 +215,27 @@ DispatchEvent = (
     | Crash
     | Ticked
     | Progressed
+    | ShardSeen
+    | Released
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """Send a job to an agent."""
+    """Send a job to an agent.
+
+    Attributes:
+        job: the job.
+        agent: that gets it.
+        platform: of the worker that gets an advance; empty for another job.
+        is_whole: the request of the advance includes what is needed to rebuild the
+            state.
+    """
 
     job: Job
     agent: str
+    platform: str = ""
+    is_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +244,7 @@ class Deliver:
 
     Attributes:
         job: that ended.
-        agent: that had it last.
+        agent: that had it last; empty if its request could not be made.
         platform: of the agent; empty for a job that is given up.
         answer: what ``job.read`` returned; None if there is a reason.
         reason: why no agent can do it.
@@ -230,141 +289,6 @@ class Overdue:
     to: str = ""
 
 
-DispatchCommand = Assign | Deliver | Cancel | AskProgress | Overdue
-
-
-# --- Shards
-
-
-@dataclass(frozen=True, slots=True)
-class ShardSeen:
-    """A shard was advanced on a platform, according to the journal.
-
-    Attributes:
-        shard: its number.
-        platform: empty if it was never advanced.
-        may_drift: it may move to another platform, provided that drift is allowed at
-            all.
-        client: the run of the arena.
-    """
-
-    shard: int
-    platform: str
-    may_drift: bool = True
-    client: Client = NO_CLIENT
-
-
-@dataclass(frozen=True, slots=True)
-class ShardRequested:
-    """A shard is to be advanced; may be repeated only after ``ShardDone``.
-
-    ``simulated_s`` is the time that the advance simulates [s]; None: unknown.
-    """
-
-    shard: int
-    simulated_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ShardReturned:
-    """An assigned advance came back from its worker.
-
-    Attributes:
-        number: of the ``AssignShard``.
-        outcome: "done"; "stateless" (the worker does not have the state); "error"
-            with a reason; "unfit" (it cannot do any job of the shard's client);
-            "malformed" (an answer that is not believed) with a reason; "lost" (no
-            reply); "unsent" with a reason (its request could not be made).
-        reason: empty unless error, malformed or unsent.
-        answer: decoded; None unless done.
-    """
-
-    number: int
-    outcome: Literal[
-        "done", "stateless", "error", "unfit", "malformed", "lost", "unsent"
-    ]
-    reason: str = ""
-    answer: object = None
-
-
-@dataclass(frozen=True, slots=True)
-class Released:
-    """A shard needs no more advances; its holder is free for another one."""
-
-    shard: int
-
-
-@dataclass(frozen=True, slots=True)
-class Killed:
-    """An assigned advance crashed its worker, by a cause such as "SIGSEGV"."""
-
-    number: int
-    agent: str
-    cause: str
-
-
-ShardEvent = (
-    Joined
-    | Left
-    | Ticked
-    | Expired
-    | ShardSeen
-    | ShardRequested
-    | ShardReturned
-    | Killed
-    | Released
-)
-
-
-@dataclass(frozen=True, slots=True)
-class AssignShard:
-    """Send a shard's advance to a worker.
-
-    Attributes:
-        number: of the job, used once.
-        shard: to advance.
-        agent: the worker.
-        platform: of the worker.
-        is_whole: the request includes what is needed to rebuild the state.
-    """
-
-    number: int
-    shard: int
-    agent: str
-    platform: str
-    is_whole: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ShardDone:
-    """A worker has done the advance of a shard; its answer is decoded."""
-
-    shard: int
-    agent: str
-    answer: object = None
-
-
-@dataclass(frozen=True, slots=True)
-class ShardFailed:
-    """The advance of a shard is given up, for the reason of its last failure.
-
-    ``agent`` is the last that tried; empty if the request could not be made.
-    """
-
-    shard: int
-    agent: str
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class CancelShard:
-    """The advance of an ``AssignShard`` goes to another worker than its agent."""
-
-    number: int
-    shard: int
-    agent: str
-
-
 @dataclass(frozen=True, slots=True)
 class Crowded:
     """Tell the user that there are more shards than states that all workers keep."""
@@ -373,12 +297,4 @@ class Crowded:
     kept: int
 
 
-ShardCommand = (
-    AssignShard
-    | ShardDone
-    | ShardFailed
-    | CancelShard
-    | AskProgress
-    | Overdue
-    | Crowded
-)
+DispatchCommand = Assign | Deliver | Cancel | AskProgress | Overdue | Crowded

@@ -4,7 +4,6 @@ Jobs and advances of arenas share one account of load, one backoff, one judgemen
 which agents are silent, and one rule for deadlines.
 """
 
-from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
@@ -61,7 +60,9 @@ class Pending:
         errors: number of agents that could not do it.
         avoid: agents that failed at it.
         repeated: agents that were sent it again after the wait for their reply.
-        lost: how often each agent had it and gave no reply.
+        lost: agents that had it and gave no reply, with its number then.
+        earlier: numbers that it had before, as an advance.
+        has_been_assigned: whether an agent has had it, as an advance.
         killed: processes that it crashed, with the causes.
     """
 
@@ -70,7 +71,9 @@ class Pending:
     errors: int = 0
     avoid: tuple[str, ...] = ()
     repeated: set[str] = field(default_factory=set)
-    lost: Counter[str] = field(default_factory=Counter)
+    lost: set[tuple[int, str]] = field(default_factory=set)
+    earlier: list[int] = field(default_factory=list)
+    has_been_assigned: bool = False
     killed: dict[str, str] = field(default_factory=dict)
 
 
@@ -81,7 +84,7 @@ class AgentState:
     Attributes:
         joined: its properties.
         held: its jobs by number, oldest first, delivered ones included.
-        advances: numbers of its advances of arenas.
+        advances: its advances of arenas by number, moved ones included.
         busy: slots that these occupy; jobs get the next one, so that they never starve.
         job_s: typical time that a slot takes for a job [s]; 0 before the first.
         most_ahead: most jobs that it holds ahead; fewer if it is slow, as they wait
@@ -99,7 +102,7 @@ class AgentState:
 
     joined: Joined
     held: dict[int, Pending] = field(default_factory=dict)
-    advances: dict[int, None] = field(default_factory=dict)
+    advances: dict[int, Pending] = field(default_factory=dict)
     busy: int = 0
     job_s: float = 0.0
     most_ahead: int = 0

@@ -12,8 +12,8 @@ from itertools import chain
 from typing import Protocol
 
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.events import Deliver, ShardFailed
-from coordinator.dispatch.fleet import End, JobRouter
+from coordinator.dispatch.events import Deliver
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import (
     Advanced,
     Answered,
@@ -159,7 +159,7 @@ class Loop:
         self.shard_requests.send_noted()
         self._take([self._learners.answer(each) for each in asks])
 
-    def act(self, now_s: float, ends: Iterable[End] = ()) -> None:
+    def act(self, now_s: float, ends: Iterable[Deliver] = ()) -> None:
         """Act on the ends of jobs and advances.
 
         Args:
@@ -179,12 +179,11 @@ class Loop:
                 self.shard_requests.send(command)
         events: list[JournalledEvent] = []
         for end in ends:
-            if isinstance(end, Deliver):
+            if end.job.shard < 0:
                 events += self._requests.events(end)
-            elif isinstance(end, ShardFailed):
+            elif not isinstance(end.answer, Reached):
                 raise self.shard_requests.refusal(end)
             else:
-                assert isinstance(end.answer, Reached)
                 event, snapshot = end.answer.event, end.answer.snapshot
                 if snapshot:
                     # It must be on disk before the journal has the advance.

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from coordinator.dispatch.events import Deliver, ShardFailed
-from coordinator.dispatch.fleet import End, JobRouter
+from coordinator.dispatch.events import Deliver
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.run.history import replayed
 from coordinator.run.run_context import RunContext
@@ -127,7 +127,7 @@ class PoseRecovery:
         for arena in self._arenas.values():
             self._requests.send(*arena.left[0])
 
-    def act(self, ends: Iterable[End]) -> None:
+    def act(self, ends: Iterable[Deliver]) -> None:
         """Take the results of advances and write their poses in the journal's order.
 
         Raises:
@@ -135,11 +135,8 @@ class PoseRecovery:
             RunFolderError: the disk is full or failed.
         """
         for end in ends:
-            if isinstance(end, ShardFailed):
+            if not isinstance(end.answer, Reached):
                 raise self._requests.refusal(end)
-            # Only advances are requested.
-            assert not isinstance(end, Deliver)
-            assert isinstance(end.answer, Reached)
             self._take(end.answer)
         if self.is_done:
             self._fleet.leave(self._client)

@@ -13,8 +13,8 @@ from functools import partial
 
 from msgspec.structs import replace
 
-from coordinator.dispatch.events import KINDS, AgentKind, Client
-from coordinator.dispatch.fleet import End, JobRouter
+from coordinator.dispatch.events import KINDS, AgentKind, Client, Deliver
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunFolder
 from schema.errors import RevolveError
@@ -100,7 +100,7 @@ class RunScheduler:
         while self._waiting and self._has_room():
             self._begin(*self._waiting.popleft())
         now_s = clock()
-        acting: dict[RunSession, list[End]] = {}
+        acting: dict[RunSession, list[Deliver]] = {}
         for run in self._places:
             if (throttle := run.loop.throttle) is not None:
                 acting[run] = []
@@ -236,7 +236,7 @@ def _queues(fleet: JobRouter) -> tuple[Queue, ...]:
         Queue(kind, fleet.dispatch.waiting(kind), fleet.dispatch.assigned(kind))
         for kind in KINDS
     )
-    return (*jobs, Queue("arena", fleet.shards.unassigned, fleet.shards.assigned))
+    return (*jobs, Queue("arena", fleet.homes.unassigned, fleet.homes.assigned))
 
 
 def _cause(run: RunSession, error: RevolveError) -> RevolveError:

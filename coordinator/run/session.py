@@ -10,8 +10,8 @@ from importlib import metadata
 from pathlib import Path
 
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.events import KINDS, AgentKind
-from coordinator.dispatch.fleet import End, JobRouter
+from coordinator.dispatch.events import KINDS, AgentKind, Deliver
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import JournalledEvent, Record
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
@@ -173,7 +173,7 @@ class RunSession:
         )
         self.recovery.start()
 
-    def recover(self, ends: Iterable[End]) -> None:
+    def recover(self, ends: Iterable[Deliver]) -> None:
         """Continue the recovery of lost poses; when it is done, start the loop.
 
         Args:

@@ -11,7 +11,7 @@ from typing import Protocol
 
 from msgspec import structs
 
-from coordinator.dispatch.events import AssignShard, Read, ShardFailed
+from coordinator.dispatch.events import Assign, Deliver, Read
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.advance_checks import (
@@ -121,14 +121,14 @@ class ShardRequests:
         """Platforms of the shards that wait for a worker; "" is any platform."""
         return {
             self._islands[number]: platform
-            for number, platform in self._fleet.shards.waiting.items()
+            for number, platform in self._fleet.homes.waiting.items()
             if number in self._islands
         }
 
     def holder(self, shard: int) -> str:
         """Return the name of the worker that holds a shard; empty if none does."""
         number = self._numbers.get(shard)
-        return "" if number is None else self._fleet.shards.holder(number)
+        return "" if number is None else self._fleet.homes.holder(number)
 
     def step(self, shard: int) -> int:
         """Return the step that a shard has reached."""
@@ -223,21 +223,22 @@ class ShardRequests:
         past.may_be_kept = True
         return drift
 
-    def refusal(self, end: ShardFailed) -> JobRefused | RunFolderError:
+    def refusal(self, end: Deliver) -> JobRefused | RunFolderError:
         """Return the error that stops a run whose arena cannot be advanced."""
         if not end.agent:
             return RunFolderError(end.reason)
+        arena = self._islands[end.job.shard]
         return JobRefused(
-            f"arena {self._islands[end.shard]}: several workers cannot advance it, the "
+            f"arena {arena}: several workers cannot advance it, the "
             f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
 
     def _past(self, shard: int) -> _Past:
         return self._pasts.setdefault(shard, _Past())
 
-    def _encode(self, command: AssignShard) -> tuple[bytes, Read]:
+    def _encode(self, command: Assign) -> tuple[bytes, Read]:
         """Return the request for a worker, and what reads the answer."""
-        shard = self._islands[command.shard]
+        shard = self._islands[command.job.shard]
         past, settings = self._past(shard), self._context.arena[shard]
         requested = past.requested
         assert requested is not None
@@ -259,7 +260,7 @@ class ShardRequests:
             rebuild=rebuild,
         )
         request = Request(
-            run, epoch, command.number, work, settings, plugins_of(settings)
+            run, epoch, command.job.number, work, settings, plugins_of(settings)
         )
         complete: Callable[[Advance], Advance] | None = None
         if is_drift:
@@ -272,7 +273,7 @@ class ShardRequests:
         read = partial(
             _read_answer,
             requested=requested,
-            job=(epoch, command.number),
+            job=(epoch, command.job.number),
             is_whole=command.is_whole,
             repeats=past.repeats,
             expected=ExpectedAdvance(

@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 
 import analyzer.service
-from coordinator.dispatch.events import AgentKind, Client, Deliver, Job
+from coordinator.dispatch.events import AgentKind, Client, Job
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
@@ -116,7 +116,7 @@ class Stream:
             RuntimeError: the workers cannot do a job.
         """
         for end in self._fleet.listen(timeout_s, now_s).get(_CLIENT, ()):
-            if isinstance(end, Deliver) and end.reason:
+            if end.reason:
                 raise RuntimeError(end.reason)
             self.done += 1
             self._ask()

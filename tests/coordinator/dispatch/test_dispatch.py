@@ -27,6 +27,7 @@ from coordinator.dispatch.events import (
     Cancel,
     Client,
     ClientEnded,
+    Crowded,
     Deliver,
     DispatchCommand,
     DispatchEvent,
@@ -42,7 +43,6 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
-from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     BACKOFF_S,
     FIRST_S,
@@ -57,7 +57,6 @@ from coordinator.dispatch.pool import (
     longer_s,
 )
 from schema.errors import UnexpectedEvent
-from schema.wire.codec import fingerprint
 from schema.wire.messages import Crash, RunningJob
 
 
@@ -82,13 +81,11 @@ def lost(number: int, agent: str) -> Returned:
 
 
 def died(number: int, agent: str, cause: str = "SIGSEGV") -> Crash:
-    return Crash(
-        RunningJob(agent, "run", 1, number, fingerprint(b"%d" % number)), cause
-    )
+    return Crash(RunningJob(agent, "run", 1, number), cause)
 
 
-def told(*events: DispatchEvent, faults: PeerFaults | None = None) -> Dispatch:
-    dispatch = Dispatch(faults)
+def told(*events: DispatchEvent) -> Dispatch:
+    dispatch = Dispatch()
     for event in events:
         dispatch.handle(event)
     return dispatch
@@ -305,9 +302,9 @@ def test_lost_jobs_are_never_given_up() -> None:
 
 def test_the_network_waits_for_a_multiple_of_the_typical_duration() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    assert dispatch.wait_s(job(0)) == LONGEST_WAIT_S
+    assert dispatch.wait_s(Assign(job(0), "a")) == LONGEST_WAIT_S
     dispatch.handle(replace(ok(0, "a"), took_s=20.0))
-    assert dispatch.wait_s(job(1)) == pytest.approx(2000.0)
+    assert dispatch.wait_s(Assign(job(1), "a")) == pytest.approx(2000.0)
     assert longer_s(2000.0) == 20_000.0
     assert longer_s(200_000.0) == LONGEST_WAIT_S
 
@@ -315,16 +312,16 @@ def test_the_network_waits_for_a_multiple_of_the_typical_duration() -> None:
 def test_the_network_waits_for_a_least_time() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     dispatch.handle(replace(ok(0, "a"), took_s=0.01))
-    assert dispatch.wait_s(job(1)) == LEAST_WAIT_S
+    assert dispatch.wait_s(Assign(job(1), "a")) == LEAST_WAIT_S
 
 
 def test_the_network_does_not_wait_long_for_replies_to_short_calls() -> None:
     """It holds memory of each request until then, and there may be millions."""
     dispatch = told(Ticked(0.0), worker("a"), Requested(job(0, "call")))
-    assert dispatch.wait_s(job(1, "call")) == LONGEST_WAIT_S
+    assert dispatch.wait_s(Assign(job(1, "call"), "a")) == LONGEST_WAIT_S
     dispatch.handle(replace(ok(0, "a"), took_s=0.01))
-    assert dispatch.wait_s(job(1, "call")) == LEAST_WAIT_S
-    assert dispatch.wait_s(job(1, "evaluate")) == LONGEST_WAIT_S
+    assert dispatch.wait_s(Assign(job(1, "call"), "a")) == LEAST_WAIT_S
+    assert dispatch.wait_s(Assign(job(1, "evaluate"), "a")) == LONGEST_WAIT_S
 
 
 def test_nothing_is_learned_from_an_agent_that_is_back_with_the_answer() -> None:
@@ -333,7 +330,7 @@ def test_nothing_is_learned_from_an_agent_that_is_back_with_the_answer() -> None
     dispatch.handle(worker("a"))
     assert dispatch.handle(replace(ok(0, "a"), took_s=0.001))
     assert dispatch.workers.agents["a"].job_s == 0.0
-    assert dispatch.wait_s(job(2)) == LONGEST_WAIT_S
+    assert dispatch.wait_s(Assign(job(2), "a")) == LONGEST_WAIT_S
 
 
 def test_late_answers_change_nothing() -> None:
@@ -746,17 +743,6 @@ def test_an_agent_that_works_is_never_called_silent() -> None:
             dispatch.handle(Progressed("a"))
 
 
-def test_late_answers_are_counted() -> None:
-    dispatch = late()
-    dispatch.handle(Ticked(9.0))
-    dispatch.handle(ok(1, "b"))
-    assert dispatch._faults.total("late") == 0
-    dispatch.handle(ok(1, "a"))
-    assert dispatch._faults.total("late") == 1
-    dispatch.handle(ok(1, "a"))
-    assert dispatch._faults.total("late") == 2
-
-
 def test_job_that_crashed_three_processes_is_given_up() -> None:
     dispatch = told(worker("a"), worker("b"), *requests(0))
     for number, name in enumerate(("a", "b")):
@@ -774,32 +760,11 @@ def test_job_that_crashed_three_processes_is_given_up() -> None:
 
 
 def test_deaths_of_agents_that_did_not_lose_the_job_do_not_count() -> None:
-    faults = PeerFaults()
-    dispatch = told(worker("a"), worker("b"), *requests(0), faults=faults)
+    dispatch = told(worker("a"), worker("b"), *requests(0))
     # "a" has the job and is there, "b" and "x" never had it.
     for name in ("a", "b", "x", "y", "z"):
         assert dispatch.handle(died(0, name)) == []
-    assert faults.total("death") == 5
     assert dispatch.handle(ok(0, "a")) == [Deliver(job(0), "a", "p", b"a0")]
-
-
-def test_a_death_by_another_request_with_the_jobs_name_does_not_count() -> None:
-    faults = PeerFaults()
-    dispatch = told(*requests(0), faults=faults)
-    for name in ("a", "b", "c", "d"):
-        dispatch.handle(worker(name))
-        dispatch.handle(Left(name))
-        event = Crash(RunningJob(name, "run", 1, 0, fingerprint(b"deadly")), "SIGSEGV")
-        assert dispatch.handle(event) == []
-    assert faults.total("death") == 4
-    assert dispatch.pending == 1
-
-
-def test_late_and_second_answers_are_counted_as_late() -> None:
-    faults = PeerFaults()
-    answers = (ok(0, "a"), ok(0, "a"), ok(7, "a"))
-    told(worker("a"), *requests(0), *answers, faults=faults)
-    assert (faults.total("late"), faults.total("malformed")) == (2, 0)
 
 
 def test_deadly_job_is_cancelled_where_it_still_runs() -> None:
@@ -852,6 +817,7 @@ class World:
             if isinstance(command, AskProgress | Overdue):
                 assert command.agent in self.agents
                 continue
+            assert not isinstance(command, Crowded)
             number, agent = command.job.number, command.agent
             if isinstance(command, Deliver):
                 assert number not in {*self.delivered, *self.withdrawn}

@@ -5,7 +5,7 @@ from typing import Literal
 import pytest
 
 from coordinator.dispatch.events import (
-    AssignShard,
+    Assign,
     Client,
     Deliver,
     Job,
@@ -13,8 +13,6 @@ from coordinator.dispatch.events import (
     Left,
     Read,
     Returned,
-    ShardDone,
-    ShardFailed,
     Ticked,
 )
 from coordinator.dispatch.fleet import JobRouter
@@ -35,7 +33,7 @@ def read(data: bytes) -> object:
     return None if data == b"stateless" else data
 
 
-def encode(command: AssignShard) -> tuple[bytes, Read]:
+def encode(command: Assign) -> tuple[bytes, Read]:
     return f"whole {command.is_whole}".encode(), read
 
 
@@ -62,6 +60,10 @@ def request(fleet: JobRouter, client: Client = CLIENT) -> int:
 
 def new_shard(fleet: JobRouter, client: Client = ARENA) -> int:
     return fleet.new_shard(client, encode, "")
+
+
+def ended(end: Deliver) -> tuple[int, str, object, str]:
+    return end.job.shard, end.agent, end.answer, end.reason
 
 
 def test_an_answer_goes_to_its_client(fleet: JobRouter, agents: SentJobs) -> None:
@@ -140,6 +142,33 @@ def test_deaths_by_jobs_of_other_coordinators_do_not_count(
     assert agents.sent
 
 
+def test_late_and_second_answers_are_counted_as_late(
+    fleet: JobRouter, agents: SentJobs
+) -> None:
+    number = request(fleet)
+    agent = agents.sent[0][1]
+    for late in range(3):
+        fleet.tell(Returned(number, agent, "ok", b"x"))
+        assert fleet.faults.total("late") == late
+    fleet.tell(Returned(77, agent, "ok", b"x"))
+    fleet.tell(Returned(77, agent, "lost"))
+    assert [(count.kind, count.count) for count in fleet.faults.counts] == [("late", 3)]
+
+
+def test_deaths_by_what_no_job_can_have_done_are_counted(
+    fleet: JobRouter, agents: SentJobs
+) -> None:
+    """The process never had the job, has it still, or died of other content."""
+    number = request(fleet)
+    other = fingerprint(b"deadly")
+    fleet.tell(Left(agents.sent[0][1]))
+    (first, _), (second, _) = [sent[1:] for sent in agents.sent]
+    for name, content in (("x", EMPTY), (second, EMPTY), (first, other)):
+        fleet.tell(Crash(RunningJob(name, "run", 1, number, content), "SIGSEGV"))
+    assert fleet.faults.total("death") == 3
+    assert fleet.open == 1
+
+
 @pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
 def test_a_job_that_its_agent_declined_is_given_to_another(
     fleet: JobRouter, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
@@ -179,7 +208,7 @@ def test_a_job_whose_wait_is_over_stays_with_its_worker(
     agents.news = [Returned(number, agent, "ok", b"x") for number, agent, _ in first]
     (delivered,), (done,) = fleet.listen(0.0, 4000.0).values()
     assert isinstance(delivered, Deliver)
-    assert done == ShardDone(shard, first[1][1], b"x")
+    assert ended(done) == (shard, first[1][1], b"x", "")
     assert (fleet.faults.total("late"), fleet.open) == (0, 0)
 
 
@@ -259,7 +288,7 @@ def test_advances_after_one_that_expired_wait_longer(
 def test_a_state_that_cannot_be_read_ends_only_its_own_run(
     fleet: JobRouter, agents: SentJobs
 ) -> None:
-    def unreadable(_command: AssignShard) -> tuple[bytes, Read]:
+    def unreadable(_command: Assign) -> tuple[bytes, Read]:
         raise RunFolderError("island-0-5.bin: is missing")
 
     shards = [fleet.new_shard(CLIENT, unreadable, ""), new_shard(fleet)]
@@ -268,10 +297,11 @@ def test_a_state_that_cannot_be_read_ends_only_its_own_run(
     fleet.tell(Left("two"))
     ((number, agent, _),) = agents.sent[-1:]
     agents.news = [Returned(number, agent, "ok", b"x")]
-    assert fleet.listen(0.0, 1.0) == {
-        CLIENT: [ShardFailed(shards[0], "", "island-0-5.bin: is missing")],
-        ARENA: [ShardDone(shards[1], agent, b"x")],
-    }
+    ends = fleet.listen(0.0, 1.0)
+    assert [ended(end) for end in (*ends[CLIENT], *ends[ARENA])] == [
+        (shards[0], "", None, "island-0-5.bin: is missing"),
+        (shards[1], agent, b"x", ""),
+    ]
     assert fleet.open == 0
     assert not any(a.busy for a in fleet.dispatch.workers.agents.values())
 
@@ -314,7 +344,8 @@ def test_arenas_of_all_runs_share_the_workers(
     assert payload == b"whole True"
     agents.news = [Returned(number, agent, "ok", b"answer")]
     ends = fleet.listen(0.0, 1.0)
-    assert ends == {OTHER: [ShardDone(shards[1], agent, b"answer")]}
+    assert list(ends) == [OTHER]
+    assert ended(*ends[OTHER]) == (shards[1], agent, b"answer", "")
     assert fleet.open == 1
 
 
@@ -338,12 +369,13 @@ def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
         fleet.tell(Ticked(10 * now_s + 5.0))
     assert set(tried) == {"one", "two"}
     if not is_answer:
-        assert ends == {ARENA: [ShardFailed(shard, agent, "no such plug-in")]}
+        assert ended(*ends[ARENA]) == (shard, agent, None, "no such plug-in")
         return
     assert ends == {}
     number, agent, _ = agents.sent[-1]
     agents.news = [Returned(number, agent, "ok", b"answer")]
-    assert fleet.listen(0.0, 50.0) == {ARENA: [ShardDone(shard, agent, b"answer")]}
+    (end,) = fleet.listen(0.0, 50.0)[ARENA]
+    assert ended(end) == (shard, agent, b"answer", "")
 
 
 def test_an_unfit_worker_gets_jobs_of_other_clients_only(
@@ -366,7 +398,7 @@ def test_an_unfit_worker_gets_jobs_of_other_clients_only(
     request(fleet, OTHER)
     assert agents.sent[-1][1] == unfit
     fleet.tell(Left(other))
-    assert fleet.shards.waiting == {0: ""}
+    assert fleet.homes.waiting == {0: ""}
     assert fleet.dispatch.fit("worker", CLIENT) == set()
     count = len(agents.sent)
     fleet.tell(Left(unfit))
@@ -435,8 +467,7 @@ def test_an_advance_that_crashes_three_workers_is_given_up(
         assert fleet.listen(0.0, 1.0) == {}
         fleet.tell(Crash(RunningJob(agent, "arena", 1, number, same), "SIGSEGV"))
     (end,) = fleet.listen(0.0, 1.0)[ARENA]
-    assert isinstance(end, ShardFailed)
-    assert (end.shard, end.agent) == (shard, agent)
+    assert ended(end)[:3] == (shard, agent, None)
 
 
 def test_a_released_arena_leaves_room_for_another(
@@ -504,7 +535,8 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
         fleet.open,
     ) == (1, 0, 1)
     agents.news = [Returned(moved, "two", "ok", b"x")]
-    assert fleet.listen(0.0, 100.0) == {ARENA: [ShardDone(0, "two", b"x")]}
+    (end,) = fleet.listen(0.0, 100.0)[ARENA]
+    assert ended(end) == (0, "two", b"x", "")
 
 
 def test_an_advance_is_timed_from_its_own_assignment(

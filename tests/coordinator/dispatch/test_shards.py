@@ -2,34 +2,63 @@
 
 from collections import Counter
 from itertools import count
+from typing import NamedTuple
 
 import pytest
 
-from coordinator.dispatch.dispatch import Dispatch
+from coordinator.dispatch.dispatch import MAX_ERRORS, Dispatch
 from coordinator.dispatch.events import (
     AskProgress,
-    AssignShard,
-    CancelShard,
+    Assign,
+    Cancel,
     Crowded,
+    Deliver,
+    DispatchEvent,
+    Job,
     Joined,
-    Killed,
     Left,
+    Outcome,
     Overdue,
     Progressed,
     Released,
+    Requested,
     Returned,
-    ShardCommand,
-    ShardDone,
-    ShardEvent,
-    ShardFailed,
-    ShardRequested,
-    ShardReturned,
     ShardSeen,
     Ticked,
 )
+from coordinator.dispatch.homes import DRIFT_S, LEAST_S
 from coordinator.dispatch.pool import FIRST_S, PATIENCE, REPLY_S
-from coordinator.dispatch.shards import DRIFT_S, LEAST_S, MAX_ERRORS, ShardDispatch
 from schema.errors import UnexpectedEvent
+from schema.wire.messages import Crash, RunningJob
+
+
+class Sent(NamedTuple):
+    """An advance that is assigned."""
+
+    number: int
+    shard: int
+    agent: str
+    platform: str
+    is_whole: bool
+
+
+class Cancelled(NamedTuple):
+    """An advance that its agent need not make any more."""
+
+    number: int
+    shard: int
+    agent: str
+
+
+class Ended(NamedTuple):
+    """An advance that was made, or was given up for a reason."""
+
+    shard: int
+    agent: str
+    reason: str = ""
+
+
+Command = Sent | Cancelled | Ended | AskProgress | Overdue | Crowded
 
 
 def joined(name: str, platform: str = "p", kind: str = "worker") -> Joined:
@@ -37,44 +66,54 @@ def joined(name: str, platform: str = "p", kind: str = "worker") -> Joined:
 
 
 class Fleet:
-    """Both dispatchers, connected as in ``coordinator.dispatch.fleet``."""
+    """A dispatcher that is only asked for advances; its commands in short."""
 
     def __init__(self, *, allows_drift: bool = False) -> None:
-        self.jobs = Dispatch()
-        self.shards = ShardDispatch(
-            count(1), self.jobs.workers, allows_drift=allows_drift
-        )
-        self.agents: dict[int, str] = {}
+        self._numbers = count(1)
+        self._dispatch = Dispatch(self._numbers, allows_drift=allows_drift)
+        self.homes = self._dispatch.homes
+        self.holder = self.homes.holder
+        self._agents: dict[int, str] = {}
 
-    def handle(self, event: ShardEvent | Progressed) -> list[ShardCommand]:
-        if isinstance(event, Joined | Left | Ticked | Progressed):
-            assert self.jobs.handle(event) == []
-        commands: list[ShardCommand] = []
-        if not isinstance(event, Progressed):
-            commands = self.shards.handle(event)
-        if isinstance(event, ShardReturned) and event.number in self.agents:
-            outcome = "ok" if event.outcome == "done" else "error"
-            agent = self.agents.pop(event.number)
-            self.jobs.handle(Returned(event.number, agent, outcome))  # type: ignore[arg-type]
-        for command in commands:
-            if isinstance(command, AssignShard):
-                self.agents[command.number] = command.agent
-        return commands
+    def handle(self, event: DispatchEvent) -> list[Command]:
+        return [self._short(command) for command in self._dispatch.handle(event)]
+
+    def request(self, shard: int, simulated_s: float | None = None) -> list[Command]:
+        number = next(self._numbers)
+        job = Job(number, "advance", simulated_s=simulated_s, shard=shard)
+        return self.handle(Requested(job))
+
+    def returned(
+        self, number: int, outcome: Outcome = "ok", reason: str = ""
+    ) -> list[Command]:
+        agent = self._agents[number]
+        return self.handle(Returned(number, agent, outcome, reason=reason))
+
+    def crashed(self, number: int, agent: str) -> list[Command]:
+        return self.handle(Crash(RunningJob(agent, "", 0, number), "SIGSEGV"))
+
+    def has_lost(self, number: int, agent: str) -> bool:
+        return self._dispatch.has_lost(agent, number)
+
+    def _short(self, command: object) -> Command:
+        match command:
+            case Assign(job, agent, platform, is_whole):
+                self._agents[job.number] = agent
+                return Sent(job.number, job.shard, agent, platform, is_whole)
+            case Cancel(job, agent):
+                return Cancelled(job.number, job.shard, agent)
+            case Deliver(job, agent, reason=reason):
+                return Ended(job.shard, agent, reason)
+        assert isinstance(command, AskProgress | Overdue | Crowded)
+        return command
 
     @property
     def waiting(self) -> dict[int, str]:
-        return self.shards.waiting
+        return self.homes.waiting
 
     @property
     def wake_s(self) -> float | None:
-        times = (self.jobs.wake_s, self.shards.wake_s)
-        return min((each for each in times if each is not None), default=None)
-
-    def holder(self, shard: int) -> str:
-        return self.shards.holder(shard)
-
-    def shard_that_lost(self, number: int) -> int | None:
-        return self.shards.shard_that_lost(number)
+        return self._dispatch.wake_s
 
 
 def fleet(*names: str) -> Fleet:
@@ -86,135 +125,122 @@ def fleet(*names: str) -> Fleet:
 
 def test_first_advance_is_whole_and_the_next_goes_on() -> None:
     dispatch = fleet("b", "a")
-    assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(1, 0, "a", "p", is_whole=True)
-    ]
-    assert dispatch.handle(ShardReturned(1, "done")) == [ShardDone(0, "a")]
-    assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(2, 0, "a", "p", is_whole=False)
-    ]
+    assert dispatch.request(0) == [Sent(1, 0, "a", "p", is_whole=True)]
+    assert dispatch.returned(1) == [Ended(0, "a")]
+    assert dispatch.request(0) == [Sent(2, 0, "a", "p", is_whole=False)]
 
 
 def test_shard_waits_for_a_worker() -> None:
     dispatch = fleet()
-    assert dispatch.handle(ShardRequested(0)) == []
+    assert dispatch.request(0) == []
     assert dispatch.waiting == {0: ""}
     assert dispatch.handle(joined("x", kind="analyzer")) == []
-    assert dispatch.handle(joined("a")) == [AssignShard(1, 0, "a", "p", is_whole=True)]
+    assert dispatch.handle(joined("a")) == [Sent(1, 0, "a", "p", is_whole=True)]
     assert dispatch.waiting == {}
 
 
 def test_shards_spread_over_workers() -> None:
     dispatch = fleet("a", "b")
-    agents = [dispatch.handle(ShardRequested(number))[0] for number in range(4)]
-    assert [hand.agent for hand in agents if isinstance(hand, AssignShard)] == list(
-        "abab"
-    )
+    agents = [dispatch.request(number)[0] for number in range(4)]
+    assert [hand.agent for hand in agents if isinstance(hand, Sent)] == list("abab")
     assert dispatch.holder(2) == "a"
 
 
 def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
-    assert dispatch.handle(Left("a")) == [AssignShard(2, 0, "b", "p", is_whole=True)]
+    dispatch.request(0)
+    assert dispatch.handle(Left("a")) == [Sent(2, 0, "b", "p", is_whole=True)]
     # Its own end as a job comes late and says nothing new.
-    assert dispatch.handle(ShardReturned(1, "lost")) == []
-    assert dispatch.handle(ShardReturned(1, "done")) == []
-    assert dispatch.handle(ShardReturned(2, "done")) == [ShardDone(0, "b")]
+    assert dispatch.returned(1, "lost") == []
+    assert dispatch.returned(1) == []
+    assert dispatch.returned(2) == [Ended(0, "b")]
 
 
 def test_holder_that_dies_between_advances() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
-    dispatch.handle(ShardReturned(1, "done"))
+    dispatch.request(0)
+    dispatch.returned(1)
     assert dispatch.handle(Left("a")) == []
-    assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(2, 0, "b", "p", is_whole=True)
-    ]
+    assert dispatch.request(0) == [Sent(2, 0, "b", "p", is_whole=True)]
 
 
 def test_worker_without_the_state_is_given_it() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
-    dispatch.handle(ShardReturned(1, "done"))
-    dispatch.handle(ShardRequested(0))
-    assert dispatch.handle(ShardReturned(2, "stateless")) == [
-        AssignShard(3, 0, "a", "p", is_whole=True)
-    ]
+    dispatch.request(0)
+    dispatch.returned(1)
+    dispatch.request(0)
+    assert dispatch.returned(2, "stateless") == [Sent(3, 0, "a", "p", is_whole=True)]
     # Asking again is an error.
-    assert dispatch.handle(ShardReturned(3, "stateless")) == [
-        AssignShard(4, 0, "b", "p", is_whole=True)
-    ]
+    assert dispatch.returned(3, "stateless") == [Sent(4, 0, "b", "p", is_whole=True)]
 
 
 @pytest.mark.parametrize("outcome", ["error", "lost"])
 def test_failed_advance_goes_to_another_worker(outcome: str) -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Ticked(10.0))
-    dispatch.handle(ShardRequested(0))
-    assert dispatch.handle(ShardReturned(1, outcome, "why")) == [  # type: ignore[arg-type]
-        AssignShard(2, 0, "b", "p", is_whole=True)
+    dispatch.request(0)
+    assert dispatch.returned(1, outcome, "why") == [  # type: ignore[arg-type]
+        Sent(2, 0, "b", "p", is_whole=True)
     ]
 
 
 def test_only_worker_gets_the_failed_advance_again_after_its_backoff() -> None:
     dispatch = fleet("a")
     dispatch.handle(Ticked(10.0))
-    dispatch.handle(ShardRequested(0))
-    assert dispatch.handle(ShardReturned(1, "lost")) == []
+    dispatch.request(0)
+    assert dispatch.returned(1, "lost") == []
     assert dispatch.handle(Ticked(10.01)) == []
-    assert dispatch.handle(Ticked(10.05)) == [
-        AssignShard(2, 0, "a", "p", is_whole=True)
-    ]
+    assert dispatch.handle(Ticked(10.05)) == [Sent(2, 0, "a", "p", is_whole=True)]
 
 
 def test_advance_that_crashed_three_workers_is_given_up() -> None:
     dispatch = fleet("a", "b", "c")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     for number, name, following in ((1, "a", "b"), (2, "b", "c")):
-        hand = AssignShard(number + 1, 0, following, "p", is_whole=True)
+        hand = Sent(number + 1, 0, following, "p", is_whole=True)
         assert dispatch.handle(Left(name)) == [hand]
-        assert dispatch.shard_that_lost(number) == 0
-        assert dispatch.handle(Killed(number, name, "SIGSEGV")) == []
+        assert dispatch.has_lost(number, name)
+        assert dispatch.crashed(number, name) == []
     assert dispatch.handle(Left("c")) == []
     reason = f"ended its own process {MAX_ERRORS} times, by SIGSEGV"
-    ended = dispatch.handle(Killed(3, "c", "SIGSEGV"))
-    assert ended == [ShardFailed(0, "c", reason)]
+    ended = dispatch.crashed(3, "c")
+    assert ended == [Ended(0, "c", reason)]
     assert dispatch.handle(joined("d")) == []
 
 
 def test_crashes_of_a_finished_advance_are_forgotten() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     dispatch.handle(Left("a"))
-    assert dispatch.handle(ShardReturned(2, "done")) == [ShardDone(0, "b")]
-    assert dispatch.shard_that_lost(1) is None
-    assert dispatch.handle(Killed(1, "a", "SIGSEGV")) == []
+    assert dispatch.returned(2) == [Ended(0, "b")]
+    assert not dispatch.has_lost(1, "a")
+    assert dispatch.crashed(1, "a") == []
 
 
 def test_errors_of_several_workers_end_an_advance_and_losses_do_not() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     now_s, number = 0.0, 1
-    for outcome in ["lost"] * 10 + ["error"] * (MAX_ERRORS - 1):
-        hands = dispatch.handle(ShardReturned(number, outcome, "no"))  # type: ignore[arg-type]
+    outcomes: list[Outcome] = ["lost"] * 10
+    for outcome in outcomes + ["error"] * (MAX_ERRORS - 1):
+        hands = dispatch.returned(number, outcome, "no")
         now_s += 10.0
         hands += dispatch.handle(Ticked(now_s))
         (hand,) = hands
-        assert isinstance(hand, AssignShard)
+        assert isinstance(hand, Sent)
         number += 1
         assert hand.number == number
     agent = dispatch.holder(0)
-    given_up = dispatch.handle(ShardReturned(number, "error", "no"))
-    assert given_up == [ShardFailed(0, agent, "no")]
+    given_up = dispatch.returned(number, "error", "no")
+    assert given_up == [Ended(0, agent, "no")]
 
 
 def test_any_number_of_malformed_answers_only_lets_the_shard_rest() -> None:
     dispatch = Fleet()
     dispatch.handle(joined("a", "x86"))
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     for number in range(1, 1300):
-        assert dispatch.handle(ShardReturned(number, "malformed", "no")) == []
+        assert dispatch.returned(number, "malformed", "no") == []
         assert len(dispatch.handle(Ticked(10.0 * number))) == 1
 
 
@@ -222,7 +248,7 @@ def test_a_shard_that_may_not_drift_waits_for_its_platform() -> None:
     dispatch = Fleet(allows_drift=True)
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(ShardSeen(0, "x86", may_drift=False))
-    assert dispatch.handle(ShardRequested(0)) == []
+    assert dispatch.request(0) == []
     for now_s in (1.0, 100.0, 1000.0):
         assert dispatch.handle(Ticked(now_s)) == []
     assert dispatch.waiting == {0: "x86"}
@@ -233,32 +259,30 @@ def test_only_a_worker_of_an_equal_platform_continues_a_shard() -> None:
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(joined("b", "x86"))
     dispatch.handle(ShardSeen(0, "x86"))
-    assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(1, 0, "b", "x86", is_whole=True)
-    ]
+    assert dispatch.request(0) == [Sent(1, 0, "b", "x86", is_whole=True)]
     assert dispatch.handle(Left("b")) == []
     assert dispatch.waiting == {0: "x86"}
     assert dispatch.handle(joined("c", "x86")) == [
-        AssignShard(2, 0, "c", "x86", is_whole=True)
+        Sent(2, 0, "c", "x86", is_whole=True)
     ]
 
 
 def test_first_advance_decides_the_platform() -> None:
     dispatch = Fleet()
     dispatch.handle(joined("a", "arm"))
-    dispatch.handle(ShardRequested(0))
-    dispatch.handle(ShardReturned(1, "done"))
+    dispatch.request(0)
+    dispatch.returned(1)
     dispatch.handle(Left("a"))
     dispatch.handle(joined("b", "x86"))
-    assert dispatch.handle(ShardRequested(0)) == []
+    assert dispatch.request(0) == []
     assert dispatch.waiting == {0: "arm"}
 
 
 def test_second_request_for_a_shard_raises() -> None:
     dispatch = fleet("a")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     with pytest.raises(UnexpectedEvent, match="requested already"):
-        dispatch.handle(ShardRequested(0))
+        dispatch.request(0)
 
 
 def drifting(*, allows_drift: bool) -> Fleet:
@@ -267,7 +291,7 @@ def drifting(*, allows_drift: bool) -> Fleet:
     dispatch.handle(ShardSeen(0, "theirs"))
     dispatch.handle(joined("b", "ours"))
     dispatch.handle(joined("a", "ours"))
-    assert dispatch.handle(ShardRequested(0)) == []
+    assert dispatch.request(0) == []
     assert dispatch.handle(Ticked(100.0)) == []
     assert dispatch.waiting == {0: "theirs"}
     return dispatch
@@ -277,32 +301,30 @@ def test_shard_drifts_to_another_platform_after_a_while_if_allowed() -> None:
     dispatch = drifting(allows_drift=True)
     assert dispatch.wake_s == 100.0 + DRIFT_S
     assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
-    whole = AssignShard(1, 0, "a", "ours", is_whole=True)
+    whole = Sent(1, 0, "a", "ours", is_whole=True)
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == [whole]
-    dispatch.handle(ShardReturned(1, "done"))
+    dispatch.returned(1)
     # It is at home there now.
     dispatch.handle(joined("c", "theirs"))
-    assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(2, 0, "a", "ours", is_whole=False)
-    ]
+    assert dispatch.request(0) == [Sent(2, 0, "a", "ours", is_whole=False)]
 
 
 def test_shard_that_may_drift_waits_for_a_worker_and_not_for_a_time() -> None:
     dispatch = Fleet(allows_drift=True)
     dispatch.handle(ShardSeen(0, "theirs"))
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     dispatch.handle(Ticked(100.0))
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
     assert dispatch.wake_s is None
     assert dispatch.handle(joined("a", "ours")) == [
-        AssignShard(1, 0, "a", "ours", is_whole=True)
+        Sent(1, 0, "a", "ours", is_whole=True)
     ]
 
 
 def test_shard_does_not_drift_if_its_platform_returns_in_time() -> None:
     dispatch = drifting(allows_drift=True)
     assert dispatch.handle(joined("z", "theirs")) == [
-        AssignShard(1, 0, "z", "theirs", is_whole=True)
+        Sent(1, 0, "z", "theirs", is_whole=True)
     ]
     dispatch.handle(Left("z"))
     # The waiting time starts again.
@@ -319,13 +341,13 @@ def test_shard_does_not_drift_unless_allowed() -> None:
 
 def test_advances_are_counted_while_they_wait_and_while_a_worker_has_them() -> None:
     dispatch = fleet()
-    shards = dispatch.shards
-    dispatch.handle(ShardRequested(0))
-    dispatch.handle(ShardRequested(1))
+    shards = dispatch.homes
+    dispatch.request(0)
+    dispatch.request(1)
     assert (shards.unassigned, shards.assigned) == (2, 0)
     dispatch.handle(joined("a"))
     assert (shards.unassigned, shards.assigned) == (0, 2)
-    dispatch.handle(ShardReturned(1, "done"))
+    dispatch.returned(1)
     assert (shards.unassigned, shards.assigned) == (0, 1)
     dispatch.handle(Left("a"))
     assert (shards.unassigned, shards.assigned) == (1, 0)
@@ -334,30 +356,28 @@ def test_advances_are_counted_while_they_wait_and_while_a_worker_has_them() -> N
 def advance(dispatch: Fleet, shard: int, start_s: float, lasts_s: float) -> None:
     """Make one advance of a shard."""
     dispatch.handle(Ticked(start_s))
-    (hand,) = dispatch.handle(ShardRequested(shard))
-    assert isinstance(hand, AssignShard)
+    (hand,) = dispatch.request(shard)
+    assert isinstance(hand, Sent)
     dispatch.handle(Ticked(start_s + lasts_s))
-    (done, *_) = dispatch.handle(ShardReturned(hand.number, "done"))
-    assert isinstance(done, ShardDone)
+    (done, *_) = dispatch.returned(hand.number)
+    assert isinstance(done, Ended)
 
 
 def test_silent_worker_loses_its_advance_to_an_idle_one() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     assert dispatch.handle(Ticked(FIRST_S - 1.0)) == []
     assert dispatch.handle(Ticked(FIRST_S)) == [AskProgress("a")]
     assert dispatch.handle(Ticked(FIRST_S + REPLY_S - 1.0)) == []
     assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == [
         Overdue("a", FIRST_S + REPLY_S, "b"),
-        CancelShard(1, 0, "a"),
-        AssignShard(2, 0, "b", "p", is_whole=True),
+        Cancelled(1, 0, "a"),
+        Sent(2, 0, "b", "p", is_whole=True),
     ]
     # The late answer changes nothing, and the next advance stays where it is.
-    assert dispatch.handle(ShardReturned(1, "done")) == []
-    assert dispatch.handle(ShardReturned(2, "done")) == [ShardDone(0, "b")]
-    assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(3, 0, "b", "p", is_whole=False)
-    ]
+    assert dispatch.returned(1) == []
+    assert dispatch.returned(2) == [Ended(0, "b")]
+    assert dispatch.request(0) == [Sent(3, 0, "b", "p", is_whole=False)]
 
 
 def test_deadline_follows_the_duration_of_earlier_advances() -> None:
@@ -367,14 +387,14 @@ def test_deadline_follows_the_duration_of_earlier_advances() -> None:
         advance(dispatch, 0, 0.0, 50.0)
         advance(dispatch, 0, 100.0, lasts_s)
         dispatch.handle(Ticked(200.0))
-        dispatch.handle(ShardRequested(0))
+        dispatch.request(0)
         assert dispatch.handle(Ticked(199.0 + limit_s)) == []
         assert dispatch.handle(Ticked(200.0 + limit_s)) == [AskProgress("a")]
 
 
 def test_worker_that_reports_progress_keeps_its_advance() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     now_s, asked = 0.0, 0
     while now_s < 100 * FIRST_S:
         now_s += 1.0
@@ -391,45 +411,43 @@ def test_worker_that_reports_progress_keeps_its_advance() -> None:
 def test_slow_advance_on_several_silent_workers_ends() -> None:
     """The deadline doubles, so that one of them finishes the advance."""
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     now_s, lasts_s, assigned_s, moves = 0.0, 1000.0, 0.0, 0
-    hand = AssignShard(1, 0, "a", "p", is_whole=True)
-    stale: list[AssignShard] = []
+    hand = Sent(1, 0, "a", "p", is_whole=True)
+    stale: list[Sent] = []
     while now_s - assigned_s < lasts_s:
         assert now_s < 10 * lasts_s
         now_s += 1.0
         for command in dispatch.handle(Ticked(now_s)):
-            if isinstance(command, AssignShard):
+            if isinstance(command, Sent):
                 stale.append(hand)
                 hand, assigned_s, moves = command, now_s, moves + 1
         # An agent finishes what it has begun, in vain.
         for old in [each for each in stale if now_s > assigned_s + lasts_s / 20]:
             stale.remove(old)
-            assert dispatch.handle(ShardReturned(old.number, "done")) == []
+            assert dispatch.returned(old.number) == []
     assert moves == 6
-    assert dispatch.handle(ShardReturned(hand.number, "done")) == [
-        ShardDone(0, hand.agent)
-    ]
+    assert dispatch.returned(hand.number) == [Ended(0, hand.agent)]
 
 
 def test_silent_worker_loses_its_advance_to_a_busy_one_with_room() -> None:
     """One that has arenas of its own is never idle until they end."""
     dispatch = fleet("a", "b")
     for shard in (0, 1):
-        dispatch.handle(ShardRequested(shard))
+        dispatch.request(shard)
     dispatch.handle(Ticked(FIRST_S))
     dispatch.handle(Progressed("b"))
     assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == [
         Overdue("a", FIRST_S + REPLY_S, "b"),
-        CancelShard(1, 0, "a"),
-        AssignShard(3, 0, "b", "p", is_whole=True),
+        Cancelled(1, 0, "a"),
+        Sent(3, 0, "b", "p", is_whole=True),
     ]
     # One without room gets none.
     dispatch = Fleet()
     for name in "ab":
         dispatch.handle(Joined(name, "worker", 1, "p", shards=1))
     for shard in (0, 1):
-        dispatch.handle(ShardRequested(shard))
+        dispatch.request(shard)
     dispatch.handle(Ticked(FIRST_S))
     dispatch.handle(Progressed("b"))
     lines = [Overdue("a", FIRST_S + REPLY_S)]
@@ -439,16 +457,16 @@ def test_silent_worker_loses_its_advance_to_a_busy_one_with_room() -> None:
 @pytest.mark.parametrize("advance_s", [0.1, 4.0])
 def test_deadlines_of_advances_follow_their_simulated_time(advance_s: float) -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0, 40.0))
+    dispatch.request(0, 40.0)
     # The first: ten times faster than real time.
     assert dispatch.handle(Ticked(3.9)) == []
     assert dispatch.handle(Ticked(4.1)) == [AskProgress("a")]
-    dispatch.handle(ShardReturned(1, "done"))
-    dispatch.handle(ShardRequested(0, 10.0))
+    dispatch.returned(1)
+    dispatch.request(0, 10.0)
     dispatch.handle(Ticked(4.1 + advance_s))
-    dispatch.handle(ShardReturned(2, "done"))
+    dispatch.returned(2)
     dispatch.handle(Ticked(100.0))
-    dispatch.handle(ShardRequested(0, 20.0))
+    dispatch.request(0, 20.0)
     limit_s = max(LEAST_S, PATIENCE * 2.0 * advance_s)
     assert dispatch.handle(Ticked(99.9 + limit_s)) == []
     assert dispatch.handle(Ticked(100.2 + limit_s)) == [AskProgress("a")]
@@ -458,7 +476,7 @@ def test_silent_worker_keeps_its_advance_while_no_other_is_idle() -> None:
     dispatch = fleet("a", "b")
     for shard in (0, 1):
         dispatch.handle(ShardSeen(shard, "p"))
-        dispatch.handle(ShardRequested(shard))
+        dispatch.request(shard)
     dispatch.handle(joined("c", "another"))
     dispatch.handle(joined("d", kind="analyzer"))
     dispatch.handle(Ticked(FIRST_S))
@@ -477,7 +495,7 @@ def test_silent_worker_keeps_its_advance_while_no_other_is_idle() -> None:
 
 def test_single_worker_never_loses_its_advance() -> None:
     dispatch = fleet("a")
-    dispatch.handle(ShardRequested(0))
+    dispatch.request(0)
     commands = [
         command
         for second in range(5000)
@@ -486,25 +504,25 @@ def test_single_worker_never_loses_its_advance() -> None:
     assert [each for each in commands if not isinstance(each, AskProgress)] == [
         Overdue("a", FIRST_S + REPLY_S)
     ]
-    assert dispatch.handle(ShardReturned(1, "done")) == [ShardDone(0, "a")]
+    assert dispatch.returned(1) == [Ended(0, "a")]
 
 
 def test_all_advances_of_a_silent_worker_move_at_once() -> None:
     dispatch = fleet("a", "b")
     for shard in range(4):
-        dispatch.handle(ShardRequested(shard))
+        dispatch.request(shard)
     for number in (2, 4):
-        dispatch.handle(ShardReturned(number, "done"))
+        dispatch.returned(number)
     dispatch.handle(Ticked(FIRST_S))
     dispatch.handle(Ticked(FIRST_S + REPLY_S))
     assert [dispatch.holder(shard) for shard in range(4)] == ["b"] * 4
     # A new shard avoids the silent worker until it gives a sign of life.
-    (hand,) = dispatch.handle(ShardRequested(4))
-    assert isinstance(hand, AssignShard)
+    (hand,) = dispatch.request(4)
+    assert isinstance(hand, Sent)
     assert hand.agent == "b"
     dispatch.handle(Progressed("a"))
-    (hand,) = dispatch.handle(ShardRequested(5))
-    assert isinstance(hand, AssignShard)
+    (hand,) = dispatch.request(5)
+    assert isinstance(hand, Sent)
     assert hand.agent == "a"
 
 
@@ -518,12 +536,12 @@ def test_full_worker_gets_a_shard_only_if_all_are_full() -> None:
     dispatch.handle(Joined("a", "worker", 1, "p", shards=2))
     dispatch.handle(Joined("b", "worker", 1, "p", shards=5))
     for shard in range(7):
-        assert len(dispatch.handle(ShardRequested(shard))) == 1
+        assert len(dispatch.request(shard)) == 1
     assert spread(dispatch, 7) == {"a": 2, "b": 5}
-    (told, hand) = dispatch.handle(ShardRequested(7))
+    (told, hand) = dispatch.request(7)
     assert told == Crowded(8, 7)
-    assert isinstance(hand, AssignShard)
-    assert len(dispatch.handle(ShardRequested(8))) == 1
+    assert isinstance(hand, Sent)
+    assert len(dispatch.request(8)) == 1
 
 
 def test_shards_spread_by_cores() -> None:
@@ -531,7 +549,7 @@ def test_shards_spread_by_cores() -> None:
     dispatch.handle(Joined("a", "worker", 1, "p", shards=16, cores=1))
     dispatch.handle(Joined("b", "worker", 1, "p", shards=16, cores=3))
     for shard in range(12):
-        dispatch.handle(ShardRequested(shard))
+        dispatch.request(shard)
     assert spread(dispatch, 12) == {"a": 3, "b": 9}
 
 
@@ -539,51 +557,51 @@ def test_forty_shards_on_two_workers_are_never_rebuilt() -> None:
     dispatch = Fleet()
     for name in ("a", "b"):
         dispatch.handle(Joined(name, "worker", 1, "p", shards=20))
-    hands = [dispatch.handle(ShardRequested(shard))[0] for shard in range(40)]
+    hands = [dispatch.request(shard)[0] for shard in range(40)]
     for _ in range(10):
         following = []
         for hand in hands:
-            assert isinstance(hand, AssignShard)
-            dispatch.handle(ShardReturned(hand.number, "done"))
-            following += dispatch.handle(ShardRequested(hand.shard))
+            assert isinstance(hand, Sent)
+            dispatch.returned(hand.number)
+            following += dispatch.request(hand.shard)
         hands = following
     assert spread(dispatch, 40) == {"a": 20, "b": 20}
-    assert dispatch.shards.rebuilt == 0
+    assert dispatch.homes.rebuilt == 0
     dispatch.handle(Left("a"))
-    assert dispatch.shards.rebuilt == 20
+    assert dispatch.homes.rebuilt == 20
 
 
 def test_worker_that_joins_late_takes_over_its_share() -> None:
     dispatch = fleet("a")
-    (first, *_) = [dispatch.handle(ShardRequested(shard))[0] for shard in range(5)]
-    dispatch.handle(ShardRequested(5))
-    assert isinstance(first, AssignShard)
-    dispatch.handle(ShardReturned(first.number, "done"))
+    (first, *_) = [dispatch.request(shard)[0] for shard in range(5)]
+    dispatch.request(5)
+    assert isinstance(first, Sent)
+    dispatch.returned(first.number)
     commands = dispatch.handle(joined("b"))
     # Those that wait in the queue of the other; none of them has a state yet.
     assert [
-        command.shard for command in commands if isinstance(command, CancelShard)
+        command.shard for command in commands if isinstance(command, Cancelled)
     ] == [5, 4, 3]
     assert spread(dispatch, 6) == {"a": 3, "b": 3}
-    assert dispatch.shards.rebuilt == 0
+    assert dispatch.homes.rebuilt == 0
 
 
 def test_shard_with_a_state_moves_after_its_present_advance() -> None:
     dispatch = fleet("a")
     for shard in (0, 1):
         advance(dispatch, shard, shard, 0.5)
-    (hand,) = dispatch.handle(ShardRequested(1))
+    (hand,) = dispatch.request(1)
     assert dispatch.handle(joined("b")) == []
-    assert isinstance(hand, AssignShard)
-    assert dispatch.handle(ShardReturned(hand.number, "done")) == [ShardDone(1, "a")]
-    (hand,) = dispatch.handle(ShardRequested(1))
-    assert hand == AssignShard(4, 1, "b", "p", is_whole=True)
-    assert dispatch.shards.rebuilt == 1
+    assert isinstance(hand, Sent)
+    assert dispatch.returned(hand.number) == [Ended(1, "a")]
+    (hand,) = dispatch.request(1)
+    assert hand == Sent(4, 1, "b", "p", is_whole=True)
+    assert dispatch.homes.rebuilt == 1
 
 
 def test_released_shard_is_forgotten() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(ShardRequested(0))
-    assert dispatch.handle(Released(0)) == []
-    assert dispatch.handle(ShardReturned(1, "done")) == []
+    dispatch.request(0)
+    assert dispatch.handle(Released(0)) == [Cancelled(1, 0, "a")]
+    assert dispatch.returned(1) == []
     assert dispatch.handle(Ticked(100 * FIRST_S)) == []

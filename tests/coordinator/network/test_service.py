@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
     AskProgress,
     Assign,
+    Crowded,
     Deliver,
     DispatchEvent,
     Job,
@@ -127,8 +129,11 @@ class Driver:
         self.took_s: list[float | None] = []
 
     def tell(self, event: DispatchEvent) -> None:
+        if isinstance(event, Returned) and (job := self.dispatch.job(event.number)):
+            answer = job.read(event.answer) if event.outcome == "ok" else None
+            event = replace(event, answer=answer)
         for command in self.dispatch.handle(event):
-            if isinstance(command, AskProgress | Overdue):
+            if isinstance(command, AskProgress | Overdue | Crowded):
                 continue
             job = command.job
             if isinstance(command, Assign):

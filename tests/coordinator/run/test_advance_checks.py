@@ -14,12 +14,12 @@ from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
     Client,
+    Deliver,
     Joined,
     Read,
     Returned,
-    ShardDone,
 )
-from coordinator.dispatch.fleet import End, JobRouter
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
@@ -118,7 +118,7 @@ class Two(SentJobs):
         worker = self.workers[self.sent[-1][1]]
         return decode(Answer, answer_to(worker.answer, self.request), ADVANCE_BYTES)
 
-    def answer(self, answer: Answer | bytes) -> list[End]:
+    def answer(self, answer: Answer | bytes) -> list[Deliver]:
         """Answer the newest request; return what ended."""
         data = answer if isinstance(answer, bytes) else encode(answer)
         number, agent, _ = self.sent[-1]
@@ -128,15 +128,18 @@ class Two(SentJobs):
     @property
     def read(self) -> Read:
         """The reader of the answer to the newest request."""
-        return self.fleet._advance_reads[self.sent[-1][0]]
+        number, agent, _ = self.sent[-1]
+        job = self.fleet.dispatch.job(number)
+        assert job is not None
+        _, read = job.sent[number, agent]
+        return read
 
-    def wait(self, seconds: float) -> list[End]:
+    def wait(self, seconds: float) -> list[Deliver]:
         self.now_s += seconds
         return self.fleet.listen(0.0, self.now_s).get(CLIENT, [])
 
 
-def event_of(end: End) -> Advanced:
-    assert isinstance(end, ShardDone)
+def event_of(end: Deliver) -> Advanced:
     assert isinstance(end.answer, Reached)
     return end.answer.event
 
