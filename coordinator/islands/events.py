@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.learners.learner import Batch, Points
-from schema.limits import Finite
+from schema.limits import Finite, printable
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
@@ -18,6 +18,21 @@ from schema.wire.messages import Evaluate, Vet
 
 QUARANTINED = "quarantined: "
 """Begin of the reason of a failed evaluation that crashed its workers' processes."""
+_SHOWN = 80
+"""Characters of a text that an error shows."""
+
+
+def brief(event: Message | str) -> str:
+    """Return the type of an event and its names and numbers; a text stays as it is."""
+    if isinstance(event, str):
+        return event
+    values = {name: getattr(event, name) for name in event.__struct_fields__}
+    small = (
+        f"{name}={printable(str(value), _SHOWN)}"
+        for name, value in values.items()
+        if isinstance(value, int | str | BirthId)
+    )
+    return f"{type(event).__name__}({', '.join(small)})"
 
 
 # --- Events --------------------------------------------------------

@@ -35,6 +35,7 @@ from coordinator.islands.events import (
     Outcome,
     Record,
     Started,
+    brief,
 )
 from coordinator.islands.island import Island
 from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
@@ -58,6 +59,10 @@ Request = Vet | Evaluate | AdvanceShard | Ask
 
 Event = Started | ExternalEvent | MigrationEvent
 """Events of islands and arenas."""
+
+
+_RECENT = 20
+"""Events that the error about an unexpected one names."""
 
 
 class Log(Protocol):
@@ -119,6 +124,7 @@ class Loop:
         self._requests = Requests(context, fleet, self.checks.audit)
         self._learners = Learners(context.experiments, context.origin)
         self._now_s = 0.0
+        self._recent: deque[Event | str] = deque(maxlen=_RECENT)
 
     @property
     def is_finished(self) -> bool:
@@ -261,16 +267,24 @@ class Loop:
                 return
         self.shard_requests.send(command)
 
-    def _tell(self, number: int, event: Started | ExternalEvent) -> list[Request]:
+    def _tell(self, number: int, first: Started | ExternalEvent) -> list[Request]:
         """Deliver an event, carry out the commands, return the requests to send.
 
         Raises:
             UnexpectedEvent: no island takes such an event.
         """
         requests: list[Request] = []
-        events: deque[tuple[int, Event]] = deque([(number, event)])
+        events: deque[tuple[int, Event]] = deque([(number, first)])
         while events:
-            for command in self._handled(*events.popleft()):
+            to, event = events.popleft()
+            # The poses of an advance are large.
+            self._recent.append(brief(event) if isinstance(event, Advanced) else event)
+            try:
+                commands = self._handled(to, event)
+            except UnexpectedEvent as error:
+                last = "; ".join(map(brief, self._recent))
+                raise UnexpectedEvent(f"{error}; the last events: {last}") from error
+            for command in commands:
                 match command:
                     case Record():
                         self._write(command)
@@ -308,4 +322,4 @@ class Loop:
                 return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):
             return machine.handle(event)
-        raise UnexpectedEvent(f"no island here takes {event}")
+        raise UnexpectedEvent(f"no island here takes {brief(event)}")

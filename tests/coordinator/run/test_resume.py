@@ -14,9 +14,10 @@ from msgspec import structs
 
 import analyzer.report
 from coordinator.dispatch.fleet import JobRouter
-from coordinator.islands.events import Ask, Asked
+from coordinator.islands.events import Ask, Asked, EvaluationFailed
 from coordinator.islands.island import Island
 from coordinator.network.local import LocalAgents
+from coordinator.run.history import replayed
 from coordinator.run.learners import Learners
 from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
@@ -25,13 +26,16 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
+from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, SelectionSection
 from schema.experiment.file import experiment_text
 from schema.experiment.learning import Learning
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.tables.files import read_table
 from schema.wire.messages import Evaluate, Failure, Request
 from schema.wire.protobuf import encode_robot
+from tests.coordinator.reports import PROVENANCE
 
 EXPERIMENT = Experiment(
     name="resume", births=40, selection=SelectionSection(population=8, children=6)
@@ -170,3 +174,18 @@ def test_newborns_that_learn_are_resumed_in_the_middle(
     # Two requests for each newborn; those three were lost, and no answer was asked for
     # twice.
     assert len(asked) == LEARNING.births * 2 + 3
+
+
+def test_an_unexpected_event_comes_with_the_last_ones(undisturbed: Path) -> None:
+    with Journal.open(undisturbed) as journal:
+        events = list(journal.replay())
+    stranger = EvaluationFailed(BirthId(0, 10**6), "no such robot", PROVENANCE)
+    details = replace(DETAILS, document=experiment_text(EXPERIMENT))
+    context = RunContext.of("resume", 1, EXPERIMENT, DETAILS.origin)
+    with pytest.raises(UnexpectedEvent) as caught:
+        replayed(details, context, [*events, stranger], store=Snapshots(undisturbed))
+    last = str(caught.value).partition("; the last events: ")[2].split("; ")
+    assert len(last) == 20
+    birth = "birth=BirthId(island=0, number=1000000)"
+    assert last[-1] == f"EvaluationFailed({birth}, reason=no such robot, trial=0)"
+    assert last[-2].startswith(type(events[-1]).__name__)
