@@ -11,15 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch.dispatch import (
-    CALL_S,
-    COPY_GROWTH,
-    LEAST_S,
-    MAX_DEATHS,
-    MAX_ERRORS,
-    VETS_AT_HAND,
-    Dispatch,
-)
+from coordinator.dispatch.assignment import CALL_S, COPY_GROWTH, LEAST_S, VETS_AT_HAND
+from coordinator.dispatch.dispatch import MAX_DEATHS, MAX_ERRORS, Dispatch
 from coordinator.dispatch.events import (
     AgentKind,
     AskProgress,
