@@ -14,17 +14,7 @@ from schema.robot.robot import Robot
 
 
 def main(arguments: list[str]) -> int:
-    """Run ``revolve robot ...`` and return its exit code.
-
-    Args:
-        arguments: the command's name, ``robot``, first.
-
-    Returns:
-        0 if done.
-
-    Raises:
-        RevolveError: a file does not hold a robot, or cannot be read or written.
-    """
+    """Run ``revolve robot ...`` and return its exit code."""
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
     robot, settings, experiment = read_with_settings(

@@ -165,21 +165,14 @@ def _types_in_words(found: re.Match[str]) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number and a noun in the right form, such as "2 workers".
-
-    Args:
-        number: any whole number.
-        noun: singular of a noun whose plural ends in "s".
-    """
+    """Return a number and a noun, whose plural ends in "s", such as "2 workers"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def rounded(value: float, digits: int = 4) -> str:
     """Return a number with so many significant digits, also if it is small.
 
-    Args:
-        value: any number, such as 0.0002; from 1 / 10000 on without exponent.
-        digits: significant digits; whole numbers keep all of theirs.
+    Whole numbers keep all of their digits; there is no exponent from 1 / 10000 on.
     """
     if abs(value) >= 10**digits - 0.5:
         return f"{value:.0f}"

@@ -182,14 +182,11 @@ def printable_lines(text: str) -> str:
 
 
 def printable(text: str, most: int = MOST_SHOWN) -> str:
-    """Return a text as one line without control characters, cut at a length.
+    """Return a text as one line of at most so many characters.
 
     Each run of white space becomes a space; a character that is not printable becomes
-    ``?``, so that no text can move a terminal's cursor or reverse its direction.
-
-    Args:
-        text: from another process, of any length.
-        most: characters to keep; a longer text ends in ``...``.
+    ``?``, so that no text can move a terminal's cursor or reverse its direction. A text
+    that is cut ends in ``...``.
     """
     if len(text) <= most and text.isprintable() and "  " not in text:
         return text.strip()

@@ -245,12 +245,7 @@ SERVO = Motor(gain=0.9, max_torque=0.17658, max_velocity=5.236)
 
 
 def block_shape(size: Vector, mass: float) -> Shape:
-    """Return the shape of a box with slots at its front, back, right and left.
-
-    Args:
-        size: full lengths along x, y, z [m]; x and y are equal.
-        mass: [kg].
-    """
+    """Return a box, x and y equal [m], [kg], with slots front, back, right and left."""
     reach = 0.5 * size[0]
     slots = (
         Slot((0.0, -reach, 0.0), MINUS_Y, Z),

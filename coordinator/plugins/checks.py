@@ -70,10 +70,6 @@ def refuse_faulty(
 
     Built-in plug-ins are not checked: the tests of this project do that.
 
-    Args:
-        drafts: of ``read_drafts``.
-        births: as for ``read_drafts``.
-
     Raises:
         ExperimentError: one cannot be loaded, breaks its contract, takes too long or
             ends its process; an experiment that is invalid.
@@ -105,11 +101,7 @@ def _refuse(words: Sequence[str]) -> None:
 
 
 def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
-    """Return the experiments of a run or campaign folder; allow its plug-ins.
-
-    Raises:
-        ExperimentError: a plug-in that is not that of the beginning.
-    """
+    """Return the experiments of a run or campaign folder; allow its plug-ins."""
     if not is_campaign(folder):
         allow_plugins_of(folder, is_resumed=True)
         return (experiment_from_text(read_details(folder).document, is_own=True),)
@@ -123,9 +115,7 @@ def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
 def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
     """Raise unless built-in plug-ins exist and take the parameters of an experiment.
 
-    Args:
-        experiment: its own plug-ins are not imported.
-        kinds: kinds of the plug-ins that are loaded.
+    Its own plug-ins are not imported.
 
     Raises:
         ExperimentError: a name or parameters that are not allowed.
@@ -163,11 +153,8 @@ def check_apart(
 ) -> list[str]:
     """Check plug-ins in a process of their own; return a line for each faulty one.
 
-    Args:
-        words: arguments of ``revolve check``.
-        tell: called with a line for each plug-in that is in order.
-        limit_s: time for the import, and for the check, of one plug-in [s].
-        warn: called with a line for each warning about a plug-in that is in order.
+    ``tell`` gets a line for each plug-in in order, ``warn`` one for each warning; an
+    import, and a check, may each take ``limit_s`` [s].
     """
     flags = [HERE, str(limit_s)]
     for entry in allowed():
@@ -214,13 +201,8 @@ def check_here(
 ) -> bool:
     """Check plug-ins in this process; return whether all are in order.
 
-    Args:
-        words: ``MODULE:NAME``, ``FILE.py:NAME``, or experiments.
-        kinds: all kinds.
-        kind: name of the kind that the words are of; None: detected.
-        output: gets the steps as lines of JSON.
-        limit_s: time after which an import or a check ends this process [s].
-        births: as for ``read_drafts``.
+    The words are as of ``revolve check``; their kind is detected unless it is named.
+    The output gets the steps as lines of JSON.
     """
     is_fine = True
 
@@ -250,11 +232,7 @@ def check_here(
 
 
 def _check_plugin(use: Use, say: Callable[[str, str], None]) -> None:
-    """Check a plug-in; say that it is in order, and what to beware of.
-
-    Raises:
-        ExperimentError: it is not in order.
-    """
+    """Check a plug-in; say that it is in order, and what to beware of."""
     key = use.kind.key
     say("begin", f"{key}: {use.path}")
     where, warning = use.check(lambda place: say("begin", f"{key}: {place}"))
@@ -321,11 +299,7 @@ def _time_limit(limit_s: float) -> Iterator[None]:
 def _uses(
     word: str, kinds: Sequence[Kind], kind: str | None, births: int | None
 ) -> list[Use]:
-    """Return the own plug-ins that a word of the command line means.
-
-    Raises:
-        ExperimentError: one cannot be loaded, or is of no kind.
-    """
+    """Return the own plug-ins that a word of the command line means."""
     place, colon, attribute = word.rpartition(":")
     if word.endswith(".py"):
         raise ExperimentError(f"{word}: name a function or class: {word}:NAME")

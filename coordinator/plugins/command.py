@@ -37,15 +37,7 @@ class Listed(NamedTuple):
 
 
 def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
-    """Run ``revolve check``; return 0 if all plug-ins are in order, else 1.
-
-    Args:
-        arguments: after the command's name.
-        kinds: all kinds.
-
-    Raises:
-        ExperimentError: a ``--plugins`` entry that is not there.
-    """
+    """Run ``revolve check``; return 0 if all plug-ins are in order, else 1."""
     options = check_flags(kinds).parse_args(arguments)
     allow(options.plugins)
     if options.here:
@@ -66,15 +58,7 @@ def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
 
 
 def list_plugins(arguments: list[str], kinds: Sequence[Kind]) -> int:
-    """Run ``revolve plugins``; return 0, or 1 if a module cannot be loaded.
-
-    Args:
-        arguments: after the command's name.
-        kinds: all kinds.
-
-    Raises:
-        ExperimentError: a ``--plugins`` entry that is not there.
-    """
+    """Run ``revolve plugins``; return 0, or 1 if a module cannot be loaded."""
     options = list_flags().parse_args(arguments)
     allow(options.plugins)
     rows = [*_built_in(kinds), *_found(kinds)]
@@ -113,11 +97,7 @@ def _found(kinds: Sequence[Kind]) -> Iterator[Listed]:
 
 
 def check_flags(kinds: Sequence[Kind]) -> Flags:
-    """Return the parser of ``revolve check``.
-
-    Args:
-        kinds: all kinds.
-    """
+    """Return the parser of ``revolve check``."""
     flags = Flags(
         prog="revolve check",
         description="Check plug-ins as a run does before its first birth: one line for "

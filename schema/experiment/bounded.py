@@ -26,11 +26,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_KEY_PART}){{{MOST_KEY_PARTS}}}")
 
 
 def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
-    """Return the bytes of a file.
-
-    Args:
-        path: of the file.
-        most: greatest allowed size.
+    """Return the bytes of a file, at most so many.
 
     Raises:
         OSError: the file cannot be read, or is larger (errno ``EFBIG``).
@@ -45,10 +41,7 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
 def text_of(path: Path, where: str, near: str = "") -> str:
     """Return the text of a user's file.
 
-    Args:
-        path: of the file.
-        where: begins the message of an error.
-        near: ends it if the file is missing.
+    ``where`` begins the message of an error, ``near`` ends it if the file is missing.
 
     Raises:
         ExperimentError: the file cannot be read, is too large, or is no text.
@@ -99,11 +92,6 @@ def parse_xml(
     text: str, most: int = MOST_TEXT_BYTES, most_depth: int = MOST_DEPTH
 ) -> ET.Element:
     """Return the root of an XML text that has no document type and so no entities.
-
-    Args:
-        text: the document.
-        most: greatest allowed length.
-        most_depth: greatest allowed number of levels.
 
     Raises:
         ValueError: not XML; a document type; too long, too deep, too many elements or

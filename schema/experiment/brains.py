@@ -53,13 +53,9 @@ _BUILT_IN = {
 def neuron_types(names: tuple[str, ...]) -> tuple[NeuronType, ...]:
     """Return the neuron types of an experiment, in its order.
 
-    Args:
-        names: ``space.neuron_types``.
-
     Raises:
-        UnknownPlugin: no such type, module or attribute, or a module that is not
-            allowed.
-        ExperimentError: no type, two of one name, or one that breaks its contract.
+        ExperimentError: no such type, none, two of one name, or one that breaks its
+            contract.
     """
     where = "space.neuron_types"
     types: dict[str, NeuronType] = {}
@@ -84,8 +80,8 @@ def types_of(
     """Return the part types and the neuron types that robots may have, by name.
 
     Raises:
-        UnknownPlugin: no such part type, neuron type or brain type.
-        ExperimentError: one that breaks its contract, or wrong parameters.
+        ExperimentError: no such type, one that breaks its contract, or wrong
+            parameters.
     """
     return body_space(settings.space), neuron_kinds(settings.brain, settings.space)
 
@@ -94,8 +90,8 @@ def neuron_kinds(brain: BrainSection, space: Space) -> NeuronKinds:
     """Return the types of output and hidden neurons that robots may have, by name.
 
     Raises:
-        UnknownPlugin: no such neuron type or brain type.
-        ExperimentError: one that breaks its contract, or wrong parameters.
+        ExperimentError: no such type, one that breaks its contract, or wrong
+            parameters.
     """
     if ":" in brain.type:
         return _own_brain(brain, space.neuron_types).neurons
@@ -111,14 +107,11 @@ def brain_half(
 ) -> Half:
     """Return the half of an experiment's brain type that one room needs.
 
-    Args:
-        brain: names the type.
-        space: names its neuron types.
-        built_in: that half of the built-in types, by short name.
+    ``built_in`` has that half of the built-in types, by short name.
 
     Raises:
-        UnknownPlugin: no such neuron type or brain type.
-        ExperimentError: one that breaks its contract, or wrong parameters.
+        ExperimentError: no such type, one that breaks its contract, or wrong
+            parameters.
     """
     if ":" in brain.type:
         # An own class has both halves.

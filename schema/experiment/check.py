@@ -39,18 +39,8 @@ def check_experiment(experiment: Experiment, where: str) -> None:
     """Raise unless the sections of an experiment are consistent.
 
     Raises:
-        ExperimentError: a name that no folder can have; limits that no robot can
-            meet; a population too small to choose parents; a window that ends
-            between two samples; an arena too small, or with intervals that are not
-            multiples of its clocks; off-line keys in an arena; an extent that is
-            not a whole number of patches; invalid scenery; an unknown plug-in; a
-            migration that can never happen; measures that are named twice, or
-            parameters of a measure that is not named; a range that ends before it
-            begins; a calibration of an unknown part type, or with a delay between two
-            ticks; light sensors or a fitness that need a light that is not there;
-            disturbances or calibrations in an arena; an unknown learner,
-            learning with re-evaluations, or in an arena with windows that end between
-            two ticks.
+        ExperimentError: the first thing that is wrong; the message names file and
+            key.
     """
     with naming(where):
         if problem := next(_problems(experiment), ""):

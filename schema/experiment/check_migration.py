@@ -14,11 +14,7 @@ _UNCONNECTED = (
 
 
 def migration_problems(experiment: Experiment) -> Iterator[str]:
-    """Yield what is wrong with an experiment's migration.
-
-    Args:
-        experiment: its other sections are consistent.
-    """
+    """Yield what is wrong with the migration of an otherwise consistent experiment."""
     migration, count = experiment.migration, island_count(experiment)
     if migration is None:
         if any(islands.migration for islands in experiment.islands):

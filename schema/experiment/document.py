@@ -591,9 +591,8 @@ def body_space(space: Space) -> BodySpace:
     """Return the part types of a document by name, in its order.
 
     Raises:
-        UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a part type, or one that ``check_part_type`` refuses; two
-            of one name, or not exactly one core.
+        ExperimentError: no such part type, one that ``check_part_type`` refuses,
+            two of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:

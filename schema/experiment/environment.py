@@ -143,9 +143,6 @@ def arena_problems(environment: Environment) -> Iterator[str]:
 def relief(environment: Environment) -> Floats:
     """Return the heights of rough ground as shares of the greatest, in [0, 1].
 
-    Args:
-        environment: with roughness.
-
     Returns:
         (N, N) exact in single precision, rows along y, columns along x, both
         ascending; 0 at the rim, 1 at the highest node.

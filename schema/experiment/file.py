@@ -100,9 +100,7 @@ def read_experiment(source: str | Tables, where: str = "") -> Experiment:
 
     The modules that it names may be imported by this process from now on.
 
-    Args:
-        source: as for ``read_draft``.
-        where: as for ``read_draft``.
+    Arguments as of ``read_draft``.
 
     Raises:
         ExperimentError: as of ``read_draft`` and ``Draft.checked``; a sweep.
@@ -119,9 +117,6 @@ def read_experiment(source: str | Tables, where: str = "") -> Experiment:
 
 def source_text(source: str) -> tuple[str, str]:
     """Return the TOML text of an experiment, and its path for ``parse_toml``.
-
-    Args:
-        source: as for ``read_experiment``.
 
     Raises:
         ExperimentError: no such experiment or file.

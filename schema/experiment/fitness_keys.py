@@ -23,10 +23,7 @@ _DEFAULTS: dict[str, Any] = to_builtins(Fitness())
 
 
 def check_fitness_keys(fitness: Fitness) -> None:
-    """Raise if a key that was changed has no effect.
-
-    Args:
-        fitness: the section; its function is called.
+    """Raise if a key that was changed has no effect; the function is called.
 
     Raises:
         ExperimentError: the function has parameters of its own, or does not read the

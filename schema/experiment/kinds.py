@@ -65,8 +65,7 @@ class Use(NamedTuple):
     def check(self, begin: Callable[[str], None] = lambda _: None) -> tuple[str, str]:
         """Check the plug-in; return where it is defined, and a warning or nothing.
 
-        Args:
-            begin: called with file and line before the check.
+        ``begin`` is called with file and line before the check.
 
         Raises:
             ExperimentError: one line with key, file and line, and what was expected.

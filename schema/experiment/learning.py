@@ -53,13 +53,7 @@ def learning_problems(
     is_reevaluated: bool,
     encoding: str,
 ) -> Iterator[str]:
-    """Yield what is wrong with the section of one island.
-
-    Args:
-        learning: the section; None if there is none.
-        is_reevaluated: whether the island re-evaluates its robots.
-        encoding: key ``encoding.type``.
-    """
+    """Yield what is wrong with the section of one island."""
     if learning is None:
         return
     name = learning.learner

@@ -139,12 +139,7 @@ class Calibration(Section, frozen=True):
 def calibration_problems(
     entries: Sequence[Calibration], types: Mapping[str, PartType]
 ) -> Iterator[str]:
-    """Yield what is wrong with the part types that the entries name.
-
-    Args:
-        entries: the tables.
-        types: part types of the experiment, by name.
-    """
+    """Yield what is wrong with the part types that the entries name."""
     names = Counter(entry.part for entry in entries)
     for number, entry in enumerate(entries):
         where, name = f"calibration[{number}]", shown(entry.part)
@@ -164,13 +159,7 @@ def calibration_problems(
 def delay_problems(
     entries: Sequence[Calibration], tick_s: float, *, is_arena: bool
 ) -> Iterator[str]:
-    """Yield what is wrong with the entries on one island.
-
-    Args:
-        entries: the tables.
-        tick_s: time between brain ticks [s].
-        is_arena: whether the island is an arena.
-    """
+    """Yield what is wrong with the entries on one island."""
     if entries and is_arena:
         yield "calibration: is for off-line evaluations, not for arenas; remove it"
     for number, entry in enumerate(entries):

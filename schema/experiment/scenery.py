@@ -60,11 +60,7 @@ class Solid:
 
 
 def solids(scenery: str, simulation: Simulation) -> list[Solid]:
-    """Return the shapes of scenery, in the order of its geoms.
-
-    Raises:
-        ExperimentError: the text is not valid scenery.
-    """
+    """Return the shapes of scenery, in the order of its geoms."""
     model = scenery_model(scenery, simulation)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -83,13 +79,7 @@ def solids(scenery: str, simulation: Simulation) -> list[Solid]:
 def add_scenery(spec: mujoco.MjSpec, scenery: str, simulation: Simulation) -> None:
     """Add the geoms and objects of scenery to a world, both named ``scenery/{k}``.
 
-    Args:
-        spec: of the world; objects come after the bodies that it has.
-        scenery: MJCF.
-        simulation: default friction and contact of its geoms.
-
-    Raises:
-        ExperimentError: the text is not valid scenery.
+    Objects come after the bodies that the world has. Errors as of ``scenery_model``.
     """
     model = scenery_model(scenery, simulation)
     data = mujoco.MjData(model)
@@ -111,11 +101,7 @@ def add_scenery(spec: mujoco.MjSpec, scenery: str, simulation: Simulation) -> No
 
 
 def object_count(environment: Environment, simulation: Simulation) -> int:
-    """Return the number of objects of an environment's scenery.
-
-    Raises:
-        ExperimentError: the text is not valid scenery.
-    """
+    """Return the number of objects of an environment's scenery."""
     if not environment.scenery:
         return 0
     return int(scenery_model(environment.scenery, simulation).njnt)
@@ -156,9 +142,7 @@ def _add_object(
 def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
     """Return the compiled model of scenery alone; do not change it.
 
-    Args:
-        scenery: MJCF.
-        simulation: default friction and contact of its geoms.
+    The simulation has the default friction and contact of its geoms.
 
     Raises:
         ExperimentError: not XML, not MJCF, no geom or too many, too many objects, an

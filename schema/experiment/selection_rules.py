@@ -21,16 +21,13 @@ _NAMES = {"parents": PARENTS, "survivors": SURVIVORS}
 def own_rule(
     selection: SelectionSection, name: str
 ) -> tuple[Callable[..., Any], Any] | None:
-    """Return an own function and its parameters; None for a built-in rule.
+    """Return an own rule for ``parents`` or ``survivors``, and its parameters.
 
-    Args:
-        selection: the section.
-        name: ``parents`` or ``survivors``.
+    None is a built-in rule.
 
     Raises:
-        UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a function of that many arguments, or other parameters than
-            it declares.
+        ExperimentError: no such function of so many arguments, or other parameters
+            than it declares.
     """
     path, key = getattr(selection, name), f"selection.{name}"
     if ":" not in path:
@@ -57,11 +54,7 @@ def _parameters(
 
 
 def rule_problems(selection: SelectionSection) -> Iterator[str]:
-    """Yield what is wrong with the rules of a section.
-
-    Raises:
-        ExperimentError: as of ``own_rule``.
-    """
+    """Yield what is wrong with the rules of a section."""
     for name, built_in in _NAMES.items():
         path = getattr(selection, name)
         if ":" in path:

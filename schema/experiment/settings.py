@@ -155,10 +155,6 @@ def arena_settings_of(experiment: Experiment) -> ArenaSettings:
 def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
     """Return the JSON that every request to advance an arena holds.
 
-    Args:
-        experiment: of the island.
-        origin: run and island.
-
     Raises:
         ExperimentError: the experiment has no arena.
     """
@@ -231,11 +227,8 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
 def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
     """Return settings with another total length of an evaluation.
 
-    The window keeps its length and ends the evaluation; the rest is warm-up.
-
-    Args:
-        settings: to change.
-        steps: of physics, warm-up included; 0 keeps the settings as they are.
+    The window keeps its length and ends the evaluation; the rest is warm-up. 0 steps
+    change nothing.
 
     Raises:
         ExperimentError: fewer steps than the window has.
@@ -257,8 +250,7 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
     """Return the fitness function that an experiment names.
 
     Raises:
-        UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a function of a trace and its parameters.
+        ExperimentError: no such function of a trace and its parameters.
     """
     where = "fitness.function"
     path = fitness.function
@@ -273,10 +265,8 @@ def fitness_argument(
 ) -> Fitness | msgspec.Struct:
     """Return the second argument of a fitness function.
 
-    Args:
-        function: annotated with a Struct of its own, which gets the table
-            ``fitness.parameters``; any other function gets the section.
-        fitness: the section.
+    A function that annotates it with a Struct of its own gets the table
+    ``fitness.parameters``; any other function gets the section.
 
     Raises:
         ExperimentError: parameters that the Struct refuses, or without a Struct.
@@ -296,13 +286,7 @@ def fitness_argument(
 
 
 def ablation_problems(ablation: Ablation, inputs: int, motors: int) -> Iterator[str]:
-    """Yield which inputs and motors of an ablation a robot does not have.
-
-    Args:
-        ablation: of the robot.
-        inputs: number of its brain's inputs.
-        motors: number of its motors.
-    """
+    """Yield which inputs and motors of an ablation a robot with so many lacks."""
     held = [number for number, _ in ablation.inputs]
     for what, numbers, count in (
         ("inputs", held, inputs),

@@ -67,9 +67,6 @@ def settings_problem(tables: dict[str, Any]) -> str:
     """Return what is wrong with the values of a sweep's settings; empty if nothing is.
 
     The errors of ``msgspec`` do not name the setting.
-
-    Args:
-        tables: of the document.
     """
     sweep = tables.get("sweep")
     settings = sweep.get("settings") if isinstance(sweep, dict) else None
@@ -169,11 +166,6 @@ def _latin_hypercube(sweep: Sweep) -> Iterator[list[Any]]:
 
 def with_point(document: dict[str, Any], point: Point, name: str) -> dict[str, Any]:
     """Return a copy of a document's tables at a point of its sweep.
-
-    Args:
-        document: tables of the TOML file.
-        point: value by dotted key.
-        name: of the experiment.
 
     Raises:
         ExperimentError: a key leads through a value that is no table.

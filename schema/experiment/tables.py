@@ -23,10 +23,8 @@ Tables = dict[str, Any]
 def converted(tables: Tables, where: str) -> Experiment:
     """Return the experiment of tables before the checks across their keys.
 
-    Args:
-        tables: of a TOML text; paths of scenery and calibration become what the files
-            hold, in place.
-        where: path of the text, for messages and relative paths.
+    Paths of scenery and calibration, relative to that of the document, become what the
+    files hold, in place.
 
     Raises:
         ExperimentError: an unknown key (the nearest is named); a value of a wrong type
@@ -47,11 +45,6 @@ def converted(tables: Tables, where: str) -> Experiment:
 
 def swept(whole: Experiment, tables: Tables, where: str) -> tuple[Experiment, ...]:
     """Return the experiments of a sweep.
-
-    Args:
-        whole: the converted document, with the sweep.
-        tables: of the document.
-        where: as of ``converted``.
 
     Raises:
         ExperimentError: as of ``converted``; too many points, or equal ones.

@@ -110,16 +110,15 @@ def _refusal(problem: str, event: yaml.Event) -> yaml.YAMLError:
 class Table:
     """Mapping in a document.
 
+    Its methods raise ``InvalidRobot``, with file, line and path: for a missing key
+    without a default, or a value of another kind.
+
     Attributes:
         line: number of its first line, from 1.
     """
 
     def __init__(self, node: DocumentNode | None, path: str, file: str) -> None:
-        """Read a node.
-
-        Raises:
-            InvalidRobot: not a mapping.
-        """
+        """Read a node."""
         self._path = path
         self._stem = f"{path}." if path else ""
         self._file = file
@@ -164,11 +163,7 @@ class Table:
         self._fail(self._at(key), message, line)
 
     def refuse_others(self, *allowed: str) -> None:
-        """Raise unless all keys are allowed; the message names the nearest key.
-
-        Raises:
-            InvalidRobot: a key that is not allowed.
-        """
+        """Raise unless all keys are allowed; the message names the nearest key."""
         for key in self._values:
             if key not in allowed:
                 words = ", ".join(allowed)
@@ -177,19 +172,11 @@ class Table:
                 )
 
     def table(self, key: str) -> "Table":
-        """Return the mapping of a key.
-
-        Raises:
-            InvalidRobot: no such key, or not a mapping.
-        """
+        """Return the mapping of a key."""
         return Table(self._node(key), self._at(key), self._file)
 
     def tables(self, key: str) -> list["Table"]:
-        """Return the list of mappings of a key; empty if the key is missing.
-
-        Raises:
-            InvalidRobot: not a list of mappings.
-        """
+        """Return the list of mappings of a key; empty if the key is missing."""
         if not self.has(key):
             return []
         items = self._node(key).value
@@ -201,11 +188,7 @@ class Table:
         ]
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return the text of a key.
-
-        Raises:
-            InvalidRobot: no such key and no default, or not a text.
-        """
+        """Return the text of a key."""
         if default is not None and not self.has(key):
             return default
         value = self._node(key).value
@@ -214,16 +197,7 @@ class Table:
         return value
 
     def word(self, key: str, allowed: Collection[str], hint: str = "") -> str:
-        """Return the text of a key, one of some words.
-
-        Args:
-            key: of the mapping.
-            allowed: the words.
-            hint: end of the message about another word.
-
-        Raises:
-            InvalidRobot: no such key, or another word; the message names the nearest.
-        """
+        """Return the text of a key, one of some words; a hint ends the message."""
         word = self.text(key)
         if word not in allowed:
             first = ", ".join(map(printable, islice(allowed, _MOST_WORDS)))
@@ -233,19 +207,11 @@ class Table:
         return word
 
     def integer(self, key: str, default: int | None = None) -> int:
-        """Return the whole number of a key.
-
-        Raises:
-            InvalidRobot: no such key and no default, or not a whole number.
-        """
+        """Return the whole number of a key."""
         return self._number(key, default, int, "a whole number")
 
     def number(self, key: str, default: float | None = None) -> float:
-        """Return the finite number of a key.
-
-        Raises:
-            InvalidRobot: no such key and no default, or not a finite number.
-        """
+        """Return the finite number of a key."""
         return self._number(key, default, float, "a finite number")
 
     def _number(
@@ -264,11 +230,7 @@ class Table:
         return value
 
     def key_as_slot(self, key: str) -> int:
-        """Return a key as a slot number.
-
-        Raises:
-            InvalidRobot: not a plain number such as 0 or 12.
-        """
+        """Return a key as a slot number."""
         if not _SLOT.fullmatch(key):
             self.refuse(key, "must be a slot number: 0, 1, ...")
         return int(key)
@@ -289,10 +251,7 @@ class Table:
 def compose(text: str, file: str, language: str = "YAML") -> Table:
     """Return the top-level mapping of a document.
 
-    Args:
-        text: the document.
-        file: its name, for messages.
-        language: YAML, or JSON, which is read as YAML.
+    JSON is read as YAML.
 
     Raises:
         InvalidRobot: not of the language, not a mapping, or beyond a limit

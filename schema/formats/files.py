@@ -33,12 +33,6 @@ def robot_from_yaml(
 ) -> Robot:
     """Return the robot of a YAML text, in the current form or that of Revolve (2016).
 
-    Args:
-        text: the document.
-        file: its name, for messages.
-        space: the allowed part types.
-        kinds: the allowed neuron types.
-
     Raises:
         InvalidRobot: not YAML; an unknown or missing key, part type or name; a value
             of a wrong type; a robot that is not well formed in this body space. The
@@ -73,8 +67,7 @@ _ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSO
 def settings_of(experiment: Experiment | None) -> EvaluationSettings:
     """Return the evaluation settings of an experiment.
 
-    Args:
-        experiment: None for the default values, with all built-in part types.
+    None has the default values, with all built-in part types.
     """
     if experiment is None:
         return EvaluationSettings(
@@ -84,12 +77,7 @@ def settings_of(experiment: Experiment | None) -> EvaluationSettings:
 
 
 def types_for(settings: EvaluationSettings) -> tuple[BodySpace, NeuronKinds]:
-    """Return the types of settings; the default ones have all built-in types.
-
-    Raises:
-        UnknownPlugin: as of ``types_of``.
-        ExperimentError: as of ``types_of``.
-    """
+    """Return the types of settings; the default ones have all built-in types."""
     if settings == settings_of(None):
         return BUILT_IN, BUILT_IN_KINDS
     return types_of(settings)

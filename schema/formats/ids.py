@@ -18,12 +18,6 @@ def with_ids(
     """Return a message of ``check_robot`` with ids in place of indices.
 
     ``body.parts[2].slot: ...`` becomes ``part 'leg': slot: ...``.
-
-    Args:
-        message: names parts, neurons and connections by their indices.
-        parts: id of each part.
-        neurons: id of each neuron.
-        connections: ids of source and target of each connection.
     """
     ids = {
         "body.parts": [shown(name) for name in parts],

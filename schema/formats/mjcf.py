@@ -41,10 +41,6 @@ _FREE_OF_WORLD = ("name", "rgba", "material")
 def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
     """Return the MJCF text of a robot on its ground, with brain and settings.
 
-    Args:
-        robot: the robot.
-        settings: of its evaluation.
-
     Raises:
         InvalidRobot: the robot is not well formed in the settings' body space, or
             MuJoCo cannot build it; MJCF beyond the limits of reading, as of about 400
@@ -78,10 +74,6 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
 def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
     """Return the robot and the settings of an MJCF text.
 
-    Args:
-        text: of an MJCF file.
-        where: its name, for messages.
-
     Raises:
         InvalidRobot: not MJCF; no robot or settings in it; a file that was edited.
     """
@@ -107,11 +99,7 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
 
 
 def _digest(root: ET.Element) -> str:
-    """Return the SHA-256 of a file, without what has no effect on a robot.
-
-    Args:
-        root: of the file; it is changed.
-    """
+    """Return the SHA-256 of a file without what has no effect on a robot, in place."""
     for section in root.findall(f"custom/text[@name='{DIGEST}']/.."):
         root.remove(section)
     for geom in root.iterfind("worldbody/geom"):

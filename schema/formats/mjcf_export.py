@@ -24,11 +24,6 @@ def add_sensors(spec: mujoco.MjSpec, robot: Robot, space: BodySpace) -> None:
 
     An imu becomes ``{p}_accelerometer`` and ``{p}_gyro``, where p is the index of its
     part, and a touch sensor ``{p}_{box}_touch``.
-
-    Args:
-        spec: world of the robot.
-        robot: as built in it.
-        space: its part types.
     """
     _rename(spec)
     for index, part in enumerate(robot.parts):
@@ -78,13 +73,10 @@ def exact_xml(spec: mujoco.MjSpec) -> str:
 
 
 def portable(root: ET.Element) -> ET.Element:
-    """Return MJCF whose servos are ``velocity`` elements, for all readers.
+    """Return MJCF, changed in place, whose servos are ``velocity`` elements.
 
     MuJoCo 4 writes them as ``general`` elements with an attribute ``input``, which
     MuJoCo 3.3 and earlier do not know. Both give the same model.
-
-    Args:
-        root: as MuJoCo writes it; it is changed.
     """
     for servo in root.iterfind("actuator/general[@input='vel']"):
         servo.tag = "velocity"

@@ -106,13 +106,6 @@ def checked_part(
 ) -> RobogenPart:
     """Return a part without children, after checking its fields.
 
-    Args:
-        name: unique in the file.
-        kind: RoboGen's type.
-        turns: quarter turns.
-        values: parameters as in the file.
-        where: file and line or path, for messages.
-
     Raises:
         InvalidRobot: an unknown type, turns outside 0..3, or a wrong number of
             parameters.
@@ -151,11 +144,6 @@ def two_neurons(part: str, number: int) -> str:
 
 def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
     """Return the robot of a RoboGen file.
-
-    Args:
-        theirs: as read from the file.
-        space: the part types; ``schema.robogen_parts`` has RoboGen's dimensions.
-        where: the file's name, for messages.
 
     Raises:
         InvalidRobot: a slot that a part does not have, a parameter out of range, an

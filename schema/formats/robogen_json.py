@@ -34,11 +34,6 @@ _NEURON_KEYS = (
 def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
     """Return the robot of RoboGen's JSON form.
 
-    Args:
-        text: of the file.
-        where: its name, for messages.
-        space: part types that the robot may use.
-
     Raises:
         InvalidRobot: not such JSON; the message names file, line and path.
     """

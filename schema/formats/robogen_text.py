@@ -52,11 +52,6 @@ _PART = re.compile(r"(\t*)(\d) (\S+) (\S+) (\d)((?: \S+)*)\s*")
 def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
     """Return the robot of RoboGen's text form.
 
-    Args:
-        text: of the file.
-        where: its name, for messages.
-        space: part types that the robot may use.
-
     Raises:
         InvalidRobot: not such a text; the message names file, line and what is allowed.
     """

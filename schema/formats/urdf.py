@@ -25,10 +25,7 @@ slider; URDF needs both."""
 def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str:
     """Return the URDF text of a robot's body, in m, kg and rad.
 
-    Args:
-        robot: the robot.
-        space: its part types.
-        simulation: gives the masses, the damping of the joints and the torques.
+    The simulation has the factors of masses and torques, and the damping of the joints.
 
     Raises:
         InvalidRobot: the body is not well formed in this body space, or MuJoCo cannot

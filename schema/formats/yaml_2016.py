@@ -147,14 +147,7 @@ def _tables(table: Table | None, key: str) -> dict[str, Table]:
 def _neuron(
     layer: Layer, part: int, written: Table | None, params: Table | None
 ) -> Neuron:
-    """Return a neuron of type Simple unless a mapping gives another.
-
-    Args:
-        layer: of the neuron.
-        part: index of its part.
-        written: its mapping in ``neurons``.
-        params: its mapping in ``params``, which overrides ``written``.
-    """
+    """Return a neuron, of type Simple unless ``params`` or ``written`` has another."""
     tables = [each for each in (params, written) if each is not None]
     if params is not None and params.has("type"):
         tables = [params]

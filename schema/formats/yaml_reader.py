@@ -51,13 +51,7 @@ class Reader:
     def __init__(
         self, space: BodySpace, file: str, kinds: NeuronKinds = BUILT_IN_KINDS
     ) -> None:
-        """Initialise for a document.
-
-        Args:
-            space: the allowed part types.
-            file: name of the document, for messages.
-            kinds: the allowed neuron types.
-        """
+        """Initialise for a document of a name, with the allowed types."""
         self.space = space
         self._kinds = kinds
         self._file = file

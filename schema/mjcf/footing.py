@@ -51,9 +51,7 @@ class Footprint:
 def footprint(model: mujoco.MjModel, attitude: Floats | None = None) -> Footprint:
     """Return the boxes of the only robot of a model, without static geoms.
 
-    Args:
-        model: of the robot.
-        attitude: of the core, a unit quaternion (4,) w, x, y, z; None if it is level.
+    ``attitude`` of the core is a unit quaternion (4,) w, x, y, z; None is level.
     """
     data = mujoco.MjData(model)
     data.qpos[:7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
@@ -82,14 +80,10 @@ def standing_height(
     place: tuple[float, float],
     heading: float,
 ) -> float:
-    """Return the height of the core of a robot that stands at a place [m].
+    """Return the height of the core [m] of a robot that stands at a place.
 
-    Args:
-        boxes: of the robot.
-        simulation: parameters of the world.
-        environment: ground and scenery.
-        place: centre of the core in the ground plane, world frame [m].
-        heading: rotation about z [rad].
+    The place is that of the core's centre in the ground plane [m], the heading a
+    rotation about z [rad]; both in the world frame.
     """
     around = np.full(len(boxes.turns), heading)
     spots = place + _turned(boxes.centres[:, :, None], around)[:, :2, 0]
@@ -125,11 +119,8 @@ def _highest(
     Patches are flat triangles between nodes, so this is the height of a node of a
     patch that the rectangle touches.
 
-    Args:
-        environment: with roughness.
-        spots: (N, 2) centres of the rectangles [m].
-        turns: (N,) their rotations [rad].
-        halves: (N, 2) their half lengths [m].
+    The rectangles have centres (N, 2) [m], turns (N,) [rad] and half lengths (N, 2)
+    [m].
     """
     c, s = np.abs(np.cos(turns))[:, None], np.abs(np.sin(turns))[:, None]
     reaches = c * halves + s * halves[:, ::-1]
@@ -162,12 +153,7 @@ class _Obstacles:
     """Scenery, with a column to test for intersection."""
 
     def __init__(self, scenery: str, simulation: Simulation) -> None:
-        """Initialise the model of the scenery.
-
-        Args:
-            scenery: MJCF.
-            simulation: parameters of the world.
-        """
+        """Initialise the model of the scenery."""
         # A copy, because the column changes.
         self._model = copy.copy(_probe(scenery, simulation))
         self._data = mujoco.MjData(self._model)
@@ -179,24 +165,16 @@ class _Obstacles:
         self._solid = is_solid.nonzero()[0]
 
     def move(self, spot: Floats, turn: float, half: Floats) -> None:
-        """Move the column.
-
-        Args:
-            spot: (2,) its centre [m].
-            turn: rotation about z [rad].
-            half: (2,) its half lengths [m].
-        """
+        """Move the column to (2,) [m], turned about z [rad]; half lengths (2,) [m]."""
         column, c, s = self._column, cos(turn), sin(turn)
         self._data.geom_xpos[column, :2] = spot
         self._data.geom_xmat[column] = c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0
         self._model.geom_size[column, :2] = half
 
     def cleared(self, bottom: float, height: float) -> float:
-        """Return the least height of the core at which the column is clear [m].
+        """Return the least height of the core, from one on, with a clear column.
 
-        Args:
-            bottom: of the column, relative to the core [m].
-            height: least height of the core [m].
+        ``bottom`` is that of the column, relative to the core; all in m.
         """
         places, radii = self._data.geom_xpos, self._model.geom_rbound
         apart = places[self._solid, :2] - places[self._column, :2]

@@ -67,13 +67,7 @@ class RobotSpec:
 
 
 def robot_spec(robot: Robot, space: BodySpace, simulation: Simulation) -> RobotSpec:
-    """Return the spec of a robot with the centre of its core at the origin.
-
-    Args:
-        robot: a checked robot.
-        space: its part types.
-        simulation: parameters of contacts, joints and servos.
-    """
+    """Return the spec of a robot with the centre of its core at the origin."""
     builder = _Builder(robot, space, simulation)
     for index in range(len(robot.parts)):
         builder.add_part(index)
@@ -96,13 +90,8 @@ def solo_spec(
 
     The robot touches the ground, or stands on the rough ground or scenery below it.
 
-    Args:
-        robot: a checked robot.
-        space: its part types.
-        simulation: parameters of the world; ``drop_m`` lifts the robot, and
-            ``start_deg`` turns it.
-        environment: ground and scenery.
-        furnish: adds further objects.
+    ``simulation.drop_m`` lifts the robot and ``start_deg`` turns it; ``furnish`` adds
+    further objects.
 
     Raises:
         ExperimentError: invalid scenery.
@@ -132,9 +121,6 @@ def _memory(robot: mujoco.MjSpec) -> int:
 
     Long robots have more contacts, and each involves more joints: memory grows with
     the square of the number of parts. Unused memory costs nothing.
-
-    Args:
-        robot: from ``robot_spec``.
     """
     parts = len({geom.name.partition("/")[0] for geom in robot.geoms})
     return MEMORY_BYTES * max(1, ceil((parts / _USUAL_PARTS) ** 2))
@@ -159,12 +145,8 @@ def shared_model(
 ) -> mujoco.MjModel:
     """Return the model of several robots on one ground.
 
-    Args:
-        robots: prefix of the names, and spec from ``robot_spec``, of each; specs are
-            not changed and can be reused.
-        simulation: parameters of the world.
-        environment: ground and scenery.
-        furnish: adds further objects.
+    ``robots`` has the prefix of the names and the spec from ``robot_spec`` of each;
+    specs are not changed and can be reused.
     """
     spec = mujoco.MjSpec()
     set_options(spec, simulation, environment, is_single=False)
@@ -185,14 +167,7 @@ def set_options(
     *,
     is_single: bool,
 ) -> None:
-    """Set the integrator, solver, gravity and time step of a world.
-
-    Args:
-        spec: of the world.
-        simulation: time step, strength of gravity and contacts.
-        environment: its slope.
-        is_single: the world has one robot, so contact islands are not needed.
-    """
+    """Set the solver, gravity and time step; one robot needs no contact islands."""
     option = spec.option
     option.timestep = simulation.timestep_s
     option.gravity = gravity_vector(environment, simulation.gravity)
@@ -227,10 +202,7 @@ def add_ground(
 ) -> None:
     """Add the infinite plane z = 0, named ``ground``, rough ground and scenery.
 
-    Args:
-        spec: of the world.
-        simulation: default contacts of scenery.
-        environment: rough ground becomes the geom ``rough``, scenery ``scenery/{k}``.
+    Rough ground becomes the geom ``rough``, scenery ``scenery/{k}``.
 
     Raises:
         ExperimentError: invalid scenery.

@@ -51,15 +51,7 @@ def check_neuron_type(kind: NeuronType) -> None:
 
 
 def states_problem(state: object, shape: tuple[int, ...]) -> str:
-    """Return what is expected of the states that a step returns, and what came.
-
-    Args:
-        state: what it returned.
-        shape: that it must have, (K, N).
-
-    Returns:
-        A part of a message; empty for float64 of this shape.
-    """
+    """Return what is wrong with states, which must be float64 (K, N); or nothing."""
     array = np.asarray(state)
     if array.shape == shape and array.dtype == np.float64:
         return ""

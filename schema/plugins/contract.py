@@ -22,11 +22,8 @@ def broken(
 ) -> ExperimentError:
     """Return the error of a plug-in that breaks a rule.
 
-    Args:
-        what: part of the plug-in, such as a method; empty for all of it.
-        must: what it must be or do.
-        value: that came.
-        came: what came, if not a value.
+    ``what`` is the part of the plug-in, empty for all of it; ``came`` says what came if
+    that is not a value.
     """
     got = came or shown(value)
     return ExperimentError(f"{what}{': ' if what else ''}must {must}, got {got}")

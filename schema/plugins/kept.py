@@ -52,12 +52,7 @@ class KeptPlugin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
 def keep(
     folder: Path, document: str, write: Callable[[Path, bytes], None]
 ) -> dict[str, KeptPlugin]:
-    """Copy the plug-ins that a document names; this process uses the copies.
-
-    Args:
-        folder: of a run or campaign.
-        document: an experiment as JSON.
-        write: writes a file durably; what it raises is passed on.
+    """Copy the plug-ins of an experiment's JSON; this process uses the copies.
 
     Returns:
         The description of each module.
@@ -102,10 +97,7 @@ def allow_kept(
 
     The copies are used, unless the user has named or imported the same source herself.
 
-    Args:
-        folder: of a run or campaign.
-        kept: description of each module.
-        is_resumed: the run continues; all sources must be those of its beginning.
+    If the run continues, all sources must be those of its beginning.
 
     Raises:
         ExperimentError: a source that was named or imported differs from that of the
@@ -126,10 +118,6 @@ def allow_kept(
 
 def refuse_other(folder: Path, kept: Mapping[str, KeptPlugin]) -> None:
     """Raise unless this process uses the sources that a folder was made with.
-
-    Args:
-        folder: of a run.
-        kept: description of each module.
 
     Raises:
         ExperimentError: a source differs.
@@ -167,11 +155,7 @@ def _problem(name: str, note: KeptPlugin, copy: Path) -> str:
 
 
 def _files(name: str, source: Path) -> dict[str, bytes]:
-    """Return the files of a plug-in by their path beside it; none if not copied.
-
-    Raises:
-        ExperimentError: one cannot be read.
-    """
+    """Return the files of a plug-in by their path beside it; none if not copied."""
     root = source.parent
     try:
         if source.is_dir():
@@ -193,11 +177,7 @@ def _files(name: str, source: Path) -> dict[str, bytes]:
 
 
 def _mark_of(name: str, files: Mapping[str, bytes]) -> Path:
-    """Return the file that says that a run of this user wrote a copy.
-
-    Raises:
-        RuntimeError: the user has no home folder.
-    """
+    """Return the file that says that a run of this user wrote a copy."""
     digests = {path: sha256(data).hexdigest() for path, data in files.items()}
     content = sha256(msgspec.json.encode((name, digests))).hexdigest()
     state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"

@@ -49,10 +49,9 @@ def load_object(
         kind: type that an own object must have.
 
     Raises:
-        UnknownPlugin: no such built-in object, module or attribute (the nearest is
-            named), or a module that is not allowed.
-        ExperimentError: importing the module raises another error; an object of
-            another type, or without an attribute.
+        ExperimentError: no such object (the nearest is named), a module that is not
+            allowed or whose import raises; an object of another type, or without an
+            attribute.
     """
     if ":" not in path and built_in:
         if path not in built_in:
@@ -82,17 +81,11 @@ def load_function(
 ) -> Callable[..., Any]:
     """Return the function that a dotted path names.
 
-    Args:
-        path: ``package.module:attribute``.
-        where: the key that holds it, for messages.
-        arguments: number of positional arguments that it must take.
-        names: of the arguments, for messages, such as ``trace, parameters``.
+    ``where`` and ``names``, of its arguments, are for messages.
 
     Raises:
-        UnknownPlugin: as for ``load_object``; a function that was defined in a
-            module that is not allowed.
-        ExperimentError: as for ``load_object``; not a function, or one that takes
-            another number of arguments.
+        ExperimentError: as for ``load_object``; no function of so many arguments,
+            or one that was defined in a module that is not allowed.
     """
     found = _load(path, where)
     if not callable(found) or isinstance(found, type):
@@ -173,10 +166,7 @@ def _is_imported(value: object, module_name: str) -> bool:
 def load_module(name: str, where: str, path: str = "") -> ModuleType:
     """Return a module that is allowed.
 
-    Args:
-        name: of the module.
-        where: what needs it, for messages.
-        path: ``module:attribute`` that is wanted, for messages, or empty.
+    ``where`` needs it, or a ``path`` of it; both are for messages.
 
     Raises:
         UnknownPlugin: it is not there.
@@ -200,12 +190,7 @@ def load_module(name: str, where: str, path: str = "") -> ModuleType:
 
 
 def place_of(path: str, plugin: object = None) -> str:
-    """Return file and line of a ``module:attribute``, or of a built-in plug-in.
-
-    Args:
-        path: of an object that was loaded; or a short name.
-        plugin: that a short name means.
-    """
+    """Return file and line of a loaded ``module:attribute`` or a built-in plug-in."""
     module_name, colon, attribute = path.partition(":")
     if not colon:
         return where_defined(plugin)

@@ -26,9 +26,6 @@ def where_defined(plugin: object) -> str:
     A wrapped or partial function counts as the function inside, an object that is
     neither function nor class as its class.
 
-    Args:
-        plugin: function, class or object.
-
     Returns:
         Name of the file and line of the definition; without a line if the source is
         not there; module and name if there is no file.
@@ -49,10 +46,6 @@ def where_defined(plugin: object) -> str:
 def where_named(module: ModuleType, name: str) -> str:
     """Return file and line of a name in a plug-in's module.
 
-    Args:
-        module: that was imported.
-        name: of one of its attributes, or one that is not there.
-
     Returns:
         As of ``where_defined``; without a line for a name that is not assigned at the
         top of the module.
@@ -66,12 +59,7 @@ def where_named(module: ModuleType, name: str) -> str:
 
 
 def where_raised(error: BaseException, file: str) -> str:
-    """Return the line of a plug-in's file in which an error was raised; or empty.
-
-    Args:
-        error: with its traceback.
-        file: name of the file, without its folder.
-    """
+    """Return the line of a plug-in's file in which an error was raised; or empty."""
     lines = [
         f"{file}:{frame.lineno}"
         for frame in extract_tb(error.__traceback__)
@@ -86,10 +74,8 @@ def naming_plugin(key: str, plugin: object, path: str = "") -> Iterator[None]:
 
     An ``InvalidRobot`` is what an attempt at a birth comes to, and passes.
 
-    Args:
-        key: of the experiment, which names the plug-in.
-        plugin: function, class or object that is called.
-        path: ``module:attribute`` of an object that is neither function nor class.
+    ``path`` is the ``module:attribute`` of a plug-in that is neither function nor
+    class.
 
     Raises:
         ExperimentError: for any error of its code, ``exit`` included.

@@ -54,15 +54,7 @@ def read_parameters(
 def parameters_type(
     function: Callable[..., Any], where: str, position: int = 1
 ) -> type[msgspec.Struct] | None:
-    """Return the Struct with which the argument for parameters is annotated.
-
-    Args:
-        function: a fitness function, a measure or a rule of selection.
-        where: the key that names it, for messages.
-        position: of that argument: the second one of fitness functions and measures.
-
-    Returns:
-        The Struct; None if there is no second argument, or no Struct as annotation.
+    """Return the Struct with which the argument for parameters is annotated, or None.
 
     Raises:
         ExperimentError: the annotation is a text that names nothing.
@@ -79,12 +71,7 @@ def parameters_type(
 
 
 def known_keys(value: Any, kind: Any) -> Any:  # noqa: ANN401 - any tree of plain values
-    """Return a value of a stored document without keys that its sections lack.
-
-    Args:
-        value: of a key of the annotation ``kind``.
-        kind: a section, or any annotation.
-    """
+    """Return a value of a stored document without keys that its sections lack."""
     if isinstance(value, list):
         return [known_keys(each, kind) for each in value]
     kinds = keys_of(kind)

@@ -35,15 +35,10 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
     Shapes are made twice for each combination of lowest and highest values; with more
     than 8 parameters, for each extreme value alone. Own sensors read hand-made views.
 
-    Args:
-        kind: the part type.
-        where: the key that names it, for messages.
-
     Raises:
-        ExperimentError: slots that do not fit the arity; a name used twice; sizes,
-            masses, ranges, axes, normals or tangents that are not what they must be;
-            segments without joint; a motor without joint; sensors of no box; a shape
-            that raises, differs from call to call, or is not hashable.
+        ExperimentError: a number, name, slot, box, joint, motor or sensor that is
+            not what it must be; a shape that raises, differs from call to call, or
+            is not hashable.
     """
     with naming_plugin(where, kind.shape):
         try:

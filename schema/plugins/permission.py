@@ -109,9 +109,8 @@ def is_chosen(top: str) -> bool:
 def allowed(*, is_new: bool = False) -> tuple[str, ...]:
     """Return the entries with which ``allow`` gives another process the same list.
 
-    Args:
-        is_new: the process starts a run: sources that are found come before the copies
-            of an earlier run that was read.
+    If a run is started, sources that are found come before the copies of an earlier run
+    that was read.
     """
     found = []
     for name, file in _allowed.items():

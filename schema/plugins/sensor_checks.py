@@ -85,9 +85,7 @@ def check_sensor(sensor: OwnSensor, shape: Shape | None = None) -> None:
     The views: at birth with nothing around; later, in touch, with a light and two other
     robots; and alone with an obstacle at hand.
 
-    Args:
-        sensor: the sensor.
-        shape: of its part; None allows any name of a box.
+    Without a shape of its part, any name of a box is allowed.
 
     Raises:
         ExperimentError: no whole number of inputs; no ``read`` of one argument; it
@@ -118,10 +116,6 @@ def _read(sensor: OwnSensor, view: HandMadeView, place: str) -> list[float]:
 
 def values_of(inputs: int, values: Iterable[object]) -> list[float]:
     """Return the values that a sensor has read as plain floats.
-
-    Args:
-        inputs: of the sensor.
-        values: what its ``read`` returned.
 
     Raises:
         ValueError: another number of values, or one that is not a finite number.

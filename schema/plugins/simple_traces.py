@@ -29,10 +29,6 @@ def check_function(function: Callable[..., Any], *arguments: object) -> None:
     A function may raise for some of the traces, which makes a failed evaluation, but
     not for all of them.
 
-    Args:
-        function: a fitness function or measure.
-        arguments: after the trace.
-
     Raises:
         ExperimentError: it returns no number, a number that is not finite, different
             numbers for one trace, or writes to the trace.

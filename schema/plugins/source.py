@@ -31,23 +31,15 @@ _IMPORTED = "__revolve_digest__"
 
 @lru_cache(maxsize=64)
 def plugins_of(settings: bytes) -> str:
-    """Return the plug-ins that settings name, with their digests on this machine.
-
-    Args:
-        settings: JSON, as for ``modules_named``.
-
-    Returns:
-        ``module=digest`` for each top-level module, by name, with a space between.
-    """
+    """Return the plug-ins that JSON names as ``module=digest``, with spaces between."""
     return " ".join(f"{name}={_digest(name)}" for name in modules_named(settings))
 
 
 def modules_named(document: bytes) -> list[str]:
     """Return the top-level modules of the plug-ins that JSON names, sorted.
 
-    Args:
-        document: JSON; every text in it like ``module:attribute`` names a plug-in, but
-            for its own name and for parameters of plug-ins, which may be any text.
+    Every text like ``module:attribute`` names a plug-in, but for the document's own
+    name and for parameters of plug-ins, which may be any text.
 
     Raises:
         ValueError: the document is not JSON.
@@ -57,11 +49,7 @@ def modules_named(document: bytes) -> list[str]:
 
 
 def paths_named(document: object) -> list[str]:
-    """Return each ``module:attribute`` that the content of a document names, once.
-
-    Args:
-        document: as of ``modules_named``, but parsed.
-    """
+    """Return each ``module:attribute`` that the content of a document names, once."""
     return list(dict.fromkeys(filter(PATH.fullmatch, _texts(document))))
 
 
@@ -84,13 +72,9 @@ def _texts(document: object) -> Iterator[str]:
 
 @lru_cache(maxsize=64)
 def check_plugins(wanted: str, run: str = "") -> None:
-    """Raise unless this machine has the same plug-ins, and this process allows them.
+    """Raise unless this machine has the plug-ins of ``plugins_of``, all allowed.
 
-    Nothing is imported.
-
-    Args:
-        wanted: the result of ``plugins_of`` on the other machine.
-        run: name of the run that wants them; it ends with the run's folder.
+    Nothing is imported. The name of the run that wants them ends with its folder.
 
     Raises:
         PluginDiffers: one is missing or not allowed, or its source differs; a text

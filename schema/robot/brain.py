@@ -101,10 +101,6 @@ def check_brain(brain: Brain, part_count: int) -> None:
 
     ``check_neurons`` checks the types of its neurons.
 
-    Args:
-        brain: the brain.
-        part_count: number of parts of its robot.
-
     Raises:
         InvalidRobot: neurons out of order, on a part that does not exist, or with a
             parameter that is not finite; an input of another type or with parameters;
@@ -147,10 +143,6 @@ def _neuron_problem(neuron: Neuron, part_count: int) -> str:
 
 def check_neurons(brain: Brain, kinds: NeuronKinds) -> None:
     """Raise unless the output and hidden neurons of a brain are of known types.
-
-    Args:
-        brain: the brain.
-        kinds: the types that an experiment allows.
 
     Raises:
         InvalidRobot: a neuron of another type, or a wrong number of parameters.

@@ -46,11 +46,7 @@ class CpgParameters(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def cpg_neurons(parameters: CpgParameters) -> NeuronKinds:
-    """Return the only neuron type of a ``cpg`` brain.
-
-    Args:
-        parameters: the range of its frequencies.
-    """
+    """Return the only neuron type of a ``cpg`` brain."""
     low, high = parameters.lowest_hz, parameters.highest_hz
     return {
         PHASE_OSCILLATOR: (

@@ -40,10 +40,6 @@ def round_reach(along: Sequence[float], half: Sequence[float]) -> float:
 def place_parts(robot: Robot, shapes: Sequence[Shape]) -> tuple[Floats, Floats]:
     """Return each part's frame in the core's frame, joints at zero.
 
-    Args:
-        robot: a checked robot.
-        shapes: of its parts.
-
     Returns:
         Rotations (P, 3, 3) part frame to core frame, and positions (P, 3) of the
         part origins [m].

@@ -94,12 +94,7 @@ Genes = tuple[
 
 
 def assemble(parts: Sequence[Part], genes: Callable[[int], Genes]) -> Genome:
-    """Return the genome of a tree of parts.
-
-    Args:
-        parts: in depth-first order.
-        genes: the genes of a part, by its index.
-    """
+    """Return the genome of parts in depth-first order, given the genes of each."""
     children: list[list[tuple[int, Node]]] = [[] for _ in parts]
     # Backwards: children are made before their parent.
     for index in range(len(parts) - 1, -1, -1):
@@ -123,10 +118,6 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
 
     Connections are left out if their path cannot be followed, if it ends at a missing
     neuron, or if an earlier connection has the same two neurons.
-
-    Args:
-        genome: a well-formed genome of this body space.
-        space: its part types.
 
     Returns:
         The robot: parts in depth-first order, neurons by layer and then by part.

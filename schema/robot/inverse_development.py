@@ -21,9 +21,6 @@ from schema.robot.robot import Part, Robot
 def genome_of(robot: Robot) -> Genome:
     """Return a genome that develops into a robot.
 
-    Args:
-        robot: well formed in its body space.
-
     Returns:
         The genome. It develops into the same parts and neurons; connections are in
         the order of the parts that they leave.
@@ -52,10 +49,7 @@ def with_brain(genome: Genome, robot: Robot, space: BodySpace) -> Genome:
 
     Connections that the robot does not have stay as they are.
 
-    Args:
-        genome: to change.
-        robot: what develops from the genome, with other parameters and weights.
-        space: its part types.
+    The robot is what develops from the genome, with other parameters and weights.
     """
     neurons, _ = _shares(robot.brain)
     own = [node.connections for node, _, _ in walk(genome)]

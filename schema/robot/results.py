@@ -52,11 +52,7 @@ class Provenance(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def failed_fitness(others: Iterable[float]) -> float:
-    """Return what a failed evaluation counts as: 0, or the least of others below 0.
-
-    Args:
-        others: fitness that it is compared with.
-    """
+    """Return what a failed evaluation counts as: 0, or the least of others below 0."""
     return min((0.0, *others))
 
 

@@ -59,9 +59,6 @@ def motor_count(robot: Robot, space: BodySpace) -> int:
 def check_tree(parts: Sequence[Part]) -> None:
     """Raise unless parts form a tree; types are not checked.
 
-    Args:
-        parts: the parts of a body.
-
     Raises:
         InvalidRobot: no parts; a parent after its child; a slot below 0 or used
             twice; parts out of depth-first order; an orientation that is not a
@@ -121,11 +118,6 @@ def check_robot(
 
     The analyzer checks intersections of parts.
 
-    Args:
-        robot: the robot.
-        space: the allowed part types.
-        kinds: the allowed neuron types.
-
     Raises:
         InvalidRobot: parts that are not a tree (``check_tree``); no core or several;
             an unknown part type; a slot that the type does not have; a wrong number
@@ -158,10 +150,6 @@ def check_number(robot: Robot) -> None:
 def check_types(robot: Robot, space: BodySpace) -> None:
     """Raise unless a robot fits a body space; its neuron types are not checked.
 
-    Args:
-        robot: a tree of parts with a valid brain, as decoding gives it.
-        space: the allowed part types.
-
     Raises:
         InvalidRobot: the causes of ``check_robot`` that depend on part types.
     """
@@ -171,10 +159,6 @@ def check_types(robot: Robot, space: BodySpace) -> None:
 
 def check_body(parts: Sequence[Part], space: BodySpace) -> None:
     """Raise unless a body fits a body space; its brain is not checked.
-
-    Args:
-        parts: a tree of parts, as decoding gives it.
-        space: the allowed part types.
 
     Raises:
         InvalidRobot: the causes of ``check_types`` that concern the body.
