@@ -5,7 +5,6 @@ refused with the nearest known one. Settings that cannot change a birth (workers
 folders, addresses) are flags of the commands, not keys.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from math import pi
@@ -557,25 +556,6 @@ def light_of(environment: Environment, arena: ArenaSection | None) -> Vector | N
     """Return the position of the light of a world [m]; None is no light."""
     own = None if arena is None else arena.light
     return own or environment.light
-
-
-def start_problems(simulation: Simulation) -> Iterator[str]:
-    """Yield what arenas do not support."""
-    if any(simulation.start_deg):
-        yield (
-            "simulation.start_deg: is for off-line evaluations; robots of an arena are "
-            "born upright with a drawn heading; remove it"
-        )
-
-
-def pose_problems(simulation: Simulation, name: str) -> Iterator[str]:
-    """Yield whether a number of steps does not end on a pose."""
-    steps = getattr(simulation, name)
-    if steps % simulation.pose_steps:
-        yield (
-            f"simulation.{name}: must be a multiple of simulation.pose_steps = "
-            f"{simulation.pose_steps}, got {steps}"
-        )
 
 
 def references(experiment: Experiment) -> list[str]:

@@ -4,14 +4,22 @@ import re
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property, lru_cache
-from math import cos, inf, isclose, radians, sin
+from math import cos, inf, radians, sin
 from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
 
 from schema.errors import cut
-from schema.experiment.section import Count, Extent, Length, Place, Positive, Section
+from schema.experiment.section import (
+    Count,
+    Extent,
+    Length,
+    Place,
+    Positive,
+    Section,
+    multiple_problems,
+)
 from schema.limits import MOST_LENGTH_M
 from schema.parts import Vector
 from schema.robot.trace import Floats
@@ -122,21 +130,8 @@ def ground_problems(environment: Environment) -> Iterator[str]:
             f"{MOST_PATCHES} = {2 * extent_m / MOST_PATCHES:g}, got {patch_m:g}"
         )
         return
-    whole = environment.patches
-    if not whole or not isclose(whole * patch_m, extent_m, rel_tol=1e-9):
-        yield (
-            "environment.extent_m: must be a whole multiple of environment.patch_m = "
-            f"{patch_m:g}, got {extent_m:g}"
-        )
-
-
-def arena_problems(environment: Environment) -> Iterator[str]:
-    """Yield what arenas do not support."""
-    if environment.push_impulse:
-        yield (
-            "environment.push_impulse: pushes are for off-line evaluations, not for "
-            "arenas; remove it"
-        )
+    key = "environment.extent_m"
+    yield from multiple_problems(key, extent_m, patch_m, "environment.patch_m")
 
 
 @lru_cache(maxsize=8)

@@ -1,11 +1,9 @@
 """The section ``[learning]``: lifetime learning of newborn robots."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from schema.errors import nearest, shown
 from schema.experiment.section import Number, Parameters, PluginSection
 
 LEARNERS = ("cma-es", "(1+1)-es", "random")
@@ -45,37 +43,3 @@ class Learning(PluginSection, frozen=True):
     inherit: Literal["darwinian", "lamarckian"] = "darwinian"
     weight_limits: tuple[Number, Number] = (0.0, 1.0)
     parameters: Parameters = field(default_factory=dict)
-
-
-def learning_problems(
-    learning: Learning | None,
-    *,
-    is_reevaluated: bool,
-    encoding: str,
-) -> Iterator[str]:
-    """Yield what is wrong with the section of one island."""
-    if learning is None:
-        return
-    name = learning.learner
-    if ":" not in name and name not in LEARNERS:
-        allowed = ", ".join(map(repr, LEARNERS))
-        yield (
-            f"learning.learner: must be one of {allowed} or 'module:attribute', "
-            f"got {shown(name)}{nearest(name, LEARNERS)}"
-        )
-    low, high = learning.weight_limits
-    if low >= high:
-        yield (
-            "learning.weight_limits: must be [least, greatest], got "
-            f"[{low:g}, {high:g}]"
-        )
-    if is_reevaluated:
-        yield (
-            "learning: cannot be combined with selection.reevaluation; remove one of "
-            "them"
-        )
-    if learning.inherit == "lamarckian" and encoding == "cppn":
-        yield (
-            "learning.inherit: must be 'darwinian' with encoding.type = 'cppn': no "
-            "pattern can be made of a given brain"
-        )

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from math import isclose
 from typing import Annotated, Literal
 
 from msgspec import Meta
@@ -76,22 +75,9 @@ class Robust(Section, frozen=True):
     actuator_noise: tuple[NoiseLevel, NoiseLevel] = (0.0, 0.01)
 
 
-def robust_problems(robust: Robust | None, *, is_arena: bool) -> Iterator[str]:
-    """Yield what is wrong with the section of one island.
-
-    Args:
-        robust: the section; None if there is none.
-        is_arena: whether the island is an arena.
-    """
-    if robust is None:
-        return
-    if is_arena:
-        yield (
-            "robust: is for off-line evaluations; the robots of an arena live once, in "
-            "one world. Remove it, or give it to off-line [[islands]] only. In arenas "
-            "use simulation.sensor_noise and simulation.actuator_noise"
-        )
-    for name in RANGES:
+def range_problems(robust: Robust | None) -> Iterator[str]:
+    """Yield which range ends before it begins."""
+    for name in RANGES if robust is not None else ():
         low, high = getattr(robust, name)
         if low > high:
             yield f"robust.{name}: must be [least, greatest], got [{low:g}, {high:g}]"
@@ -154,21 +140,3 @@ def calibration_problems(
             yield f"{where}.sensor: {name} has no sensor"
         if entry.motor != IDEAL and not kind.outputs:
             yield f"{where}.motor: {name} has no motor"
-
-
-def delay_problems(
-    entries: Sequence[Calibration], tick_s: float, *, is_arena: bool
-) -> Iterator[str]:
-    """Yield what is wrong with the entries on one island."""
-    if entries and is_arena:
-        yield "calibration: is for off-line evaluations, not for arenas; remove it"
-    for number, entry in enumerate(entries):
-        for what in ("sensor", "motor"):
-            delay_s = getattr(entry, what).delay_s
-            if not isclose(
-                round(delay_s / tick_s) * tick_s, delay_s, rel_tol=1e-9, abs_tol=1e-12
-            ):
-                yield (
-                    f"calibration[{number}].{what}.delay_s: must be a whole multiple "
-                    f"of {tick_s:g} s, the time between brain ticks, got {delay_s:g}"
-                )

@@ -1,5 +1,7 @@
 """Base classes and number types of the sections of an experiment."""
 
+from collections.abc import Iterator
+from math import isclose
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct, json
@@ -38,3 +40,9 @@ class PluginSection(Section, frozen=True):
     def __hash__(self) -> int:
         """Return a hash of the section's text: a dict has none."""
         return hash(json.encode(self, order="deterministic"))
+
+
+def multiple_problems(key: str, value: float, unit: float, what: str) -> Iterator[str]:
+    """Yield whether the value of a key is no whole multiple of a unit."""
+    if not isclose(round(value / unit) * unit, value, rel_tol=1e-9):
+        yield f"{key}: must be a whole multiple of {unit:g}, {what}, got {value:g}"

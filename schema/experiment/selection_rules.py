@@ -8,9 +8,9 @@ from typing import Any
 
 from msgspec import Struct
 
-from schema.errors import ExperimentError, nearest, shown
+from schema.errors import ExperimentError, shown
 from schema.experiment.document import PARENTS, SURVIVORS, SelectionSection
-from schema.plugins.load import load_function
+from schema.plugins.load import load_function, unknown
 from schema.plugins.origin import where_defined
 from schema.plugins.parameters import parameters_type, read_parameters
 
@@ -60,11 +60,7 @@ def rule_problems(selection: SelectionSection) -> Iterator[str]:
         if ":" in path:
             own_rule(selection, name)
         elif path not in built_in:
-            allowed = ", ".join(map(repr, built_in))
-            yield (
-                f"selection.{name}: must be one of {allowed} or 'module:attribute', "
-                f"got {shown(path)}{nearest(path, built_in)}"
-            )
+            yield str(unknown(path, f"selection.{name}", built_in))
         elif table := getattr(selection, f"{name}_parameters"):
             yield (
                 f"selection.{name}_parameters: {path!r} has no parameters, got "

@@ -1,7 +1,7 @@
 """Settings in requests: the sections of an experiment that an answer depends on."""
 
 from collections.abc import Callable, Iterator
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import TypeVar
 
 import msgspec
@@ -19,18 +19,11 @@ from schema.experiment.document import (
     Space,
     Vetting,
     light_of,
-    pose_problems,
-    start_problems,
 )
-from schema.experiment.environment import (
-    FLAT,
-    Environment,
-    arena_problems,
-    ground_problems,
-)
+from schema.experiment.environment import FLAT, Environment, ground_problems
 from schema.experiment.identity import Origin
-from schema.experiment.robust import Calibration, Robust, robust_problems
-from schema.experiment.section import Count, Section
+from schema.experiment.robust import Calibration, Robust, range_problems
+from schema.experiment.section import Count, Section, multiple_problems
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Vector
 from schema.plugins.load import load_function, unknown
@@ -47,6 +40,16 @@ FITNESS = {
     "balance": "worker.tasks:balance",
 }
 """Fitness functions that come with the toolkit, by short name."""
+_OFF_LINE = {
+    "simulation.evaluation_s": "arenas evaluate all the time",
+    "simulation.start_deg": "robots of an arena are born upright, with a drawn heading",
+    "environment.push_impulse": "arenas have no pushes",
+    "selection.culling": "[arena] has these keys",
+    "selection.reevaluation": "arenas re-evaluate all the time",
+    "robust": "robots of an arena live once; they can have the noise of [simulation]",
+    "calibration": "robots of an arena have ideal sensors and motors",
+}
+"""Keys that arenas do not have, and why."""
 
 
 class VettingSettings(Section, frozen=True):
@@ -166,62 +169,56 @@ def _sections(experiment: Experiment, kind: type[T]) -> T:
     return msgspec.convert(experiment, kind, from_attributes=True)
 
 
-@lru_cache(maxsize=64)
-def read_arena_settings(settings: bytes) -> ArenaSettings:
-    """Return the settings of a request to advance an arena.
-
-    Raises:
-        ExperimentError: the bytes are not such settings.
-    """
-    return _from_json(settings, ArenaSettings)
-
-
-@lru_cache(maxsize=64)
-def read_vetting_settings(settings: bytes) -> VettingSettings:
-    """Return the settings of a vetting request.
-
-    Raises:
-        ExperimentError: the bytes are not such settings.
-    """
-    return _from_json(settings, VettingSettings)
-
-
-@lru_cache(maxsize=64)
-def read_evaluation_settings(settings: bytes) -> EvaluationSettings:
-    """Return the settings of an evaluation request, or of a robot file.
-
-    Raises:
-        ExperimentError: the bytes are not such settings.
-    """
-    return _from_json(settings, EvaluationSettings)
-
-
-def _from_json(settings: bytes, kind: type[T]) -> T:
+def _from_json(kind: type[T], data: bytes) -> T:
     """Return settings; what an experiment may not have is refused here, too.
 
     Keys that no longer exist, as in robot files of earlier versions, are left out.
     """
     where = "settings of a request"
-    if len(settings) > MOST_SETTINGS_BYTES:
+    if len(data) > MOST_SETTINGS_BYTES:
         raise ExperimentError(
-            f"{where}: must have <= {MOST_SETTINGS_BYTES} bytes, got {len(settings)}"
+            f"{where}: must have <= {MOST_SETTINGS_BYTES} bytes, got {len(data)}"
         )
     try:
-        known = known_keys(msgspec.json.decode(settings), kind)
-        found = msgspec.convert(known, kind)
+        known = known_keys(msgspec.json.decode(data), kind)
+        settings = msgspec.convert(known, kind)
     except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise ExperimentError(f"{where}: {error}") from None
-    environment = getattr(found, "environment", FLAT)
-    problems = list(ground_problems(environment))
-    if isinstance(found, ArenaSettings):
-        problems += arena_problems(environment)
-        problems += start_problems(found.simulation)
-    if isinstance(found, EvaluationSettings):
-        problems += pose_problems(found.simulation, "window_steps")
-    problems += robust_problems(getattr(found, "robust", None), is_arena=False)
-    for problem in problems:
+    if problem := next(_problems(settings), ""):
         raise ExperimentError(f"{where}: {problem}")
-    return found
+    return settings
+
+
+def _problems(settings: object) -> Iterator[str]:
+    yield from ground_problems(getattr(settings, "environment", FLAT))
+    if isinstance(settings, ArenaSettings):
+        yield from arena_problems(settings)
+    if isinstance(settings, EvaluationSettings):
+        clock = settings.simulation
+        key, unit = "simulation.window_steps", "simulation.pose_steps"
+        yield from multiple_problems(key, clock.window_steps, clock.pose_steps, unit)
+        yield from range_problems(settings.robust)
+
+
+def arena_problems(settings: Experiment | ArenaSettings) -> Iterator[str]:
+    """Yield which keys of an arena are for off-line islands."""
+    for key, why in _OFF_LINE.items():
+        section, _, name = key.rpartition(".")
+        holder = getattr(settings, section, None) if section else settings
+        value = getattr(holder, name, None)
+        if any(value) if isinstance(value, tuple) else value:
+            yield f"{key}: is for off-line islands, as {why}; remove it"
+
+
+read_vetting_settings = lru_cache(maxsize=64)(partial(_from_json, VettingSettings))
+read_evaluation_settings = lru_cache(maxsize=64)(
+    partial(_from_json, EvaluationSettings)
+)
+read_arena_settings = lru_cache(maxsize=64)(partial(_from_json, ArenaSettings))
+"""Return the settings of a request, or of a robot file, from their JSON.
+
+Other bytes raise ``ExperimentError``.
+"""
 
 
 def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:

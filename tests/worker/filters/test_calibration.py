@@ -171,7 +171,7 @@ def test_a_file_is_read_beside_the_document(tmp_path: Path) -> None:
         ),
         (
             "[[calibration]]\npart = 'Core'\nsensor = {delay_s = 0.02}",
-            r"calibration\[0\].sensor.delay_s: must be a whole multiple of 0.125 s",
+            r"calibration\[0\].sensor.delay_s: must be a whole multiple of 0.125, ",
         ),
         ("[[calibration]]\npart = 'Core'\n[arena]", "calibration: is for off-line"),
         (

@@ -1,0 +1,240 @@
+"""Checks that the sections of one island are consistent."""
+
+from collections.abc import Iterator
+from math import lcm
+
+from schema.errors import ExperimentError, shown
+from schema.experiment.document import (
+    ArenaSection,
+    Culling,
+    Experiment,
+    SelectionSection,
+    light_of,
+    steps_of,
+)
+from schema.experiment.environment import ground_problems
+from schema.experiment.learning import LEARNERS
+from schema.experiment.robust import range_problems
+from schema.experiment.section import multiple_problems
+from schema.experiment.selection_rules import rule_problems
+from schema.experiment.settings import FITNESS, arena_problems
+from schema.plugins.load import unknown
+
+
+def island_problems(experiment: Experiment) -> Iterator[str]:
+    """Yield what is wrong with one island; each check relies on those before it."""
+    arena, culling = experiment.arena, experiment.selection.culling
+    yield from _limits_problems(experiment)
+    yield from _selection_problems(experiment)
+    if culling is not None:
+        yield from _death_problems(experiment, "selection.culling", culling, 1)
+        if round(culling.full_cull_share * culling.population_limit) < 1:
+            yield (
+                "selection.culling.full_cull_share: must remove at least one robot of "
+                f"{culling.population_limit}, got {culling.full_cull_share:g}"
+            )
+    yield from _clock_problems(experiment)
+    yield from ground_problems(experiment.environment)
+    yield from _scenery_problems(experiment)
+    yield from _push_problems(experiment)
+    yield from _light_problems(experiment)
+    yield from range_problems(experiment.robust)
+    yield from _learning_problems(experiment)
+    if arena is not None:
+        yield from arena_problems(experiment)
+        yield from _death_problems(experiment, "arena", arena, 0)
+        yield from _arena_problems(experiment, arena)
+
+
+def _limits_problems(experiment: Experiment) -> Iterator[str]:
+    space, selection = experiment.space, experiment.selection
+    if space.min_parts > space.max_parts:
+        yield (
+            f"space.min_parts: must be <= space.max_parts = {space.max_parts}, "
+            f"got {space.min_parts}"
+        )
+    if space.max_parts == 1:
+        yield "space.max_parts: must be > 1, got 1"
+    if experiment.births < selection.population:
+        yield (
+            f"births: must be >= selection.population = {selection.population}, "
+            f"got {experiment.births}"
+        )
+
+
+def _selection_problems(experiment: Experiment) -> Iterator[str]:
+    selection = experiment.selection
+    yield from rule_problems(selection)
+    if selection.population < selection.parents_needed:
+        yield (
+            f"selection.population: must be >= {selection.parents_needed}, to choose "
+            f"two parents{_by(selection)}, got {selection.population}"
+        )
+    if not selection.keep_parents and selection.children < selection.population:
+        yield (
+            "selection.children: must be >= selection.population = "
+            f"{selection.population} if parents are not kept, got {selection.children}"
+        )
+    if experiment.window > selection.children:
+        yield (
+            "selection.window: must be <= selection.children = "
+            f"{selection.children}, got {experiment.window}"
+        )
+    if selection.reevaluation is not None and not selection.keep_parents:
+        yield (
+            "selection.reevaluation: no individual outlives its brood if "
+            "selection.keep_parents is false"
+        )
+
+
+def _by(selection: SelectionSection) -> str:
+    """Return how parents are chosen, where that decides how many are needed."""
+    is_by_size = selection.parents == "tournament"
+    return f" with tournament_size = {selection.tournament_size}" if is_by_size else ""
+
+
+def _death_problems(
+    experiment: Experiment, where: str, rules: ArenaSection | Culling, spare: int
+) -> Iterator[str]:
+    """Yield what is wrong with the rules by which a population varies in size."""
+    selection = experiment.selection
+    if selection.survivors != "best" or not selection.keep_parents:
+        yield (
+            f"{where}: survival depends on fitness; selection.survivors must be "
+            '"best" and selection.keep_parents true'
+        )
+    if rules.population_floor < selection.parents_needed:
+        yield (
+            f"{where}.population_floor: must be >= {selection.parents_needed}, to "
+            f"choose two parents{_by(selection)}, got {rules.population_floor}"
+        )
+    lowest = max(rules.population_floor + spare, selection.population)
+    if rules.population_limit < lowest:
+        yield (
+            f"{where}.population_limit: must be >= {lowest}, for population_floor and "
+            f"selection.population, got {rules.population_limit}"
+        )
+
+
+def _clock_problems(experiment: Experiment) -> Iterator[str]:
+    """Yield which duration does not fit the clocks, off-line and in arenas."""
+    clock, is_arena = experiment.simulation, experiment.arena is not None
+    units = {"pose_steps": clock.pose_steps}
+    if is_arena and experiment.learning is not None:
+        # Trials of infants end at brain ticks.
+        units["brain_steps"] = clock.brain_steps
+    for unit, steps in units.items():
+        for name in ("window_steps", "warmup_steps") if is_arena else ("window_steps",):
+            key, value = f"simulation.{name}", getattr(clock, name)
+            yield from multiple_problems(key, value, steps, f"simulation.{unit}")
+    for number, entry in enumerate(experiment.calibration):
+        for what in ("sensor", "motor"):
+            key, delay_s = f"calibration[{number}].{what}", getattr(entry, what).delay_s
+            yield from multiple_problems(
+                f"{key}.delay_s", delay_s, clock.tick_s, "the time between brain ticks"
+            )
+    if clock.evaluation_s is None:
+        return
+    shortest, longest = clock.evaluation_s
+    if steps_of(shortest, clock) < clock.evaluation_steps:
+        least = clock.evaluation_steps * clock.timestep_s
+        yield (
+            f"simulation.evaluation_s: must be >= {least:g} s, warmup_steps and "
+            f"window_steps together, got {shortest:g}"
+        )
+    if longest < shortest:
+        ends = f"[{shortest:g}, {longest:g}]"
+        yield f"simulation.evaluation_s: must be [shortest, longest], got {ends}"
+
+
+def _arena_problems(experiment: Experiment, arena: ArenaSection) -> Iterator[str]:
+    """Yield what is wrong with distances and intervals of an arena."""
+    if arena.split_distance_m < arena.merge_distance_m:
+        yield (
+            "arena.split_distance_m: must be >= arena.merge_distance_m = "
+            f"{arena.merge_distance_m}, got {arena.split_distance_m}"
+        )
+    radius_m = 0.5 * arena.wall_diameter_m
+    if 0.0 < radius_m <= arena.birth_radius_m:
+        yield (
+            f"arena.birth_radius_m: must be less than half of wall_diameter_m, "
+            f"{radius_m:g} m, as robots are born inside the wall; got "
+            f"{arena.birth_radius_m:g}"
+        )
+    clock = experiment.simulation
+    tick_s = lcm(clock.brain_steps, clock.pose_steps) * clock.timestep_s
+    shared = "the common multiple of simulation.brain_steps and pose_steps"
+    for name in ("founder", "birth", "cull", "sample", "snapshot"):
+        key = f"{name}_interval_s"
+        value = getattr(arena, key)
+        yield from multiple_problems(f"arena.{key}", value, tick_s, shared)
+
+
+def _learning_problems(experiment: Experiment) -> Iterator[str]:
+    learning = experiment.learning
+    if learning is None:
+        return
+    if ":" not in learning.learner and learning.learner not in LEARNERS:
+        yield str(unknown(learning.learner, "learning.learner", LEARNERS))
+    low, high = learning.weight_limits
+    if low >= high:
+        ends = f"[{low:g}, {high:g}]"
+        yield f"learning.weight_limits: must be [least, greatest], got {ends}"
+    if experiment.selection.reevaluation is not None:
+        yield "learning: cannot be combined with selection.reevaluation; remove one"
+    if learning.inherit == "lamarckian" and experiment.encoding.type == "cppn":
+        yield (
+            "learning.inherit: must be 'darwinian' with encoding.type = 'cppn': no "
+            "pattern can be made of a given brain"
+        )
+
+
+def _scenery_problems(experiment: Experiment) -> Iterator[str]:
+    if scenery := experiment.environment.scenery:
+        # MuJoCo is imported only if needed: it is slow to load.
+        from schema.experiment.scenery import (  # noqa: PLC0415
+            refuse_objects,
+            scenery_model,
+        )
+
+        try:
+            scenery_model(scenery, experiment.simulation)
+            if experiment.arena is not None:
+                refuse_objects(experiment.environment, experiment.simulation)
+        except ExperimentError as error:
+            yield str(error)
+
+
+def _push_problems(experiment: Experiment) -> Iterator[str]:
+    """Yield whether pushes do not begin at a tick, or never begin."""
+    world, clock = experiment.environment, experiment.simulation
+    if not world.push_impulse:
+        return
+    key, interval_s = "environment.push_interval_s", world.push_interval_s
+    ticks = "the time between brain ticks"
+    yield from multiple_problems(key, interval_s, clock.tick_s, ticks)
+    longest_s = clock.evaluation_steps * clock.timestep_s
+    if clock.evaluation_s is not None:
+        longest_s = clock.evaluation_s[1]
+    if steps_of(interval_s, clock) >= steps_of(longest_s, clock):
+        yield (
+            f"{key}: must be < {longest_s:g} s, the longest evaluation, or there is no "
+            f"push, got {interval_s:g}"
+        )
+
+
+def _light_problems(experiment: Experiment) -> Iterator[str]:
+    arena, there = experiment.arena, experiment.environment.light
+    function = experiment.fitness.function
+    needs_light = function in ("light", FITNESS["light"])
+    if needs_light and not light_of(experiment.environment, arena):
+        yield (
+            f"fitness.function: {shown(function)} needs environment.light = [x, y, z], "
+            "got none"
+        )
+    here = None if arena is None else arena.light
+    if here and there and here != there:
+        yield (
+            f"arena.light: differs from environment.light = {list(there)}, got "
+            f"{list(here)}; remove one of the two"
+        )
