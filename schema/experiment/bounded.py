@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from schema.errors import ExperimentError, nearest, unreadable
+from schema.errors import ExperimentError, RevolveError, nearest, unreadable
 from schema.limits import (
     MOST_BRACKETS,
     MOST_DEPTH,
@@ -38,20 +38,27 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     return data
 
 
-def text_of(path: Path, where: str, near: str = "") -> str:
+def text_of(
+    path: Path,
+    where: str,
+    near: str = "",
+    *,
+    most: int = MOST_TEXT_BYTES,
+    kind: type[RevolveError] = ExperimentError,
+) -> str:
     """Return the text of a user's file.
 
     ``where`` begins the message of an error, ``near`` ends it if the file is missing.
 
     Raises:
-        ExperimentError: the file cannot be read, is too large, or is no text.
+        RevolveError: of that kind: the file cannot be read, is too large, or no text.
     """
     try:
         # With the byte order mark of editors of Windows.
-        return read_bytes(path).decode("utf-8-sig")
+        return read_bytes(path, most).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         ending = near if isinstance(error, FileNotFoundError) else ""
-        raise ExperimentError(f"{where}: {unreadable(error)}{ending}") from None
+        raise kind(f"{where}: {unreadable(error)}{ending}") from None
 
 
 def near_files(missing: Path) -> str:

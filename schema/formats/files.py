@@ -9,10 +9,10 @@ import os
 from pathlib import Path
 
 from schema.errors import InvalidRobot, MalformedMessage, unreadable
+from schema.experiment.bounded import read_bytes
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.formats.contents import read_data, read_text
 from schema.formats.document import compose
 from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
@@ -119,9 +119,9 @@ def read_robot(
     """
     ending = check_file(path)
     if ending in _YAML:
-        return robot_from_yaml(read_text(path), str(path), space, kinds)
+        return robot_from_yaml(_text(path, ending), str(path), space, kinds)
     if ending in _ROBOGEN:
-        text = _robogen_text(path)
+        text = _text(path, ending)
         # The content decides: either form may have either ending.
         is_json = text.lstrip()[:1] == "{" or (ending == ".json" and text[:1] != "0")
         read = robot_from_robogen_json if is_json else robot_from_robogen_text
@@ -133,9 +133,11 @@ def read_robot(
         robot, _ = read_mjcf(path)
     else:
         try:
-            robot = decode_robot(read_data(path))
+            robot = decode_robot(read_bytes(path))
         except MalformedMessage as error:
             raise MalformedMessage(f"{path}: {error}") from None
+        except OSError as error:
+            raise InvalidRobot(f"{path}: {unreadable(error)}") from None
     try:
         check_number(robot)
         check_robot(robot, space, kinds)
@@ -144,13 +146,15 @@ def read_robot(
     return robot
 
 
-def _robogen_text(path: Path) -> str:
-    """Return the text of a RoboGen robot; its binary dumps are refused by name."""
+def _text(path: Path, ending: str) -> str:
+    """Return the text of a robot; RoboGen's binary dumps are refused by name."""
     try:
         # Editors of Windows begin a text with a mark of its encoding.
-        return read_data(path).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InvalidRobot(f"{path}: {_BINARY_DUMP}") from None
+        return read_bytes(path).decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        is_dump = ending in _ROBOGEN and isinstance(error, UnicodeDecodeError)
+        why = _BINARY_DUMP if is_dump else unreadable(error)
+        raise InvalidRobot(f"{path}: {why}") from None
 
 
 def write_robot(

@@ -17,10 +17,9 @@ from xml.etree import ElementTree as ET
 import msgspec
 
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage, one_line
-from schema.experiment.bounded import parse_xml
+from schema.experiment.bounded import parse_xml, text_of
 from schema.experiment.brains import types_of
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
-from schema.formats.contents import read_text
 from schema.formats.mjcf_export import add_limits, add_sensors, exact_xml, portable
 from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import solo_spec
@@ -119,7 +118,8 @@ def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
     Raises:
         InvalidRobot: as ``robot_from_mjcf``, or the file cannot be read.
     """
-    return robot_from_mjcf(read_text(path, MOST_MJCF_BYTES), str(path))
+    text = text_of(path, str(path), most=MOST_MJCF_BYTES, kind=InvalidRobot)
+    return robot_from_mjcf(text, str(path))
 
 
 def _bytes(held: dict[str, str], name: str) -> bytes:

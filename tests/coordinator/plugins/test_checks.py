@@ -259,14 +259,8 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
 @pytest.mark.parametrize(
     ("tables", "expected"),
     [
-        (
-            "[fitness.parameters]\nheigth_m = 0.2",
-            r"mine.toml:5: fitness.parameters.heigth_m: no such",
-        ),
-        (
-            "[fitness.parameters]\nheight_m = true",
-            "mine.toml:5: fitness.parameters.height_m: must be a number",
-        ),
+        ("[fitness.parameters]\nheigth_m = 0.2", "mine.toml:5: .*heigth_m: no such"),
+        ("[fitness.parameters]\nheight_m = true", "mine.toml:5: .*must be a number"),
         ("", r"mine.toml: fitness.parameters: .*height_m"),
         # Another section has the key: no line is named.
         (

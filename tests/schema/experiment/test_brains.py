@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from schema.errors import ExperimentError, RevolveError
 from schema.experiment.brains import neuron_kinds, neuron_types
@@ -12,11 +13,11 @@ from schema.experiment.settings import evaluation_settings, evaluation_settings_
 from schema.formats.files import read_robot, write_robot
 from schema.plugins import permission
 from schema.robot.brain import NEURON_TYPES, Brain, Neuron
-from schema.robot.robot import Part, Robot
+from schema.robot.robot import Part
 from tests.documents import parse_experiment
+from tests.schema.robots import GREY, robot_of
 
 own = pytest.mark.usefixtures("_own_brains")
-GREY = (0.5, 0.5, 0.5)
 TIRED = '[space]\nneuron_types = ["Sigmoid", "my_brains:Adapting"]\n'
 WAVES = '[brain]\ntype = "my_brains:Wave"\n[brain.parameters]\nfrequency_hz = 2\n'
 
@@ -47,15 +48,9 @@ def test_own_types_are_named_in_documents_requests_and_references() -> None:
 def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
     experiment = parse_experiment(f'name = "x"\n{TIRED}', "x.toml")
     kinds = neuron_kinds(experiment.brain, experiment.space)
-    robot = Robot(
-        (Part("Core", -1, -1, -1, 0, GREY), Part("ActiveHinge", 0, 0, 0, 0, GREY)),
-        Brain(
-            (
-                *(Neuron("input", "Input", 0) for _ in range(6)),
-                Neuron("output", "Adapting", 1, (0.5, 0.1, 0.25)),
-            )
-        ),
-    )
+    plain = robot_of(Part("ActiveHinge", 0, 0, 0, 0, GREY))
+    adapting = Neuron("output", "Adapting", 1, (0.5, 0.1, 0.25))
+    robot = replace(plain, brain=Brain((*plain.brain.neurons[:6], adapting)))
     for ending in ("yaml", "pb", "xml"):
         file = tmp_path / f"robot.{ending}"
         settings = evaluation_settings_of(experiment)
@@ -78,24 +73,15 @@ def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
         ('[brain]\ntype = "my_brains:np"', "has no 'outputs'"),
         ('[brain]\ntype = "my_brains:Adapting"', "has no 'outputs'"),
         ("[brain]\nparameters = {a = 1}", r"brain\.parameters\.a: no such key"),
-        (
-            WAVES.replace("2", '"fast"'),
-            r"brain\.parameters\.frequency_hz: must be a number",
-        ),
+        (WAVES.replace("2", '"fast"'), r"brain.parameters.frequency_hz: must be a nu"),
         ("[space]\nneuron_types = []", "must name at least one type"),
         ('[space]\nneuron_types = ["Simpel"]', "did you mean 'Simple'"),
-        (
-            '[space]\nneuron_types = ["Simple", "Simple"]',
-            "two types are named 'Simple'",
-        ),
+        ('[space]\nneuron_types = ["Simple", "Simple"]', "two types are named 'Simpl"),
         (
             '[space]\nneuron_types = ["my_brains:Wave"]',
-            "raised TypeError: .* missing 2 required positional arguments",
+            "raised TypeError: .* missing 2",
         ),
-        (
-            '[space]\nneuron_types = ["my_brains:np"]',
-            "raised AttributeError: .* has no attribute 'name'",
-        ),
+        ('[space]\nneuron_types = ["my_brains:np"]', "raised AttributeError: .*'name'"),
     ],
 )
 def test_a_wrong_name_or_object_is_refused(text: str, message: str) -> None:

@@ -123,7 +123,7 @@ def test_inconsistent_migration_is_refused_in_one_line(
         ("[[islands]]\ncount = 0", "count"),
         (
             '[[islands]]\ncount = 2\n[migration]\ntopology = "ring"\nepoch_s = 9.0',
-            "arenas only",
+            "arenas",
         ),
         (
             (

@@ -9,10 +9,11 @@ from schema.experiment.environment import Environment
 from schema.experiment.scenery import object_count
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
-from schema.robot.robot import Part, Robot
+from schema.robot.robot import Robot
 from tests.documents import parse_experiment
+from tests.schema.robots import CORE
 
-CORE = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
+ALONE = Robot((CORE,))
 YARD = """
 <!-- a yard -->
 <mujoco model="yard">
@@ -36,8 +37,8 @@ def scene(inside: str, outside: str = "") -> str:
 
 def test_scenery_adds_only_geoms_to_the_world() -> None:
     simulation = Simulation(friction=0.7, contact_time_s=0.02)
-    empty = solo_spec(CORE, BUILT_IN, simulation, Environment()).compile()
-    model = solo_spec(CORE, BUILT_IN, simulation, Environment(scenery=YARD)).compile()
+    empty = solo_spec(ALONE, BUILT_IN, simulation, Environment()).compile()
+    model = solo_spec(ALONE, BUILT_IN, simulation, Environment(scenery=YARD)).compile()
     assert (model.nbody, model.nq) == (empty.nbody, empty.nq)
     assert model.ngeom == empty.ngeom + 5
     names = [f"scenery/{index}" for index in range(5)]
@@ -62,7 +63,7 @@ def test_rotated_geoms_keep_their_rotation() -> None:
         scenery=scene('<body euler="0 0 30"><geom type="box" size="1 .1 .1" '
                       'pos="5 0 1" euler="0 0 15"/></body>')
     )  # fmt: skip
-    model = solo_spec(CORE, BUILT_IN, Simulation(), environment).compile()
+    model = solo_spec(ALONE, BUILT_IN, Simulation(), environment).compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     axis = data.geom("scenery/0").xmat.reshape(3, 3)[:, 0]
@@ -83,9 +84,9 @@ OBJECTS = scene(
 
 def test_a_body_with_a_free_joint_becomes_an_object_after_the_robot() -> None:
     simulation = Simulation(friction=0.7)
-    empty = solo_spec(CORE, BUILT_IN, simulation, Environment()).compile()
+    empty = solo_spec(ALONE, BUILT_IN, simulation, Environment()).compile()
     environment = Environment(scenery=OBJECTS)
-    model = solo_spec(CORE, BUILT_IN, simulation, environment).compile()
+    model = solo_spec(ALONE, BUILT_IN, simulation, environment).compile()
     assert object_count(environment, simulation) == 2
     assert (model.nbody, model.nq) == (empty.nbody + 2, empty.nq + 14)
     assert model.jnt_qposadr.tolist() == [0, 7, 14]
@@ -118,7 +119,7 @@ def test_an_object_keeps_its_compensation_of_gravity() -> None:
         for x, share in ((5, 0), (10, 1), (15, 2))
     )
     environment = Environment(scenery=scene(bodies))
-    model = solo_spec(CORE, BUILT_IN, Simulation(), environment).compile()
+    model = solo_spec(ALONE, BUILT_IN, Simulation(), environment).compile()
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 10)
     speeds = [data.joint(f"scenery/{body}").qvel[2] for body in (1, 2, 3)]
@@ -140,7 +141,7 @@ def test_objects_are_refused_in_arenas() -> None:
 def test_a_robot_starts_on_an_object_that_lies_where_it_is_born() -> None:
     slab = '<body pos="0 0 .05"><freejoint/><geom type="box" size=".3 .3 .05"/></body>'
     environment = Environment(scenery=scene(BOX.replace("/>", ' pos="3 0 0"/>') + slab))
-    model = solo_spec(CORE, BUILT_IN, Simulation(), environment).compile()
+    model = solo_spec(ALONE, BUILT_IN, Simulation(), environment).compile()
     assert model.qpos0[2] == pytest.approx(0.1 + 0.0225, abs=3e-5)
 
 

@@ -15,8 +15,7 @@ import pytest
 from schema.errors import InvalidRobot
 from schema.formats.files import read_robot, settings_of
 from schema.formats.mjcf import robot_to_mjcf
-from schema.robot.brain import INPUT, Brain, Neuron
-from schema.robot.robot import Part, Robot
+from tests.schema.robots import robot_of
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -54,11 +53,6 @@ for word in sys.argv[1:]:
     os.wait()
 """
 
-GREY = (0.5, 0.5, 0.5)
-CORE = Robot(
-    (Part("Core", -1, -1, -1, 0, GREY),),
-    Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))),
-)
 NEURON = "  - {{id: n{0}, part: part-0, layer: hidden, type: Simple}}\n"
 EDGE = "  - {{source: n{0}, target: n{0}, weight: 1}}\n"
 
@@ -81,7 +75,7 @@ ENTITIES = (
 
 def mjcf(assets: str = "", world: str = "") -> str:
     """Return the MJCF of a robot with more in it."""
-    text = robot_to_mjcf(CORE, settings_of(None))
+    text = robot_to_mjcf(robot_of(), settings_of(None))
     assert "<worldbody>" in text
     text = text.replace("<worldbody>", f"{assets}<worldbody>", 1)
     return text.replace("</worldbody>", f"{world}</worldbody>", 1)
@@ -154,7 +148,7 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "line.txt": (lambda: "0 E c 0" + " 1" * 450_000, "<= 1000 characters"),
     "digits.txt": (
         lambda: "0 E c 0\n\n\nc " + "9" * 900 + " c 1 1",
-        "must be a neuron's number",
+        "a neuron's number",
     ),
     "neurons.txt": (lambda: "0 E c 0\n\n" + "c simple\n" * 90_000, "10000 neurons"),
     "entities.xml": (lambda: f"{ENTITIES}<mujoco name='&j;'/>", "document type"),
@@ -176,21 +170,15 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "tables.toml": (lambda: "[[islands]]\n" * 80_000, "<= 20000 lists and tables"),
     "islands.toml": (
         lambda: "name = 'x'\n" + "[[islands]]\n" * 1001,
-        "islands: must be a list of length <= 1000",
+        "of length <= 1000",
     ),
-    "count.toml": (
-        lambda: "name = 'x'\n[[islands]]\ncount = 1000000000",
-        "whole number <= 10000",
-    ),
+    "count.toml": (lambda: "name = 'x'\n[[islands]]\ncount = 1000000000", "<= 10000"),
     "dotted.toml": (lambda: "a." * 15_000 + "b = 1", "<= 16 parts"),
     "quoted.toml": (lambda: "' '." * 15_000 + "b = 1", "<= 16 parts"),
     "digits.toml": (lambda: "births = " + "9" * 900_000, "<= 1000 digits"),
     "hex.toml": (lambda: "births = 0x" + "f" * 900_000, "<= 1000 digits"),
     "count64.toml": (lambda: "name = 'x'\nbirths = 0x" + "f" * 900, "births: must be"),
-    "float.toml": (
-        lambda: "name = 'x'\n[simulation]\ngravity = 1e999999",
-        "must be finite",
-    ),
+    "float.toml": (lambda: "name = 'x'\n[simulation]\ngravity = 1e999999", "be finite"),
     "word.toml": (
         lambda: f"name = 'x'\n[selection]\nparents = '{'A' * 900_000}'",
         "must be one of",
@@ -271,4 +259,4 @@ def test_mjcf_of_a_robot_is_read_without_its_lights(tmp_path: Path) -> None:
     """Elements that belong to no part may be added by hand."""
     path = tmp_path / "robot.xml"
     path.write_text(mjcf("<statistic extent='2'/>", "<light/><camera name='c'/>"))
-    assert read_robot(path) == CORE
+    assert read_robot(path) == robot_of()

@@ -18,10 +18,9 @@ from schema.experiment.document import Simulation
 from schema.formats.files import write_robot
 from schema.mjcf.model import robot_spec
 from schema.parts import BUILT_IN
-from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
+from tests.schema.robots import GREY, robot_of
 
-GREY = (0.5, 0.5, 0.5)
 INSTALL_S = 900
 pytestmark = [pytest.mark.long, pytest.mark.timeout(INSTALL_S + 120)]
 
@@ -98,9 +97,9 @@ class Description(TypedDict):
 
 def spider() -> Robot:
     """Return four legs of hinge, brick, passive hinge, tilted bar and touch sensor."""
-    parts = [Part("Core", -1, -1, -1, 0, GREY)]
+    parts: list[Part] = []
     for slot in range(4):
-        first = len(parts)
+        first = len(parts) + 1
         bar = (60.0, 0.3, 0.0, *GREY)
         parts += [
             Part("ActiveHinge", 0, slot, slot % 2, 90, GREY),
@@ -109,18 +108,7 @@ def spider() -> Robot:
             Part("ParametricBarJoint", first + 2, 1, 0, 0, bar),
             Part("TouchSensor", first + 3, 1, 0, 0, GREY),
         ]
-    types = [BUILT_IN[part.kind] for part in parts]
-    neurons = [
-        Neuron("input", INPUT, index)
-        for index, kind in enumerate(types)
-        for _ in range(kind.inputs)
-    ]
-    neurons += [
-        Neuron("output", "Oscillator", index, (1.0, 0.0, 1.0))
-        for index, kind in enumerate(types)
-        if kind.outputs
-    ]
-    return Robot(tuple(parts), Brain(tuple(neurons)))
+    return robot_of(*parts)
 
 
 def run_with(folder: Path, packages: list[str], script: str, file: Path) -> Description:

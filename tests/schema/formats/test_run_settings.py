@@ -16,12 +16,11 @@ from schema.formats.files import settings_of, write_robot
 from schema.formats.run_settings import experiment_of, read_with_settings
 from schema.plugins import permission
 from schema.plugins.kept import keep
-from schema.robot.brain import INPUT, Brain, Neuron
-from schema.robot.robot import Part, Robot
 from schema.tables.description import Description, description_text
 from schema.tables.files import parquet_path
 from tests.analysis.tables import table
 from tests.documents import parse_experiment
+from tests.schema.robots import robot_of
 
 BUMPY = 'name = "bumpy"\n[environment]\nroughness_m = 0.04\n'
 PADDLES = """
@@ -195,9 +194,7 @@ def test_settings_of_an_mjcf_file_elsewhere_are_named_where_they_count(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "core.xml"
-    senses = tuple(Neuron("input", INPUT, 0) for _ in range(6))
-    core = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),), Brain(senses))
-    write_robot(core, path)
+    write_robot(robot_of(), path)
     read_with_settings(path, None)
     assert capsys.readouterr().err == ""
     read_with_settings(path, None, tells_default=True)

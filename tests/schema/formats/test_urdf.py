@@ -20,26 +20,21 @@ from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import robot_spec
 from schema.parts import BUILT_IN
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
-from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
+from tests.schema.robots import GREY, robot_of
 
-GREY = (0.5, 0.5, 0.5)
-SENSES = tuple(Neuron("input", INPUT, 0) for _ in range(6))
 SIMULATION = Simulation()
 
 
 def test_wheels_become_continuous_joints_and_cylinders() -> None:
     """Of the driven wheel: radius 60 mm, 3 mm thick, 0.3924 N m, 5.236 rad/s."""
     wheel = (60.0, *GREY)
-    robot = Robot(
-        (
-            Part("Core", -1, -1, -1, 0, GREY),
-            Part("ActiveWheel", 0, 2, 0, 0, wheel),
-            Part("Wheel", 0, 3, 0, 0, wheel),
-        ),
-        Brain((*SENSES, Neuron("output", "Sigmoid", 1, (0.0, 1.0)))),
-    )
     space = {**BUILT_IN, "ActiveWheel": ACTIVE_WHEEL, "Wheel": WHEEL}
+    wheels = (
+        Part("ActiveWheel", 0, 2, 0, 0, wheel),
+        Part("Wheel", 0, 3, 0, 0, wheel),
+    )
+    robot = robot_of(*wheels, space=space)
     root = parse_xml(robot_to_urdf(robot, space, SIMULATION), MOST_MJCF_BYTES)
     driven, free = root.iter("joint")
     assert [each.get("type") for each in (driven, free)] == ["continuous"] * 2
@@ -62,10 +57,8 @@ def test_a_slider_becomes_a_prismatic_joint() -> None:
     assert shape.joint is not None
     sliding = changed(shape.joint, kind="prismatic", limit=0.012)
     slide = replace(BUILT_IN["Hinge"], shape=lambda _: changed(shape, joint=sliding))
-    parts = (Part("Core", -1, -1, -1, 0, GREY), Part("Hinge", 0, 2, 0, 0, GREY))
-    text = robot_to_urdf(
-        Robot(parts, Brain(SENSES)), {**BUILT_IN, "Hinge": slide}, SIMULATION
-    )
+    space = {**BUILT_IN, "Hinge": slide}
+    text = robot_to_urdf(robot_of(Part("Hinge", 0, 2, 0, 0, GREY)), space, SIMULATION)
     (joint,) = parse_xml(text, MOST_MJCF_BYTES).iter("joint")
     assert joint.get("type") == "prismatic"
     limits = joint.find("limit")
@@ -109,14 +102,8 @@ def test_urdf_moves_like_the_robot(
 
 
 def test_limits_of_driven_and_free_hinges() -> None:
-    robot = Robot(
-        (
-            Part("Core", -1, -1, -1, 0, GREY),
-            Part("ActiveHinge", 0, 0, 0, 0, GREY),
-            Part("Hinge", 0, 1, 0, 0, GREY),
-        ),
-        Brain((*SENSES, Neuron("output", "Simple", 1, (0.0, 0.5)))),
-    )
+    hinges = Part("ActiveHinge", 0, 0, 0, 0, GREY), Part("Hinge", 0, 1, 0, 0, GREY)
+    robot = robot_of(*hinges)
     text = robot_to_urdf(robot, BUILT_IN, SIMULATION)
     # 1.8 kg cm and 50 rpm within 45 degrees; 60 degrees without a motor.
     assert 'lower="-0.785398' in text
@@ -129,7 +116,7 @@ def test_limits_of_driven_and_free_hinges() -> None:
 
 def test_urdf_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "core.urdf"
-    write_robot(Robot((Part("Core", -1, -1, -1, 0, GREY),), Brain(SENSES)), path)
+    write_robot(robot_of(), path)
     assert path.read_text().startswith("<?xml")
     with pytest.raises(InvalidRobot, match=r"must end in one of .*, got '\.urdf'"):
         read_robot(path)
@@ -137,7 +124,6 @@ def test_urdf_is_not_read(tmp_path: Path) -> None:
 
 def test_a_body_that_the_engine_cannot_build_is_refused() -> None:
     tiny = changed(SIMULATION, mass_factor=1e-9)
-    core, hinge = Part("Core", -1, -1, -1, 0, GREY), Part("Hinge", 0, 2, 0, 0, GREY)
-    robot = Robot((core, hinge), Brain(SENSES))
+    robot = robot_of(Part("Hinge", 0, 2, 0, 0, GREY))
     with pytest.raises(InvalidRobot, match=r"^cannot be built: .*inertia must .*body1"):
         robot_to_urdf(robot, BUILT_IN, tiny)

@@ -13,13 +13,13 @@ from schema.mjcf.footing import footprint, standing_height
 from schema.mjcf.model import robot_spec, shared_model, solo_spec
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
+from tests.schema.robots import CORE, GREY
 
-GREY = (0.5, 0.5, 0.5)
 WORLD = Simulation()
-CORE = Robot((Part("Core", -1, -1, -1, 0, GREY),))
+ALONE = Robot((CORE,))
 LEGGED = Robot(
     (
-        Part("Core", -1, -1, -1, 0, GREY),
+        CORE,
         Part("ParametricBarJoint", 0, 2, 0, 0, (90.0, 0.5, 0.0, *GREY)),
         Part("FixedBrick", 1, 1, 0, 0, GREY),
         Part("ActiveHinge", 0, 3, 0, 90, GREY),
@@ -66,42 +66,42 @@ def depths(
 
 def test_a_core_stands_on_a_block_and_beside_a_wall() -> None:
     """A block as high as 0.3 m lifts it by that; a slanting wall is left alone."""
-    flat = height(CORE, Environment())
+    flat = height(ALONE, Environment())
     block = '<geom type="box" size="0.2 0.2 0.15" pos="0 0 0.15"/>'
     wall = '<geom type="box" size="1 0.01 0.5" pos="0.1 -0.1 0.5" euler="0 0 45"/>'
     scenes = [
         Environment(scenery=f"<mujoco><worldbody>{one}</worldbody></mujoco>")
         for one in (block, wall)
     ]
-    assert height(CORE, scenes[0]) == pytest.approx(flat + 0.3, abs=3e-5)
-    assert height(CORE, scenes[0], (1.0, 0.0)) == flat
+    assert height(ALONE, scenes[0]) == pytest.approx(flat + 0.3, abs=3e-5)
+    assert height(ALONE, scenes[0], (1.0, 0.0)) == flat
     # 0.14 m from the core, whose corners reach 0.065 m.
-    assert height(CORE, scenes[1]) == flat
-    assert height(CORE, scenes[1], (0.1, -0.1)) == pytest.approx(flat + 1.0, abs=3e-5)
+    assert height(ALONE, scenes[1]) == flat
+    assert height(ALONE, scenes[1], (0.1, -0.1)) == pytest.approx(flat + 1.0, abs=3e-5)
 
 
 def test_geoms_that_do_not_collide_are_ignored() -> None:
     ghost = '<geom type="box" size="1 1 1" contype="0" conaffinity="0"/>'
     scene = Environment(scenery=f"<mujoco><worldbody>{ghost}</worldbody></mujoco>")
-    assert height(CORE, scene) == height(CORE, Environment())
+    assert height(ALONE, scene) == height(ALONE, Environment())
 
 
 def test_a_core_stands_on_the_highest_node_that_it_may_touch() -> None:
     """Patches of 0.4 m about the origin's node: the core touches four of them."""
     environment = Environment(roughness_m=0.2, patch_m=0.4, extent_m=2.0)
-    flat, shares = height(CORE, Environment()), relief(environment)
+    flat, shares = height(ALONE, Environment()), relief(environment)
     assert shares.shape == (11, 11)
     highest = 0.2 * float(shares[4:7, 4:7].max())
-    assert height(CORE, environment) == pytest.approx(flat + highest)
+    assert height(ALONE, environment) == pytest.approx(flat + highest)
     # Inside of the patch between x 0.4 and 0.8, y -0.4 and 0.
     highest = 0.2 * float(shares[4:6, 6:8].max())
-    assert height(CORE, environment, (0.6, -0.2)) == pytest.approx(flat + highest)
+    assert height(ALONE, environment, (0.6, -0.2)) == pytest.approx(flat + highest)
     for place in ((2.5, 0.0), (0.0, -9.0), (-3.0, 3.0)):
-        assert height(CORE, environment, place) == flat
+        assert height(ALONE, environment, place) == flat
 
 
 def test_model_and_footing_use_the_same_heights() -> None:
-    model = solo_spec(CORE, BUILT_IN, WORLD, ROUGH).compile()
+    model = solo_spec(ALONE, BUILT_IN, WORLD, ROUGH).compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     data.geom_xpos[model.geom_bodyid > 0] = (50.0, 0.0, 0.0)
@@ -146,7 +146,7 @@ def test_two_builds_are_equal_to_the_last_bit(environment: Environment) -> None:
     one, two = (
         solo_spec(LEGGED, BUILT_IN, WORLD, environment).compile() for _ in range(2)
     )
-    child = robot_spec(CORE, BUILT_IN, WORLD).spec
+    child = robot_spec(ALONE, BUILT_IN, WORLD).spec
     many = shared_model([("a/", child), ("b/", child)], WORLD, environment)
     for name in ("qpos0", "geom_pos", "geom_quat", "geom_size", "hfield_data"):
         assert getattr(one, name).tobytes() == getattr(two, name).tobytes()

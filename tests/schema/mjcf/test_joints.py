@@ -24,11 +24,10 @@ from schema.parts import (
 )
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
 from schema.robot.robot import Part, Robot
+from tests.schema.robots import CORE, GREY
 from worker.robot.devices import Servos
 from worker.robot.placed import PlacedRobot
 
-GREY = (0.5, 0.5, 0.5)
-CORE = Part("Core", -1, -1, -1, 0, GREY)
 WORLD = Simulation()
 SPACE_WORLD = replace(WORLD, gravity=0.0, drop_m=5.0)
 ON_SIDE: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))

@@ -18,9 +18,8 @@ from schema.mjcf.model import (
 )
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
+from tests.schema.robots import CORE, GREY
 
-GREY = (0.5, 0.5, 0.5)
-CORE = Part("Core", -1, -1, -1, 0, GREY)
 WORLD = Simulation()
 KINDS: Mapping[str, tuple[float, ...]] = {
     "FixedBrick": GREY,

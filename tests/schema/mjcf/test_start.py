@@ -12,9 +12,9 @@ from schema.experiment.environment import FLAT, Environment
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
+from tests.schema.robots import CORE, GREY
 
-CORE = Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5))
-HINGED = Robot((CORE, Part("ActiveHinge", 0, 0, 0, 0, (0.5, 0.5, 0.5))))
+HINGED = Robot((CORE, Part("ActiveHinge", 0, 0, 0, 0, GREY)))
 WORLD = Simulation(drop_m=0.01)
 
 

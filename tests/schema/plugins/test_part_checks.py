@@ -68,6 +68,15 @@ def measured(*own: Parameter) -> PartType:
     return replace(FIXED_BRICK, own_parameters=own)
 
 
+def sensing(*sensors: Sensor) -> PartType:
+    """Return a touch sensor with other sensors."""
+    return replace(TOUCH_SENSOR, sensors=sensors)
+
+
+def _nothing(_values: tuple[float, ...]) -> None:
+    pass
+
+
 def _thin(values: tuple[float, ...]) -> Shape:
     """Return a brick of a size that the parameter may make 0."""
     size = (values[0], 0.041, 0.0355)
@@ -86,113 +95,69 @@ def _wordy(values: tuple[float, ...]) -> Shape:
 
 _TURN = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """A mirror image, no rotation."""
+_THIRD = changed(HINGED.slots[1], segment=2)
 _TAILS = tuple(box for box in HINGED.boxes if box.segment == 1)
 _SIZE = Parameter("size", 0.0, 1.0, 0.5)
 
-WRONG = {
-    "no slots": (replace(FIXED_BRICK, arity=3), r"slots: must be 3, the arity, got 4"),
-    "arity": (replace(FIXED_BRICK, arity=0), r"arity: must be .* >= 1, got 0"),
-    "name": (replace(FIXED_BRICK, name=" "), r"name: must not be empty, got ' '"),
-    "size": (
-        boxed(size=(0.1, 0.0, 0.1)),
-        r"boxes\[0\] \(body\).size: must be 3 finite numbers > 0, got \(0.1, 0.0, 0.1",
+WRONG = [
+    (replace(FIXED_BRICK, arity=3), "slots: must be 3, the arity, got 4"),
+    (replace(FIXED_BRICK, arity=0), "arity: must be .* >= 1, got 0"),
+    (replace(FIXED_BRICK, name=" "), "name: must not be empty, got ' '"),
+    (boxed(size=(0.1, 0.0, 0.1)), r"boxes\[0\] \(body\).size: .* > 0, got \(0.1, 0.0"),
+    (boxed(size=(0.1, 0.1)), r"size: must be 3 .* got \(0.1, 0.1\)"),
+    (boxed(is_round=True, size=(0.1, 0.2, 0.1)), "have equal x and y in a cylinder"),
+    (boxed(mass=math.nan), "mass: must be finite and > 0, got nan"),
+    (boxed(mass=0.0), "mass: must be finite and > 0, got 0.0"),
+    (boxed(position=(0.0, math.inf, 0.0)), "position: must be 3 finite"),
+    (boxed(rotation=_TURN), "rotation: must be a rotation matrix"),
+    (boxed(segment=1), "segment: must be 0 without a joint, got 1"),
+    (boxed(size=[0.1, 0.1, 0.1]), "must hold tuples and numbers only"),
+    (slotted(normal=(0.0, 2.0, 0.0)), r"slots\[1\].normal: must be .* length 1, got"),
+    (slotted(tangent=(0.0, 0.6, 0.8)), r"slots\[1\].tangent: must be at right angles"),
+    (slotted(segment=1), "segment: must be 0 without a joint, got 1"),
+    (
+        shaped(HINGE, changed(HINGED, slots=(*HINGED.slots[:1], _THIRD))),
+        "segment: must be 0 or 1 with a joint, got 2",
     ),
-    "two numbers": (boxed(size=(0.1, 0.1)), r"size: must be 3 .* got \(0.1, 0.1\)"),
-    "oval": (
-        boxed(is_round=True, size=(0.1, 0.2, 0.1)),
-        r"must have equal x and y in a cylinder, got \(0.1, 0.2, 0.1\)",
+    (jointed(axis=(1.0, 1.0, 0.0)), "joint.axis: must be .* of length 1"),
+    (jointed(limit=-1.0), "joint.limit: must be .* > 0, got -1.0"),
+    (jointed(limit=math.inf), "joint.limit: must be .* > 0, got inf"),
+    (jointed(kind="continuous"), "joint.limit: must be infinite if continuous, got 0"),
+    (jointed(kind="ball"), "kind: must be one of revolute, continuous, .* got 'ball'"),
+    (jointed(kind="continuous", limit=math.inf), "motor.control: must be 'velocity'"),
+    (replace(FIXED_BRICK, motor=ACTIVE_HINGE.motor), "motor: must have a joint, got a"),
+    (driven(max_torque=0.0), "max_torque: must be finite and > 0, got 0"),
+    (driven(control="force"), "control: must be one of position, velocity"),
+    (shaped(HINGE, changed(HINGED, boxes=_TAILS)), "least one in segment 0, got none"),
+    (shaped(FIXED_BRICK, changed(BRICK, boxes=2 * BRICK.boxes)), "two named 'body'"),
+    (
+        measured(Parameter("a", 1.0, 0.5, 0.7)),
+        r"0\] \(a\): must have .*\(1.0, 0.7, 0.5",
     ),
-    "mass": (boxed(mass=math.nan), r"mass: must be finite and > 0, got nan"),
-    "weightless": (boxed(mass=0.0), r"mass: must be finite and > 0, got 0.0"),
-    "place": (boxed(position=(0.0, math.inf, 0.0)), r"position: must be 3 finite"),
-    "mirrored": (boxed(rotation=_TURN), r"rotation: must be a rotation matrix"),
-    "segment": (boxed(segment=1), r"segment: must be 0 without a joint, got 1"),
-    "list": (boxed(size=[0.1, 0.1, 0.1]), r"must hold tuples and numbers only"),
-    "long normal": (
-        slotted(normal=(0.0, 2.0, 0.0)),
-        r"slots\[1\].normal: must be .* of length 1, got \(0.0, 2.0, 0.0\)",
+    (measured(Parameter("size", 0.0, 1.0, 2.0)), r"got \(0.0, 2.0, 1.0\)"),
+    (measured(replace(_SIZE, unit=cast("str", 1))), "unit: must be a text, got 1"),
+    (measured(Parameter("red", 0.0, 1.0, 0.5)), "own_parameters: .* two named 'red'"),
+    (replace(measured(_SIZE), shape=_thin), r"got \(0.0, .* \(with size = 0, then"),
+    (replace(measured(_SIZE), shape=_raising), r"raised ZeroDiv.* \(with size = 0, th"),
+    (replace(measured(_SIZE), shape=_wordy), r"raised ValueError: two lines \(with si"),
+    (sensing(Sensor("touch", "middle")), "be one of base, left, right, got 'middle'"),
+    (sensing(Sensor(cast("Any", "smell"), "left")), "imu, touch, light, got 'smell'"),
+    (replace(FIXED_BRICK, shape=cast("Any", BRICK)), "raised TypeError: .*callable"),
+    (
+        replace(FIXED_BRICK, shape=cast("Any", _nothing)),
+        "must return a Shape, got None",
     ),
-    "skew tangent": (
-        slotted(tangent=(0.0, 0.6, 0.8)),
-        r"slots\[1\].tangent: must be at right angles .* got \(0.0, 0.6, 0.8\)",
+]
+PAIR = (Sensor("imu", "left"), Sensor("imu", "right"))
+PAD = boxed(name="pad/left")
+UNSUITABLE = [
+    (slotted(normal=(0.0, -1.0, 0.0)), r"\[1\].normal: must point out .* 41 mm deep"),
+    (sensing(*PAIR), "sensors: must have imus on one box only, got"),
+    (
+        replace(PAD, sensors=(Sensor("touch", "pad/left"),)),
+        "no '/' in the name of a box",
     ),
-    "slot beyond": (slotted(segment=1), r"segment: must be 0 without a joint, got 1"),
-    "third segment": (
-        shaped(HINGE, changed(HINGED, slots=(
-            HINGED.slots[0], changed(HINGED.slots[1], segment=2)))),
-        r"segment: must be 0 or 1 with a joint, got 2",
-    ),
-    "axis": (jointed(axis=(1.0, 1.0, 0.0)), "joint.axis: must be .* of length 1"),
-    "limit": (jointed(limit=-1.0), r"joint.limit: must be .* > 0, got -1.0"),
-    "no limit": (jointed(limit=math.inf), r"joint.limit: must be .* > 0, got inf"),
-    "wheel with limit": (
-        jointed(kind="continuous"),
-        r"joint.limit: must be infinite if continuous, got 0.78",
-    ),
-    "unknown joint": (
-        jointed(kind="ball"),
-        r"joint.kind: must be one of revolute, continuous, prismatic, got 'ball'",
-    ),
-    "position of a wheel": (
-        jointed(kind="continuous", limit=math.inf),
-        r"motor.control: must be 'velocity' for a continuous joint, got 'position'",
-    ),
-    "motor": (
-        replace(FIXED_BRICK, motor=ACTIVE_HINGE.motor),
-        r"motor: must have a joint, got a shape without one",
-    ),
-    "torque": (driven(max_torque=0.0), r"max_torque: must be finite and > 0, got 0"),
-    "control": (driven(control="force"), r"control: must be one of position, velocity"),
-    "empty segment": (
-        shaped(ACTIVE_HINGE, changed(HINGED, boxes=_TAILS)),
-        r"boxes: must have at least one in segment 0, got none",
-    ),
-    "two boxes": (
-        shaped(FIXED_BRICK, changed(BRICK, boxes=2 * BRICK.boxes)),
-        r"boxes: must have different names, got two named 'body'",
-    ),
-    "range": (
-        measured(Parameter("size", 1.0, 0.5, 0.7)),
-        r"own_parameters\[0\] \(size\): must have .* got \(1.0, 0.7, 0.5\)",
-    ),
-    "default": (measured(Parameter("size", 0.0, 1.0, 2.0)), r"got \(0.0, 2.0, 1.0\)"),
-    "unit": (
-        measured(Parameter("size", 0.0, 1.0, 0.5, unit=cast("str", 1))),
-        r"own_parameters\[0\] \(size\).unit: must be a text, got 1",
-    ),
-    "name of a colour": (
-        measured(Parameter("red", 0.0, 1.0, 0.5)),
-        r"own_parameters: must have .* got two named 'red'",
-    ),
-    "corner": (
-        replace(measured(_SIZE), shape=_thin),
-        r"size: must be 3 finite .* got \(0.0, 0.041, 0.0355\) \(with size = 0, then",
-    ),
-    "raising corner": (
-        replace(measured(_SIZE), shape=_raising),
-        r"shape raised ZeroDivisionError: .* \(with size = 0, then three colours\)",
-    ),
-    "wordy corner": (
-        replace(measured(_SIZE), shape=_wordy),
-        r"shape raised ValueError: two lines \(with size = 0",
-    ),
-    "sensor": (
-        replace(TOUCH_SENSOR, sensors=(Sensor("touch", "middle"),)),
-        r"sensors\[0\].box: must be one of base, left, right, got 'middle'",
-    ),
-    "kind of sensor": (
-        replace(TOUCH_SENSOR, sensors=(Sensor("smell", "left"),)),  # type: ignore[arg-type]
-        r"sensors\[0\].kind: must be one of imu, touch, light, got 'smell'",
-    ),
-    "no function": (
-        replace(FIXED_BRICK, shape=BRICK),  # type: ignore[arg-type]
-        r"shape raised TypeError: .*not callable",
-    ),
-    "no shape": (
-        replace(FIXED_BRICK, shape=lambda _: None),  # type: ignore[arg-type, return-value]
-        r"shape: must return a Shape, got None",
-    ),
-}  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("kind", [*BUILT_IN.values(), *ROBOGEN])
@@ -202,29 +167,10 @@ def test_built_in_part_types_pass(kind: PartType) -> None:
     assert advise_shape(kind) == ""
 
 
-PAIR = (Sensor("imu", "left"), Sensor("imu", "right"))
-PAD = boxed(name="pad/left")
-UNSUITABLE = {
-    "slot": (
-        slotted(normal=(0.0, -1.0, 0.0)),
-        r"slots\[1\].normal: must point out .* into its box 'body', 41 mm deep",
-    ),
-    "imus": (
-        replace(TOUCH_SENSOR, sensors=PAIR),
-        "sensors: must have imus on one box only, got",
-    ),
-    "touch": (
-        replace(PAD, sensors=(Sensor("touch", "pad/left"),)),
-        "no '/' in the name of a box with a touch sensor, got 'pad/left'",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", UNSUITABLE)
+@pytest.mark.parametrize(("kind", "message"), UNSUITABLE)
 def test_parts_that_finished_runs_may_have_are_refused_by_another_check(
-    name: str,
+    kind: PartType, message: str
 ) -> None:
-    kind, message = UNSUITABLE[name]
     check_part_type(kind)
     with pytest.raises(ExperimentError, match=message):
         check_slots_and_sensors(kind)
@@ -232,7 +178,7 @@ def test_parts_that_finished_runs_may_have_are_refused_by_another_check(
 
 def test_two_imus_of_one_box_and_an_imu_of_a_box_with_a_slash_pass() -> None:
     sensors = (*PAIR[:1] * 2, Sensor("touch", "left"))
-    check_slots_and_sensors(replace(TOUCH_SENSOR, sensors=sensors))
+    check_slots_and_sensors(sensing(*sensors))
     check_slots_and_sensors(replace(PAD, sensors=(Sensor("imu", "pad/left"),)))
 
 
@@ -249,9 +195,8 @@ def test_a_limit_in_degrees_gets_a_warning() -> None:
     assert advise_shape(jointed(limit=3.0)) == ""
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_wrong_part_types_are_refused(name: str) -> None:
-    kind, message = WRONG[name]
+@pytest.mark.parametrize(("kind", "message"), WRONG)
+def test_wrong_part_types_are_refused(kind: PartType, message: str) -> None:
     with pytest.raises(ExperimentError, match=message) as caught:
         check_part_type(kind, "space.part_types")
     text = str(caught.value)
@@ -269,31 +214,29 @@ def test_the_message_names_file_and_line_of_the_shape() -> None:
         check_part_type(kind)
 
 
-def test_of_many_parameters_each_extreme_is_tried_alone() -> None:
+def tried(kind: PartType) -> set[tuple[float, ...]]:
+    """Return the own parameters with which the shape of a type is made."""
     seen: list[tuple[float, ...]] = []
 
     def record(values: tuple[float, ...]) -> Shape:
-        seen.append(values)
-        return BRICK
+        seen.append(values[:-3])
+        return kind.shape(values)
 
+    check_part_type(replace(kind, shape=record))
+    return set(seen)
+
+
+def test_of_many_parameters_each_extreme_is_tried_alone() -> None:
     own = [Parameter(f"p{number}", -1.0, 2.0, 0.0) for number in range(9)]
-    check_part_type(replace(measured(*own), shape=record))
-    found = {values[:9] for values in seen}
-    assert len(found) == 1 + 2 * 9
-    assert (0.0,) * 8 + (2.0,) in found
+    corners = tried(measured(*own))
+    assert len(corners) == 1 + 2 * 9
+    assert (0.0,) * 8 + (2.0,) in corners
 
 
 def test_all_corners_of_the_bar_are_tried() -> None:
-    seen: list[tuple[float, ...]] = []
-
-    def record(values: tuple[float, ...]) -> Shape:
-        seen.append(values)
-        return PARAMETRIC_BAR_JOINT.shape(values)
-
-    check_part_type(replace(PARAMETRIC_BAR_JOINT, shape=record))
     half = math.pi / 2
     corners = {(x, a, 0.0) for x in (20.0, 100.0) for a in (-half, half)}
-    assert {values[:3] for values in seen} == corners | {(50.0, 0.0, 0.0)}
+    assert tried(PARAMETRIC_BAR_JOINT) == corners | {(50.0, 0.0, 0.0)}
 
 
 def test_a_document_with_a_wrong_part_type_is_refused(
@@ -304,9 +247,6 @@ def test_a_document_with_a_wrong_part_type_is_refused(
     space = Space(part_types=("schema.parts:CORE", "schema.parts:WRONG"))
     with pytest.raises(ExperimentError, match=r"space.part_types: .*slots\[1\].normal"):
         body_space(space)
-
-
-# --- sensors -----------------------------------------------------------------
 
 
 @dataclass
@@ -335,33 +275,23 @@ def longsighted(calls: list[Any]) -> Sequence[float]:
     return (calls[-1].distance("body", (1.0, 1.0, 0.0), 0.5),)
 
 
-BAD: dict[str, tuple[Any, str]] = {
-    "two values": (Nose((0.5, 0.5)), r"Nose.read .* must return 1 values.* got 2"),
-    "nan": (Nose((math.nan,)), r"must return finite numbers, got \[nan\]"),
-    "text": (Nose("5"), r"must return numbers, got '5'"),
-    "nothing": (Nose(None), r"must return numbers, got None"),
-    "no inputs": (Nose((), 0), r"inputs: must be a whole number from 1 .* got 0"),
-    "half an input": (Nose((0.5,), 0.5), r"inputs: must be a whole number.* got 0.5"),
-    "state": (
-        Nose(lambda calls: (float(len(calls)),)),
-        r"must return the same twice, got \[1.0\] and \[2.0\]",
-    ),
-    "raises": (
-        Nose(lambda calls: (calls[-1].light[2],)),
-        "Nose.read of a part at birth: TypeError",
-    ),
-    "raises lines": (Nose(wordy), "Nose.read of a part at birth: .*: two lines$"),
-    "direction": (
-        Nose(longsighted),
-        r"direction must have length 1, got \(1.0, 1.0, 0.0\)",
-    ),
-    "no method": (object(), r"inputs: must be a whole number.* got None"),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_wrong_sensors_are_refused(name: str) -> None:
-    sensor, message = BAD[name]
+@pytest.mark.parametrize(
+    ("sensor", "message"),
+    [
+        (Nose((0.5, 0.5)), r"Nose.read .* must return 1 values.* got 2"),
+        (Nose((math.nan,)), r"must return finite numbers, got \[nan\]"),
+        (Nose("5"), "must return numbers, got '5'"),
+        (Nose(None), "must return numbers, got None"),
+        (Nose((), 0), "inputs: must be a whole number from 1 .* got 0"),
+        (Nose((0.5,), 0.5), "inputs: must be a whole number.* got 0.5"),
+        (Nose(lambda calls: (float(len(calls)),)), "must return the same twice, got"),
+        (Nose(lambda calls: (calls[-1].light[2],)), "a part at birth: TypeError"),
+        (Nose(wordy), "Nose.read of a part at birth: .*: two lines$"),
+        (Nose(longsighted), r"direction must have length 1, got \(1.0, 1.0, 0.0"),
+        (object(), "inputs: must be a whole number.* got None"),
+    ],
+)
+def test_wrong_sensors_are_refused(sensor: Any, message: str) -> None:  # noqa: ANN401
     with pytest.raises(ExperimentError, match=message) as caught:
         check_sensor(sensor)
     assert "\n" not in str(caught.value)

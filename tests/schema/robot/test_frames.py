@@ -14,8 +14,8 @@ from schema.robot.frames import attach, place_parts, shapes_of
 from schema.robot.genome import Genome, Node, develop
 from schema.robot.robot import ORIENTATIONS, Part, Robot
 from schema.robot.trace import Floats
+from tests.schema.robots import CORE, GREY
 
-GREY = (0.5, 0.5, 0.5)
 NodeMaker = Callable[..., Node]
 
 
@@ -63,17 +63,12 @@ def test_golden_position_of_a_hinge_on_the_front(node: NodeMaker) -> None:
     core = node("Core", children=((0, node("Hinge")),))
     robot = body(core)
     rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
+    assert (rotations[0] == np.eye(3)).all()
+    assert (positions[0] == 0.0).all()
     boxes = BUILT_IN["Hinge"].shape(core.children[0][1].parameters).boxes
     centres = {box.name: rotations[1] @ box.position + positions[1] for box in boxes}
     assert centres["root"] == pytest.approx((0.0, -0.04575, 0.0), abs=1e-12)
     assert centres["conn_a"] == pytest.approx((0.0, -0.05685, 0.0), abs=1e-12)
-
-
-def test_core_is_at_the_origin(node: NodeMaker) -> None:
-    robot = body(node("Core"))
-    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
-    assert (rotations[0] == np.eye(3)).all()
-    assert (positions[0] == 0.0).all()
 
 
 def test_a_brick_at_the_end_of_a_tilted_bar() -> None:
@@ -83,12 +78,7 @@ def test_a_brick_at_the_end_of_a_tilted_bar() -> None:
     from x to y and begins 45 + 0.75 + 50 + 1.5 mm from the core's centre.
     """
     bar = Part("ParametricBarJoint", 0, 2, 0, 0, (50.0, math.pi / 6, 0.0, *GREY))
-    parts = (
-        Part("Core", -1, -1, -1, 0, GREY),
-        bar,
-        Part("FixedBrick", 1, 1, 1, 0, GREY),
-    )
-    robot = Robot(parts)
+    robot = Robot((CORE, bar, Part("FixedBrick", 1, 1, 1, 0, GREY)))
     rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     cosine, sine = math.sqrt(0.75), 0.5
     assert rotations[1] == pytest.approx(

@@ -20,16 +20,7 @@ HIDDEN = NeuronGene("Sigmoid", (0.25, 0.75))
 
 # Of the genome below: 6 inputs of the core, 2 of the touch sensor, then the
 # outputs of both hinges, then the hidden neurons of core and second hinge.
-IMU_X, IMU_WZ, LEFT, RIGHT, OUT_A, OUT_B, HIDDEN_CORE, HIDDEN_B = (
-    0,
-    5,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-)
+IMU_X, IMU_WZ, LEFT, RIGHT, OUT_A, OUT_B, HIDDEN_CORE, HIDDEN_B = (0, *range(5, 12))
 
 
 def gene(
@@ -74,19 +65,16 @@ def test_parts_are_in_depth_first_order_by_slot(node: NodeMaker) -> None:
         ("FixedBrick", 0, 2, 3, 0),
         ("ActiveHinge", 3, 1, 1, 7),
     ]
+    visits = [(n.kind, parent, slot) for n, parent, slot in walk(limb(node))]
+    assert visits == [(kind, parent, slot) for kind, parent, slot, *_ in places]
 
 
 def test_neurons_are_sorted_by_layer_then_part(node: NodeMaker) -> None:
     neurons = develop(limb(node), BUILT_IN).brain.neurons
     layers = [(neuron.layer, neuron.part) for neuron in neurons]
     inputs = [("input", 0)] * 6 + [("input", 2)] * 2
-    assert layers == [
-        *inputs,
-        ("output", 1),
-        ("output", 4),
-        ("hidden", 0),
-        ("hidden", 4),
-    ]
+    outputs, hidden = [("output", 1), ("output", 4)], [("hidden", 0), ("hidden", 4)]
+    assert layers == [*inputs, *outputs, *hidden]
     assert neurons[HIDDEN_B].kind == "Sigmoid"
     assert neurons[HIDDEN_B].parameters == (0.25, 0.75)
 
@@ -99,11 +87,7 @@ def test_neurons_are_sorted_by_layer_then_part(node: NodeMaker) -> None:
         ("a", (("output", 0), (), ("output", 0), 0.2), (OUT_A, OUT_A, 0.2)),
         # Down one edge, down two.
         ("core", (("input", 0), (0,), ("output", 0), 0.3), (IMU_X, OUT_A, 0.3)),
-        (
-            "core",
-            (("hidden", 0), (2, 1), ("hidden", 0), 1.0),
-            (HIDDEN_CORE, HIDDEN_B, 1),
-        ),
+        ("core", (("hidden", 0), (2, 1), ("hidden", 0), 1), (HIDDEN_CORE, HIDDEN_B, 1)),
         # Up, and up and down again: own slots lead to the parent.
         ("touch", (("input", 1), (0,), ("output", 0), 0.4), (RIGHT, OUT_A, 0.4)),
         ("touch", (("input", 0), (0, 0), ("hidden", 0), 0.5), (LEFT, HIDDEN_CORE, 0.5)),
@@ -114,10 +98,7 @@ def test_neurons_are_sorted_by_layer_then_part(node: NodeMaker) -> None:
     ],
 )
 def test_connection_with_a_valid_path(
-    node: NodeMaker,
-    owner: str,
-    connection: Edge,
-    expected: tuple[int, int, float],
+    node: NodeMaker, owner: str, connection: Edge, expected: tuple[int, int, float]
 ) -> None:
     genome = limb(node, **{owner: (gene(*connection),)})
     assert edges(genome) == [expected]
@@ -143,9 +124,7 @@ def test_connection_with_a_valid_path(
     ],
 )
 def test_connection_with_an_invalid_path_is_left_out(
-    node: NodeMaker,
-    owner: str,
-    connection: Edge,
+    node: NodeMaker, owner: str, connection: Edge
 ) -> None:
     kept = gene(("output", 0), (), ("output", 0), 0.5)
     genome = limb(node, **{owner: (gene(*connection),)})
@@ -167,17 +146,6 @@ def test_reverse_connection_is_another_pair(node: NodeMaker) -> None:
     down = gene(("output", 0), (0, 2, 1), ("output", 0), 0.2)
     genome = limb(node, a=(down,), b=(up,))
     assert edges(genome) == [(OUT_A, OUT_B, 0.2), (OUT_B, OUT_A, 0.1)]
-
-
-def test_walk_returns_parents(node: NodeMaker) -> None:
-    visits = [(n.kind, parent, slot) for n, parent, slot in walk(limb(node))]
-    assert visits == [
-        ("Core", -1, -1),
-        ("ActiveHinge", 0, 0),
-        ("TouchSensor", 1, 1),
-        ("FixedBrick", 0, 2),
-        ("ActiveHinge", 3, 1),
-    ]
 
 
 def test_a_long_chain_develops(node: NodeMaker) -> None:
