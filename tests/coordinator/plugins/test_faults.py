@@ -7,8 +7,8 @@ import io
 import json
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -19,160 +19,100 @@ CRITTERS = Path(__file__).parents[2] / "plugins" / "critters_lab" / "critters"
 RANDOM = '__import__("random")'
 
 
-@dataclass(frozen=True)
-class Plugin:
-    """A plug-in and its changes.
+class Plugin(NamedTuple):
+    """A plug-in.
 
     Attributes:
         file: of the package.
         name: of the plug-in.
         document: keys of an experiment that name it as ``LAB:name``.
         body: statement of its code before which a process ends or waits.
-        changes: of each fault, a text and what replaces it.
     """
 
     file: str
     name: str
     document: str
     body: str
-    changes: dict[str, tuple[str, str]] = field(hash=False)
 
 
 _PISTON = """[space]
 part_types = ["schema.parts:CORE", "schema.parts:ACTIVE_HINGE", "LAB:PISTON"]
 """
+_LEAKY = '[space]\nneuron_types = ["Sigmoid", "LAB:Leaky"]\n'
+_THRIFTY = '[fitness]\nfunction = "LAB:thrifty"\nparameters = {price = 0.1}\n'
+_ELITE = '[selection]\nsurvivors = "LAB:elite_and_young"\n'
 _LENGTH = "length = values[0] / 1000.0"
 _NEAR = "return [1.0 - distance / REACH_M]"
 _STACK = "return np.stack([output, potential])"
 _RANDOM = "return tuple(self.joint(rng) for _ in range(count))"
 _JOINT = "return 0.5 + 4.5 * rng.random(), rng.random()"
+_BUILT = "return rv.Robot(tuple(parts), rv.Brain(tuple(neurons)))"
 _SCORE = "return math.hypot(x, y) / seconds - parameters.price * power"
 _SWAY = "return float(np.max(height) - np.min(height))"
+_PAIR = "return first, second"
 _YOUNG = "return elite + others[len(others) - (count - len(elite)) :]"
+_SAMPLE = f"return {RANDOM}.sample(range(len(population)), "
 PLUGINS = {
-    "part-type": Plugin(
-        "bodies.py",
-        "PISTON",
-        _PISTON,
-        _LENGTH,
-        {
-            "arity": ("(values: tuple[float, ...])", "()"),
-            "type": (_LENGTH, "return 3"),
-            "finite": (_LENGTH, 'length = float("nan")'),
-            "repeatable": (_LENGTH, f"length = 0.01 + 0.01 * {RANDOM}.random()"),
-        },
-    ),
-    "sensor": Plugin(
-        "bodies.py",
-        "PISTON",
-        _PISTON,
-        _NEAR,
-        {
-            "missing": ("def read(", "def look("),
-            "misspelt": ('distance("tail"', 'distance("tial"'),
-            "arity": ("(self, view: rv.SensorView)", "(self)"),
-            "type": (_NEAR, 'return ["near"]'),
-            "finite": (_NEAR, 'return [float("inf")]'),
-            "repeatable": (_NEAR, f"return [{RANDOM}.random()]"),
-        },
-    ),
-    "neuron-type": Plugin(
-        "neurons.py",
-        "Leaky",
-        '[space]\nneuron_types = ["Sigmoid", "LAB:Leaky"]\n',
-        _STACK,
-        {
-            "arity": ("        tick: rv.Tick,\n", ""),
-            "type": (_STACK, 'return "active"'),
-            "finite": (_STACK, "return np.stack([output, potential]) * np.inf"),
-            "repeatable": (_STACK, "return np.random.random(state.shape)"),
-        },
-    ),
+    "part-type": Plugin("bodies.py", "PISTON", _PISTON, _LENGTH),
+    "sensor": Plugin("bodies.py", "PISTON", _PISTON, _NEAR),
+    "neuron-type": Plugin("neurons.py", "Leaky", _LEAKY, _STACK),
     "brain": Plugin(
-        "brains.py",
-        "Beat",
-        '[brain]\ntype = "LAB:Beat"\n',
-        "return swing",
-        {
-            "arity": ("readings: Floats, age_ticks: object", "readings: Floats"),
-            "type": ("return swing", 'return "wave"'),
-            "finite": ("return swing", "return swing * np.inf"),
-            "repeatable": ("return swing", "return swing * np.random.random()"),
-        },
+        "brains.py", "Beat", '[brain]\ntype = "LAB:Beat"\n', "return swing"
     ),
     "encoding": Plugin(
-        "genomes.py",
-        "Snakes",
-        '[encoding]\ntype = "LAB:Snakes"\n',
-        _RANDOM,
-        {
-            "arity": (
-                "def random(self, rng: np.random.Generator, birth: object)",
-                "def random(self, rng: np.random.Generator)",
-            ),
-            "type": (
-                "return rv.Robot(tuple(parts), rv.Brain(tuple(neurons)))",
-                "return 3",
-            ),
-            "finite": ("(period, phase, 1.0)", '(period, phase, float("nan"))'),
-            "repeatable": (_JOINT, f"return 0.5 + {RANDOM}.random(), rng.random()"),
-        },
+        "genomes.py", "Snakes", '[encoding]\ntype = "LAB:Snakes"\n', _RANDOM
     ),
-    "fitness": Plugin(
-        "scores.py",
-        "thrifty",
-        '[fitness]\nfunction = "LAB:thrifty"\nparameters = {price = 0.1}\n',
-        _SCORE,
-        {
-            "arity": ("trace: rv.Trace, parameters: Thrift", "trace: rv.Trace"),
-            "type": (_SCORE, 'return "fast"'),
-            "finite": (_SCORE, "return math.inf"),
-            "repeatable": (_SCORE, "return np.random.random()"),
-        },
-    ),
-    "measure": Plugin(
-        "scores.py",
-        "sway",
-        '[measures]\nnames = ["LAB:sway"]\n',
-        _SWAY,
-        {
-            "arity": ("sway(trace: rv.Trace)", "sway()"),
-            "type": (_SWAY, "return None"),
-            "finite": (_SWAY, "return math.nan"),
-            "repeatable": (_SWAY, "return np.random.random()"),
-        },
-    ),
+    "fitness": Plugin("scores.py", "thrifty", _THRIFTY, _SCORE),
+    "measure": Plugin("scores.py", "sway", '[measures]\nnames = ["LAB:sway"]\n', _SWAY),
     "parents": Plugin(
-        "choices.py",
-        "alike",
-        '[selection]\nparents = "LAB:alike"\n',
-        "return first, second",
-        {
-            "arity": (", parameters: None", ""),
-            "type": ("return first, second", 'return "both"'),
-            "finite": ("return first, second", 'return first, float("nan")'),
-            "repeatable": (
-                "return first, second",
-                f"return {RANDOM}.sample(range(len(population)), 2)",
-            ),
-        },
+        "choices.py", "alike", '[selection]\nparents = "LAB:alike"\n', _PAIR
     ),
-    "survivors": Plugin(
-        "choices.py",
-        "elite_and_young",
-        '[selection]\nsurvivors = "LAB:elite_and_young"\n',
-        _YOUNG,
-        {
-            "arity": ("    count: int,\n", ""),
-            "type": (_YOUNG, "return None"),
-            "finite": (_YOUNG, 'return [float("inf")] * count'),
-            "repeatable": (
-                _YOUNG,
-                f"return {RANDOM}.sample(range(len(population)), count)",
-            ),
-        },
-    ),
+    "survivors": Plugin("choices.py", "elite_and_young", _ELITE, _YOUNG),
 }
+CHANGES = {
+    ("part-type", "arity"): ("(values: tuple[float, ...])", "()"),
+    ("part-type", "type"): (_LENGTH, "return 3"),
+    ("part-type", "finite"): (_LENGTH, 'length = float("nan")'),
+    ("part-type", "repeatable"): (_LENGTH, f"length = 0.01 + 0.01 * {RANDOM}.random()"),
+    ("sensor", "missing"): ("def read(", "def look("),
+    ("sensor", "misspelt"): ('distance("tail"', 'distance("tial"'),
+    ("sensor", "arity"): ("(self, view: rv.SensorView)", "(self)"),
+    ("sensor", "type"): (_NEAR, 'return ["near"]'),
+    ("sensor", "finite"): (_NEAR, 'return [float("inf")]'),
+    ("sensor", "repeatable"): (_NEAR, f"return [{RANDOM}.random()]"),
+    ("neuron-type", "arity"): ("        tick: rv.Tick,\n", ""),
+    ("neuron-type", "type"): (_STACK, 'return "active"'),
+    ("neuron-type", "finite"): (_STACK, f"{_STACK} * np.inf"),
+    ("neuron-type", "repeatable"): (_STACK, "return np.random.random(state.shape)"),
+    ("brain", "arity"): ("readings: Floats, age_ticks: object", "readings: Floats"),
+    ("brain", "type"): ("return swing", 'return "wave"'),
+    ("brain", "finite"): ("return swing", "return swing * np.inf"),
+    ("brain", "repeatable"): ("return swing", "return swing * np.random.random()"),
+    ("encoding", "arity"): (
+        "def random(self, rng: np.random.Generator, birth: object)",
+        "def random(self, rng: np.random.Generator)",
+    ),
+    ("encoding", "type"): (_BUILT, "return 3"),
+    ("encoding", "finite"): ("(period, phase, 1.0)", '(period, phase, float("nan"))'),
+    ("encoding", "repeatable"): (_JOINT, f"return {RANDOM}.random(), rng.random()"),
+    ("fitness", "arity"): ("trace: rv.Trace, parameters: Thrift", "trace: rv.Trace"),
+    ("fitness", "type"): (_SCORE, 'return "fast"'),
+    ("fitness", "finite"): (_SCORE, "return math.inf"),
+    ("fitness", "repeatable"): (_SCORE, "return np.random.random()"),
+    ("measure", "arity"): ("sway(trace: rv.Trace)", "sway()"),
+    ("measure", "type"): (_SWAY, "return None"),
+    ("measure", "finite"): (_SWAY, "return math.nan"),
+    ("measure", "repeatable"): (_SWAY, "return np.random.random()"),
+    ("parents", "arity"): (", parameters: None", ""),
+    ("parents", "type"): (_PAIR, 'return "both"'),
+    ("parents", "finite"): (_PAIR, 'return first, float("nan")'),
+    ("parents", "repeatable"): (_PAIR, f"{_SAMPLE}2)"),
+    ("survivors", "arity"): ("    count: int,\n", ""),
+    ("survivors", "type"): (_YOUNG, "return None"),
+    ("survivors", "finite"): (_YOUNG, 'return [float("inf")] * count'),
+    ("survivors", "repeatable"): (_YOUNG, f"{_SAMPLE}count)"),
+}
+"""Of each fault of each kind, a text and what replaces it."""
 ENDS = {
     "slow": '__import__("time").sleep(60)',
     "exit": '__import__("sys").exit(3)',
@@ -210,8 +150,8 @@ def faulty(tmp_path: Path) -> Callable[[str, str], tuple[Path, Path]]:
         document = plugin.document.replace("LAB", file.stem)
         if fault in ENDS:
             change = plugin.body, f"{ENDS[fault]}; {plugin.body}"
-        elif fault in plugin.changes:
-            change = plugin.changes[fault]
+        elif (kind, fault) in CHANGES:
+            change = CHANGES[kind, fault]
         else:
             change = "", ""
             name = "Nobody" if fault == "missing" else plugin.name[:-1]
