@@ -16,6 +16,7 @@ from schema.errors import ExperimentError
 from schema.plugins import permission
 from tests.own_brains import write_module
 
+Writer = Callable[[str], Path]
 Steps = list[tuple[str, str]]
 
 CRITTERS = Path(__file__).parents[2] / "plugins" / "critters_lab" / "critters"
@@ -31,7 +32,7 @@ pytestmark = pytest.mark.usefixtures("_nothing_allowed")
 
 
 @pytest.fixture
-def lab(tmp_path: Path) -> Callable[[str], Path]:
+def lab(tmp_path: Path) -> Writer:
     """Return a function that writes a plug-in file with a name of its own."""
 
     def write(text: str) -> Path:
@@ -44,7 +45,7 @@ def lab(tmp_path: Path) -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def experiment(tmp_path: Path) -> Callable[[str], Path]:
+def experiment(tmp_path: Path) -> Writer:
     """Return a function that writes an experiment of some sections."""
 
     def write(sections: str) -> Path:
@@ -71,7 +72,7 @@ def last(word: object, why: str, kind: str | None = None) -> str:
 
 
 def test_a_fitness_function_is_recognised_and_in_order(
-    lab: Callable[[str], Path],
+    lab: Writer,
 ) -> None:
     file = lab(GOOD)
     path = f"{file.stem}:judge"
@@ -89,7 +90,7 @@ def test_a_part_type_is_recognised() -> None:
 
 
 def test_a_part_that_is_never_attached_to_an_unknown_one_makes_a_warning(
-    lab: Callable[[str], Path], experiment: Callable[[str], Path]
+    lab: Writer, experiment: Writer
 ) -> None:
     file = lab(
         "from dataclasses import replace\nfrom schema.parts import HINGE\n"
@@ -130,14 +131,12 @@ def test_neuron_and_brain_types_are_recognised(tmp_path: Path) -> None:
         ("f = 3", "must be of one of the kinds .*, got a int"),
     ],
 )
-def test_each_fault_is_one_line(
-    lab: Callable[[str], Path], text: str, expected: str
-) -> None:
+def test_each_fault_is_one_line(lab: Writer, text: str, expected: str) -> None:
     file = lab(text)
     last(f"{file}:f", expected.replace("FILE.py", re.escape(file.name)))
 
 
-def test_a_plug_in_that_is_named_twice_is_told_once(lab: Callable[[str], Path]) -> None:
+def test_a_plug_in_that_is_named_twice_is_told_once(lab: Writer) -> None:
     file = lab("""def f(population, rng, parameters):
     if sum(one.fitness == -1.0 for one in population) > 10:
         raise ValueError("a failed robot")
@@ -152,7 +151,7 @@ def test_a_plug_in_that_is_named_twice_is_told_once(lab: Callable[[str], Path]) 
 
 
 def test_experiment_without_own_plug_ins_is_in_order(
-    experiment: Callable[[str], Path],
+    experiment: Writer,
 ) -> None:
     words = ["scenario1", str(experiment("births = 20"))]
     lines: list[str] = []
@@ -177,7 +176,7 @@ environment.push_impulse = 0.1"""
     ],
 )
 def test_check_refuses_what_a_run_would_refuse(
-    experiment: Callable[[str], Path], sections: str, fault: str
+    experiment: Writer, sections: str, fault: str
 ) -> None:
     """Also what is wrong beside an encoding that is in order."""
     document = experiment(sections)
@@ -198,7 +197,7 @@ def test_file_of_another_folder_may_have_the_name_of_one_here(
     assert check_apart(["there/walk.py:judge"]) == []
 
 
-def test_own_encoding_of_islands_is_in_order(experiment: Callable[[str], Path]) -> None:
+def test_own_encoding_of_islands_is_in_order(experiment: Writer) -> None:
     document = experiment(
         'births = 20\n[encoding]\ntype = "genomes:Snakes"\n'
         "[migration]\ntopology = 'ring'\nepoch = 5\n[[islands]]\ncount = 2\n"
@@ -214,25 +213,25 @@ def test_name_that_no_folder_can_have_is_a_fault(tmp_path: Path) -> None:
     assert problem.startswith(f"{document}: name: must have no '/'")
 
 
-def test_file_without_a_name_is_asked_for_one(lab: Callable[[str], Path]) -> None:
+def test_file_without_a_name_is_asked_for_one(lab: Writer) -> None:
     file = lab(GOOD)
     assert last(file, "name") == f"{file}: name a function or class: {file}:NAME"
 
 
-def test_kind_may_be_said(lab: Callable[[str], Path]) -> None:
+def test_kind_may_be_said(lab: Writer) -> None:
     file = lab("def f(a):\n    return 1.0")
     wanted = r"must take 2 arguments \(trace, parameters\), this one takes 1 \(a\)$"
     last(f"{file}:f", f"{file.name}:1: '{file.stem}:f' {wanted}", kind="fitness")
 
 
 def test_plug_in_that_prints_does_not_disturb_the_report(
-    lab: Callable[[str], Path],
+    lab: Writer,
 ) -> None:
     file = lab("def f(a, b):\n    print('hello')\n    return 1.0")
     last(f"{file}:f", "")
 
 
-def test_check_of_a_module_that_never_ends_ends(lab: Callable[[str], Path]) -> None:
+def test_check_of_a_module_that_never_ends_ends(lab: Writer) -> None:
     file = lab("import time\ntime.sleep(60)")
     good: list[str] = []
     words = ["worker.fitness:thesis", f"{file}:f"]
@@ -243,7 +242,7 @@ def test_check_of_a_module_that_never_ends_ends(lab: Callable[[str], Path]) -> N
 
 
 def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
-    lab: Callable[[str], Path], experiment: Callable[[str], Path]
+    lab: Writer, experiment: Writer
 ) -> None:
     file = lab("def f(a, b):\n    return a\n")
     document = experiment(f'[fitness]\nfunction = "{file.stem}:f"')
@@ -267,8 +266,8 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
     ],
 )
 def test_a_wrong_parameter_is_placed_in_the_experiment(
-    lab: Callable[[str], Path],
-    experiment: Callable[[str], Path],
+    lab: Writer,
+    experiment: Writer,
     tables: str,
     expected: str,
 ) -> None:
@@ -282,7 +281,7 @@ def test_a_wrong_parameter_is_placed_in_the_experiment(
 
 
 def test_a_key_of_fitness_without_effect_is_refused(
-    lab: Callable[[str], Path], experiment: Callable[[str], Path]
+    lab: Writer, experiment: Writer
 ) -> None:
     file = lab("def judge(track, fitness):\n    return min(1.0, fitness.limit)\n")
     for function, key, why in (
@@ -294,7 +293,7 @@ def test_a_key_of_fitness_without_effect_is_refused(
         last(experiment(f'[fitness]\nfunction = "{function}"\n{key} = 2.0'), why)
 
 
-def test_births_outside_the_wall_are_refused(experiment: Callable[[str], Path]) -> None:
+def test_births_outside_the_wall_are_refused(experiment: Writer) -> None:
     for wall, why in (
         ("wall_diameter_m = 3.0", "less than half of wall_diameter_m, 1.5 m"),
         ("wall_diameter_m = 3.0\nbirth_radius_m = 1.5", "1.5 m, as .*; got 1.5"),
@@ -305,7 +304,7 @@ def test_births_outside_the_wall_are_refused(experiment: Callable[[str], Path]) 
 
 
 def test_inherited_parameters_of_an_island_are_explained(
-    lab: Callable[[str], Path], experiment: Callable[[str], Path]
+    lab: Writer, experiment: Writer
 ) -> None:
     file = lab(
         "import msgspec\nclass P(msgspec.Struct):\n    a: float = 1.0\n"
@@ -322,7 +321,7 @@ def test_inherited_parameters_of_an_island_are_explained(
 
 
 def test_selection_gets_the_measures_that_the_experiment_records(
-    lab: Callable[[str], Path], experiment: Callable[[str], Path]
+    lab: Writer, experiment: Writer
 ) -> None:
     file = lab(
         "def keep(population, count, rng, parameters):\n"
@@ -338,7 +337,7 @@ def test_selection_gets_the_measures_that_the_experiment_records(
 
 
 def test_the_current_folder_hides_no_module_of_the_standard_library(
-    experiment: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+    experiment: Writer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     document = experiment("births = 20")
     monkeypatch.chdir(document.parent)

@@ -16,6 +16,7 @@ from coordinator.__main__ import plugin_kinds
 from coordinator.plugins.checks import check_apart, check_here
 
 CRITTERS = Path(__file__).parents[2] / "plugins" / "critters_lab" / "critters"
+Writer = Callable[[str, str], tuple[Path, Path]]
 RANDOM = '__import__("random")'
 
 
@@ -138,7 +139,7 @@ pytestmark = pytest.mark.usefixtures("_nothing_allowed")
 
 
 @pytest.fixture
-def faulty(tmp_path: Path) -> Callable[[str, str], tuple[Path, Path]]:
+def faulty(tmp_path: Path) -> Writer:
     """Return a function that writes an experiment and its faulty plug-in."""
 
     def write(kind: str, fault: str) -> tuple[Path, Path]:
@@ -174,9 +175,7 @@ def _faults_here(document: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("kind", PLUGINS)
-def test_plug_ins_without_fault_are_in_order(
-    faulty: Callable[[str, str], tuple[Path, Path]], kind: str
-) -> None:
+def test_plug_ins_without_fault_are_in_order(faulty: Writer, kind: str) -> None:
     document, file = faulty(kind, "slow")
     file.write_text((CRITTERS / PLUGINS[kind].file).read_text())
     assert _faults_here(document) == []
@@ -185,7 +184,7 @@ def test_plug_ins_without_fault_are_in_order(
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("kind", PLUGINS)
 def test_each_fault_of_each_kind_is_one_line(
-    faulty: Callable[[str, str], tuple[Path, Path]], kind: str, fault: str
+    faulty: Writer, kind: str, fault: str
 ) -> None:
     document, file = faulty(kind, fault)
     (line,) = _faults_here(document)
@@ -196,7 +195,7 @@ def test_each_fault_of_each_kind_is_one_line(
 @pytest.mark.parametrize("fault", APART)
 @pytest.mark.parametrize("kind", PLUGINS)
 def test_each_end_of_a_process_is_one_line(
-    faulty: Callable[[str, str], tuple[Path, Path]], kind: str, fault: str
+    faulty: Writer, kind: str, fault: str
 ) -> None:
     document, file = faulty(kind, fault)
     (line,) = check_apart([str(document)], limit_s=1.0 if fault == "slow" else 30.0)

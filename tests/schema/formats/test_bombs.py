@@ -99,117 +99,84 @@ def chain(parts: int) -> dict[str, list[dict[str, Any]]]:
     return {"part": [core, *bricks], "connection": edges}
 
 
+def many(unit: str, times: int, before: str = "", after: str = "") -> Callable[[], str]:
+    """Return a function that makes a long text: long ones are not kept."""
+    return lambda: before + unit * times + after
+
+
+def neurons() -> str:
+    numbers = range(5000)
+    nodes, edges = ("".join(map(line.format, numbers)) for line in (NEURON, EDGE))
+    wrong = "  - {source: nowhere, target: n1}\n"
+    brain = f"brain:\n  neurons:\n{nodes}  connections:\n{edges}{wrong}"
+    return f"body: {{type: Core}}\n{brain}"
+
+
+def attributes() -> str:
+    names = map("a{}=''".format, range(190_000))
+    return f"<mujoco {' '.join(names)}/>"
+
+
 GEOM = '<geom size="1"/>'
+COPIES = f'<replicate count="9999999">{GEOM}</replicate>'
+NESTED = f'<replicate count="200">{COPIES.replace("9999999", "200")}</replicate>'
+HFIELD = '<asset><hfield nrow="30000" ncol="30000"/></asset>'
 ALIASES = "a: &a [x]\n" + laughs("*{0}", "{0}: &{0} [{1}]\n", ",")
+PARAM = """{"body": {"part": [{"id": "a", "type": "CoreComponent",
+"orientation": 0, "evolvableParam": [{"paramValue": 1"""
+STEEP = "roughness_m = 1.0\nextent_m = 1e6\npatch_m = 1e-300"
+DEEP = "".join("\t" * i + f"0 F b{i} 0\n" for i in range(1, 1200))
+ROBOT = "revolve_robot: "
+MINE = "name = 'x'\n"
 BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "laughs.yaml": (lambda: ALIASES, "aliases are not allowed"),
-    "deep.yaml": (lambda: "[" * 900_000, "<= 400 levels"),
-    "maps.yaml": (lambda: "{a: " * 200_000, "<= 400 levels"),
-    "list.yaml": (lambda: f"body: [{'1,' * 490_000}]", "<= 100000 values"),
-    "size.yaml": (lambda: "1," * 10_000_000, "<= 1000000 bytes"),
-    "scalar.yaml": (lambda: "revolve_robot: " + "x" * 900_000, "whole number"),
-    "digits.yaml": (lambda: "revolve_robot: " + "1" * 900_000, "whole number"),
-    "gene.yaml": (lambda: f"body: {{type: Core, gene: {'9' * 4000}}}", "gene: must"),
+    "deep.yaml": (many("[", 900_000), "<= 400 levels"),
+    "maps.yaml": (many("{a: ", 200_000), "<= 400 levels"),
+    "list.yaml": (many("1,", 490_000, "body: [", "]"), "<= 100000 values"),
+    "size.yaml": (many("1,", 10_000_000), "<= 1000000 bytes"),
+    "scalar.yaml": (many("x", 900_000, ROBOT), "whole number"),
+    "digits.yaml": (many("1", 900_000, ROBOT), "whole number"),
+    "gene.yaml": (many("9", 4000, "body: {type: Core, gene: ", "}"), "gene: must"),
     "float.yaml": (lambda: "body: {type: Core, params: {red: 1e999999}}", "finite"),
-    "word.yaml": (lambda: f"body: {{type: {'A' * 900_000}}}", "must be one of"),
-    "brain.yaml": (
-        lambda: (
-            "body: {type: Core}\nbrain:\n  neurons:\n"
-            + "".join(map(NEURON.format, range(5000)))
-            + "  connections:\n"
-            + "".join(map(EDGE.format, range(5000)))
-            + "  - {source: nowhere, target: n1}\n"
-        ),
-        "source: must be one of",
-    ),
-    "deep.json": (lambda: "[" * 900_000, "not valid JSON"),
+    "word.yaml": (many("A", 900_000, "body: {type: ", "}"), "must be one of"),
+    "brain.yaml": (neurons, "source: must be one of"),
+    "deep.json": (many("[", 900_000), "not valid JSON"),
     "list.json": (
-        lambda: '{"body": {"part": [' + "[]," * 300_000 + "[]]}}",
-        "<= 100000 values",
+        many("[],", 300_000, '{"body": {"part": [', "[]]}}"),
+        "<= 100000 val",
     ),
-    "size.json": (lambda: "[]," * 10_000_000, "<= 1000000 bytes"),
-    "digits.json": (lambda: '{"body": ' + "9" * 900_000 + "}", "must be a mapping"),
-    "float.json": (
-        lambda: (
-            '{"body": {"part": [{"id": "a", "type": "CoreComponent", '
-            '"orientation": 0, "evolvableParam": [{"paramValue": 1'
-            + "0" * 4000
-            + "}]}]}}"
-        ),
-        "paramValue: must be a finite number",
-    ),
-    "deep.txt": (
-        lambda: (
-            "0 E c 0\n" + "".join("\t" * i + f"0 F b{i} 0\n" for i in range(1, 1200))
-        ),
-        "<= 1000 characters",
-    ),
+    "size.json": (many("[],", 10_000_000), "<= 1000000 bytes"),
+    "digits.json": (many("9", 900_000, '{"body": ', "}"), "must be a mapping"),
+    "float.json": (many("0", 4000, PARAM, "}]}]}}"), "Value: must be a finite number"),
+    "deep.txt": (lambda: f"0 E c 0\n{DEEP}", "<= 1000 characters"),
     "chain.json": (lambda: json.dumps({"body": chain(2000)}), "nested too deeply"),
-    "line.txt": (lambda: "0 E c 0" + " 1" * 450_000, "<= 1000 characters"),
-    "digits.txt": (
-        lambda: "0 E c 0\n\n\nc " + "9" * 900 + " c 1 1",
-        "a neuron's number",
-    ),
-    "neurons.txt": (lambda: "0 E c 0\n\n" + "c simple\n" * 90_000, "10000 neurons"),
+    "line.txt": (many(" 1", 450_000, "0 E c 0"), "<= 1000 characters"),
+    "digits.txt": (many("9", 900, "0 E c 0\n\n\nc ", " c 1 1"), "a neuron's number"),
+    "neurons.txt": (many("c simple\n", 90_000, "0 E c 0\n\n"), "10000 neurons"),
     "entities.xml": (lambda: f"{ENTITIES}<mujoco name='&j;'/>", "document type"),
     "deep.xml": (lambda: "<a>" * 4000 + "</a>" * 4000, "levels of nesting"),
     "elements.xml": (lambda: mjcf(world=GEOM * 90_000), "was edited"),
-    "attributes.xml": (
-        lambda: f"<mujoco {' '.join(map('a{}=_'.format, range(190_000)))}/>".replace(
-            "_", "''"
-        ),
-        "has no text",
-    ),
-    "heights.xml": (
-        lambda: mjcf('<asset><hfield nrow="30000" ncol="30000"/></asset>'),
-        "was edited",
-    ),
-    "size.xml": (lambda: "<a/>" * 10_000_000, "<= 6000000 bytes"),
-    "size.toml": (lambda: "#\n" * 10_000_000, "<= 1000000 bytes"),
-    "deep.toml": (lambda: "a = " + "[" * 19_000, "nested too deeply"),
-    "tables.toml": (lambda: "[[islands]]\n" * 80_000, "<= 20000 lists and tables"),
-    "islands.toml": (
-        lambda: "name = 'x'\n" + "[[islands]]\n" * 1001,
-        "of length <= 1000",
-    ),
-    "count.toml": (lambda: "name = 'x'\n[[islands]]\ncount = 1000000000", "<= 10000"),
-    "dotted.toml": (lambda: "a." * 15_000 + "b = 1", "<= 16 parts"),
-    "quoted.toml": (lambda: "' '." * 15_000 + "b = 1", "<= 16 parts"),
-    "digits.toml": (lambda: "births = " + "9" * 900_000, "<= 1000 digits"),
-    "hex.toml": (lambda: "births = 0x" + "f" * 900_000, "<= 1000 digits"),
-    "count64.toml": (lambda: "name = 'x'\nbirths = 0x" + "f" * 900, "births: must be"),
-    "float.toml": (lambda: "name = 'x'\n[simulation]\ngravity = 1e999999", "be finite"),
-    "word.toml": (
-        lambda: f"name = 'x'\n[selection]\nparents = '{'A' * 900_000}'",
-        "must be one of",
-    ),
-    "copies.toml": (
-        lambda: scenery(f'<replicate count="9999999">{GEOM}</replicate>'),
-        "count='9999999'> must be a whole number <= 10000",
-    ),
-    "nested.toml": (
-        lambda: scenery(
-            f'<replicate count="200"><replicate count="200">{GEOM}</replicate>'
-            "</replicate>"
-        ),
-        "<= 10000 elements, copies included",
-    ),
+    "attributes.xml": (attributes, "has no text"),
+    "heights.xml": (lambda: mjcf(HFIELD), "was edited"),
+    "size.xml": (many("<a/>", 10_000_000), "<= 6000000 bytes"),
+    "size.toml": (many("#\n", 10_000_000), "<= 1000000 bytes"),
+    "deep.toml": (many("[", 19_000, "a = "), "nested too deeply"),
+    "tables.toml": (many("[[islands]]\n", 80_000), "<= 20000 lists and tables"),
+    "islands.toml": (many("[[islands]]\n", 1001, MINE), "list of length <= 1000"),
+    "count.toml": (lambda: f"{MINE}[[islands]]\ncount = 1000000000", "number <= 10000"),
+    "dotted.toml": (many("a.", 15_000, "", "b = 1"), "<= 16 parts"),
+    "quoted.toml": (many("' '.", 15_000, "", "b = 1"), "<= 16 parts"),
+    "digits.toml": (many("9", 900_000, "births = "), "<= 1000 digits"),
+    "hex.toml": (many("f", 900_000, "births = 0x"), "<= 1000 digits"),
+    "count64.toml": (many("f", 900, f"{MINE}births = 0x"), "births: must be"),
+    "float.toml": (lambda: f"{MINE}[simulation]\ngravity = 1e999999", "be finite"),
+    "word.toml": (many("A", 900_000, f"{MINE}brain.type = '", "'"), "must be one of"),
+    "copies.toml": (lambda: scenery(COPIES), "whole number <= 10000"),
+    "nested.toml": (lambda: scenery(NESTED), "<= 10000 elements, copies included"),
     "entities.toml": (lambda: scenery(GEOM, ENTITIES), "document type"),
-    "bodies.toml": (
-        lambda: scenery("<body>" * 200 + GEOM + "</body>" * 200),
-        "<= 100 levels",
-    ),
-    "ground.toml": (
-        lambda: (
-            "name = 'x'\n[environment]\nroughness_m = 1.0\n"
-            "extent_m = 1e6\npatch_m = 1e-300"
-        ),
-        "patch_m: must be >=",
-    ),
-    "user.toml": (
-        lambda: scenery(f'<geom size="1" user="{"1 " * 400_000}"/>'),
-        "user=...> is not allowed",
-    ),
+    "bodies.toml": (lambda: scenery(f"{'<body>' * 200}{'</body>' * 200}"), "<= 100 le"),
+    "ground.toml": (lambda: f"{MINE}[environment]\n{STEEP}", "patch_m: must be >="),
+    "user.toml": (lambda: scenery(f'<geom user="{"1 " * 400_000}"/>'), "user=...> is"),
 }
 
 

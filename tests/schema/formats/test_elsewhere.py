@@ -144,6 +144,7 @@ def test_a_body_of_ours_keeps_its_genes() -> None:
         ("bias: 0.5", "tau: 0.5", r":30: neuron 'inner': tau: no such key"),
         ("id: Leg", "id: Hip", r":9: part 'Hip': id: duplicate part name 'Hip'"),
         ("-90", "45", r":8: part 'Hip': orientation: must be one of"),
+        ("-90", "0.5", r":8: part 'Hip': orientation: must be a whole number"),
         ("-90", ".inf", r":8: part 'Hip': orientation: must be a finite number"),
         ("{1: {id: Leg", "{0: {id: Leg", r":9: part 'Leg': slot 0 of part 'Hip' is"),
         ("{1: {id: Leg", "{2: {id: Leg", r"part 'Leg': parent_slot: ActiveHinge has"),

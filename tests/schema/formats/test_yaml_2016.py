@@ -1,8 +1,5 @@
 """Robots in the YAML form of 2016: the published walker."""
 
-import pytest
-
-from schema.errors import InvalidRobot
 from schema.formats.files import robot_from_yaml
 from schema.formats.yaml import robot_to_yaml
 from schema.parts import BUILT_IN
@@ -86,21 +83,3 @@ def test_default_outputs_and_hidden_neurons_by_name() -> None:
     assert brain.connections == (Connection(1, 7, -0.5), Connection(8, 6, 0.0))
     bare = read("id: 3\nbody: {id: c, type: Core, children: {0: {type: ActiveHinge}}}")
     assert bare.brain.neurons[6:] == (Neuron("output", "Simple", 1, (0.0, 0.5)),)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("early: {type", "earlier: {type", r"its\.yaml:9: brain.params.earlier: unkn"),
-        ("gain: 0.25", "phase: 0.25", r"its\.yaml:4: neuron 'late': phase: no"),
-        ("src: late", "src: later", r"its\.yaml:12: .*'late'"),
-        ("layer: hidden", "layer: input", r":4: neuron 'late': layer: part 'h' has"),
-        ("type: Core", "type: Cor", r"its\.yaml:1: part 'c': type: must be"),
-        ("id: h,", "id: h, orientation: 0.5,", r"its\.yaml:1: .*orientation: must"),
-        ("part_id: h, gain", "part_id: x, gain", r"its\.yaml:4: .*part_id"),
-    ],
-)  # fmt: skip
-def test_errors_name_the_line(old: str, new: str, message: str) -> None:
-    assert old in HAND
-    with pytest.raises(InvalidRobot, match=message):
-        read(HAND.replace(old, new, 1))

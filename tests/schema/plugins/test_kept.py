@@ -22,6 +22,7 @@ from schema.plugins.permission import (
 )
 from schema.plugins.source import check_plugins, digest_of, forget_digests
 
+Kept = dict[str, KeptPlugin]
 DOCUMENT = '{"function":"kept_lab:judge"}'
 
 
@@ -45,7 +46,7 @@ def write(file: Path, data: bytes) -> None:
     file.write_bytes(data)
 
 
-def kept_by(run: Path, document: str = DOCUMENT) -> dict[str, KeptPlugin]:
+def kept_by(run: Path, document: str = DOCUMENT) -> Kept:
     """Return what a run keeps; nothing is allowed or in use any more."""
     kept = keep(run, document, write)
     forget()
@@ -58,15 +59,13 @@ def forget() -> None:
 
 
 @pytest.fixture
-def kept(tmp_path: Path, original: Path) -> dict[str, KeptPlugin]:
+def kept(tmp_path: Path, original: Path) -> Kept:
     """Return what a run keeps of the file; nothing is allowed any more."""
     allow([str(original)])
     return kept_by(tmp_path / "run")
 
 
-def test_a_copy_of_the_user_is_allowed(
-    tmp_path: Path, kept: dict[str, KeptPlugin]
-) -> None:
+def test_a_copy_of_the_user_is_allowed(tmp_path: Path, kept: Kept) -> None:
     assert kept["kept_lab"].digest == "5ff4453f1603"
     allow_kept(tmp_path / "run", kept, is_resumed=True)
     assert allowed() == (f"kept_lab={tmp_path}/run/plugins/kept_lab.py",)
@@ -77,7 +76,7 @@ def test_a_copy_of_the_user_is_allowed(
 def test_a_changed_original_does_not_matter(
     tmp_path: Path,
     *,
-    kept: dict[str, KeptPlugin],
+    kept: Kept,
     monkeypatch: pytest.MonkeyPatch,
     place: str,
     is_resumed: bool,
@@ -110,7 +109,7 @@ def test_the_run_uses_its_copy_from_its_start(tmp_path: Path, original: Path) ->
 
 
 def test_another_file_that_is_named_is_refused(
-    tmp_path: Path, original: Path, kept: dict[str, KeptPlugin]
+    tmp_path: Path, original: Path, kept: Kept
 ) -> None:
     original.write_text("judge = 2\n")
     allow([str(original)])
@@ -148,7 +147,7 @@ def test_a_module_that_was_imported_before_an_edit_is_not_that_of_a_later_run(
 
 
 def test_copies_of_two_runs_do_not_mix(
-    tmp_path: Path, original: Path, kept: dict[str, KeptPlugin]
+    tmp_path: Path, original: Path, kept: Kept
 ) -> None:
     original.write_text("judge = 2\n")
     allow([str(original)])
@@ -160,9 +159,7 @@ def test_copies_of_two_runs_do_not_mix(
         allow([f"kept_lab={kept_file(tmp_path / 'other', 'kept_lab')}"])
 
 
-def test_a_copy_is_imported_as_it_is(
-    tmp_path: Path, kept: dict[str, KeptPlugin]
-) -> None:
+def test_a_copy_is_imported_as_it_is(tmp_path: Path, kept: Kept) -> None:
     """Not from a compiled file beside it."""
     copy = kept_file(tmp_path / "run", "kept_lab")
     write_time = copy.stat().st_mtime_ns
@@ -303,7 +300,7 @@ def test_data_files_of_one_name_that_differ_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("is_resumed", [True, False])
 def test_a_changed_copy_is_refused(
     tmp_path: Path,
-    kept: dict[str, KeptPlugin],
+    kept: Kept,
     is_resumed: bool,  # noqa: FBT001 - a parameter of the test
 ) -> None:
     kept_file(tmp_path / "run", "kept_lab").write_text("judge = 3\n")
@@ -313,7 +310,7 @@ def test_a_changed_copy_is_refused(
 
 
 def test_a_copy_of_somebody_else_is_refused(
-    tmp_path: Path, kept: dict[str, KeptPlugin], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, kept: Kept, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "other"))
     copy = kept_file(tmp_path / "run", "kept_lab")
@@ -376,7 +373,7 @@ def test_a_separate_worker_says_how_it_gets_the_source(
 def test_a_new_run_has_the_present_source(
     tmp_path: Path,
     original: Path,
-    kept: dict[str, KeptPlugin],
+    kept: Kept,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """In Python, a run may be started after an earlier one was read."""
