@@ -150,6 +150,7 @@ def unreadable(error: OSError | UnicodeDecodeError) -> str:
 def expectation(message: str) -> str:
     """Return a message of msgspec in words, such as "must be a number, got a text"."""
     text = message.replace("Expected ", "must be ")
+    text = re.sub(r" [<>]= -?1\.7976931348623157e\+308", " that is finite", text)
     text = re.sub(
         "Object missing required field `(.*?)`", r"must have a key '\1'", text
     )

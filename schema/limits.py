@@ -163,6 +163,7 @@ MOST_PLUGIN_CHARACTERS = 10_000
 
 Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 """Float that is neither infinite nor NaN: NaN satisfies no bound."""
+PositiveFinite = Annotated[float, Meta(gt=0, le=sys.float_info.max)]
 MOST_LENGTH_M = 1e6
 """Greatest length in an experiment [m]: beyond it contacts lose their precision."""
 GREATEST_COORDINATE = 1e10

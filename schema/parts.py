@@ -11,11 +11,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
-from schema.limits import Finite
+from schema.limits import Finite, PositiveFinite
 
 Vector = tuple[Finite, Finite, Finite]
 Matrix = tuple[Vector, Vector, Vector]
@@ -40,9 +40,9 @@ class Box(Struct, frozen=True):
     """
 
     name: str
-    size: Vector
+    size: tuple[PositiveFinite, PositiveFinite, PositiveFinite]
     position: Vector
-    mass: float
+    mass: PositiveFinite
     segment: int = 0
     rotation: Matrix = IDENTITY
     is_round: bool = False
@@ -100,7 +100,7 @@ class Joint(Struct, frozen=True):
 
     anchor: Vector
     axis: Vector
-    limit: float = math.inf
+    limit: Annotated[float, Meta(gt=0)] = math.inf
     kind: Literal["revolute", "continuous", "prismatic"] = "revolute"
 
 
@@ -119,9 +119,9 @@ class Motor:
         control: ``position`` or ``velocity``; a continuous joint needs ``velocity``.
     """
 
-    gain: float
-    max_torque: float
-    max_velocity: float
+    gain: Finite
+    max_torque: PositiveFinite
+    max_velocity: PositiveFinite
     control: Literal["position", "velocity"] = "position"
 
 
@@ -163,9 +163,9 @@ class Parameter:
     """
 
     name: str
-    low: float
-    high: float
-    default: float
+    low: Finite
+    high: Finite
+    default: Finite
     is_mutable: bool = True
     unit: str = ""
 

@@ -1,30 +1,22 @@
 """Checks of part types, built-in or own, when an experiment is loaded."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
+from msgspec import convert, to_builtins
 
-from schema.errors import ExperimentError, cut, error_text, shown
-from schema.parts import (
-    Box,
-    Joint,
-    Matrix,
-    Motor,
-    PartType,
-    Sensor,
-    Shape,
-    Slot,
-    Vector,
-)
+from schema.errors import ExperimentError, cut, error_text, expectation, shown
+from schema.parts import Box, Joint, Motor, PartType, Sensor, Shape, Slot
 from schema.plugins.contract import broken, repeated
 from schema.plugins.origin import naming_plugin
 from schema.plugins.sensor_checks import check_sensor
 
 ROUNDING = 1e-6
 """Greatest deviation of a length from 1, and of a cosine from 0."""
+_UNIT_VECTORS = {"axis", "normal", "tangent"}
 _MOST_TOGETHER = 8
 """Most parameters of which all combinations of extreme values are tried."""
 
@@ -62,65 +54,24 @@ def _check_consistency(kind: PartType) -> None:
                 check_sensor(sensor, shape)
 
 
-def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and math.isfinite(value)
-
-
-def _is_positive(value: Any) -> bool:  # noqa: ANN401 - whatever a user wrote
-    return _is_finite(value) and value > 0.0
-
-
-def _is_vector(value: Any) -> bool:  # noqa: ANN401
-    return isinstance(value, tuple) and len(value) == 3 and all(map(_is_finite, value))  # noqa: PLR2004
-
-
-def _is_unit(value: Any) -> bool:  # noqa: ANN401
-    return _is_vector(value) and abs(math.hypot(*value) - 1.0) <= ROUNDING
-
-
-def _is_rotation(value: Any) -> bool:  # noqa: ANN401
-    turn = np.array(value, dtype=np.float64)
-    return turn.shape == (3, 3) and bool(
-        np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=ROUNDING)
-        and np.linalg.det(turn) > 0.0
-    )
-
-
-_POSITIVE = "be finite and > 0", _is_positive
-_UNIT = "be 3 finite numbers of length 1", _is_unit
-_BY_NAME: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
-    **dict.fromkeys(("mass", "max_torque", "max_velocity"), _POSITIVE),
-    **dict.fromkeys(("axis", "normal", "tangent"), _UNIT),
-    "size": (
-        "be 3 finite numbers > 0",
-        lambda size: _is_vector(size) and min(size) > 0.0,
-    ),
-    "limit": ("be > 0", lambda limit: _is_finite(limit) or limit == math.inf),
-}
-"""What attributes of the pieces of a part must be, whatever others are."""
-_BY_TYPE: Mapping[object, tuple[str, Callable[[Any], bool]]] = {
-    str: ("be a text", lambda value: isinstance(value, str)),
-    bool: ("be true or false", lambda value: isinstance(value, bool)),
-    int: ("be a whole number", lambda value: type(value) is int),
-    float: ("be finite", _is_finite),
-    Vector: ("be 3 finite numbers", _is_vector),
-    Matrix: ("be a rotation matrix", _is_rotation),
-}
-"""What other attributes must be, by their type."""
-
-
-def _check_attributes(piece: object, at: str) -> None:
-    """Raise unless each attribute of a piece of a part is what it must be by itself."""
-    for name, kind in get_type_hints(type(piece), include_extras=True).items():
-        value = getattr(piece, name)
-        if get_origin(kind) is Literal:
-            allowed = get_args(kind)
-            if value not in allowed:
-                raise broken(f"{at}.{name}", f"be one of {', '.join(allowed)}", value)
-            continue
-        rule, holds = _BY_NAME.get(name) or _BY_TYPE[kind]
-        if not holds(value):
-            raise broken(f"{at}.{name}", rule, value)
+def _check_types(piece: object, at: str) -> None:
+    """Raise unless each attribute of a piece of a part is of its type and in range."""
+    kinds = get_type_hints(type(piece))
+    try:
+        convert(to_builtins(piece, enc_hook=float), type(piece))
+    except (TypeError, ValueError) as error:
+        # NumPy's numbers count as numbers; of others the hook raises, without a place.
+        message, _, path = str(error).partition(" - at `$.")
+        path = path.rstrip("`")
+        name = path.partition("[")[0]
+        rule = expectation(message).partition(", got ")[0].removeprefix("must ")
+        if get_origin(kinds.get(name)) is Literal:
+            rule = f"be one of {', '.join(get_args(kinds[name]))}"
+        value = getattr(piece, name, piece)
+        raise broken(f"{at}.{path}" if path else at, rule, value) from None
+    for name in _UNIT_VECTORS & kinds.keys():
+        if abs(math.hypot(*getattr(piece, name)) - 1.0) > ROUNDING:
+            raise broken(f"{at}.{name}", "be of length 1", getattr(piece, name))
 
 
 def _check_declaration(kind: PartType) -> None:
@@ -131,18 +82,18 @@ def _check_declaration(kind: PartType) -> None:
         raise broken("arity", "be a whole number >= 1", kind.arity)
     for number, parameter in enumerate(kind.own_parameters):
         at = f"own_parameters[{number}] ({parameter.name})"
-        _check_attributes(parameter, at)
+        _check_types(parameter, at)
         ends = parameter.low, parameter.default, parameter.high
         if list(ends) != sorted(ends):
             raise broken(at, "have low <= default <= high", ends)
     _check_names("own_parameters", [parameter.name for parameter in kind.parameters])
     if kind.motor is not None:
-        _check_attributes(kind.motor, "motor")
+        _check_types(kind.motor, "motor")
         if kind.motor.control == "position" and kind.motor.gain <= 0.0:
-            raise broken("motor.gain", _POSITIVE[0], kind.motor.gain)
+            raise broken("motor.gain", "be > 0", kind.motor.gain)
     for number, sensor in enumerate(kind.sensors):
         if isinstance(sensor, Sensor):
-            _check_attributes(sensor, f"sensors[{number}]")
+            _check_types(sensor, f"sensors[{number}]")
 
 
 def _shape(kind: PartType, values: tuple[float, ...]) -> Shape:
@@ -158,9 +109,8 @@ def _shape(kind: PartType, values: tuple[float, ...]) -> Shape:
     try:
         hash(shape)
     except TypeError as error:
-        raise broken(
-            "shape", "hold tuples and numbers only", came=f"an {error}"
-        ) from error
+        rule = "hold tuples and numbers only"
+        raise broken("shape", rule, came=f"an {error}") from error
     return shape
 
 
@@ -172,7 +122,11 @@ def _check_shape(kind: PartType, values: tuple[float, ...]) -> None:
     _check_names("boxes", names)
     for number, box in enumerate(shape.boxes):
         at = f"boxes[{number}] ({box.name})"
-        _check_attributes(box, at)
+        _check_types(box, at)
+        turn = np.array(box.rotation)
+        is_turn = np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=ROUNDING)
+        if not (is_turn and np.linalg.det(turn) > 0.0):
+            raise broken(f"{at}.rotation", "be a rotation matrix", box.rotation)
         if box.is_round and box.size[0] != box.size[1]:
             raise broken(f"{at}.size", "have equal x and y in a cylinder", box.size)
     for number, sensor in enumerate(kind.sensors):
@@ -192,7 +146,7 @@ def _check_slots(kind: PartType, slots: Sequence[Slot]) -> None:
         raise broken("slots", f"be {kind.arity}, the arity", len(slots))
     for number, slot in enumerate(slots):
         at = f"slots[{number}]"
-        _check_attributes(slot, at)
+        _check_types(slot, at)
         if abs(float(np.dot(slot.normal, slot.tangent))) > ROUNDING:
             rule = f"be at right angles to the normal {slot.normal}"
             raise broken(f"{at}.tangent", rule, slot.tangent)
@@ -208,17 +162,16 @@ def _check_segments(kind: PartType, shape: Shape) -> None:
             raise broken("segment", rule, piece.segment)
     for segment in allowed if shape.joint is not None or kind.is_root else ():
         if all(box.segment != segment for box in shape.boxes):
-            raise broken(
-                "boxes", f"have at least one in segment {segment}", came="none"
-            )
+            rule = f"have at least one in segment {segment}"
+            raise broken("boxes", rule, came="none")
 
 
 def _check_joint(joint: Joint, motor: Motor | None) -> None:
     """Raise for what is wrong with a joint and its motor."""
-    _check_attributes(joint, "joint")
+    _check_types(joint, "joint")
     is_continuous = joint.kind == "continuous"
-    if is_continuous != (joint.limit == math.inf) or joint.limit <= 0.0:
-        rule = "be infinite if continuous" if is_continuous else _POSITIVE[0]
+    if is_continuous != (joint.limit == math.inf):
+        rule = "be infinite if continuous" if is_continuous else "be finite and > 0"
         raise broken("joint.limit", rule, joint.limit)
     if is_continuous and motor is not None and motor.control != "velocity":
         rule = "be 'velocity' for a continuous joint"
