@@ -45,6 +45,14 @@ class NetworkError(RevolveError):
     """An address that cannot be listened on or reached."""
 
 
+def check_most(
+    count: int, most: int, what: str, where: str, kind: type[RevolveError]
+) -> None:
+    """Raise an error of a kind if there are more things than a limit allows."""
+    if count > most:
+        raise kind(f"{where}: must have <= {most} {what}, got {count}")
+
+
 _TYPES = {
     "int": "a whole number",
     "float": "a number",

@@ -16,7 +16,7 @@ the gaps between boxes and for the infrared sensor.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any
 
 from schema import parts
 from schema.parts import (
@@ -161,15 +161,6 @@ def _active_wheel(values: tuple[float, ...]) -> Shape:
     )
 
 
-class _Rays(Protocol):
-    """What the infrared sensor needs of ``schema.plugins.protocols.SensorView``."""
-
-    def distance(
-        self, box: str, direction: Vector, reach: float, start: Vector
-    ) -> float:
-        """Return how far a ray gets [m]."""
-
-
 @dataclass(frozen=True, slots=True)
 class Infrared:
     """Sensor that measures how near the first obstacle ahead of a box is.
@@ -180,19 +171,15 @@ class Infrared:
         box: that sends the ray, along its x axis.
         start: of the ray, in the frame of the box [m].
         range_m: [m].
-        inputs: one.
+        inputs: number of network inputs.
     """
 
     box: str
     start: Vector
     range_m: float = IR_RANGE_M
+    inputs: int = 1
 
-    @property
-    def inputs(self) -> int:
-        """Number of network inputs."""
-        return 1
-
-    def read(self, view: _Rays, /) -> tuple[float]:
+    def read(self, view: Any, /) -> tuple[float]:  # noqa: ANN401 - a SensorView
         """Return the nearness of the first obstacle."""
         distance = view.distance(self.box, parts.X, self.range_m, self.start)
         return (1.0 - distance / self.range_m,)

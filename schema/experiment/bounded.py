@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from schema.errors import ExperimentError, RevolveError, nearest, unreadable
+from schema.errors import (
+    ExperimentError,
+    RevolveError,
+    check_most,
+    nearest,
+    unreadable,
+)
 from schema.limits import (
     MOST_BRACKETS,
     MOST_DEPTH,
@@ -73,14 +79,9 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         ExperimentError: not TOML, too long, nested too deeply, or a key of too many
             parts.
     """
-    if len(text) > MOST_TEXT_BYTES:
-        raise ExperimentError(
-            f"{where}: must have <= {MOST_TEXT_BYTES} characters, got {len(text)}"
-        )
-    if (brackets := text.count("[")) > MOST_BRACKETS:
-        raise ExperimentError(
-            f"{where}: must have <= {MOST_BRACKETS} lists and tables, got {brackets}"
-        )
+    check_most(len(text), MOST_TEXT_BYTES, "characters", where, ExperimentError)
+    tables = "lists and tables"
+    check_most(text.count("["), MOST_BRACKETS, tables, where, ExperimentError)
     if _LONG_KEY.search(text):
         raise ExperimentError(f"{where}: a key must have <= {MOST_KEY_PARTS} parts")
     if _LONG_NUMBER.search(text):

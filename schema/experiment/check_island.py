@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from math import lcm
+from operator import attrgetter
 
 from schema.errors import ExperimentError, shown
 from schema.experiment.document import (
@@ -47,19 +48,22 @@ def island_problems(experiment: Experiment) -> Iterator[str]:
 
 
 def _limits_problems(experiment: Experiment) -> Iterator[str]:
-    space, selection = experiment.space, experiment.selection
-    if space.min_parts > space.max_parts:
-        yield (
-            f"space.min_parts: must be <= space.max_parts = {space.max_parts}, "
-            f"got {space.min_parts}"
-        )
-    if space.max_parts == 1:
+    pairs = [
+        ("space.min_parts", "space.max_parts"),
+        ("selection.population", "births"),
+    ]
+    if experiment.selection.window is not None:
+        pairs.append(("selection.window", "selection.children"))
+    if not experiment.selection.keep_parents:
+        pairs.append(("selection.population", "selection.children"))
+    if experiment.arena is not None:
+        pairs.append(("arena.merge_distance_m", "arena.split_distance_m"))
+    for lower, upper in pairs:
+        low, high = attrgetter(lower, upper)(experiment)
+        if low > high:
+            yield f"{upper}: must be >= {lower} = {low:g}, got {high:g}"
+    if experiment.space.max_parts == 1:
         yield "space.max_parts: must be > 1, got 1"
-    if experiment.births < selection.population:
-        yield (
-            f"births: must be >= selection.population = {selection.population}, "
-            f"got {experiment.births}"
-        )
 
 
 def _selection_problems(experiment: Experiment) -> Iterator[str]:
@@ -69,16 +73,6 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
         yield (
             f"selection.population: must be >= {selection.parents_needed}, to choose "
             f"two parents{_by(selection)}, got {selection.population}"
-        )
-    if not selection.keep_parents and selection.children < selection.population:
-        yield (
-            "selection.children: must be >= selection.population = "
-            f"{selection.population} if parents are not kept, got {selection.children}"
-        )
-    if experiment.window > selection.children:
-        yield (
-            "selection.window: must be <= selection.children = "
-            f"{selection.children}, got {experiment.window}"
         )
     if selection.reevaluation is not None and not selection.keep_parents:
         yield (
@@ -149,11 +143,6 @@ def _clock_problems(experiment: Experiment) -> Iterator[str]:
 
 def _arena_problems(experiment: Experiment, arena: ArenaSection) -> Iterator[str]:
     """Yield what is wrong with distances and intervals of an arena."""
-    if arena.split_distance_m < arena.merge_distance_m:
-        yield (
-            "arena.split_distance_m: must be >= arena.merge_distance_m = "
-            f"{arena.merge_distance_m}, got {arena.split_distance_m}"
-        )
     radius_m = 0.5 * arena.wall_diameter_m
     if 0.0 < radius_m <= arena.birth_radius_m:
         yield (

@@ -113,11 +113,6 @@ def scenery_problem(scenery: str) -> str:
     return ""
 
 
-def is_mjcf(scenery: str) -> bool:
-    """Return whether scenery is MJCF, not the path of a file."""
-    return scenery.lstrip().startswith("<")
-
-
 def ground_problems(environment: Environment) -> Iterator[str]:
     """Yield what is wrong with rough ground."""
     if not environment.roughness_m:

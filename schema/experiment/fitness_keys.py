@@ -17,7 +17,6 @@ from schema.plugins.permission import ROOMS
 from schema.plugins.simple_traces import simple_traces
 
 _KEYS = ("path_weight", "straight_weight", "limit")
-_TABLE = "fitness.parameters"
 _SHORT = {path: name for name, path in FITNESS.items()}
 _DEFAULTS: dict[str, Any] = to_builtins(Fitness())
 
@@ -29,16 +28,14 @@ def check_fitness_keys(fitness: Fitness) -> None:
         ExperimentError: the function has parameters of its own, or does not read the
             key; errors of ``fitness_argument``.
     """
-    changed = [key for key in _KEYS if getattr(fitness, key) != _default(key)]
+    changed = [key for key in _KEYS if getattr(fitness, key) != _DEFAULTS[key]]
     if not changed:
         return
     function = fitness_function(fitness)
     name = fitness.function
     if not isinstance(fitness_argument(function, fitness), Fitness):
-        raise ExperimentError(
-            f"fitness.{changed[0]}: has no effect on {name}, which reads "
-            f"[{_TABLE}]: move the key there, or remove it"
-        )
+        why = f"has no effect on {name}, which reads [fitness.parameters]"
+        raise ExperimentError(f"fitness.{changed[0]}: {why}: move the key or remove it")
     read = _keys_read(function, fitness)
     for key in changed:
         if key not in read:
@@ -46,10 +43,6 @@ def check_fitness_keys(fitness: Fitness) -> None:
                 f"fitness.{key}: has no effect on {name}, which does not read it: "
                 f"remove the key, or let the function use it (parameters.{key})"
             )
-
-
-def _default(key: str) -> float:
-    return float(getattr(Fitness(), key))
 
 
 class _Watched:

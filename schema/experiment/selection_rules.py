@@ -3,10 +3,8 @@
 Built-in rules have short names; ``coordinator.evolution.selection`` holds them.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any
-
-from msgspec import Struct
 
 from schema.errors import ExperimentError, shown
 from schema.experiment.document import PARENTS, SURVIVORS, SelectionSection
@@ -33,24 +31,15 @@ def own_rule(
     if ":" not in path:
         return None
     function = load_function(path, key, _ARGUMENTS[name])
-    table = getattr(selection, f"{name}_parameters")
-    return function, _parameters(function, table, key)
-
-
-def _parameters(
-    function: Callable[..., Any], table: Mapping[str, Any], key: str
-) -> Struct | None:
-    """Return parameters as the Struct with which the last argument is annotated."""
-    place = where_defined(function)
+    table, place = getattr(selection, f"{name}_parameters"), where_defined(function)
     kind = parameters_type(function, f"{key}: {place}", position=-1)
     if kind is not None:
-        return read_parameters(table, kind, f"{key}_parameters")
+        return function, read_parameters(table, kind, f"{key}_parameters")
     if table:
-        raise ExperimentError(
-            f"{key}_parameters: {place}: must annotate its last "
-            f"argument with a msgspec Struct to get parameters, got {shown(table)}"
-        )
-    return None
+        rule = "must annotate its last argument with a msgspec Struct"
+        got = f"to get parameters, got {shown(table)}"
+        raise ExperimentError(f"{key}_parameters: {place}: {rule} {got}")
+    return function, None
 
 
 def rule_problems(selection: SelectionSection) -> Iterator[str]:
@@ -62,7 +51,5 @@ def rule_problems(selection: SelectionSection) -> Iterator[str]:
         elif path not in built_in:
             yield str(unknown(path, f"selection.{name}", built_in))
         elif table := getattr(selection, f"{name}_parameters"):
-            yield (
-                f"selection.{name}_parameters: {path!r} has no parameters, got "
-                f"{shown(table)}"
-            )
+            why = f"{path!r} has no parameters, got {shown(table)}"
+            yield f"selection.{name}_parameters: {why}"

@@ -7,7 +7,7 @@ from typing import TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, check_most
 from schema.experiment.document import (
     NETWORK,
     ArenaSection,
@@ -175,10 +175,7 @@ def _from_json(kind: type[T], data: bytes) -> T:
     Keys that no longer exist, as in robot files of earlier versions, are left out.
     """
     where = "settings of a request"
-    if len(data) > MOST_SETTINGS_BYTES:
-        raise ExperimentError(
-            f"{where}: must have <= {MOST_SETTINGS_BYTES} bytes, got {len(data)}"
-        )
+    check_most(len(data), MOST_SETTINGS_BYTES, "bytes", where, ExperimentError)
     try:
         known = known_keys(msgspec.json.decode(data), kind)
         settings = msgspec.convert(known, kind)

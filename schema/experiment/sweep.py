@@ -10,7 +10,7 @@ from typing import Any
 
 from msgspec import field
 
-from schema.errors import ExperimentError, cut, shown
+from schema.errors import ExperimentError, check_most, cut, shown
 from schema.experiment.section import Count, Parameters, PluginSection, Section, Value
 from schema.limits import MOST_SWEEP_POINTS
 from schema.plugins.parameters import read_parameters
@@ -125,10 +125,7 @@ def sweep_points(sweep: Sweep) -> list[Point]:
         ExperimentError: more points than are allowed.
     """
     size = sweep.samples or math.prod(map(_size, sweep.settings.values()))
-    if size > MOST_SWEEP_POINTS:
-        raise ExperimentError(
-            f"sweep: must have <= {MOST_SWEEP_POINTS} points, got {size}"
-        )
+    check_most(size, MOST_SWEEP_POINTS, "points", "sweep", ExperimentError)
     if sweep.samples:
         rows: Iterable[tuple[Any, ...]] = zip(*_latin_hypercube(sweep), strict=True)
     else:

@@ -8,10 +8,10 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, cut, shown
+from schema.errors import ExperimentError, check_most, cut, shown
 from schema.experiment.bounded import near_files, parse_toml, text_of
 from schema.experiment.document import Experiment, island_count, island_experiments
-from schema.experiment.environment import is_mjcf, scenery_problem
+from schema.experiment.environment import scenery_problem
 from schema.experiment.sweep import Point, settings_problem, sweep_points, with_point
 from schema.limits import MOST_ISLANDS
 from schema.plugins.parameters import read_parameters
@@ -35,11 +35,8 @@ def converted(tables: Tables, where: str) -> Experiment:
     _read_calibration(tables, where)
     _read_scenery(tables, where)
     experiment = read_parameters(_completed(tables), Experiment, where, ": ")
-    if island_count(experiment) > MOST_ISLANDS:
-        raise ExperimentError(
-            f"{where}: islands: must be <= {MOST_ISLANDS} islands, got "
-            f"{island_count(experiment)}"
-        )
+    count = island_count(experiment)
+    check_most(count, MOST_ISLANDS, "islands", where, ExperimentError)
     return experiment
 
 
@@ -114,7 +111,8 @@ def _read_scenery(tables: Tables, where: str) -> None:
             if not isinstance(scenery, str) or not scenery:
                 continue
             place = f"{where}: environment.scenery"
-            if not is_mjcf(scenery):
+            if not scenery.lstrip().startswith("<"):
+                # It is no MJCF, but the path of a file.
                 place += f": {scenery}"
                 scenery = text_of(Path(where).parent / scenery, place)
                 if not scenery.strip():

@@ -14,7 +14,7 @@ from typing import NamedTuple, NoReturn, TypeVar, cast
 
 import yaml
 
-from schema.errors import InvalidRobot, nearest, one_line, shown
+from schema.errors import InvalidRobot, check_most, nearest, one_line, shown
 from schema.limits import MOST_DEPTH, MOST_NODES, MOST_TEXT_BYTES, printable
 
 T = TypeVar("T", int, float)
@@ -257,10 +257,7 @@ def compose(text: str, file: str, language: str = "YAML") -> Table:
         InvalidRobot: not of the language, not a mapping, or beyond a limit
             (``schema.limits``).
     """
-    if len(text) > MOST_TEXT_BYTES:
-        raise InvalidRobot(
-            f"{file}: must have <= {MOST_TEXT_BYTES} characters, got {len(text)}"
-        )
+    check_most(len(text), MOST_TEXT_BYTES, "characters", file, InvalidRobot)
     try:
         node = _Composer(yaml.parse(text, Loader=_LOADER)).document()
     except yaml.MarkedYAMLError as error:

@@ -8,7 +8,7 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 import os
 from pathlib import Path
 
-from schema.errors import InvalidRobot, MalformedMessage, unreadable
+from schema.errors import InvalidRobot, MalformedMessage, check_most, unreadable
 from schema.experiment.bounded import read_bytes
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
@@ -34,9 +34,8 @@ def robot_from_yaml(
     """Return the robot of a YAML text, in the current form or that of Revolve (2016).
 
     Raises:
-        InvalidRobot: not YAML; an unknown or missing key, part type or name; a value
-            of a wrong type; a robot that is not well formed in this body space. The
-            message names file, line and field.
+        InvalidRobot: no such document, or no well-formed robot; the message names
+            file, line and field.
     """
     document = compose(text, file)
     if not is_of_revolve(document):
@@ -180,8 +179,8 @@ def write_robot(
     except InvalidRobot as error:
         raise InvalidRobot(f"{path}: {error}") from None
     most = MOST_MJCF_BYTES if ending == MJCF_ENDING else MOST_TEXT_BYTES
-    if ending in _READ and len(data) > most:
-        raise InvalidRobot(f"{path}: must have <= {most} bytes, got {len(data)}")
+    if ending in _READ:
+        check_most(len(data), most, "bytes", str(path), InvalidRobot)
     try:
         # Where a link leads: the link itself stays.
         target = Path(os.path.realpath(path))

@@ -59,7 +59,7 @@ class RobogenPart:
         kind: Revolve's name of the part type.
         orientation: quarter turns, 0..3.
         parameters: as in the file: length [m], alpha and beta [degrees].
-        where: file and line or path, for messages.
+        where: file and line or path, and name, for messages.
         has_imu: false of a core whose inputs RoboGen does not have.
         children: by RoboGen's slot; parts that are not square number them from 1.
     """
@@ -112,17 +112,15 @@ def checked_part(
     """
     at = f"{where}: part {shown(name)}"
     if kind not in KINDS:
-        raise InvalidRobot(
-            f"{at}: type {shown(kind)} is not supported: must be one of "
-            f"{', '.join(KINDS)}"
-        )
+        allowed = f"must be one of {', '.join(KINDS)}"
+        raise InvalidRobot(f"{at}: type {shown(kind)} is not supported: {allowed}")
     if turns not in range(4):
         raise InvalidRobot(f"{at}: orientation must be 0..3, got {shown(turns)}")
     ours = KINDS[kind]
     wanted = _BAR_NUMBERS if ours == "ParametricBarJoint" else 0
     if len(values) != wanted:
         raise InvalidRobot(f"{at}: {kind} takes {wanted} numbers, got {len(values)}")
-    return RobogenPart(name, ours, turns, values, where, kind != _NO_IMU)
+    return RobogenPart(name, ours, turns, values, at, kind != _NO_IMU)
 
 
 def neuron_kind(name: str, where: str) -> str:
@@ -205,10 +203,8 @@ class _Body:
         by_slot: dict[int, tuple[int, RobogenPart]] = {}
         for slot, child in part.children.items():
             if not 0 <= slot < BUILT_IN[part.kind].arity:
-                raise InvalidRobot(
-                    f"{child.where}: part {shown(child.name)}: {shown(part.name)} has "
-                    f"no slot {shown(slot)}"
-                )
+                missing = f"{shown(part.name)} has no slot {shown(slot)}"
+                raise InvalidRobot(f"{child.where}: {missing}")
             by_slot[our_slot(part.kind, slot)] = slot, child
         for parent_slot in sorted(by_slot):
             slot, child = by_slot[parent_slot]

@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Iterator
 
-from schema.errors import InvalidRobot, shown
+from schema.errors import InvalidRobot, check_most, shown
 from schema.formats.robogen import (
     RobogenPart,
     RobogenRobot,
@@ -88,13 +88,10 @@ def _sections(text: str, where: str) -> Iterator[list[tuple[str, list[str]]]]:
     section: list[tuple[str, list[str]]] = []
     is_body = True
     for number, line in enumerate(text.splitlines(), start=1):
-        if len(line) > MOST_LINE:
-            raise InvalidRobot(
-                f"{where}:{number}: must have <= {MOST_LINE} characters, "
-                f"got {len(line)}"
-            )
+        at = f"{where}:{number}"
+        check_most(len(line), MOST_LINE, "characters", at, InvalidRobot)
         if line.strip():
-            section.append((f"{where}:{number}", [line] if is_body else line.split()))
+            section.append((at, [line] if is_body else line.split()))
         else:
             yield section
             section, is_body = [], False
@@ -106,19 +103,15 @@ def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
     if not lines:
         raise InvalidRobot(f"{where}:1: must be the core, got an empty line")
     if dump := _DUMPS.get(lines[0][1][0].split()[0]):
-        raise InvalidRobot(
-            f"{where}:1: a RoboGen {dump} of an individual is not supported: only "
-            "RoboGen's robot text and JSON are"
-        )
+        what = f"a RoboGen {dump} of an individual is not supported"
+        raise InvalidRobot(f"{where}:1: {what}: only its robot text and JSON are")
     path: list[RobogenPart] = []
     names: set[str] = set()
     for line, (written,) in lines:
         match = _PART.fullmatch(written)
         if match is None:
-            raise InvalidRobot(
-                f"{line}: must be TABS SLOT TYPE NAME ORIENTATION PARAMETERS, "
-                f"got {shown(written)}"
-            )
+            form = "TABS SLOT TYPE NAME ORIENTATION PARAMETERS"
+            raise InvalidRobot(f"{line}: must be {form}, got {shown(written)}")
         tabs, slot, kind, name, turns, rest = match.groups()
         kind = _LETTERS.get(kind) or _NOT_SUPPORTED.get(kind, kind)
         values = tuple(_number(word, line) for word in rest.split())
@@ -142,17 +135,13 @@ def _graft(parent: RobogenPart, slot: int, child: RobogenPart) -> None:
     # Slot 0 of all parts but the core attaches them to their parent: not numbered.
     own = slot + (parent.kind != "Core")
     if own in parent.children:
-        raise InvalidRobot(
-            f"{child.where}: part {shown(child.name)}: slot {slot} of "
-            f"{shown(parent.name)} is taken"
-        )
+        taken = f"slot {slot} of {shown(parent.name)} is taken"
+        raise InvalidRobot(f"{child.where}: {taken}")
     count = BUILT_IN[parent.kind].arity
     if own >= count:
         free = count - (parent.kind != "Core")
-        raise InvalidRobot(
-            f"{child.where}: part {shown(child.name)}: {shown(parent.name)} has {free} "
-            f"free slots, got slot {slot}"
-        )
+        few = f"{shown(parent.name)} has {free} free slots, got slot {slot}"
+        raise InvalidRobot(f"{child.where}: {few}")
     parent.children[own] = child
 
 

@@ -98,12 +98,8 @@ def read_with_settings(
         of the default ones, the experiment is None.
 
     Raises:
-        InvalidRobot: the file is missing, or holds no robot that is well formed.
-        MalformedMessage: a .pb file that does not hold a robot.
-        ExperimentError: an invalid experiment, or no island of that number; a plug-in
-            of the run that is missing or not the user's own.
-        RunFolderError: the description of the run, or the table of the populations that
-            names the best robot's island, is damaged.
+        RevolveError: no well-formed robot in the file; an invalid experiment,
+            island or plug-in; a damaged description or table of the run.
     """
     # First: nothing is said about the settings of a file that is not there.
     if check_file(file) == MJCF_ENDING and named is None and island is None:

@@ -27,10 +27,7 @@ def check_neuron_type(kind: NeuronType) -> None:
     The neurons are computed for some ticks: all together, and in smaller batches.
 
     Raises:
-        ExperimentError: a wrong name, parameter or number of states; a step that
-            gives another shape or a number that is not finite, changes its arguments,
-            or gives a neuron another state in another batch.
-        Exception: any error of its code.
+        Exception: an error of its code, or ``ExperimentError`` for a broken rule.
     """
     _check_declaration(kind)
     rng = np.random.default_rng(0)

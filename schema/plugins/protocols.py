@@ -44,9 +44,7 @@ class Encoding(Protocol[Genome]):
     def random(self, rng: np.random.Generator, birth: BirthId) -> Genome:
         """Return the genome of a random robot.
 
-        Args:
-            rng: the only source of randomness.
-            birth: id of the individual; identities of its genes may derive from it.
+        Identities of its genes may derive from the birth's id.
         """
 
     def develop(self, genome: Genome) -> Robot:
@@ -63,10 +61,7 @@ class Encoding(Protocol[Genome]):
     ) -> Genome | None:
         """Return a genome made of two parents', or None if they cannot mate.
 
-        Args:
-            first: genome of a parent.
-            second: genome of the other one, which was selected second.
-            rng: the only source of randomness.
+        ``second`` is the parent that was selected second.
         """
 
     def mutate(
@@ -74,10 +69,8 @@ class Encoding(Protocol[Genome]):
     ) -> Genome | None:
         """Return a mutated genome, or None if no robot may develop from it.
 
-        Args:
-            genome: what `crossover` returned.
-            rng: the only source of randomness, as `crossover` left it.
-            birth: id of the child; identities of its new genes may derive from it.
+        ``genome`` is what `crossover` returned, ``rng`` as it left it; identities of
+        new genes may derive from the child's id.
         """
 
     def to_bytes(self, genome: Genome) -> bytes:
@@ -347,11 +340,8 @@ class BrainGenes(Protocol):
     ) -> None:
         """Add hidden neurons and connections to new parts, which have outputs only.
 
-        Args:
-            draws: source of all choices.
-            new: all parts of a random robot, or the part that mutation added.
-            branches: all parts of the robot.
-            rules: of the experiment.
+        ``new`` are all parts of a random robot, or the part that mutation added;
+        ``branches`` are all parts of the robot.
         """
 
     def prune(
@@ -412,9 +402,8 @@ class BrainControl(Protocol):
     def pack(self, brain: Brain, width: Widths) -> Any:  # noqa: ANN401 - its own
         """Return a brain in the form that ``bank`` takes, as arrays for example.
 
-        Args:
-            brain: a checked brain of this type's neurons, within the widths.
-            width: greatest numbers of neurons.
+        The brain is checked: of this type's neurons, within the greatest numbers of
+        neurons.
         """
 
     def bank(self, packed: Sequence[Any], width: Widths, tick_s: float) -> Bank:
@@ -424,10 +413,8 @@ class BrainControl(Protocol):
         any batch: use arrays of fixed width, elementwise functions, and ``matmul``
         with one slice for each robot.
 
-        Args:
-            packed: R results of ``pack``.
-            width: greatest numbers of neurons.
-            tick_s: time between two ticks [s].
+        ``packed`` has R results of ``pack``; ``tick_s`` is the time between two ticks
+        [s].
         """
 
 
@@ -555,14 +542,10 @@ class Learner(Protocol):
     """
 
     def ask(self, rng: np.random.Generator, most: int, /) -> Sequence[Any] | Floats:
-        """Return the next points to try, all of them at the same time.
+        """Return the next points to try together: (P, N), 1 <= P <= most, in [0, 1].
 
-        Args:
-            rng: stream of this request, of this newborn alone.
-            most: greatest number of points: what is left of the budget.
-
-        Returns:
-            (P, N), 1 <= P <= most, from 0 to 1.
+        ``rng`` is a stream of this request, of this newborn alone; ``most`` is what is
+        left of the budget.
         """
 
     def tell(self, points: Floats, fitness: Floats, /) -> None:
@@ -589,10 +572,8 @@ class FitnessFunction(Protocol):
     def __call__(self, trace: Trace, parameters: Any, /) -> float:  # noqa: ANN401
         """Return the fitness of a trace.
 
-        Args:
-            trace: of the robot over its fitness window, with the declared channels;
-                not to be changed.
-            parameters: own parameters, or the section.
+        The trace is that of the robot over its fitness window, with the declared
+        channels; it must not be changed.
         """
 
 

@@ -88,9 +88,8 @@ def check_sensor(sensor: OwnSensor, shape: Shape | None = None) -> None:
     Without a shape of its part, any name of a box is allowed.
 
     Raises:
-        ExperimentError: no whole number of inputs; no ``read`` of one argument; it
-            raises, returns another number of values, one that is not a finite number,
-            or different values for one view.
+        ExperimentError: no whole number of inputs, or a ``read`` that raises or
+            does not return as many finite numbers, equal for one view.
     """
     name = type(sensor).__name__
     inputs = getattr(sensor, "inputs", None)

@@ -30,9 +30,9 @@ def check_function(function: Callable[..., Any], *arguments: object) -> None:
     not for all of them.
 
     Raises:
-        ExperimentError: it returns no number, a number that is not finite, different
-            numbers for one trace, or writes to the trace.
-        Exception: what it raises for each trace.
+        Exception: what it raises for each trace, or ``ExperimentError`` for a
+            broken rule: a finite number, always the same, and no change of the
+            trace.
     """
     raised: list[Exception] = []
     traces = simple_traces(function)
@@ -51,14 +51,11 @@ def check_function(function: Callable[..., Any], *arguments: object) -> None:
         if len(raised) > count:
             continue
         is_number = isinstance(value, Real) and not isinstance(value, bool)
+        came = f"{shown(value)} for a {name} trace"
         if not is_number:
-            raise broken(
-                "", "return a number", came=f"{shown(value)} for a {name} trace"
-            )
+            raise broken("", "return a number", came=came)
         if not math.isfinite(cast("float", value)):
-            raise broken(
-                "", "return a finite number", came=f"{value} for a {name} trace"
-            )
+            raise broken("", "return a finite number", came=came)
     if len(raised) >= 2 * len(traces):  # each is called twice
         raise raised[0]
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
-from schema.errors import PluginDiffers, shown
+from schema.errors import PluginDiffers, check_most, shown
 from schema.limits import MOST_PLUGIN_CHARACTERS
 from schema.plugins.permission import (
     FLAG,
@@ -80,11 +80,8 @@ def check_plugins(wanted: str, run: str = "") -> None:
         PluginDiffers: one is missing or not allowed, or its source differs; a text
             that is too long.
     """
-    if len(wanted) > MOST_PLUGIN_CHARACTERS:
-        raise PluginDiffers(
-            f"a list of plug-ins must have <= {MOST_PLUGIN_CHARACTERS} characters, got "
-            f"{len(wanted)}"
-        )
+    most, what = MOST_PLUGIN_CHARACTERS, "characters"
+    check_most(len(wanted), most, what, "list of plug-ins", PluginDiffers)
     for each in wanted.split():
         name, _, digest = each.partition("=")
         if not allows_any_of(name):

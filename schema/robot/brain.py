@@ -102,16 +102,14 @@ def check_brain(brain: Brain, part_count: int) -> None:
     ``check_neurons`` checks the types of its neurons.
 
     Raises:
-        InvalidRobot: neurons out of order, on a part that does not exist, or with a
-            parameter that is not finite; an input of another type or with parameters;
-            a connection to an input, to or from a missing neuron, or given twice.
+        InvalidRobot: neurons out of order or on no part, inputs of a type, numbers
+            that are not finite; connections to inputs or missing neurons, or given
+            twice.
     """
     order = [(LAYERS.index(neuron.layer), neuron.part) for neuron in brain.neurons]
     if order != sorted(order):
-        raise InvalidRobot(
-            "brain.neurons: must be inputs, then outputs, then hidden neurons, "
-            "each by ascending part"
-        )
+        rule = "inputs, then outputs, then hidden neurons, each by ascending part"
+        raise InvalidRobot(f"brain.neurons: must be {rule}")
     # Build messages only on errors: this runs for each birth in each process.
     for index, neuron in enumerate(brain.neurons):
         if problem := _neuron_problem(neuron, part_count):
@@ -121,10 +119,8 @@ def check_brain(brain: Brain, part_count: int) -> None:
         if problem := _connection_problem(edge, brain):
             raise InvalidRobot(f"brain.connections[{index}]{problem}")
         if (edge.source, edge.target) in seen:
-            raise InvalidRobot(
-                f"brain.connections[{index}]: second connection "
-                f"{edge.source} -> {edge.target}, at most one is allowed"
-            )
+            second = f"second connection {edge.source} -> {edge.target}"
+            raise InvalidRobot(f"brain.connections[{index}]: {second}, not allowed")
         seen.add((edge.source, edge.target))
 
 
@@ -152,15 +148,11 @@ def check_neurons(brain: Brain, kinds: NeuronKinds) -> None:
             continue
         parameters = kinds.get(neuron.kind)
         if parameters is None:
-            raise InvalidRobot(
-                f"brain.neurons[{index}].kind: must be one of {', '.join(kinds)}, "
-                f"got {shown(neuron.kind)}"
-            )
-        if len(neuron.parameters) != len(parameters):
-            raise InvalidRobot(
-                f"brain.neurons[{index}].parameters: {neuron.kind} takes "
-                f"{len(parameters)}, got {len(neuron.parameters)}"
-            )
+            rule = f"must be one of {', '.join(kinds)}, got {shown(neuron.kind)}"
+            raise InvalidRobot(f"brain.neurons[{index}].kind: {rule}")
+        if (count := len(neuron.parameters)) != len(parameters):
+            rule = f"{neuron.kind} takes {len(parameters)}, got {count}"
+            raise InvalidRobot(f"brain.neurons[{index}].parameters: {rule}")
 
 
 def check_widths(brain: Brain, width: Widths) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from schema.errors import InvalidRobot, shown
+from schema.errors import InvalidRobot, check_most, shown
 from schema.limits import MOST_NEURONS, MOST_PARTS, Finite
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Brain, NeuronKinds, check_brain, check_neurons
@@ -60,9 +60,8 @@ def check_tree(parts: Sequence[Part]) -> None:
     """Raise unless parts form a tree; types are not checked.
 
     Raises:
-        InvalidRobot: no parts; a parent after its child; a slot below 0 or used
-            twice; parts out of depth-first order; an orientation that is not a
-            quarter turn; a number that is not finite; a gene outside 64 bits.
+        InvalidRobot: no tree in depth-first order, a slot that is used twice, or a
+            number that is out of range or not finite.
     """
     if not parts:
         raise InvalidRobot("body: must have at least the core")
@@ -75,10 +74,8 @@ def check_tree(parts: Sequence[Part]) -> None:
             continue
         for end in ((part.parent, part.parent_slot), (index, part.slot)):
             if end in taken:
-                raise InvalidRobot(
-                    f"body.parts[{index}]: slot {shown(end[1])} of "
-                    f"body.parts[{end[0]}] is taken"
-                )
+                place = f"slot {shown(end[1])} of body.parts[{end[0]}]"
+                raise InvalidRobot(f"body.parts[{index}]: {place} is taken")
             taken.add(end)
     _check_order(parts)
 
@@ -119,10 +116,9 @@ def check_robot(
     The analyzer checks intersections of parts.
 
     Raises:
-        InvalidRobot: parts that are not a tree (``check_tree``); no core or several;
-            an unknown part type; a slot that the type does not have; a wrong number
-            of parameters or one out of range; a brain that breaks its rules or does
-            not fit the sensors and motors of the body.
+        InvalidRobot: as of ``check_tree``; parts, slots or parameters that their
+            types do not have; a brain that breaks its rules or does not fit the
+            body.
     """
     check_tree(robot.parts)
     check_brain(robot.brain, len(robot.parts))
@@ -136,15 +132,9 @@ def check_number(robot: Robot) -> None:
     Raises:
         InvalidRobot: it has more.
     """
-    if len(robot.parts) > MOST_PARTS:
-        raise InvalidRobot(
-            f"body: must have <= {MOST_PARTS} parts, got {len(robot.parts)}"
-        )
-    if len(robot.brain.neurons) > MOST_NEURONS:
-        raise InvalidRobot(
-            f"brain: must have <= {MOST_NEURONS} neurons, "
-            f"got {len(robot.brain.neurons)}"
-        )
+    check_most(len(robot.parts), MOST_PARTS, "parts", "body", InvalidRobot)
+    neurons = len(robot.brain.neurons)
+    check_most(neurons, MOST_NEURONS, "neurons", "brain", InvalidRobot)
 
 
 def check_types(robot: Robot, space: BodySpace) -> None:
@@ -164,7 +154,8 @@ def check_body(parts: Sequence[Part], space: BodySpace) -> None:
         InvalidRobot: the causes of ``check_types`` that concern the body.
     """
     for index, part in enumerate(parts):
-        _check_part(part, index, space)
+        if problem := _type_problem(part, index, space):
+            raise InvalidRobot(f"body.parts[{index}]{problem}")
         if index == 0:
             continue
         for name, slot, kind in (
@@ -172,30 +163,23 @@ def check_body(parts: Sequence[Part], space: BodySpace) -> None:
             ("slot", part.slot, space[part.kind]),
         ):
             if slot >= kind.arity:
-                raise InvalidRobot(
-                    f"body.parts[{index}].{name}: {kind.name} has slots "
-                    f"0..{kind.arity - 1}, got {shown(slot)}"
-                )
+                slots = f"{kind.name} has slots 0..{kind.arity - 1}, got {shown(slot)}"
+                raise InvalidRobot(f"body.parts[{index}].{name}: {slots}")
 
 
-def _check_part(part: Part, index: int, space: BodySpace) -> None:
+def _type_problem(part: Part, index: int, space: BodySpace) -> str:
+    """Return in what a part does not fit its type, or nothing."""
     kind = space.get(part.kind) or part_type(part.kind, space, f"body.parts[{index}]")
     if kind.is_root != (index == 0):
-        raise InvalidRobot(
-            f"body.parts[{index}]: exactly the first part must be a core, "
-            f"got {part.kind}"
-        )
+        return f": exactly the first part must be a core, got {part.kind}"
     if len(part.parameters) != len(kind.parameters):
-        raise InvalidRobot(
-            f"body.parts[{index}].parameters: {part.kind} takes "
-            f"{len(kind.parameters)}, got {len(part.parameters)}"
-        )
+        wanted = f"{part.kind} takes {len(kind.parameters)}"
+        return f".parameters: {wanted}, got {len(part.parameters)}"
     for parameter, value in zip(kind.parameters, part.parameters, strict=True):
         if not parameter.low <= value <= parameter.high:
-            raise InvalidRobot(
-                f"body.parts[{index}].{parameter.name}: must be in "
-                f"[{parameter.low}, {parameter.high}], got {value}"
-            )
+            allowed = f"[{parameter.low}, {parameter.high}]"
+            return f".{parameter.name}: must be in {allowed}, got {value}"
+    return ""
 
 
 def part_type(name: str, space: BodySpace, where: str) -> PartType:
@@ -222,10 +206,8 @@ def _check_order(parts: Sequence[Part]) -> None:
         if not is_first and (
             not path or last_slot.get(part.parent, -1) >= part.parent_slot
         ):
-            raise InvalidRobot(
-                f"body.parts[{index}]: parts must be in depth-first order, "
-                "children by ascending slot"
-            )
+            order = "parts must be in depth-first order, children by ascending slot"
+            raise InvalidRobot(f"body.parts[{index}]: {order}")
         last_slot[part.parent] = part.parent_slot
         path.append(index)
 

@@ -52,7 +52,7 @@ SELECTION = [
     ("[selection]\npopulation = 4", "be >= 5, .* with tournament_size = 4, got 4"),
     ("[selection]\npopulation = 1\nparents = 'random'", "must be >= 2, .*nts, got 1"),
     ("[selection]\nchildren = 9\nkeep_parents = false", "children: must be >= .* = 15"),
-    ("[selection]\nwindow = 16", "window: must be <= .* = 15, got 16"),
+    ("[selection]\nwindow = 16", "children: must be >= .*window = 16, got 15"),
     ("[selection]\nparents = 'rank'", "parents: must be one of .* none .* got 'rank'"),
     ("[[islands]]\nselection = {survivors = 'bets'}", r"islands.0.: .*mean 'best'"),
     ("[selection.culling]\npopulation_floor = 4", "population_floor: must be >= 5"),
@@ -86,7 +86,7 @@ CLOCKS = [
     ),
 ]
 OTHERS = [
-    ("[space]\nmin_parts = 31", "space.min_parts: must be <= .* = 30, got 31"),
+    ("[space]\nmin_parts = 31", "space.max_parts: must be >= .* = 31, got 30"),
     ("[space]\nmin_parts = 1\nmax_parts = 1", "space.max_parts: must be > 1"),
     ("[space]\nmax_inputs = 5", "space.max_inputs: must be >= 6"),
     ("[arena]\npopulation_floor = 31", r"limit: must be >= 31, for .* got 30"),
