@@ -8,14 +8,15 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from scipy import stats
 
-from analysis.measures.load import IslandSettings, island_settings
+from analysis.measures.load import island_settings
 from analysis.measures.outputs import OWN, POPULATION, schema
 from analysis.measures.population_table import Numbers
 from analysis.measures.populations import RETENTION_BIRTHS
+from schema.experiment.document import Experiment
 
 
 def outcome(
-    tables: Mapping[str, pa.Table], births: int, settings: Sequence[IslandSettings]
+    tables: Mapping[str, pa.Table], births: int, settings: Sequence[Experiment]
 ) -> dict[str, float]:
     """Return the outcomes of a run at a number of births.
 
@@ -41,7 +42,7 @@ def outcome(
         rows = np.flatnonzero((islands == island) & (counts <= births))
         if len(rows):
             columns = {name: _column(populations, name)[rows] for name in POPULATION}
-            founders = island_settings(island, settings).founders
+            founders = island_settings(island, settings).selection.population
             each.append(_of_island(columns, counts[rows], births, founders))
     found = {"births": float(births)}
     for name in each[0] if each else ():
@@ -50,7 +51,8 @@ def outcome(
     judged_again = [
         island
         for island in going_on
-        if (own := island_settings(island, settings)).is_online or own.reevaluation
+        if (own := island_settings(island, settings)).arena
+        or own.selection.reevaluation
     ]
     found |= _of_robots(tables, found, births, judged_again)
     return found | _own_measures(tables, births) | _of_lives(tables, births, going_on)

@@ -5,7 +5,6 @@ from graphlib import CycleError, TopologicalSorter
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.outputs import run_schema
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
@@ -54,30 +53,22 @@ def parents_first(parents: list[list[int]]) -> list[int]:
 
 
 def ancestors(parents: list[list[int]]) -> list[int]:
-    """Return the ancestors of each individual, as bits of one number.
+    """Return the ancestors of each individual, given ``parents_of``, as bits.
 
-    Args:
-        parents: as ``parents_of`` returns them.
-
-    Returns:
-        One number per individual: bit r is set if births row r is an ancestor. An
-        individual is not its own ancestor.
+    Bit r of a number is set if births row r is an ancestor. An individual is not its
+    own ancestor.
     """
-    found = [0] * len(parents)
+    lines = [0] * len(parents)
     for row in parents_first(parents):
         for parent in parents[row]:
-            found[row] |= found[parent] | 1 << parent
-    return found
+            lines[row] |= lines[parent] | 1 << parent
+    return lines
 
 
 def unique_ancestors(table: PopulationTable, lines: list[int]) -> Integers:
     """Return the number of different ancestors of each population, (G,).
 
-    Only members whose fitness counts are considered.
-
-    Args:
-        table: populations of a run.
-        lines: as ``ancestors`` returns them.
+    Only members whose fitness counts are considered; ``lines`` are their ``ancestors``.
 
     Source: Hupkes 2016, table 6.2 and figure 6.4.
     """
@@ -110,38 +101,3 @@ def foreign_share(
     pairs = zip(table.members.tolist(), here, strict=True)
     is_foreign = [origins[member] != 1 << island for member, island in pairs]
     return table.mean(np.array(is_foreign, np.float64))
-
-
-def migrants(
-    migrations: pa.Table, births: pa.Table, table: PopulationTable, lines: list[int]
-) -> pa.Table:
-    """Return the descendants of each migrant.
-
-    Args:
-        migrations: migrations of one run: ``epoch``, ``birth_island`` and ``birth`` (id
-            of the migrant), ``island`` (origin), ``to``, ``fitness`` [m/s].
-        births: births of the same run: ``island``, ``birth``.
-        table: populations of the same run.
-        lines: as ``ancestors`` returns them.
-
-    Returns:
-        One row per migration, in order: its columns, ``descendants`` (born on the
-        island ``to``), ``living`` (members of that island's last population, the
-        migrant included) and ``reached`` (islands whose last population contains the
-        migrant or a descendant).
-
-    Source: own.
-    """
-    is_last = table.is_last[table.group_of]
-    members = table.members[is_last]
-    where = table.islands[table.group_of][is_last]
-    homes = np.asarray(births["island"], np.int64)
-    found = migrations.to_pylist()
-    rows = rows_of(individual_ids(migrations), births).tolist()
-    for row, migrant in zip(rows, found, strict=True):
-        line = np.array([row >= 0 and up >> row & 1 for up in lines], np.bool_)
-        is_own = line[members] | (members == row)
-        migrant["descendants"] = int((line & (homes == migrant["to"])).sum())
-        migrant["living"] = int((is_own & (where == migrant["to"])).sum())
-        migrant["reached"] = len(np.unique(where[is_own]))
-    return pa.Table.from_pylist(found, run_schema("migrants"))

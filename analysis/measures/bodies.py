@@ -12,15 +12,9 @@ TOUCH = "TouchSensor"
 
 
 def body_sizes(births: pa.Table) -> dict[str, Numbers]:
-    """Return the sizes of every individual, absolute and per part.
+    """Return the sizes of every individual, (B,) by ``outputs.BODY`` and ``PER_PART``.
 
-    Args:
-        births: births of one run: ``parts``, ``joints``, ``motors``, ``extremities``,
-            ``hidden``, ``connections``, ``body``.
-
-    Returns:
-        Arrays (B,) by the names of ``outputs.BODY`` and ``PER_PART``. Joints with a
-        motor are active, all others passive.
+    Joints with a motor are active, all others passive.
 
     Source: Hupkes 2016, figures 6.9 to 6.16. Touch sensors are counted as parts; the
     axis of figure 6.15 seems to count their inputs, two per sensor.
@@ -42,15 +36,7 @@ def body_sizes(births: pa.Table) -> dict[str, Numbers]:
 
 
 def extremity_bins(robots: pa.Table) -> pa.Table:
-    """Return the mean fitness of robots by their extremities.
-
-    Args:
-        robots: ``is_last``, ``parts``, ``extremities``, ``fitness`` [m/s].
-
-    Returns:
-        One row per ``population`` ("final" or "born"), ``by`` ("count", or "per_part"
-        in bins of 0.1) and ``bin`` (the count, or the bin's lower end): number of
-        ``robots`` and their mean ``fitness`` [m/s].
+    """Return the mean fitness of robots, rows of ``robots``, by their extremities.
 
     Source: Hupkes 2016, figure 6.14.
     """

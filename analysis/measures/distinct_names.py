@@ -15,7 +15,6 @@ from typing import Any
 from msgspec import to_builtins
 
 from analysis.measures.load import LoadedRun
-from schema.experiment.file import experiment_from_text
 
 MARK = "~"
 """Separator of a name and a number that makes it distinct."""
@@ -35,7 +34,7 @@ def with_distinct_names(runs: Sequence[LoadedRun]) -> list[LoadedRun]:
     """
     groups: dict[str, dict[str, list[LoadedRun]]] = {}
     for run in runs:
-        both = (_settings(run.document), dict(run.plugins))
+        both = (_settings(run), dict(run.plugins))
         text = json.dumps(both, sort_keys=True)
         groups.setdefault(run.experiment, {}).setdefault(text, []).append(run)
     renamed: dict[int, LoadedRun] = {}
@@ -57,10 +56,9 @@ def with_distinct_names(runs: Sequence[LoadedRun]) -> list[LoadedRun]:
     return [renamed.get(id(run), run) for run in runs]
 
 
-def _settings(document: str) -> dict[str, Any]:
-    """Return a document's settings, with current defaults for an older document."""
-    entries: dict[str, Any] = to_builtins(experiment_from_text(document))
-    # Runs of a sweep are one experiment.
+def _settings(run: LoadedRun) -> dict[str, Any]:
+    """Return a run's settings; those of a sweep that it is a point of are marked."""
+    entries: dict[str, Any] = to_builtins(run.settings)
     for key in (entries.get("sweep") or {}).pop("chosen", None) or {}:
         _mark_swept(entries, key.split("."))
     return _without(entries)
@@ -92,7 +90,7 @@ def _compared(mine: LoadedRun, other: LoadedRun) -> list[str]:
         for name, digest in other.plugins.items()
         if mine.plugins.get(name, digest) != digest
     ]
-    settings = _settings(mine.document), _settings(other.document)
+    settings = _settings(mine), _settings(other)
     if not all(each.get("sweep") for each in settings):
         # The settings that only one of them sweeps are listed.
         for each in settings:

@@ -39,12 +39,7 @@ class Family:
 
 
 def family(births: pa.Table, row: int, levels: int = LEVELS) -> Family:
-    """Return the nearest ancestors of a robot, and the founders of their parts.
-
-    Args:
-        births: births table of the robot's run.
-        row: row of the robot.
-        levels: number of levels, the robot's own included.
+    """Return the nearest ancestors of a births row, and the founders of their parts.
 
     Source: Hupkes 2016, figures 6.18 to 6.20.
     """
@@ -82,13 +77,8 @@ def family(births: pa.Table, row: int, levels: int = LEVELS) -> Family:
 def families(run: RunTables) -> pa.Table:
     """Return the family of the fittest robot of each island's last population.
 
-    Returns:
-        One row per ``island``: ``births`` there, ``birth_island`` and ``birth`` of the
-        robot, ``members`` of its family (its ancestors of four levels, and itself),
-        ``distance`` (mean tree edit distance of pairs of them), ``founder_distance``
-        (the same for the robots without parents among the first 15 of the island) and
-        ``founders`` (robots without parents whose parts are in the family). Null where
-        there are no pairs, or no genes.
+    Founders are the robots without parents among the first 15 of the island. Null where
+    there are no pairs, or no genes.
 
     Source: Hupkes 2016, figures 6.18 to 6.20; measures: own.
     """

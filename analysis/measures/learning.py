@@ -43,12 +43,7 @@ def _trials(run: RunTables) -> tuple[Numbers, Integers]:
 
 
 def learning(run: RunTables) -> pa.Table:
-    """Return each newborn that has learnt.
-
-    Returns:
-        One row per robot, with the columns of ``outputs.OUTPUTS["learning"]`` except
-        the run's.
-    """
+    """Return each newborn that has learnt."""
     best, robots = _trials(run)
     tried = (~np.isnan(best)).sum(axis=1)
     at_birth = best[:, 0] if best.size else np.empty(0)
@@ -138,12 +133,7 @@ def _culled(run: RunTables) -> list[int]:
 
 
 def learning_curves(run: RunTables) -> pa.Table:
-    """Return quartiles over robots of the best fitness after each trial.
-
-    Returns:
-        One row per trial, with the columns of ``outputs.OUTPUTS["learning_curves"]``
-        except the run's.
-    """
+    """Return quartiles over robots of the best fitness after each trial."""
     best, _ = _trials(run)
     count = best.shape[1]
     low, median, high = (

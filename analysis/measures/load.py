@@ -4,7 +4,7 @@ Everything readable is read; everything else is reported with its folder and the
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from msgspec import structs
 from pyarrow.parquet import read_schema
 
 from schema.errors import ExperimentError, RunFolderError
-from schema.experiment.document import Experiment, SelectionSection, island_experiments
+from schema.experiment.document import Experiment, island_experiments
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.experiment.fitness_keys import fitness_text
 from schema.plugins.source import modules_named
@@ -28,7 +28,6 @@ from schema.tables.segments import FINISHED, warn_once
 TABLE = "table "
 """Prefix of the name of a table that was left out."""
 
-_FOUNDERS = SelectionSection().population
 _NEEDED = (
     "births", "evaluations", "population", "fitness", "deaths", "touches",
     "migrations", "learning",
@@ -44,36 +43,14 @@ class LeftOut:
     why: str
 
 
-@dataclass(frozen=True, slots=True)
-class IslandSettings:
-    """Settings of an island that an analysis needs.
-
-    Attributes:
-        births: on the island.
-        is_online: it is an arena.
-        records_touches: it records which robots touch.
-        learns: its robots learn.
-        founders: size of its first population.
-        reevaluation: how re-evaluations of its robots count, ``replace`` or ``mean``;
-            empty if there are none.
-    """
-
-    births: int
-    is_online: bool
-    records_touches: bool
-    learns: bool = False
-    founders: int = _FOUNDERS
-    reevaluation: str = ""
-
-
-def island_settings(island: int, islands: Sequence[IslandSettings]) -> IslandSettings:
-    """Return the settings of an island; the last ones if it is not in the document.
-
-    Args:
-        island: number of the island.
-        islands: settings of the islands of the document.
-    """
+def island_settings(island: int, islands: Sequence[Experiment]) -> Experiment:
+    """Return an island's settings; the last ones if it is not in the document."""
     return islands[min(island, len(islands) - 1)]
+
+
+def records_touches(island: Experiment) -> bool:
+    """Return whether an island is an arena that records which robots touch."""
+    return island.arena is not None and island.arena.record_touches
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,15 +64,12 @@ class LoadedRun:
         seed: seed of the run.
         state: finished, stopped or running (also if it was killed).
         document: the experiment as JSON.
-        islands: settings of each island.
+        settings: the experiment.
         differs: settings that differ from other runs of the same experiment name, or
             from those of the first experiment.
-        measures: of robots, as the experiment names them.
-        function: fitness function; empty if the document does not name one.
         fitness: fitness functions as ``fitness_text``, with digests of their sources.
         plugins: digest of the source of each plug-in, by module; "unknown" for runs
             that did not record it.
-        point: values of the swept settings, by dotted key; empty without a sweep.
     """
 
     folder: Path
@@ -104,13 +78,20 @@ class LoadedRun:
     seed: int
     state: str
     document: str
-    islands: tuple[IslandSettings, ...]
+    settings: Experiment
     differs: str = ""
-    measures: tuple[str, ...] = ()
-    function: str = ""
     fitness: str = ""
     plugins: Mapping[str, str] = field(default_factory=dict)
-    point: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def islands(self) -> tuple[Experiment, ...]:
+        """Settings of each island."""
+        return island_experiments(self.settings)
+
+    @property
+    def point(self) -> Mapping[str, Any]:
+        """Values of the swept settings, by dotted key; empty without a sweep."""
+        return self.settings.sweep.chosen if self.settings.sweep else {}
 
     @property
     def is_finished(self) -> bool:
@@ -145,9 +126,8 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[LoadedRun], list[LeftOut]]:
         try:
             runs.append(read_run(folder))
         except RunFolderError as error:
-            left_out.append(
-                LeftOut(str(folder), "run", str(error).removeprefix(f"{folder}/"))
-            )
+            why = str(error).removeprefix(str(folder)).lstrip("/: ")
+            left_out.append(LeftOut(str(folder), "run", why))
     if not runs:
         first = left_out[0]
         raise RunFolderError(f"no run can be read: {first.folder}: {first.why}")
@@ -155,16 +135,11 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[LoadedRun], list[LeftOut]]:
 
 
 def _different(runs: list[LoadedRun], left_out: list[LeftOut]) -> list[LoadedRun]:
-    """Return each run once; add its other folders to ``left_out``.
-
-    Args:
-        runs: sorted by folder.
-        left_out: what was left out.
-    """
+    """Return each of the sorted runs once; add its other folders to ``left_out``."""
     copies: dict[tuple[object, ...], list[LoadedRun]] = {}
     for run in runs:
         sources = tuple(run.plugins.items())
-        settings = _without_births(run.document)
+        settings = _without_births(run.settings)
         name = (run.experiment, run.number, run.seed, settings, sources)
         copies.setdefault(name, []).append(run)
     kept = []
@@ -180,9 +155,8 @@ def _different(runs: list[LoadedRun], left_out: list[LeftOut]) -> list[LoadedRun
     return sorted(kept, key=lambda run: run.folder)
 
 
-def _without_births(document: str) -> str:
-    """Return a document without numbers of planned births."""
-    experiment = experiment_from_text(document)
+def _without_births(experiment: Experiment) -> str:
+    """Return an experiment as JSON without numbers of planned births."""
     islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
     return experiment_text(structs.replace(experiment, births=1, islands=islands))
 
@@ -203,47 +177,38 @@ def read_run(folder: Path) -> LoadedRun:
     try:
         settings = experiment_from_text(details["document"])
     except ExperimentError as error:
-        raise RunFolderError(f"{DETAILS}: cannot be read: {error}") from None
+        raise RunFolderError(f"{folder / DETAILS}: cannot be read: {error}") from None
     plugins = _plugins(details)
-    point = settings.sweep.chosen if settings.sweep else {}
     run = LoadedRun(
         folder=folder,
-        experiment=_experiment(details["name"], point),
+        experiment=details["name"],
         number=details["run"],
         seed=details["seed"],
         state=_state(folder, details),
         document=details["document"],
-        islands=tuple(map(_settings, island_experiments(settings))),
-        measures=settings.measures.names,
-        function=settings.fitness.function,
+        settings=settings,
         fitness=fitness_text(settings, plugins),
         plugins=plugins,
-        point=point,
     )
     if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
-        raise RunFolderError("the run is finished, but its tables are missing")
-    return run
+        why = "the run is finished, but its tables are missing"
+        raise RunFolderError(f"{folder}: {why}")
+    return replace(run, experiment=_swept(run)) if run.point else run
 
 
-def _experiment(name: str, point: Mapping[str, Any]) -> str:
-    """Return the name of an experiment, or of the sweep that a run is a point of.
+def _swept(run: LoadedRun) -> str:
+    """Return the name of the sweep that a run is a point of.
 
     Points with different settings of fitness are different experiments, as their
-    fitness cannot be compared.
-
-    Args:
-        name: in the document; of a point, that of the sweep, a hyphen and a number.
-        point: settings that the sweep chose; empty if there is no sweep.
+    fitness cannot be compared. The document names the sweep, a hyphen and a number.
     """
-    if not point:
-        return name
     chosen = [
         # Without spaces, as names of experiments are.
         f"{key.rpartition('.')[2]}={''.join(str(value).split())}"
-        for key, value in point.items()
+        for key, value in run.point.items()
         if key.startswith("fitness.")
     ]
-    return "-".join([name.rpartition("-")[0], *chosen])
+    return "-".join([run.experiment.rpartition("-")[0], *chosen])
 
 
 def _details(folder: Path) -> dict[str, Any]:
@@ -284,24 +249,8 @@ def _state(folder: Path, details: dict[str, Any]) -> str:
     return state
 
 
-def _settings(island: Experiment) -> IslandSettings:
-    """Return what an analysis needs of the settings of an island."""
-    arena, again = island.arena, island.selection.reevaluation
-    return IslandSettings(
-        births=island.births,
-        is_online=arena is not None,
-        records_touches=arena is not None and arena.record_touches,
-        learns=island.learning is not None,
-        founders=island.selection.population,
-        reevaluation="" if again is None else again.fitness,
-    )
-
-
 def read_tables(run: LoadedRun) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     """Return the tables of a run that its measures need.
-
-    Args:
-        run: the run.
 
     Returns:
         Tables by name, and the tables that could not be read. An unreadable table, or
@@ -320,7 +269,7 @@ def read_tables(run: LoadedRun) -> tuple[dict[str, pa.Table], list[LeftOut]]:
             tables[name] = _named(TABLES[name].empty_table())
             left_out.append(LeftOut(str(run.folder), TABLE + name, str(error)))
     tables["births"] = with_learnt(tables["births"], tables["learning"])
-    online = np.array([island.is_online for island in run.islands], np.bool_)
+    online = np.array([island.arena is not None for island in run.islands])
     islands = np.asarray(tables["population"]["island"], np.int64)
     # An island that is not in the document has the settings of the last one.
     here = online[np.minimum(islands, len(online) - 1)]
@@ -349,14 +298,14 @@ def _named(table: pa.Table) -> pa.Table:
 
 def _check_there(run: LoadedRun, name: str) -> None:
     """Raise if a table of a finished run is missing."""
-    online = [island.is_online for island in run.islands]
+    arenas = [island.arena is not None for island in run.islands]
     expected = {
-        "evaluations": not all(online),
-        "fitness": any(online),
-        "deaths": any(online),
-        "touches": any(island.records_touches for island in run.islands),
+        "evaluations": not all(arenas),
+        "fitness": any(arenas),
+        "deaths": any(arenas),
+        "touches": any(map(records_touches, run.islands)),
         "migrations": len(run.islands) > 1,
-        "learning": any(island.learns for island in run.islands),
+        "learning": any(island.learning for island in run.islands),
     }
     is_expected = run.is_finished and expected.get(name, True)
     if is_expected and not has_rows(run.folder, name):

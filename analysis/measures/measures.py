@@ -4,20 +4,20 @@ Everything is a function of the run's own tables. A measure that needs a damaged
 is left out, with the reason; all others are measured.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.ancestry import migrants
+from analysis.measures.arenas import interactions, last_samples, variability
 from analysis.measures.bodies import extremity_bins
-from analysis.measures.diversity import mean_distances
 from analysis.measures.families import families
-from analysis.measures.interactions import interactions
+from analysis.measures.islands import mean_distances, migrants
 from analysis.measures.learning import learning, learning_curves
-from analysis.measures.load import island_settings
+from analysis.measures.load import island_settings, records_touches
 from analysis.measures.named_measures import named_measures
 from analysis.measures.population_table import (
     Booleans,
@@ -31,19 +31,12 @@ from analysis.measures.population_table import (
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import Problems, RunTables
 from analysis.measures.trees import Integers
-from analysis.measures.variability import last_samples, variability
 from schema.errors import RevolveError
-
-_OF_ROBOTS = ("births", "population", "evaluations", "fitness")
+from schema.experiment.document import Experiment
 
 
 def robots(run: RunTables) -> pa.Table:
-    """Return all robots that were evaluated, with sizes, rank and fitness.
-
-    Returns:
-        One row per robot, in the order of birth, with the columns of
-        ``outputs.OUTPUTS["robots"]`` except the run's.
-    """
+    """Return all robots that were evaluated, with sizes, rank and fitness, by birth."""
     fitness, islands, is_last, is_failed = _evaluated(run)
     chosen = np.flatnonzero(~np.isnan(fitness))
     births = run.births.take(chosen)
@@ -65,19 +58,15 @@ def robots(run: RunTables) -> pa.Table:
 
 
 def births_so_far(births: pa.Table) -> npt.NDArray[np.int64]:
-    """Return the number of births on each individual's island up to its own.
-
-    Args:
-        births: ``island``, ``birth``, and ``sim_time_s``, which is null off-line.
-    """
+    """Return the number of births on each individual's island up to its own, (B,)."""
     islands = np.asarray(births["island"], np.int64)
     times = np.asarray(pc.fill_null(births["sim_time_s"], 0.0), np.float64)
     order = np.lexsort((np.asarray(births["birth"], np.int64), times, islands))
     _, first = np.unique(islands[order], return_index=True)
-    found = np.empty(len(order), np.int64)
+    so_far = np.empty(len(order), np.int64)
     counts = np.diff(first, append=len(order))
-    found[order] = np.arange(1, len(order) + 1) - np.repeat(first, counts)
-    return found
+    so_far[order] = np.arange(1, len(order) + 1) - np.repeat(first, counts)
+    return so_far
 
 
 def _evaluated(run: RunTables) -> tuple[Numbers, Integers, Booleans, Booleans]:
@@ -140,7 +129,9 @@ def _evaluations(run: RunTables) -> pa.Table:
     averaged = [
         island
         for island in np.unique(islands).tolist()
-        if run.islands and island_settings(island, run.islands).reevaluation == "mean"
+        if run.islands
+        and (again := island_settings(island, run.islands).selection.reevaluation)
+        and again.fitness == "mean"
     ]
     if not averaged:
         return last
@@ -168,12 +159,7 @@ def _greatest(run: RunTables, last: Numbers) -> Numbers:
 
 
 def brains(run: RunTables) -> pa.Table:
-    """Return measures of the brains of all robots, in the order of birth.
-
-    Returns:
-        One row per robot, with the columns of ``outputs.OUTPUTS["brains"]`` except the
-        run's.
-    """
+    """Return measures of the brains of all robots, in the order of birth."""
     return pa.table(
         {
             "birth_island": run.births["island"],
@@ -184,61 +170,81 @@ def brains(run: RunTables) -> pa.Table:
     )  # fmt: skip
 
 
-_OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
-    "robots": (robots, _OF_ROBOTS),
-    "extremities": (lambda run: extremity_bins(robots(run)), _OF_ROBOTS),
-    "families": (families, ("births", "population")),
-    "brains": (brains, ("births",)),
-    "variability": (lambda run: variability(run.tables["fitness"]), ("fitness",)),
-    "interactions": (
-        lambda run: interactions(
-            run.births, *(run.tables[name] for name in ("fitness", "deaths", "touches"))
-        ),
-        ("births", "fitness", "deaths", "touches"),
+class _Measure(NamedTuple):
+    """A table of measures, as ``outputs.OUTPUTS`` describes it.
+
+    Attributes:
+        compute: returns the table without the columns that name the run.
+        needs: tables of the run, as words.
+        applies: whether a run with these islands has it.
+    """
+
+    compute: Callable[[RunTables], pa.Table]
+    needs: str
+    applies: Callable[[Sequence[Experiment]], bool] = lambda _: True
+
+
+def _has_arena(islands: Sequence[Experiment]) -> bool:
+    return any(island.arena for island in islands)
+
+
+def _learns(islands: Sequence[Experiment]) -> bool:
+    return any(island.learning for island in islands)
+
+
+def _is_divided(islands: Sequence[Experiment]) -> bool:
+    return len(islands) > 1
+
+
+_OF_ROBOTS = "births population evaluations fitness"
+_OTHERS = {
+    "robots": _Measure(robots, _OF_ROBOTS),
+    "extremities": _Measure(lambda run: extremity_bins(robots(run)), _OF_ROBOTS),
+    "families": _Measure(families, "births population"),
+    "brains": _Measure(brains, "births"),
+    "variability": _Measure(variability, "fitness", _has_arena),
+    "interactions": _Measure(
+        interactions,
+        "births fitness deaths touches",
+        lambda islands: any(map(records_touches, islands)),
     ),
-    "between": (
-        lambda run: mean_distances(run.population_table, run.trees),
-        ("births", "population"),
+    "between": _Measure(mean_distances, "births population", _is_divided),
+    "named_measures": _Measure(
+        named_measures,
+        _OF_ROBOTS,
+        lambda islands: any(island.measures.names for island in islands),
     ),
-    "named_measures": (named_measures, _OF_ROBOTS),
-    "learning": (learning, ("births", "population", "learning", "deaths")),
-    "learning_curves": (learning_curves, ("births", "learning")),
-    "migrants": (
-        lambda run: migrants(
-            run.tables["migrations"], run.births, run.population_table, run.lines
-        ),
-        ("births", "population", "migrations"),
-    ),
+    "learning": _Measure(learning, "births population learning deaths", _learns),
+    "learning_curves": _Measure(learning_curves, "births learning", _learns),
+    "migrants": _Measure(migrants, "births population migrations", _is_divided),
 }
-"""Measures other than those of populations, and the tables that they need."""
+"""Measures other than those of populations."""
 
 
 def measure(
-    run: RunTables, wanted: frozenset[str], unread: frozenset[str] = frozenset()
+    run: RunTables, unread: frozenset[str] = frozenset()
 ) -> tuple[dict[str, pa.Table], Problems]:
     """Return all measures of a run.
 
     Args:
         run: the run's tables.
-        wanted: which of variability, interactions, between, migrants, named_measures,
-            learning and learning_curves apply to the run.
         unread: tables that could not be read; measures that need them are left out.
 
     Returns:
         Tables by name, with the columns of ``outputs.run_schema``; and the measures
         that were left out, with the reason.
     """
-    found = {}
-    found["populations"], problems = populations(run)
-    for name, (function, needed) in _OTHERS.items():
-        if name not in {"robots", "extremities", "families", "brains"} | wanted:
+    measures = {}
+    measures["populations"], problems = populations(run)
+    for name, (compute, needs, applies) in _OTHERS.items():
+        if not applies(run.islands):
             continue
-        missing = [table for table in needed if table in unread]
+        missing = [table for table in needs.split() if table in unread]
         if missing:
             problems[name] = f"needs table {missing[0]}"
             continue
         try:
-            found[name] = function(run)
+            measures[name] = compute(run)
         except RevolveError as error:
             problems[name] = str(error)
-    return found, problems
+    return measures, problems

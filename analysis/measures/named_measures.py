@@ -21,10 +21,6 @@ def named_measures(run: RunTables) -> pa.Table:
 
     Off-line each robot counts with its last evaluation on the island; on-line with each
     sample that was taken at that number of births while it was mature.
-
-    Returns:
-        One row per island, number of births and measure, with the columns of
-        ``outputs.OUTPUTS["named_measures"]`` except the run's.
     """
     samples = run.tables["fitness"]
     mature = samples.filter(samples["is_mature"])
@@ -43,10 +39,7 @@ def named_measures(run: RunTables) -> pa.Table:
 def _values(table: pa.Table, births: pa.Table, more: dict[str, object]) -> pa.Table:
     """Return one row per value of a named measure: island, robot, measure, value.
 
-    Args:
-        table: with ``measures``, ``island``, ``birth_island`` and ``birth``.
-        births: births of the run; ``robot`` is a row of it.
-        more: further columns of the table.
+    ``robot`` is a row of births; ``more`` are further columns of the table.
     """
     lists = table["measures"].combine_chunks()
     offsets = np.asarray(lists.offsets)
@@ -89,11 +82,9 @@ def _off_line(run: RunTables) -> pa.Table:
 def with_docstrings(named: pa.Table, run: LoadedRun) -> pa.Table:
     """Return rows of ``named_measures`` with the column ``about``.
 
-    Args:
-        named: the rows.
-        run: whose folder has the sources of its own measures; none is imported.
+    The run's folder has the sources of its own measures; none is imported.
     """
-    paths = filter(PATH.fullmatch, run.measures)
+    paths = filter(PATH.fullmatch, run.settings.measures.names)
     own = {path.rpartition(":")[2]: _first_line(run, path) for path in paths}
     about = [own.get(name, "") for name in named["measure"].to_pylist()]
     return named.append_column("about", pa.array(about, pa.string()))
@@ -104,12 +95,12 @@ def _first_line(run: LoadedRun, path: str) -> str:
     module, _, name = path.rpartition(":")
     file = run.folder.joinpath(PLUGINS, *module.split(".")).with_suffix(".py")
     try:
-        found = ast.parse(read_bytes(file, MOST_PLUGIN_BYTES)).body
+        statements = ast.parse(read_bytes(file, MOST_PLUGIN_BYTES)).body
     except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
         return ""
     texts = [
-        ast.get_docstring(each) or ""
-        for each in found
-        if isinstance(each, ast.FunctionDef) and each.name == name
+        ast.get_docstring(statement) or ""
+        for statement in statements
+        if isinstance(statement, ast.FunctionDef) and statement.name == name
     ]
     return printable("".join(texts).partition("\n")[0], LONGEST_NAME)

@@ -8,13 +8,13 @@ import pyarrow as pa
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import body_sizes
 from analysis.measures.brains.measures import brain_measures
-from analysis.measures.load import IslandSettings
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
     population_table,
 )
 from analysis.measures.trees import SlotRule, Trees, encode
+from schema.experiment.document import Experiment
 
 Problems = dict[str, str]
 """Reasons why measures were left out, by the name of the measure."""
@@ -27,14 +27,15 @@ class RunTables:
         tables: by name, as ``analysis.measures.load.read_tables`` returns them: births,
             evaluations, population, fitness, deaths, touches, migrations, learning.
         slots: slot that labels a part in tree edit distance.
-        islands: settings of the islands; without them no robot is re-evaluated.
+        islands: settings of the islands; without them a run has neither arenas nor
+            robots that are evaluated again.
     """
 
     def __init__(
         self,
         tables: Mapping[str, pa.Table],
         slots: SlotRule = "parent",
-        islands: Sequence[IslandSettings] = (),
+        islands: Sequence[Experiment] = (),
     ) -> None:
         self.tables = tables
         self.slots = slots

@@ -16,6 +16,7 @@ from analysis.measures.load import (
     LoadedRun,
     read_duration_s,
     read_tables,
+    records_touches,
 )
 from analysis.measures.measures import measure
 from analysis.measures.named_measures import with_docstrings
@@ -78,13 +79,13 @@ def measure_run(run: LoadedRun, slots: SlotRule) -> MeasuredRun:
     folder = str(run.folder)
     shared = RunTables(tables, slots, run.islands)
     unread = frozenset(one.what.removeprefix(TABLE) for one in left_out)
-    found, problems = measure(shared, _wanted(run), unread)
+    measures, problems = measure(shared, unread)
     if skipped := shared.population_table.incomplete:
         why = f"{skipped} populations skipped: the birth of a member is not recorded"
         left_out.append(LeftOut(folder, "populations", why))
     if not len(shared.population_table):
         left_out.append(LeftOut(folder, "measures", "no population is recorded"))
-    if any(island.is_online and not island.records_touches for island in run.islands):
+    if any(island.arena and not records_touches(island) for island in run.islands):
         why = "contacts are not recorded (arena.record_touches is false)"
         left_out.append(LeftOut(folder, "interactions", why))
     left_out += [LeftOut(folder, f"measure {one}", problems[one]) for one in problems]
@@ -92,9 +93,10 @@ def measure_run(run: LoadedRun, slots: SlotRule) -> MeasuredRun:
         born, planned = tables["births"].num_rows, planned_births(run)
         why = f"the run is not finished: {born} of {planned} births are recorded"
         left_out.append(LeftOut(folder, "comparison", why))
-    if "named_measures" in found:
-        found["named_measures"] = with_docstrings(found["named_measures"], run)
-    named = {name: _named(found[name], name, run) for name in found}
+    if "named_measures" in measures:
+        named_measures = with_docstrings(measures["named_measures"], run)
+        measures["named_measures"] = named_measures
+    named = {name: _named(rows, name, run) for name, rows in measures.items()}
     named["runs"] = _named(_summary(run, tables, unread), "runs", run)
     if run.point:
         named["sweeps"] = _named(_chosen(run), "sweeps", run)
@@ -119,25 +121,10 @@ def planned_births(run: LoadedRun) -> int:
     return sum(island.births for island in run.islands)
 
 
-def _wanted(run: LoadedRun) -> frozenset[str]:
-    wanted = set()
-    if any(island.is_online for island in run.islands):
-        wanted.add("variability")
-    if any(island.records_touches for island in run.islands):
-        wanted.add("interactions")
-    if len(run.islands) > 1:
-        wanted |= {"between", "migrants"}
-    if run.measures:
-        wanted.add("named_measures")
-    if any(island.learns for island in run.islands):
-        wanted |= {"learning", "learning_curves"}
-    return frozenset(wanted)
-
-
 def _summary(
     run: LoadedRun, tables: Mapping[str, pa.Table], unread: frozenset[str]
 ) -> pa.Table:
-    arenas = [number for number, one in enumerate(run.islands) if one.is_online]
+    arenas = [number for number, island in enumerate(run.islands) if island.arena]
     has_arena = bool(arenas)
     born_there = pc.is_in(tables["births"]["island"], pa.array(arenas, pa.int32()))
     row = {
@@ -149,13 +136,13 @@ def _summary(
         "planned": planned_births(run),
         "islands": len(run.islands),
         "differs": run.differs,
-        "function": run.function,
+        "function": run.settings.fitness.function,
         "fitness_function": run.fitness,
         "plugins": " ".join(f"{name}={digest}" for name, digest in run.plugins.items()),
         "arena_births": (pc.sum(born_there).as_py() or 0) if has_arena else None,
         "arena_living": _living(tables["population"]) if has_arena else None,
         "deaths": tables["deaths"].num_rows if has_arena else None,
-        "simulated_s": _simulated_s(tables) if has_arena else None,
+        "simulated_s": pc.max(tables["fitness"]["sim_time_s"]).as_py(),
         "failures": None if unread & {"evaluations", "deaths"} else _failures(tables),
         "duration_s": read_duration_s(run.folder),
     }
@@ -168,12 +155,6 @@ def _living(population: pa.Table) -> int:
     last = in_arenas.group_by("island").aggregate([("births", "max")])
     here = in_arenas.join(last, "island")
     return int(pc.sum(pc.equal(here["births"], here["births_max"])).as_py() or 0)
-
-
-def _simulated_s(tables: Mapping[str, pa.Table]) -> float | None:
-    """Return the greatest time of a sample of fitness [s]; None without samples."""
-    latest: float | None = pc.max(tables["fitness"]["sim_time_s"]).as_py()
-    return latest
 
 
 def _failures(tables: Mapping[str, pa.Table]) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from analysis.measures.load import read_run
 from analysis.progress import bars
 from analysis.render.arena_picture import ArenaRenderer, Poses
 from analysis.render.picture import NoPictures, gait_strip, save_animation
@@ -18,7 +19,6 @@ from analysis.viewer.replay import (
     read_news,
     read_poses,
     rows_by_robot,
-    shown_run,
     span_of,
 )
 from analysis.viewer.scene import scene_of
@@ -96,7 +96,7 @@ def draw_film(
         RunFolderError: the folder has no run, or the run has no robot yet.
         NoPictures: the run has no arena, or no poses are recorded.
     """
-    run = shown_run(folder)
+    run = read_run(folder)
     allow_plugins_of(folder)
     experiment = experiment_from_text(run.document, is_own=True)
     bodies = {one.birth: one.body for one in read_news(run).births}

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from analysis.measures.load import LoadedRun
+from analysis.measures.load import LoadedRun, read_run
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
@@ -22,7 +22,6 @@ from analysis.viewer.replay import (
     CHUNK_S,
     read_news,
     read_poses,
-    shown_run,
     span_of,
 )
 from analysis.viewer.resimulate import Simulators, resimulate
@@ -76,7 +75,7 @@ def _replay(
 ) -> None:
     """Record a run from its tables, and keep serving the recording."""
     folder: Path = options.run
-    run = shown_run(folder)
+    run = read_run(folder)
     allow_plugins_of(folder)
     scene = scene_of(experiment_from_text(run.document, is_own=True))
     news = read_news(run)

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import LoadedRun, read_run
+from analysis.measures.load import LoadedRun
 from schema.errors import RevolveError, RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.files import campaign, read_table
@@ -26,19 +26,6 @@ CHUNK_S = 20.0
 """Simulated time of the poses that are read and shown at once [s]."""
 
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
-
-
-def shown_run(folder: Path) -> LoadedRun:
-    """Return the run in a folder.
-
-    Raises:
-        RunFolderError: the folder has no run.
-    """
-    try:
-        return read_run(folder)
-    except RunFolderError as error:
-        why = str(error).removeprefix(f"{folder}: ")
-        raise RunFolderError(f"{folder}: {why}") from None
 
 
 def read_news(run: LoadedRun) -> Update:

@@ -14,9 +14,15 @@ from analysis.comparison.comparison import comparison, outcomes_of
 from analysis.comparison.findings import findings, with_benchmark
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
-from analysis.measures.load import IslandSettings, LoadedRun
+from analysis.measures.load import LoadedRun
 from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
 from analysis.measures.study import MeasuredRun
+from schema.experiment.document import (
+    ArenaSection,
+    Experiment,
+    Reevaluation,
+    SelectionSection,
+)
 
 Level = Mapping[str, float | None]
 ROBOT = dict.fromkeys(OUTPUTS["robots"], 0) | {
@@ -42,17 +48,15 @@ def tables(
     }
 
 
-SETTINGS = (IslandSettings(100, is_online=False, records_touches=False),) * 2
+SETTINGS = (Experiment("e", births=100),) * 2
 
 
 def measured(
     name: str, number: int, made: dict[str, pa.Table], state: str = "finished"
 ) -> MeasuredRun:
-    settings = SETTINGS[:1]
     folder = Path(f"{name}-{number}")
-    return MeasuredRun(
-        LoadedRun(folder, name, number, 1, state, "", settings), made, ()
-    )
+    run = LoadedRun(folder, name, number, 1, state, "", SETTINGS[0])
+    return MeasuredRun(run, made, ())
 
 
 def runs(name: str, values: list[float], *, births: int = 100) -> list[MeasuredRun]:
@@ -130,7 +134,7 @@ def test_outcomes_by_hand() -> None:
     assert math.isnan(found["touched"])
 
 
-EIGHT = replace(SETTINGS[0], founders=8)
+EIGHT = Experiment("e", births=100, selection=SelectionSection(population=8))
 
 
 @pytest.mark.parametrize(
@@ -143,7 +147,7 @@ EIGHT = replace(SETTINGS[0], founders=8)
     ],
 )
 def test_changes_are_counted_from_the_founders_of_the_experiment(
-    settings: tuple[IslandSettings, ...], island: int, gain: float, change: float
+    settings: tuple[Experiment, ...], island: int, gain: float, change: float
 ) -> None:
     levels = [
         {
@@ -185,11 +189,15 @@ def test_contacts_and_families_of_later_births_do_not_count() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "at_15"),
-    [({}, 0.9), ({"reevaluation": "replace"}, -1.0), ({"is_online": True}, -1.0)],
+    ("island", "at_15"),
+    [
+        (SETTINGS[1], 0.9),
+        (Experiment("e", selection=SelectionSection(reevaluation=Reevaluation())), -1),
+        (Experiment("e", arena=ArenaSection()), -1.0),
+    ],
 )
 def test_fitness_of_whole_lives_counts_on_islands_that_end(
-    changes: Mapping[str, Any], at_15: float
+    island: Experiment, at_15: float
 ) -> None:
     """Island 0 ends with 15 births; island 1 goes on, and larger ones are fitter."""
     levels = [
@@ -208,7 +216,7 @@ def test_fitness_of_whole_lives_counts_on_islands_that_end(
     ]
     made = tables(levels, robots)
     made["variability"] = pa.Table.from_pylist(lives, schema("variability"))
-    settings = (SETTINGS[0], replace(SETTINGS[1], **changes))
+    settings = (SETTINGS[0], island)
     early, late = (outcome(made, births, settings) for births in (15, 30))
     # Ranks 2 1 3 4 5, or 2 1 alone: 1 - 6 (1 + 1) / (5 (25 - 1)) = 0.9.
     assert early["parts_fitness"] == pytest.approx(at_15)

@@ -9,9 +9,13 @@ from typing import Any
 import pytest
 
 from analysis.measures.distinct_names import with_distinct_names
-from analysis.measures.load import IslandSettings, LoadedRun
+from analysis.measures.load import LoadedRun
 from schema.experiment.document import Experiment, Islands, SelectionSection
-from schema.experiment.file import experiment_text, read_experiment
+from schema.experiment.file import (
+    experiment_from_text,
+    experiment_text,
+    read_experiment,
+)
 
 Document = Mapping[str, Any]
 
@@ -41,12 +45,10 @@ def changed(**sections: Any) -> dict[str, Any]:  # noqa: ANN401 - of JSON
 
 
 def runs(*documents: Document, name: str = "scenario1") -> list[LoadedRun]:
-    settings = (IslandSettings(60, is_online=False, records_touches=False),)
+    texts = enumerate(map(json.dumps, documents))
     return [
-        LoadedRun(
-            Path(f"{number}"), name, 0, number, "finished", json.dumps(each), settings
-        )
-        for number, each in enumerate(documents)
+        LoadedRun(Path(), name, 0, number, "finished", text, experiment_from_text(text))
+        for number, text in texts
     ]
 
 

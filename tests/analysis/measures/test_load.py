@@ -324,22 +324,11 @@ def test_a_truncated_segment_loses_only_its_last_rows(made: Maker, kept: float) 
 
 
 def test_islands_have_their_own_settings(made: Maker) -> None:
-    selections: list[dict[str, object] | None] = [
-        None, {"reevaluation": None}, {"reevaluation": {}},
-        {"reevaluation": {"fitness": "mean"}},
-    ]  # fmt: skip
-    islands = [
-        {"count": 2, "births": 5},
-        {"arena": {"record_touches": True}},
-        *({"selection": each} for each in selections),
-    ]
+    islands = [{"count": 2, "births": 5}, {"arena": {"record_touches": True}}, {}]
     folder = made("x", islands=islands)
     settings = found_in(folder).islands
-    assert [one.births for one in settings] == [5, 5, 3, 3, 3, 3, 3]
-    places = [number for number, one in enumerate(settings) if one.is_online]
-    assert places == [n for n, one in enumerate(settings) if one.records_touches] == [2]
-    again = [one.reevaluation for one in settings]
-    assert again == ["", "", "", "", "", "replace", "mean"]
+    assert [one.births for one in settings] == [5, 5, 3, 3]
+    assert [n for n, one in enumerate(settings) if one.arena] == [2]
     for name in ("fitness", "deaths", "touches", "migrations"):
         pq.write_table(table(name, []), parquet_path(folder, "e", 0, name))
     measured = measure_run(found_in(folder), "parent")

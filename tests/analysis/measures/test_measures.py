@@ -1,26 +1,31 @@
 """Tests of all measures, with small tables and known results."""
 
 import math
-from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
 from analysis.comparison.progression import progression
-from analysis.measures.ancestry import ancestors, migrants, parents_of
+from analysis.measures.ancestry import ancestors, parents_of
+from analysis.measures.arenas import interactions, variability
 from analysis.measures.bodies import body_sizes, extremity_bins
-from analysis.measures.diversity import diversity, mean_distances
-from analysis.measures.load import IslandSettings
+from analysis.measures.diversity import diversity
+from analysis.measures.islands import mean_distances, migrants
 from analysis.measures.measures import births_so_far, measure, robots
 from analysis.measures.outputs import schema
 from analysis.measures.population_table import population_table
 from analysis.measures.populations import populations, retention
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import encode
-from analysis.measures.variability import variability
 from schema.errors import RunFolderError
+from schema.experiment.document import (
+    ArenaSection,
+    Experiment,
+    Reevaluation,
+    SelectionSection,
+)
 from tests.analysis.bodies import Body, part
 from tests.analysis.tables import CORE, births, population, run, table
 
@@ -115,7 +120,7 @@ def test_a_missing_parent_is_reported_and_other_measures_remain() -> None:
     )
     with pytest.raises(RunFolderError, match="row 1 has a parent whose birth is not"):
         parents_of(tables["births"])
-    found, problems = measure(RunTables(tables), frozenset())
+    found, problems = measure(RunTables(tables))
     assert found["populations"]["fitness"].to_pylist() == [1.5]
     assert found["populations"]["ancestors"].to_pylist() == [None]
     assert {"ancestors", "foreign", "robots"} <= set(problems)
@@ -182,7 +187,7 @@ def test_variability_by_hand() -> None:
         {"birth": birth, "sim_time_s": time, "fitness": fitness, "is_mature": mature}
         for birth, time, fitness, mature in rows
     ]
-    found = variability(table("fitness", samples)).to_pylist()
+    found = variability(RunTables(run(fitness=table("fitness", samples)))).to_pylist()
     assert [(row["birth"], row["samples"]) for row in found] == [(0, 3), (1, 4)]
     # While 0 lived, fitness ran from 0.1 to 0.6; while 1 did, from 0.1 to 1.1.
     assert [row["fitness_range"] for row in found] == pytest.approx([0.3, 1.0])
@@ -263,10 +268,10 @@ def test_a_failure_counts_as_the_least_fitness_below_0() -> None:
     assert found["fitness"].to_pylist() == [0.5, 0.0, 0.3, -0.6]
 
 
-def rejudged(rule: str) -> tuple[IslandSettings]:
+def rejudged(rule: Literal["replace", "mean"]) -> tuple[Experiment]:
     """Return the settings of an island that evaluates robots again."""
-    settings = IslandSettings(5, is_online=False, records_touches=False)
-    return (replace(settings, reevaluation=rule),)
+    again = SelectionSection(reevaluation=Reevaluation(fitness=rule))
+    return (Experiment("e", births=5, selection=again),)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +279,7 @@ def rejudged(rule: str) -> tuple[IslandSettings]:
     [("replace", [0.3, 0.4, 0.0, 0.5, 0.3]), ("mean", [0.2, 0.2, 0.0, 0.5, 0.3])],
 )
 def test_robots_have_the_mean_of_their_evaluations_if_selection_takes_it(
-    rule: str, expected: list[float]
+    rule: Literal["replace", "mean"], expected: list[float]
 ) -> None:
     """A, B and C are dead; a failed evaluation of B counts as 0, D lives.
 
@@ -391,8 +396,7 @@ def test_interactions_by_hand() -> None:
     samples = table("fitness", [{"birth": 1, "sim_time_s": 60.0}])
     tables = run(births=born, population=population((0, 3, {B: None}), is_online=True))
     tables |= {"deaths": deaths, "touches": touches, "fitness": samples}
-    found, _ = measure(RunTables(tables), frozenset({"interactions"}))
-    (row,) = found["interactions"].to_pylist()
+    (row,) = interactions(RunTables(tables)).to_pylist()
     # A lived 40 s, B 50 s and C 40 s, to the last sample; D off-line.
     assert row == {
         "island": 0,
@@ -419,8 +423,8 @@ def test_migrants_and_their_descendants() -> None:
             {"island": 1, "to": 0, "epoch": 1, "birth": 0, "fitness": None},
         ],
     )
-    lines = ancestors(parents_of(ISLANDS))
-    found = migrants(moved, ISLANDS, population_table(living, ISLANDS), lines)
+    tables = run(births=ISLANDS, population=living, migrations=moved)
+    found = migrants(RunTables(tables))
     names = ["birth_island", "descendants", "living", "reached"]
     # A has G and H on island 1, where both live, and C at home.
     expected = [[0, 2, 2, 2], [1, 0, 0, 1]]
@@ -430,18 +434,11 @@ def test_migrants_and_their_descendants() -> None:
 def test_distances_between_islands() -> None:
     bodies = [CORE, BRICK, FAR, HINGE, CORE, CORE]
     born = births((A, []), (B, []), (F, []), (C, []), (G, []), (H, []), body=bodies)
-    recorded_populations = population_table(
-        population(
-            (0, 2, {A: 1, B: 1}),
-            (1, 1, {F: 1}),
-            (0, 4, {B: 1, C: 1}),
-            (1, 3, {F: 1, G: 1}),
-        ),
-        born,
+    living = population(
+        (0, 2, {A: 1, B: 1}), (1, 1, {F: 1}), (0, 4, {B: 1, C: 1}), (1, 3, {F: 1, G: 1})
     )
-    found = mean_distances(
-        recorded_populations, encode(born["body"]), step=2
-    ).to_pylist()
+    tables = run(births=born, population=living)
+    found = mean_distances(RunTables(tables), step=2).to_pylist()
     # At 2: core and brick here, far there: (2 + 3) / 2; within only here: 1.
     assert found[0] == {"births": 2, "islands": 2, "within": 1.0, "between": 2.5}
     # At 4: brick and hinge; far and core: 3, 1, 3, 1; within: 1 and 2.
@@ -496,8 +493,9 @@ def test_a_population_with_an_unknown_member_is_left_out() -> None:
 
 def test_a_run_without_births_has_no_measures() -> None:
     tables = run(births=births(), population=population())
-    wanted = frozenset({"variability", "interactions", "between", "migrants"})
-    found, problems = measure(RunTables(tables), wanted)
+    island = Experiment("e", arena=ArenaSection(record_touches=True))
+    found, problems = measure(RunTables(tables, islands=[island] * 2))
+    assert {"variability", "interactions", "between", "migrants"} < set(found)
     assert not problems
     assert {rows.num_rows for rows in found.values()} == {0}
     empty = population_table(tables["population"], tables["births"])

@@ -5,8 +5,9 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from analysis.measures.load import IslandSettings, LoadedRun
+from analysis.measures.load import LoadedRun
 from analysis.measures.named_measures import with_docstrings
+from schema.experiment.document import Experiment, Measures
 
 SOURCE = '''\
 """Measures of a lab; importing it would fail."""
@@ -39,10 +40,8 @@ def run(tmp_path: Path) -> LoadedRun:
 
 
 def run_of(folder: Path, names: list[str]) -> LoadedRun:
-    islands = (IslandSettings(30, is_online=False, records_touches=False),)
-    return LoadedRun(
-        folder, "a", 0, 1, "finished", "{}", islands, measures=tuple(names)
-    )
+    settings = Experiment("a", measures=Measures(names=tuple(names)))
+    return LoadedRun(folder, "a", 0, 1, "finished", "{}", settings)
 
 
 def described(run: LoadedRun, *names: str) -> dict[str, str]:

@@ -14,6 +14,7 @@ import pyarrow as pa
 import pytest
 from msgspec.structs import replace
 
+from analysis.measures.load import read_run
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
 from analysis.viewer.command import view
@@ -23,7 +24,6 @@ from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.output import Output, Window, keep_serving, ways_to_view
 from analysis.viewer.recording import Recording, ViewerError
-from analysis.viewer.replay import shown_run
 from analysis.viewer.resimulate import Simulators
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
@@ -225,7 +225,7 @@ def test_a_campaign_is_told_to_name_a_run(tmp_path: Path) -> None:
         (tmp_path / f"a-{number}").mkdir()
         (tmp_path / f"a-{number}" / "run.json").touch()
     with pytest.raises(RunFolderError, match=f"several runs; .* as {tmp_path}/a-0$"):
-        shown_run(tmp_path)
+        read_run(tmp_path)
 
 
 def test_plug_ins_of_a_running_run_are_those_of_its_folder(tmp_path: Path) -> None:

@@ -60,7 +60,8 @@ def shown_again(
         return Evaluation(max(known), 0.1, 0.1, 12.0), pa.table({})
 
     simulators = Simulators(alone, lambda *_: (b"", None), lambda *_: iter(()))  # type: ignore[arg-type]
-    run = LoadedRun(Path(), "e", 0, 1, "finished", experiment_text(experiment), ())
+    text = experiment_text(experiment)
+    run = LoadedRun(Path(), "e", 0, 1, "finished", text, experiment)
     with (
         patch.object(
             resimulate,
