@@ -56,14 +56,7 @@ COLUMNS: Columns = {
 
 
 def shares(rows: Iterable[Row], group: str, scope: str, kind: str = "") -> list[float]:
-    """Return the known shares of some rows.
-
-    Args:
-        rows: of the table.
-        group: of the rows.
-        scope: likewise.
-        kind: likewise; empty for every kind.
-    """
+    """Return the known shares of some rows; every kind if it is empty."""
     return [
         row["share"]
         for row in rows

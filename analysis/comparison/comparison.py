@@ -45,11 +45,7 @@ class RunOutcomes(NamedTuple):
 
 
 class Outcomes:
-    """Outcomes of the finished runs of experiments.
-
-    Args:
-        runs: runs by experiment, at least one of each.
-    """
+    """Outcomes of the finished runs of experiments, at least one of each."""
 
     def __init__(self, runs: Mapping[str, Sequence[RunOutcomes]]) -> None:
         self.runs = runs
@@ -79,8 +75,8 @@ class Outcomes:
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
         """Return the runs' values of a measure; runs without a value are skipped."""
         runs = self.at(experiment, births)
-        found = np.array([run.get(measure, math.nan) for run in runs], np.float64)
-        values: Numbers = found[~np.isnan(found)]
+        every = np.array([run.get(measure, math.nan) for run in runs], np.float64)
+        values: Numbers = every[~np.isnan(every)]
         return values
 
     def own_measures(self, births: int, *experiments: str) -> list[str]:
@@ -98,9 +94,9 @@ class Outcomes:
         rows: list[Row] = []
         for name in self.experiments:
             births = self.births(name)
-            each = zip(self.runs[name], self.at(name, births), strict=True)
-            for run, found in each:
-                numbers: Row = {key: known(value) for key, value in found.items()}
+            pairs = zip(self.runs[name], self.at(name, births), strict=True)
+            for run, values in pairs:
+                numbers: Row = {key: known(value) for key, value in values.items()}
                 names = {"experiment": name, "folder": run.folder, "births": births}
                 rows.append(numbers | names)
         return pa.Table.from_pylist(rows, schema("outcomes"))
@@ -120,11 +116,9 @@ def outcomes_of(measured: Sequence[MeasuredRun]) -> Outcomes:
 def comparison(outcomes: Outcomes) -> pa.Table:
     """Return the comparison of every pair of experiments by every measure.
 
-    Returns:
-        One row per measure and pair for which both experiments have values, with the
-        columns of ``outputs``. Pairs with different fitness functions have no rows of
-        the measures ``OF_FITNESS``. A measure that is equal in all runs of both is no
-        test: it has no p, and does not count for the correction of the others.
+    Pairs with different fitness functions have no rows of the measures ``OF_FITNESS``.
+    A measure that is equal in all runs of both is no test: it has no p, and does not
+    count for the correction of the others.
     """
     rows = []
     for a, b in combinations(outcomes.experiments, 2):

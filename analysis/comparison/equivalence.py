@@ -24,13 +24,7 @@ ALPHA = 0.05
 
 
 def alike_p(delta: float, first: int, second: int, margin: float) -> float:
-    """Return p of the test that Cliff's delta is within a margin.
-
-    Args:
-        delta: Cliff's delta of two experiments.
-        first: number of runs of one experiment.
-        second: number of runs of the other.
-        margin: largest delta that counts as alike, in (0, 1).
+    """Return p of the test that Cliff's delta of N and M runs is within a margin.
 
     Source: score test, as the interval of ``statistics.delta_interval``.
     """
@@ -43,13 +37,7 @@ def alike_p(delta: float, first: int, second: int, margin: float) -> float:
 def alike_power(first: int, second: int, margin: float, alpha: float = ALPHA) -> float:
     """Return how probably ``alike_p`` is at most ``alpha`` for one distribution.
 
-    Counted exactly over all orders of the runs, without ties.
-
-    Args:
-        first: number of runs of one experiment.
-        second: number of runs of the other.
-        margin: largest delta that counts as alike.
-        alpha: less than 5 % if p is corrected for many tests.
+    Counted exactly over all orders of N and M runs, without ties.
     """
     error = math.sqrt(score_variance((margin + 1) / 2, first, second))
     most = margin - 2 * stats.norm.ppf(1 - alpha) * error
@@ -60,12 +48,7 @@ def alike_power(first: int, second: int, margin: float, alpha: float = ALPHA) ->
 
 
 def mean_alike_p(values: Numbers, reference: float, margin: float) -> float:
-    """Return p of the test that a mean is within a margin of a number.
-
-    Args:
-        values: (N,) one number per run, N >= 2.
-        reference: the number.
-        margin: largest difference that counts as alike, in the measure's unit.
+    """Return p of the test that the mean of two or more runs is near a number.
 
     Source: Schuirmann, 1987, with Student's t.
     """
@@ -82,10 +65,6 @@ def mean_alike_power(values: Numbers, margin: float) -> float:
     """Return how probably ``mean_alike_p`` is below 5 % if the mean is the number.
 
     The spread over runs is taken as known from the runs.
-
-    Args:
-        values: (N,) one number per run, N >= 2.
-        margin: largest difference that counts as alike, in the measure's unit.
     """
     error, freedom = standard_error(values), len(values) - 1
     if math.isnan(error):

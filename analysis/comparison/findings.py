@@ -26,9 +26,7 @@ ARENA_ROBOTS = 30
 def with_benchmark(outcomes: Outcomes, benchmark: pa.Table) -> Outcomes:
     """Return outcomes with the speed of an arena as an experiment of its own.
 
-    Args:
-        outcomes: outcomes of runs.
-        benchmark: rows of ``revolve bench arena --out``; each repetition is a run.
+    Each repetition, a row of ``revolve bench arena --out``, is a run.
     """
     is_of = (pc.field("benchmark") == "arena") & (
         pc.field("population") == ARENA_ROBOTS
@@ -43,11 +41,9 @@ def _speed(factor: float) -> Callable[[int], dict[str, float]]:
 
 
 def findings(outcomes: Outcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
-    """Return the test of each finding of the thesis.
+    """Return the test of each finding of the thesis, one row per claim, in order.
 
-    Returns:
-        One row per claim, in order, with the columns of ``outputs``; claims about
-        experiments without finished runs are undecided.
+    Claims about experiments without finished runs are undecided.
     """
     rows = [_tested(outcomes, claim) for claim in claims]
     correct(rows)
@@ -74,24 +70,25 @@ def _tested(outcomes: Outcomes, claim: Claim) -> Row:
     names = [name for name in (claim.a, claim.b) if name is not None]
     for name in names:
         if name not in outcomes.experiments:
-            why = f"no finished run of {name} could be measured"
-            return {"verdict": "undecided", "why": why}
+            return _undecided(f"no finished run of {name} could be measured")
     functions = outcomes.fitness_functions(*names)
     if claim.measure in OF_FITNESS and len(functions) > 1:
-        why = f"different fitness functions: {', '.join(functions)}"
-        return {"verdict": "undecided", "why": why}
+        return _undecided(f"different fitness functions: {', '.join(functions)}")
     births = outcomes.births(*names)
     if births < claim.births:
         why = f"means something from {claim.births} births on"
         return {"births": births, "verdict": "does not apply", "why": why}
     samples = [outcomes.values(name, claim.measure, births) for name in names]
     if min(map(len, samples)) <= 1:
-        why = "less than two runs have a value"
-        return {"births": births, "verdict": "undecided", "why": why}
+        return {"births": births, **_undecided("less than two runs have a value")}
     if claim.b is None:
         return {"births": births, **_against_number(samples[0], claim)}
     a, b = samples
     return {"births": births, **_against_experiment(a, b, claim)}
+
+
+def _undecided(why: str) -> Row:
+    return {"verdict": "undecided", "why": why}
 
 
 def _against_number(a: Numbers, claim: Claim) -> Row:
@@ -116,5 +113,5 @@ def _against_experiment(a: Numbers, b: Numbers, claim: Claim) -> Row:
 
 def _distances(values: Numbers) -> Numbers:
     """Return the distances of runs from their median, (N,)."""
-    found: Numbers = np.abs(values - np.median(values))
-    return found
+    distances: Numbers = np.abs(values - np.median(values))
+    return distances

@@ -10,7 +10,7 @@ from scipy import stats
 
 from analysis.measures.load import island_settings
 from analysis.measures.outputs import OWN, POPULATION, schema
-from analysis.measures.population_table import Numbers
+from analysis.measures.population_table import Numbers, ratio
 from analysis.measures.populations import RETENTION_BIRTHS
 from schema.experiment.document import Experiment
 
@@ -96,8 +96,8 @@ def of_courses(
         columns: ``fitness`` and ``diversity`` of its P populations, (P,) each.
         counts: (P,) births at each of them, ascending.
         births: at which the run is judged.
-        spacing: of the populations that count [births]: experiments that record one
-            at each birth are treated as those that record one per brood.
+        spacing: of the populations that count [births], so that experiments that record
+            one at each birth are treated as those that record one per brood.
     """
 
     def over_tenth(name: str, end: float) -> float:
@@ -170,17 +170,13 @@ def _of_lives(
         _table(tables, name, going_on)
         for name in ("families", "interactions", "variability")
     )
-    distance, apart = (
-        _column(families, name) for name in ("distance", "founder_distance")
-    )
-    ratio = np.full(len(apart), np.nan)
-    np.divide(distance, apart, out=ratio, where=apart > 0)
+    distances = (_column(families, name) for name in ("distance", "founder_distance"))
     ranges = _column(lives.filter(pc.field("birth") < births), "variability")
     ranges = ranges[~np.isnan(ranges)]
     until = _table(tables, "between").filter(pc.field("births") <= births)
     between = _column(until, "between")
     return {
-        "family_distance": _mean(ratio),
+        "family_distance": _mean(ratio(*distances)),
         "family_founders": _mean(_column(families, "founders")),
         "variability": float(np.median(ranges)) if len(ranges) else math.nan,
         "between": float(between[-1]) if len(between) else math.nan,

@@ -13,13 +13,8 @@ def progression(populations: pa.Table) -> pa.Table:
 
     A run of several islands contributes their mean, at numbers of births at which all
     its islands have a value: islands are not recorded equally often. A run contributes
-    at every number of births at which its own populations were recorded.
-
-    Returns:
-        One row per ``experiment``, ``measure`` (a column of ``populations``) and
-        ``births``, ascending: ``mean`` over runs, ``low`` and ``high`` (the mean's
-        95 % interval by Student's t; null for one run), ``least``, ``greatest``,
-        ``runs``. There is no row where no run has a value.
+    at every number of births at which its own populations were recorded. There is no
+    row where no run has a value.
 
     Source: Hupkes 2016, figures 6.3, 6.5 and 6.7; the intervals: own.
     """
@@ -47,9 +42,7 @@ def progression(populations: pa.Table) -> pa.Table:
 def run_means(populations: pa.Table, measure: str) -> pa.Table:
     """Return a measure of each run by number of births, the mean over its islands.
 
-    Returns:
-        ``experiment``, ``folder``, ``births``, ``mean``, in ascending order, at the
-        births at which all islands of the run have a value.
+    Rows are in ascending order, at births at which all islands of the run have a value.
     """
     keys = ["experiment", "folder", "births"]
     known = populations.filter(populations[measure].is_valid())
@@ -61,27 +54,17 @@ def run_means(populations: pa.Table, measure: str) -> pa.Table:
 
 
 def mean_of_all_runs(progression: pa.Table, by_run: pa.Table) -> pa.Table:
-    """Return the rows of a progression at which every run has a value.
+    """Return the rows of a measure's progression at which every run has a value.
 
     A mean over other runs at other births would change without a change in any run.
-
-    Args:
-        progression: rows of one measure, as ``progression`` returns them.
-        by_run: the same measure, as ``run_means`` returns it.
+    ``by_run`` are the measure's ``run_means``.
     """
     runs = by_run.group_by("experiment").aggregate([("folder", "count_distinct")])
     return _with_count(progression, "runs", "experiment", runs)
 
 
 def _with_count(rows: pa.Table, count: str, key: str, wanted: pa.Table) -> pa.Table:
-    """Return the rows whose count is that of their key.
-
-    Args:
-        rows: with the columns ``count`` and ``key``.
-        count: column of counts.
-        key: column of keys.
-        wanted: count of each key; its columns are the key and the count.
-    """
+    """Return the rows whose count is that of their key in a table of both."""
     names, counts = (
         wanted[name].combine_chunks() for name in (key, wanted.column_names[-1])
     )

@@ -48,12 +48,7 @@ COLUMNS: Columns = {
 
 
 def table_of(rows: Iterable[Row], columns: Columns) -> pa.Table:
-    """Return the table of some rows, whose shares are computed here.
-
-    Args:
-        rows: with all columns but ``share``.
-        columns: of the table; the meaning of each becomes metadata of its field.
-    """
+    """Return the table of rows that have all columns but ``share``."""
     schema = pa.schema(
         [
             pa.field(name, kind, metadata={"meaning": meaning})
@@ -93,12 +88,9 @@ def line_of(
     of_best: Callable[[Sequence[Row]], str],
     of_last: Callable[[Sequence[Sequence[Row]]], str],
 ) -> str:
-    """Return a line about the best robot ever, the last population, and failures.
+    """Return a line about a run's best robot ever, last population, and failures.
 
-    Args:
-        table: rows of one run.
-        of_best: describes the best robot ever by its rows.
-        of_last: describes the last population by the rows of each robot; may be empty.
+    ``of_best`` describes a robot by its rows, ``of_last`` several by the rows of each.
     """
     robots: dict[tuple[int, int], list[Row]] = {}
     rows = table.to_pylist()

@@ -1,7 +1,8 @@
 """Effect sizes and tests of the difference between experiments; the unit is the run.
 
 Experiments are compared by ranks, without assuming a distribution. Probabilities are
-exact, also for few runs: SciPy's exact rank tests do not apply to tied values.
+exact, also for few runs: SciPy's exact rank tests do not apply to tied values. Arrays
+(N,) and (M,) hold one number per run of an experiment and of another one.
 """
 
 import math
@@ -21,14 +22,7 @@ confidence that at most 26 % of all runs differ."""
 
 
 def cliffs_delta(a: Numbers, b: Numbers) -> float:
-    """Return Cliff's delta: how much more often ``a`` is above ``b`` than below.
-
-    Args:
-        a: (N,) one number per run.
-        b: (M,) one number per run of the other experiment.
-
-    Returns:
-        P(a > b) - P(a < b), in [-1, 1].
+    """Return Cliff's delta, P(a > b) - P(a < b), in [-1, 1].
 
     Source: Cliff, *Dominance statistics*, Psychological Bulletin 114(3), 1993.
     """
@@ -36,15 +30,10 @@ def cliffs_delta(a: Numbers, b: Numbers) -> float:
 
 
 def delta_interval(delta: float, first: int, second: int) -> tuple[float, float]:
-    """Return the ends of the 95 % interval of Cliff's delta.
+    """Return the ends of the 95 % interval of Cliff's delta of N and M runs.
 
     Unlike a bootstrap interval, it does not shrink to a point if all runs of one
     experiment are above all runs of the other.
-
-    Args:
-        delta: Cliff's delta of two experiments.
-        first: number of runs of one experiment.
-        second: number of runs of the other.
 
     Source: Newcombe, *Confidence intervals for an effect size measure based on the
     Mann-Whitney statistic*, part 2, method 5, Statistics in Medicine 25, 2006.
@@ -74,13 +63,8 @@ def score_variance(theta: float, first: int, second: int) -> float:
 def rank_sum_p(a: Numbers, b: Numbers) -> float:
     """Return the two-sided p of the Wilcoxon-Mann-Whitney test.
 
-    Args:
-        a: (N,) one number per run.
-        b: (M,) one number per run of the other experiment.
-
-    Returns:
-        Share of all ways to divide the N + M numbers, ties included, whose rank sum
-        is at least as far from its mean.
+    It is the share of all ways to divide the N + M numbers, ties included, whose rank
+    sum is at least as far from its mean.
 
     Source: Wilcoxon, 1945; Mann and Whitney, 1947; counted exactly.
     """
@@ -90,12 +74,7 @@ def rank_sum_p(a: Numbers, b: Numbers) -> float:
 
 
 def rank_sum_ways(places: Integers, chosen: int) -> Numbers:
-    """Return the number of ways to choose some of the places, by the sum of these.
-
-    Args:
-        places: (N,) twice the rank of each number.
-        chosen: how many are chosen.
-    """
+    """Return the number of ways to choose some doubled ranks, by the sum of these."""
     ways = np.zeros((chosen + 1, int(places.sum()) + 1))
     ways[0, 0] = 1.0
     for place in places.tolist():
@@ -105,14 +84,10 @@ def rank_sum_ways(places: Integers, chosen: int) -> Numbers:
 
 
 def signed_rank(values: Numbers) -> tuple[float, float]:
-    """Return effect and p of Wilcoxon's signed-rank test.
+    """Return effect and p of Wilcoxon's signed-rank test of differences.
 
-    Args:
-        values: (N,) difference of each run from a reference; zeros are ignored.
-
-    Returns:
-        Matched-pairs rank-biserial correlation, in [-1, 1], and the two-sided p of
-        the test, ties included; 0 and 1 if all differences are zero.
+    The effect is the matched-pairs rank-biserial correlation, in [-1, 1]; p is
+    two-sided, with ties. Zeros are ignored; 0 and 1 if there is nothing else.
 
     Source: Wilcoxon, 1945, counted exactly; Kerby, *The simple difference formula*,
     Comprehensive Psychology 3, 2014.
@@ -148,9 +123,6 @@ def standard_error(values: Numbers) -> float:
 
     It is for one run, and for fewer than ``EQUAL_RUNS`` that are all equal: those show
     how rare other values are, not that there are none.
-
-    Args:
-        values: (N,) one number per run.
     """
     # The deviation of equal numbers may be rounded to more than 0.
     if not np.ptp(values):
@@ -159,25 +131,15 @@ def standard_error(values: Numbers) -> float:
 
 
 def mean(values: Numbers) -> float:
-    """Return the mean of numbers; of equal ones exactly their value.
-
-    Args:
-        values: (N,) one number per run.
-    """
+    """Return the mean of numbers; of equal ones exactly their value."""
     return float(np.clip(values.mean(), values.min(), values.max()))
 
 
 def mean_difference(a: Numbers, b: Numbers | float) -> tuple[float, float, float]:
-    """Return the difference of two means and the ends of its 95 % interval.
+    """Return the difference of two means, and the ends of its 95 % interval.
 
-    SciPy's intervals warn of nearly equal numbers, and have other rules for few runs.
-
-    Args:
-        a: (N,) one number per run.
-        b: (M,) one number per run of the other experiment, or a reference.
-
-    Returns:
-        mean(a) - mean(b) and the interval's ends; NaN where a spread is unknown.
+    They are NaN where a spread is unknown. SciPy's intervals warn of nearly equal
+    numbers, and have other rules for few runs. Instead of runs ``b`` may be a number.
 
     Source: Welch, *The generalization of Student's problem*, Biometrika 34, 1947.
     """
@@ -195,12 +157,10 @@ def mean_difference(a: Numbers, b: Numbers | float) -> tuple[float, float, float
 
 
 def half_interval(deviation: Numbers, runs: Integers) -> Numbers:
-    """Return half the width of means' 95 % intervals, (N,); NaN for one run.
+    """Return half the width of means' 95 % intervals, (G,); NaN for one run.
 
-    Args:
-        deviation: (N,) standard deviations over runs, divided by the number of runs
-            as Arrow does.
-        runs: (N,) numbers of runs.
+    The standard deviations over runs, (G,), are divided by the number of runs, as Arrow
+    does.
     """
     freedom = np.where(runs > 1, runs - 1.0, np.nan)
     half: Numbers = stats.t.ppf((1 + LEVEL) / 2, freedom) * deviation / np.sqrt(freedom)

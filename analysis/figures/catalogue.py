@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from analysis.figures.bench import speed
-from analysis.figures.brains import changes_over_births
-from analysis.figures.courses import course_caption, over_births
-from analysis.figures.file_names import file_name
+from analysis.figures.courses import (
+    changes_over_births,
+    course_caption,
+    measures_over_births,
+    over_births,
+)
 from analysis.figures.findings import effects
 from analysis.figures.forms import (
     NothingToDraw,
@@ -25,8 +28,8 @@ from analysis.figures.learning import (
     learning_curves,
     learning_gain,
 )
-from analysis.figures.named_measures import measures_over_births
 from analysis.figures.robots import extremities_and_fitness, lineages, variability
+from analysis.figures.style import file_name
 
 BIRTHS = "the births tables of the runs"
 """A source that is not a table of measures."""
@@ -88,6 +91,11 @@ class Figure:
         """Name of the figure's files without ending, for example ``A-connections``."""
         number = self.number.partition("-")[0]
         return file_name(f"{number}-{self.subject or self.title.lower()}")
+
+
+def missing(number: str, why: str) -> Figure:
+    """Return a figure that cannot be drawn."""
+    return Figure(number, "", "", ("",), list, "robots", nothing=why)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Courses of measures over births: runs, their mean, and its interval."""
 
-from collections.abc import Mapping
+import re
 from typing import Any, NamedTuple
 
 import plotnine as p9
@@ -26,12 +26,27 @@ from analysis.figures.style import (
     theme_of_size,
 )
 
-FEW_RUNS = 10
+_FEW_RUNS = 10
 """Runs of an experiment up to which each is drawn."""
-_NARROW = 2
-"""Panels in a row."""
 _MOST_POINTS = 300
 """Points of a run that are drawn; more cannot be told apart."""
+_CHANGES = {
+    "body_change": "body: tree edit distance [edits]",
+    "brain_change": "brain: distance [elements]",
+}
+_BINS = 25
+"""Greatest number of points of a line of changes."""
+_LEAST = 20
+"""Least number of births of such a point."""
+UNITS = {
+    "path_velocity": "m/s",
+    "straight_velocity": "m/s",
+    "turning": "rad/s",
+    "energy": "J",
+    "height": "m",
+    "joint_effort": "N m",
+}
+"""Units of the measures that come with the toolkit and have one."""
 
 
 class Course(NamedTuple):
@@ -51,11 +66,7 @@ class Course(NamedTuple):
 
 
 def course(tables: Tables, measure: str) -> Course:
-    """Return the course of a measure.
-
-    Args:
-        tables: ``populations`` and ``progression``.
-        measure: column of ``populations``.
+    """Return the course of a measure, a column of ``populations``.
 
     Raises:
         NothingToDraw: no run has two populations with a value.
@@ -99,26 +110,19 @@ def _thinned(by_run: pa.Table) -> pa.Table:
 def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     """Return a measure of runs, and its mean over them, by number of births.
 
-    Args:
-        tables: ``populations`` and ``progression``; ``runs`` for the panels of
-            fitness functions.
-        measure: column of ``populations``.
-        text: label of the axis.
-
     Raises:
         NothingToDraw: no run has two populations with a value.
     """
     shown = course(tables, measure)
     functions = fitness_panels(tables) if measure == FITNESS else {}
-
     y_text = fitness_text(tables, text) if measure == FITNESS else text
 
     def frame(rows: pa.Table) -> Any:  # noqa: ANN401 - pandas
-        made = rows.to_pandas()
-        return made.assign(function=made["experiment"].map(functions))
+        values = rows.to_pandas()
+        return values.assign(function=values["experiment"].map(functions))
 
     runs = frame(shown.by_run)
-    few = [name for name, size in shown.sizes.items() if 1 < size <= FEW_RUNS]
+    few = [name for name, size in shown.sizes.items() if 1 < size <= _FEW_RUNS]
     mean = frame(shown.mean)
     figure = p9.ggplot(mean, p9.aes("births", "mean"))
     sure = shown.mean.filter(pc.field("runs") >= BAND_RUNS)
@@ -139,8 +143,8 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     figure = figure + scales(tables, shown.sizes, is_filled=sure.num_rows > 0)
     figure += p9.expand_limits(y=0)
     if functions:
-        figure += p9.facet_wrap("function", scales="free_y", ncol=_NARROW)
-    rows = -(-len(set(functions.values())) // _NARROW) or 1
+        figure += p9.facet_wrap("function", scales="free_y", ncol=2)
+    rows = -(-len(set(functions.values())) // 2) or 1
     return figure + p9.labs(x="births", y=y_text) + theme_of_size(0.8 + 3.0 * rows)
 
 
@@ -153,7 +157,7 @@ def course_caption(tables: Tables, measure: str) -> str:
     else:
         text = "Thick lines are means over runs"
     texts = [f"{text} ({counted_runs(sizes)})."]
-    if any(1 < size <= FEW_RUNS for size in sizes.values()):
+    if any(1 < size <= _FEW_RUNS for size in sizes.values()):
         texts.append("Thin lines are single runs.")
     if max(sizes.values()) >= BAND_RUNS:
         texts.append(
@@ -161,12 +165,77 @@ def course_caption(tables: Tables, measure: str) -> str:
             "of few runs may reach beyond possible values."
         )
     note = fitness_note(tables) if measure == FITNESS else ""
-    return " ".join([*texts, *_ends(shown.ends)]) + note
+    if ends := shown.ends:
+        where = (f"{ends[name]} births ({label(name)})" for name in in_order(ends))
+        line = f"A mean ends where the first of its runs ends: {', '.join(where)}."
+        texts.append(line)
+    return " ".join(texts) + note
 
 
-def _ends(ends: Mapping[str, int]) -> list[str]:
-    """Return where means end although a run goes on."""
-    if not ends:
-        return []
-    where = ", ".join(f"{ends[name]} births ({label(name)})" for name in in_order(ends))
-    return [f"A mean ends where the first of its runs ends: {where}."]
+def changes_over_births(tables: Tables) -> p9.ggplot:
+    """Return the change of bodies and of brains from the first parent to its child.
+
+    Raises:
+        NothingToDraw: no robot has a parent.
+    """
+    known = tables["brains"].filter(tables["brains"]["body_change"].is_valid())
+    if not known:
+        raise NothingToDraw("no robot has parents")
+    rows = known.to_pandas()
+    width = max(int(rows["birth"].max()) // _BINS + 1, _LEAST)
+    rows["births"] = rows.groupby(rows["birth"] // width)["birth"].transform("mean")
+    stacked = rows.melt(
+        ["experiment", "folder", "births"], list(_CHANGES), "panel", "value"
+    )
+    stacked["panel"] = stacked["panel"].map(_CHANGES)
+    runs = _mean(stacked, ["experiment", "folder", "panel", "births"])
+    means = _mean(runs, ["experiment", "panel", "births"])
+    sizes = runs.groupby("experiment")["folder"].nunique()
+    few = sizes[(sizes > 1) & (sizes <= _FEW_RUNS)].index
+    figure = p9.ggplot(means, p9.aes("births", "value", colour="experiment"))
+    if len(few):
+        figure += p9.geom_line(
+            p9.aes(group="folder"),
+            data=runs[runs["experiment"].isin(few)],
+            size=0.35,
+            alpha=0.6,
+        )
+    return (
+        figure
+        + p9.geom_line(size=0.9)
+        + lone_points(means, ["experiment", "panel"])
+        + p9.facet_wrap("panel", scales="free_y", ncol=2)
+        + scales(tables, in_order(sizes.index), is_filled=False)
+        + p9.expand_limits(y=0)
+        + p9.labs(x=f"births (means over {width})", y="change")
+        + theme_of_size(3.4)
+    )
+
+
+def _mean(rows: Any, keys: list[str]) -> Any:  # noqa: ANN401 - pandas
+    """Return the mean value of each group."""
+    return rows.groupby(keys, as_index=False)["value"].mean()
+
+
+def measures_over_births(tables: Tables) -> p9.ggplot:
+    """Return the mean of each measure over births, a line per run and island."""
+    frame = tables["named_measures"].to_pandas()
+    frame["line"] = frame["folder"] + " " + frame["island"].astype(str)
+    experiments = in_order(frame["experiment"])
+    frame["measure"] = list(map(_with_unit, frame["measure"], frame["about"]))
+    lines = -(-frame["measure"].nunique() // 3)
+    return (
+        p9.ggplot(frame, p9.aes("births", "mean"))
+        + p9.geom_line(p9.aes(colour="experiment", group="line"), size=0.6, alpha=0.8)
+        + lone_points(frame, ["experiment", "line", "measure"])
+        + p9.facet_wrap("measure", ncol=3, scales="free_y")
+        + scales(tables, experiments, is_filled=False)
+        + p9.labs(x="births on the island", y="mean of the population")
+        + theme_of_size(1.0 + 2.0 * lines)
+    )
+
+
+def _with_unit(measure: str, about: str) -> str:
+    """Return a measure's name and unit, of an own one the last of its docstring."""
+    *_, unit = [UNITS.get(measure, ""), *re.findall(r"\[([^][]+)\]", about)]
+    return f"{measure} [{unit}]" if unit else measure

@@ -1,56 +1,36 @@
 """Draws all figures that the data allows; records why the others are left out."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from glob import escape
+from itertools import chain, count
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.compute as pc
 from rich.progress import Progress
 
-from analysis.figures.catalogue import BIRTHS, FIGURES, DrawnFigure, Figure
-from analysis.figures.family_tree import (
-    LINEAGE,
-    Best,
-    best_robots,
-    lineage,
-    row_of,
-)
-from analysis.figures.file_names import FileNames
+from analysis.figures.catalogue import FIGURES, DrawnFigure, Figure
+from analysis.figures.family_tree import LINEAGE, Best
 from analysis.figures.films import film
 from analysis.figures.forms import NothingToDraw, Tables, fitness_units
-from analysis.figures.pictures import family_tree, gaits
-from analysis.figures.robot_pictures import (
-    RobotPicture,
-    robot_picture,
-    shown_document,
+from analysis.figures.robot_figures import (
+    gait_figures,
+    robot_pictures,
+    tree_figures,
 )
-from analysis.figures.style import PICTURE_ENDING, in_order, label, save
+from analysis.figures.robot_pictures import RobotPicture
+from analysis.figures.style import (
+    PICTURE_ENDING,
+    file_name,
+    in_order,
+    label,
+    save,
+)
 from analysis.figures.sweeps import sweep_caption, sweep_map
-from analysis.measures.families import family
 from analysis.measures.load import LeftOut, LoadedRun
 from analysis.render.picture import Simulate
-from schema.errors import RevolveError
-from schema.experiment.file import experiment_from_text
-from schema.experiment.identity import Origin
-from schema.plugins.source import modules_named
-from schema.robot.ids import BirthId
-from schema.tables.description import allow_plugins_of
-from schema.tables.learnt import learnt_births
 
-_TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
-_BASELINES = ("no-reproduction", "no-selection")
-"""Experiments without an ancestry that selection made."""
-PART_COLOURS = (
-    "A part's colour shows the founder that the part descends from; white parts were "
-    "added by mutation. Parts of encodings that give them no identity keep their own "
-    "colour."
-)
-GAITS = "6.10"
-"""Number of the figure of gaits."""
-_SOURCE = ("robots", BIRTHS)
 _FILM = "best-robot-of-"
 
 
@@ -88,13 +68,9 @@ class FigureWriter:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Remove files of earlier analyses whose names the experiments determine.
-
-        Args:
-            folder: an existing folder.
-        """
+        """Remove files of earlier analyses whose names the experiments determine."""
         self._folder = folder
-        self._names = FileNames()
+        self._taken: set[str] = set()
         for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif"):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
@@ -114,33 +90,40 @@ class FigureWriter:
             what = f"figure {figure.number}"
             self.left_out.append(LeftOut("", what, str(error)))
             return
-        stem = self._folder / self._names.add(figure.stem)
+        stem = self._stem(figure.stem)
         save(drawn, stem)
         picture = stem.with_name(stem.name + PICTURE_ENDING)
         caption = figure.caption
         text = caption if isinstance(caption, str) else caption(tables)
         self.drawn.append(DrawnFigure(figure, text, picture))
 
-    def add_film(self, one: RobotPicture) -> Film:
+    def add_film(self, robot: RobotPicture) -> Film:
         """Write the moving picture of a robot."""
-        name = self._names.add(f"{_FILM}{one.best.experiment}")
-        path = self._folder / f"{name}.gif"
-        path.write_bytes(film(one.film, one.film_interval_s))
-        return Film(one.best, path)
+        stem = self._stem(f"{_FILM}{robot.best.experiment}")
+        path = stem.with_name(f"{stem.name}.gif")
+        path.write_bytes(film(robot.film, robot.film_interval_s))
+        return Film(robot.best, path)
+
+    def _stem(self, text: str) -> Path:
+        """Return a path without ending, distinct also where case does not count."""
+        name = file_name(text)
+        numbered = (f"{name}-{number}" for number in count(2))
+        free = next(
+            stem
+            for stem in chain([name], numbered)
+            if stem.casefold() not in self._taken
+        )
+        self._taken.add(free.casefold())
+        return self._folder / free
 
     def _remove(self, pattern: str) -> None:
         for path in self._folder.glob(pattern):
             path.unlink()
 
 
-def _tree_number(experiment: str) -> str:
-    """Return the number of an experiment's family tree."""
-    return _TREES.get(experiment, f"G-{experiment}")
-
-
-def _place(one: DrawnFigure) -> tuple[bool, list[int], str]:
+def _place(drawn: DrawnFigure) -> tuple[bool, list[int], str]:
     """Return the sort key that puts the figures of the thesis first."""
-    number = one.figure.number
+    number = drawn.figure.number
     # The name of an experiment may follow.
     parts = number.partition("-")[0].split(".")
     digits = [int(part.rstrip("abc")) for part in parts if part[0] < "A"]
@@ -166,26 +149,21 @@ def draw_figures(
     """
     writer = FigureWriter(folder)
     lines: dict[str, pa.Table] = {}
-    pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar, lines)
+    pictures, problems = robot_pictures(tables["robots"], runs, simulate, bar, lines)
     lineages = [LINEAGE.empty_table(), *lines.values()]
     given = {**tables, "lineage": pa.concat_tables(lineages)}
     units = fitness_units(tables)
     every = [
         *FIGURES,
         *_sweeps(tables),
-        *_gaits([*pictures.values()], problems, units),
-        *_trees(pictures, problems, lines, tables["robots"], units),
+        *gait_figures([*pictures.values()], problems, units),
+        *tree_figures(pictures, problems, lines, tables["robots"], units),
     ]
     for figure in bar.track(every, description="drawing figures"):
         writer.add(figure, given)
     films = [writer.add_film(one) for one in pictures.values()]
     figures = sorted(writer.drawn, key=_place)
     return Drawings(figures, films, problems, writer.left_out)
-
-
-def _missing(number: str, why: str) -> Figure:
-    """Return a figure that cannot be drawn."""
-    return Figure(number, "", "", ("",), list, "robots", nothing=why)
 
 
 def _sweeps(tables: Tables) -> Iterator[Figure]:
@@ -201,128 +179,3 @@ def _sweeps(tables: Tables) -> Iterator[Figure]:
             "sweeps",
             f"sweep-{name}",
         )
-
-
-def _robot_pictures(
-    robots: pa.Table,
-    runs: Mapping[Path, LoadedRun],
-    simulate: Callable[[], Simulate],
-    bar: Progress,
-    lines: dict[str, pa.Table],
-) -> tuple[dict[str, RobotPicture], dict[str, str]]:
-    """Return pictures of the best robots by experiment, and why others have none.
-
-    The lineages of those whose family is shown are added to ``lines``.
-    """
-    best = {one.experiment: one for one in best_robots(robots)}
-    living = robots.filter(pc.field("is_last"))["experiment"].to_pylist()
-    why = "all robots of its last populations failed"
-    problems = {name: why for name in in_order(living) if name not in best}
-    try:
-        simulation = simulate()
-    except RevolveError as error:
-        return {}, problems | dict.fromkeys(best, str(error))
-    pictures: dict[str, RobotPicture] = {}
-    for name in bar.track(in_order(best), description="rendering robots"):
-        run = runs[best[name].folder]
-        try:
-            document = shown_document(run.document)
-            if modules_named(document.encode()):
-                allow_plugins_of(run.folder)
-            births = learnt_births(run.folder)
-            row = row_of(best[name], births)
-            pictures[name] = robot_picture(
-                best[name],
-                births,
-                family(births, row),
-                experiment_from_text(document, is_own=True),
-                simulation,
-                origin=Origin(seed=run.seed, run=run.number),
-                has_family=name not in _BASELINES,
-            )
-            if name not in _BASELINES:
-                lines[name] = lineage(births, name, row)
-        except RevolveError as error:
-            problems[name] = str(error)
-    return pictures, problems
-
-
-def _gaits(
-    pictures: Sequence[RobotPicture],
-    problems: Mapping[str, str],
-    units: Mapping[str, str],
-) -> Iterator[Figure]:
-    """Yield the figure of gaits, and what is missing in it."""
-    for name, why in problems.items():
-        yield _missing(f"{GAITS} of {name}", why)
-    if not pictures and not problems:
-        yield _missing(GAITS, "no evaluated robot is in a recorded population")
-    if pictures:
-        yield Figure(
-            GAITS,
-            "Gaits of the best robots",
-            "The fittest robot of each experiment's last populations, simulated alone "
-            "and shown from the middle of its evaluation on, by a camera that stands "
-            "still; a tile of the floor has 20 cm. Pictures of robots that move less "
-            "than 10 cm in that time are taken further apart, up to the end of the "
-            f"evaluation. {PART_COLOURS}",
-            _SOURCE,
-            lambda _: gaits(pictures, units),
-            "robots",
-        )
-
-
-def _trees(
-    pictures: Mapping[str, RobotPicture],
-    problems: Mapping[str, str],
-    lines: Mapping[str, pa.Table],
-    robots: pa.Table,
-    units: Mapping[str, str],
-) -> Iterator[Figure]:
-    """Yield the family of each best robot but those of baselines."""
-    for name in dict.fromkeys((*_TREES, *pictures)):
-        if name in lines:
-            ancestors = lines[name].num_rows - 1
-            yield _tree(pictures[name], ancestors, robots, units.get(name, ""))
-        elif name not in pictures:
-            why = f"no evaluated robot of {name} is in a recorded population"
-            yield _missing(_tree_number(name), problems.get(name, why))
-
-
-def _tree(one: RobotPicture, ancestors: int, robots: pa.Table, unit: str) -> Figure:
-    """Return the figure of one experiment's best robot and its family."""
-    best, relatives = one.best, one.family
-    assert relatives is not None
-    number = _tree_number(best.experiment)
-    if len(relatives.levels) == 1:
-        return _missing(number, f"the best robot of {best.experiment} is a founder")
-    mine = robots.filter(pc.field("folder") == str(best.folder))
-    known = mine.select(["birth_island", "birth", "fitness"]).to_pylist()
-    fitness = {
-        BirthId(row["birth_island"], row["birth"]): row["fitness"] for row in known
-    }
-    colours = (
-        "Above the dashed line are the founders whose parts survive in these robots; a "
-        "part has the colour of its founder, and white parts were added by mutation."
-    )
-    if not relatives.founders:
-        colours = (
-            "The encoding gives parts no identity that children inherit, so the "
-            "founders of parts are not known."
-        )
-    caption = (
-        f"Robot {best.birth_island}:{best.birth} of {best.folder.name}, the fittest "
-        "robot of the last populations, at the bottom, and its ancestors over four "
-        "levels of reproduction: parents are drawn above their children. A dotted line "
-        f"leads to a parent that is drawn on another level. {colours} The robot has "
-        f"{ancestors} ancestors in total."
-    )
-    return Figure(
-        number,
-        f"Ancestry of the best robot of {label(best.experiment)}",
-        caption,
-        _SOURCE,
-        lambda _: family_tree(one, relatives, fitness, unit),
-        "robots",
-        f"ancestry-of-{best.experiment}",
-    )

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import groupby
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import Any
 
 import pyarrow.compute as pc
 from matplotlib.axes import Axes
@@ -26,220 +26,144 @@ _MARKS: dict[str, dict[str, Any]] = {
 _SIGNS = {">": ">", "<": "<", "=": "≈", "!=": "≠"}
 _SHADE, _BOUND, _RULE = "#E4E4E4", "#555555", "#C8C8C8"
 _SMALL, _TEXT = 7.0, 7.5
-_WORDS: dict[str, Any] = {"va": "center_baseline", "fontsize": _SMALL, "color": INK}
-"""Look of headings and names."""
-_LETTER_IN = 0.0565
-"""Width of a letter of a heading [inches], rather more than the mean."""
-
+_LETTERS = 71
+"""Characters of a line of a heading."""
 _WIDTH_IN, _LINE_IN = 9.0, 0.122
-_NAMES_IN, _NUMBER_IN, _RIGHT_IN = 0.78, 0.36, 0.12
-"""Widths: names of pairs, number of the figure in a heading, right of a panel."""
-_TOP_IN, _ABOVE_IN, _BELOW_IN = 0.62, 0.22, 0.5
-"""Heights: legend; ticks above a panel; ticks, label and space below it."""
+_NAMES_IN, _RIGHT_IN, _TOP_IN, _BELOW_IN = 0.78, 0.12, 0.84, 0.45
+"""Space around panels: names of pairs, right of them, legend and ticks, axis label."""
+_NUMBER_PT, _HEADING_PT = -55, -30
+"""Places of a figure's number and of a heading, from the left end of the axis."""
 _GAP = 0.6
 """Space below a finding, and above the first one [lines]."""
 _NOTE = (
     "A/B are the compared experiments: 1, 2 and 3 are the scenarios, random is random "
     "search (no reproduction), drift is no selection. † says nothing about evolution."
 )
-_DECADES = 6
-
-
-class _Finding(NamedTuple):
-    """A finding, and the pairs or experiments by which it is tested."""
-
-    figure: str
-    heading: list[str]
-    rows: list[Row]
-
-    @property
-    def lines(self) -> float:
-        """Height [lines]."""
-        return len(self.heading) + len(self.rows) + _GAP
-
-    @property
-    def is_of_pairs(self) -> bool:
-        """Whether it compares experiments with each other, not with a number."""
-        return bool(self.rows[0]["b"])
-
-
-Panel = list[_Finding]
-"""Findings that share an axis."""
+_DECADES = [10.0**power for power in range(6)]
 
 
 def effects(tables: Tables) -> Figure:
     """Return the effects by which the thesis's findings are tested.
 
-    Pairs of experiments have Cliff's delta, experiments that are compared with a
-    number have the difference divided by its margin; both with 95 % intervals.
+    Left: pairs of experiments, with Cliff's delta. Right: experiments that are compared
+    with a number, with the difference divided by its margin. Both with 95 % intervals.
 
     Raises:
         NothingToDraw: no finding could be tested.
     """
-    rows = tables["findings"].filter(pc.field("effect").is_valid())
-    if not rows.num_rows:
+    tested = tables["findings"].filter(pc.field("effect").is_valid())
+    if not tested.num_rows:
         raise NothingToDraw("no finding has two finished runs of each experiment")
-    shown = [row for row in rows.to_pylist() if row["expected"] != "some"]
-    if not shown:
+    rows = [row for row in tested.to_pylist() if row["expected"] != "some"]
+    kinds = [[row for row in rows if bool(row["b"]) == is_pair]
+             for is_pair in (True, False)]  # fmt: skip
+    panels = [kind for kind in kinds if kind]
+    if not panels:
         raise NothingToDraw("no finding compares runs with each other or a number")
-    columns = _columns(_findings(shown))
-    height = _TOP_IN + max(map(_height_in, columns))
-    figure = Figure(figsize=(_WIDTH_IN, height))
-    width = _WIDTH_IN / len(columns)
-    for at, panels in enumerate(columns):
-        top = height - _TOP_IN
-        for panel in panels:
-            high = _LINE_IN * _lines(panel)
-            top -= _ABOVE_IN + high
-            wide = width - _NAMES_IN - _RIGHT_IN
-            box = (at * width + _NAMES_IN, top, wide, high)
-            _draw_panel(_axes(figure, box), panel, wide)
-            top -= _BELOW_IN
-    _share_limits(figure)
+    figure = Figure()
+    (every,) = figure.subplots(1, len(panels), squeeze=False)
+    lines = max(
+        _draw_panel(axes, panel) for axes, panel in zip(every, panels, strict=True)
+    )
+    for axes in every:
+        axes.set_ylim(lines, 0)
+    height = _TOP_IN + _LINE_IN * lines + _BELOW_IN
+    figure.set_size_inches(_WIDTH_IN, height)
+    gaps = _NAMES_IN + _RIGHT_IN
+    figure.subplots_adjust(
+        _NAMES_IN / _WIDTH_IN, _BELOW_IN / height, 1 - _RIGHT_IN / _WIDTH_IN,
+        1 - _TOP_IN / height, wspace=gaps / (_WIDTH_IN / len(panels) - gaps),
+    )  # fmt: skip
     _add_legend(figure, height)
     return figure
 
 
-def _findings(rows: Sequence[Row]) -> list[_Finding]:
-    """Return findings without names of experiments: those of pairs first."""
+def _draw_panel(axes: Axes, rows: Sequence[Row]) -> float:
+    """Draw findings of one kind below each other; return their height [lines]."""
+    at, previous = _GAP, ""
+    for (number, topic, expected), group in groupby(rows, _heading):
+        if previous and number != previous:
+            axes.plot([-0.22, 1], [at - _GAP / 3] * 2, color=_RULE, lw=0.6,
+                      transform=axes.get_yaxis_transform(), clip_on=False)  # fmt: skip
+        if number != previous:
+            _write(axes, at + 0.45, number, _NUMBER_PT, weight="bold")
+        previous = number
+        for text in wrap(f"{topic} ({expected})", _LETTERS):
+            _write(axes, at + 0.45, text, _HEADING_PT)
+            at += 1
+        own = list(group)
+        _draw_rows(axes, own, at)
+        at += len(own) + _GAP
+    _set_axis(axes, is_pair=bool(rows[0]["b"]))
+    return at
 
-    def key(row: Row) -> tuple[str, ...]:
-        return row["figure"], row["topic"] or row["claim"], _expected(row)
 
-    letters = int((_WIDTH_IN / 2 - _NUMBER_IN - _RIGHT_IN) / _LETTER_IN)
-    found = []
-    for is_number in (False, True):
-        mine = [row for row in rows if is_number == (not row["b"])]
-        for (figure, topic, expected), group in groupby(mine, key):
-            heading = wrap(f"{topic} ({expected})", letters)
-            found.append(_Finding(figure, heading, list(group)))
-    return found
-
-
-def _expected(row: Row) -> str:
-    """Return what is expected, for example "A > B", or "< 0.5" of a number."""
+def _heading(row: Row) -> tuple[str, str, str]:
+    """Return figure, topic and what is expected: "A > B", or "< 0.5" of a number."""
     sign = _SIGNS[row["expected"]]
     if row["b"]:
-        return f"A {sign} B"
-    return sign if row["mean_b"] is None else f"{sign} {row['mean_b']:.3g}"
+        expected = f"A {sign} B"
+    else:
+        expected = sign if row["mean_b"] is None else f"{sign} {row['mean_b']:.3g}"
+    return row["figure"], row["topic"] or row["claim"], expected
 
 
-def _columns(found: Sequence[_Finding]) -> list[list[Panel]]:
-    """Return the panels of two columns of about equal height, or of one."""
-    ways = [
-        [_panels(found[:cut]), _panels(found[cut:])] for cut in range(1, len(found) + 1)
-    ]
-    best = min(ways, key=lambda columns: max(map(_height_in, columns)))
-    return [panels for panels in best if panels]
+def _write(
+    axes: Axes,
+    height: float,
+    text: str,
+    aside_pt: int,
+    **look: Any,  # noqa: ANN401 - of any text
+) -> None:
+    axes.annotate(
+        text, (0, height), (aside_pt, 0), axes.get_yaxis_transform(), "offset points",
+        va="center_baseline", fontsize=_SMALL, color=INK, **look,
+    )  # fmt: skip
 
 
-def _panels(found: Sequence[_Finding]) -> list[Panel]:
-    return [list(group) for _, group in groupby(found, lambda one: one.is_of_pairs)]
-
-
-def _height_in(panels: Sequence[Panel]) -> float:
-    return sum(_LINE_IN * _lines(panel) + _ABOVE_IN + _BELOW_IN for panel in panels)
-
-
-def _lines(panel: Panel) -> float:
-    """Return the height of a panel [lines]."""
-    return _GAP + sum(one.lines for one in panel)
-
-
-def _axes(figure: Figure, box_in: tuple[float, float, float, float]) -> Axes:
-    """Return axes at a place in inches, without a frame at the sides."""
-    wide, high = figure.get_size_inches()
-    left, bottom, width, height = box_in
-    axes = figure.add_axes((left / wide, bottom / high, width / wide, height / high))
-    axes.tick_params(top=True, labeltop=True, labelsize=_SMALL, length=2.5, pad=2)
-    axes.tick_params(color=INK, labelcolor=INK)
-    axes.yaxis.set_major_locator(NullLocator())
-    for side in ("left", "right"):
-        axes.spines[side].set_visible(False)
-    return axes
-
-
-def _draw_panel(axes: Axes, panel: Panel, width_in: float) -> None:
-    """Draw findings below each other.
-
-    Args:
-        axes: axes of the panel.
-        panel: its findings.
-        width_in: width of the axes [inches].
-    """
-    place = axes.get_yaxis_transform()
-    left = -_NAMES_IN / width_in
-    at, previous = _GAP, ""
-    for one in panel:
-        if previous and one.figure != previous:
-            axes.plot([left, 1], [at - _GAP / 3] * 2, color=_RULE, lw=0.6,
-                      transform=place, clip_on=False)  # fmt: skip
-        if one.figure != previous:
-            axes.text(left + 0.01, at + 0.45, one.figure, transform=place,
-                      weight="bold", **_WORDS)  # fmt: skip
-        previous = one.figure
-        for text in one.heading:
-            axes.text(left + _NUMBER_IN / width_in, at + 0.45, text, transform=place,
-                      **_WORDS)  # fmt: skip
-            at += 1
-        _draw_rows(axes, one, at)
-        at += len(one.rows) + _GAP
-    axes.set_ylim(at, 0)
-    text = "Cliff's delta (positive: A above B)"
-    if not panel[0].is_of_pairs:
-        text = "(mean - number) / margin, logarithmic beyond ±1"
-        axes.set_xscale("symlog", linthresh=1, linscale=0.8)
-    axes.set_xlabel(text, fontsize=_TEXT, color=INK, labelpad=3)
-
-
-def _draw_rows(axes: Axes, one: _Finding, top: float) -> None:
+def _draw_rows(axes: Axes, rows: Sequence[Row], top: float) -> None:
     """Draw the rows of a finding, and the bounds between them."""
-    bottom = top + len(one.rows)
-    bound = NEGLIGIBLE if one.is_of_pairs else 1
+    bottom, is_pair = top + len(rows), bool(rows[0]["b"])
+    bound = NEGLIGIBLE if is_pair else 1
     axes.fill_between([-bound, bound], top, bottom, color=_SHADE, lw=0, zorder=0)
     axes.vlines(0, top, bottom, color=_BOUND, lw=0.6, zorder=1)
-    if one.is_of_pairs:
+    if is_pair:
         axes.vlines([-LARGE, LARGE], top, bottom, color=_BOUND, lw=0.8,
                     linestyles=":", zorder=1)  # fmt: skip
-    for at, row in enumerate(one.rows):
+    name = "effect" if is_pair else "difference"
+    for at, row in enumerate(rows):
         middle = top + at + 0.5
-        value, ends = _shown(row)
+        shown: list[Any] = [
+            None if row[end] is None else row[end] / (1 if is_pair else row["margin"])
+            for end in (name, f"{name}_low", f"{name}_high")
+        ]
+        value, *ends = shown
         look = _MARKS[row["verdict"]]
         if None not in ends:
             axes.plot(ends, [middle] * 2, color=look["color"], lw=1.2, zorder=2)
-        axes.plot([value], [middle], ls="", zorder=3, **look)
-        axes.annotate(
-            pair_name(row), (0, middle), (-3, 0), axes.get_yaxis_transform(),
-            "offset points", ha="right", **_WORDS,
-        )  # fmt: skip
+        axes.plot(value, middle, ls="", zorder=3, **look)
+        _write(axes, middle, pair_name(row), -3, ha="right")
 
 
-def _shown(row: Row) -> tuple[Any, tuple[Any, Any]]:
-    """Return the place of a row's mark, and the ends of its interval or nulls."""
-    if row["b"]:
-        return row["effect"], (row["effect_low"], row["effect_high"])
-    value, low, high = (
-        None if row[name] is None else row[name] / row["margin"]
-        for name in ("difference", "difference_low", "difference_high")
-    )
-    return value, (low, high)
-
-
-def _share_limits(figure: Figure) -> None:
-    """Give axes of the same kind equal limits and ticks."""
-    numbers = [axes for axes in figure.axes if axes.get_xscale() != "linear"]
-    for axes in figure.axes:
-        if axes not in numbers:
-            axes.set_xlim(-1.05, 1.05)
-            axes.xaxis.set_major_locator(FixedLocator([-1, -0.5, 0, 0.5, 1]))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ends = [end for axes in numbers for end in axes.dataLim.intervalx]
-    decades = [10.0**power for power in range(_DECADES)]
-    for axes in numbers:
-        axes.set_xlim(min(-2.0, *ends) * 1.2, max(2.0, *ends) * 1.2)
-        ticks = [-value for value in decades] + [0.0, *decades]
-        axes.xaxis.set_major_locator(FixedLocator(ticks))
-        axes.xaxis.set_minor_locator(NullLocator())
+def _set_axis(axes: Axes, *, is_pair: bool) -> None:
+    """Set limits, ticks and label of the axis of effects, which has no frame."""
+    if is_pair:
+        text, ticks = "Cliff's delta (positive: A above B)", [-1, -0.5, 0, 0.5, 1]
+        axes.set_xlim(-1.05, 1.05)
+    else:
+        text = "(mean - number) / margin, logarithmic beyond ±1"
+        low, high = axes.dataLim.intervalx
+        axes.set_xscale("symlog", linthresh=1, linscale=0.8)
+        axes.set_xlim(1.2 * min(-2.0, low), 1.2 * max(2.0, high))
+        ticks = [-value for value in _DECADES] + [0.0, *_DECADES]
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_xlabel(text, fontsize=_TEXT, color=INK, labelpad=3)
+    axes.tick_params(top=True, labeltop=True, labelsize=_SMALL, length=2.5, pad=2)
+    axes.tick_params(color=INK, labelcolor=INK)
+    axes.yaxis.set_major_locator(NullLocator())
+    axes.spines[["left", "right"]].set_visible(False)
 
 
 def _add_legend(figure: Figure, height_in: float) -> None:

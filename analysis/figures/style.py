@@ -44,6 +44,14 @@ _SETTINGS: dict[Any, Any] = {"pdf.fonttype": 42, "savefig.facecolor": "white"}
 PICTURE_ENDING = ".png"
 _ENDINGS = (PICTURE_ENDING, ".pdf")
 _BROAD = 12
+_MOST_BYTES = 100
+"""Length of a file's name: file systems allow 255 bytes, endings included."""
+
+
+def file_name(text: str) -> str:
+    """Return words as the name of a file without ending: safe and not too long."""
+    name = "-".join(re.findall(r"[\w.~+=]+", text))
+    return name.encode()[:_MOST_BYTES].decode(errors="ignore")
 
 
 def in_order(experiments: Iterable[str]) -> list[str]:

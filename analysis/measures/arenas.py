@@ -8,6 +8,7 @@ from analysis.measures.outputs import run_schema
 from analysis.measures.population_table import (
     Numbers,
     last_there,
+    ratio,
     residence_columns,
     residence_ids,
 )
@@ -103,15 +104,13 @@ def variability(run: RunTables) -> pa.Table:
         spans = zip(mine.tolist(), begin.tolist(), until.tolist(), strict=True)
         for robot, first, end in spans:
             population[robot] = np.ptp(fitness_here[first:end])
-    ratio = np.full(len(own), np.nan)
-    np.divide(own, population, out=ratio, where=population > 0)
     return pa.table(
         {
             **{key: stays[key] for key in keys},
             "samples": stays["fitness_count"],
             "fitness_range": own,
             "population_range": population,
-            "variability": pa.array(ratio, from_pandas=True),
+            "variability": pa.array(ratio(own, population), from_pandas=True),
         }
     )
 

@@ -17,22 +17,18 @@ _RUNS = "experiment="
 
 
 def read_benchmarks(roots: Iterable[Path]) -> tuple[pa.Table, list[LeftOut]]:
-    """Return the benchmarks in some files and folders.
+    """Return the benchmarks in some files and folders, and files that are left out.
 
-    Args:
-        roots: files or folders. Files below a folder that are no benchmarks are
-            ignored; a file that is given itself is reported.
-
-    Returns:
-        One row per repetition: ``benchmark`` ("arena" or "spider"), ``population``,
-        ``factor`` (simulated by wall-clock time); and files that could not be read.
+    Each row is a repetition: ``benchmark`` ("arena" or "spider"), ``population``,
+    ``factor`` (simulated by wall-clock time). Files below a folder that are no
+    benchmarks are ignored; a file that is given itself is reported.
     """
     pieces = [_COLUMNS.empty_table()]
     left_out = []
     for path, is_named in _files(roots).items():
         try:
-            found = pq.read_schema(path)
-            if (found.metadata or {}).get(b"revolve.schema") == _NAME:
+            metadata = pq.read_schema(path).metadata or {}
+            if metadata.get(b"revolve.schema") == _NAME:
                 table = pq.read_table(path, columns=_COLUMNS.names)
                 pieces.append(table.replace_schema_metadata().cast(_COLUMNS))
             elif is_named:
@@ -44,11 +40,11 @@ def read_benchmarks(roots: Iterable[Path]) -> tuple[pa.Table, list[LeftOut]]:
 
 def _files(roots: Iterable[Path]) -> dict[Path, bool]:
     """Return the files that may be benchmarks, and whether each is a root."""
-    found: dict[Path, bool] = {}
+    files: dict[Path, bool] = {}
     for root in roots:
         if root.is_file():
-            found[root] = True
+            files[root] = True
         for path in sorted(root.glob("**/*.parquet")):
             if not any(part.startswith(_RUNS) for part in path.parts):
-                found.setdefault(path, False)
-    return found
+                files.setdefault(path, False)
+    return files

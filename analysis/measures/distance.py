@@ -16,15 +16,9 @@ from analysis.measures.trees import Integers, Trees
 
 
 def tree_distances(trees: Trees, first: Integers, second: Integers) -> Integers:
-    """Return the edit distances of pairs of trees.
+    """Return the edit distances, (P,), of pairs of trees by their indices, (P,).
 
-    Args:
-        trees: as ``analysis.measures.trees.encode`` returns them.
-        first: (P,) index of the first tree of each pair.
-        second: (P,) index of the second.
-
-    Returns:
-        (P,) least total cost of edits that turn one tree into the other; >= 0.
+    It is the least total cost of edits that turn one tree into the other.
 
     Source: Zhang and Shasha, *Simple fast algorithms for the editing distance
     between trees and related problems*, SIAM J. Comput. 18(6), 1989; costs: Hupkes
@@ -37,8 +31,8 @@ def tree_distances(trees: Trees, first: Integers, second: Integers) -> Integers:
     )
     pairs = np.ascontiguousarray(np.stack([first, second], axis=1), np.int64)
     nodes = (kinds, slots, lefts, trees.key_roots)
-    found: Integers = _distances(trees.starts, nodes, pairs)
-    return found
+    distances: Integers = _distances(trees.starts, nodes, pairs)
+    return distances
 
 
 def _compiled(function: Any) -> Any:  # noqa: ANN401 - of Numba, which has no types

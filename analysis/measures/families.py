@@ -88,7 +88,7 @@ def families(run: RunTables) -> pa.Table:
     has_parents = np.array([bool(couple) for couple in run.parents], np.bool_)
     rows = []
     for group in np.flatnonzero(table.is_last).tolist():
-        living = slice(table.starts[group], table.starts[group + 1])
+        living = table.living[group]
         fitness = table.fitness[living]
         if np.isnan(fitness).all():
             continue

@@ -20,12 +20,8 @@ UNITS = {
 def functions_of(runs: pa.Table) -> dict[str, str]:
     """Return the name of each experiment's fitness function, by experiment.
 
-    Args:
-        runs: ``experiment`` and ``fitness_function``; an experiment has one function.
-
-    Returns:
-        Texts as those of ``fitness_text``, without the digests of sources where that
-        does not make different texts equal; by name of the experiment.
+    Names are those of ``fitness_text``, without the digests of sources where that does
+    not make different texts equal.
     """
     rows = runs.select(["experiment", "fitness_function"]).to_pylist()
     texts = {row["experiment"]: row["fitness_function"] or "" for row in rows}
@@ -38,22 +34,14 @@ def functions_of(runs: pa.Table) -> dict[str, str]:
 
 def by_function(functions: Mapping[str, str]) -> dict[str, list[str]]:
     """Return the experiments of each fitness function, in order of appearance."""
-    found: dict[str, list[str]] = {}
+    groups: dict[str, list[str]] = {}
     for experiment, function in functions.items():
-        found.setdefault(function, []).append(experiment)
-    return found
+        groups.setdefault(function, []).append(experiment)
+    return groups
 
 
 def measured_apart(runs: pa.Table) -> tuple[list[str], list[str]]:
-    """Return the experiments in arenas and the off-line ones, if both are compared.
-
-    Args:
-        runs: ``experiment``, ``fitness_function`` and ``simulated_s``.
-
-    Returns:
-        Sorted names of both, only of functions that both have; both empty if an
-        arena's fitness is compared only with that of other arenas.
-    """
+    """Return the sorted experiments in arenas and off-line, of functions of both."""
     rows = runs.select(["experiment", "simulated_s"]).to_pylist()
     in_arenas = {row["experiment"] for row in rows if row["simulated_s"] is not None}
     online: list[str] = []
@@ -69,9 +57,7 @@ def measured_apart(runs: pa.Table) -> tuple[list[str], list[str]]:
 def not_compared(runs: pa.Table, name: Callable[[str], str] = str) -> list[str]:
     """Return why fitness cannot be compared in some pairs; empty if it can in all.
 
-    Args:
-        runs: ``experiment``, ``fitness_function`` and ``simulated_s``.
-        name: returns the label of an experiment.
+    ``name`` returns the label of an experiment.
     """
 
     def listed(experiments: Iterable[str]) -> str:
@@ -96,11 +82,7 @@ def not_compared(runs: pa.Table, name: Callable[[str], str] = str) -> list[str]:
 
 
 def fitness_unit(function: str) -> str:
-    """Return the unit of a fitness function; empty if it is not known.
-
-    Args:
-        function: a value of ``functions_of``.
-    """
+    """Return the unit of a value of ``functions_of``; empty if it is not known."""
     return UNITS.get(function.partition(" (")[0], "") if " and " not in function else ""
 
 

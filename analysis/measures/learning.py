@@ -1,17 +1,10 @@
 """What newborns gain by lifetime learning, and which bodies it saves."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.population_table import (
-    Numbers,
-    PopulationTable,
-    individual_ids,
-    rows_of,
-)
+from analysis.measures.population_table import Numbers, individual_ids, rows_of
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import Integers
 
@@ -83,10 +76,12 @@ def _selected(
     is_online = np.asarray(run.births["sim_time_s"].is_valid())
     past: dict[int, int] = {}
     matured: set[int] = set()
-    for group, members, fitness in _groups(run.population_table):
-        island = int(run.population_table.islands[group])
+    table = run.population_table
+    for group, own in enumerate(table.living):
+        members, fitness = table.members[own], table.fitness[own]
+        island = int(table.islands[group])
         first = past.get(island)
-        past[island] = births = int(run.population_table.births[group])
+        past[island] = births = int(table.births[group])
         judged = {*members[~np.isnan(fitness)].tolist()}
         least = np.nanmin(fitness, initial=np.inf)
         is_own = islands == island
@@ -109,13 +104,6 @@ def _selected(
         pa.array([kept.get(row) for row in chosen], pa.bool_()),
         pa.array([saved.get(row) for row in chosen], pa.bool_()),
     )
-
-
-def _groups(table: PopulationTable) -> Iterator[tuple[int, Integers, Numbers]]:
-    """Yield each recorded population: its number, members and their fitness."""
-    for group in range(len(table)):
-        own = slice(table.starts[group], table.starts[group + 1])
-        yield group, table.members[own], table.fitness[own]
 
 
 def _culled(run: RunTables) -> list[int]:

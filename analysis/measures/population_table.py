@@ -1,6 +1,7 @@
 """The population table as arrays, with individuals as rows of the births table."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +44,12 @@ class PopulationTable:
         return np.diff(self.starts)
 
     @property
+    def living(self) -> list[slice]:
+        """Where the members of each population are, G slices of N."""
+        ends = self.starts.tolist()
+        return [slice(*span) for span in pairwise(ends)]
+
+    @property
     def group_of(self) -> Integers:
         """Index of each member's population, (N,)."""
         return np.repeat(np.arange(len(self.births)), self.sizes)
@@ -61,22 +68,21 @@ class PopulationTable:
         return len(self.births)
 
     def mean(self, values: Numbers) -> Numbers:
-        """Return the mean of each population, (G,); NaN if no member has a value.
-
-        Args:
-            values: (N,) value of each member; NaN is ignored.
-        """
+        """Return the means, (G,), of members' values, (N,); NaN is ignored."""
         is_known = ~np.isnan(values)
-        total = self.sum(np.where(is_known, values, 0.0))
-        count = self.sum(is_known.astype(np.float64))
-        unknown = np.full(len(self), np.nan)
-        found: Numbers = np.divide(total, count, out=unknown, where=count > 0)
-        return found
+        return ratio(self.sum(np.where(is_known, values, 0.0)), self.sum(is_known))
 
-    def sum(self, values: Numbers) -> Numbers:
+    def sum(self, values: Numbers | Booleans) -> Numbers:
         """Return the sum of each population, (G,), of its members' values, (N,)."""
         total = np.bincount(self.group_of, values, minlength=len(self))
         return total.astype(np.float64)
+
+
+def ratio(parts: Numbers, wholes: Numbers) -> Numbers:
+    """Return parts by wholes, (G,); NaN where a whole is not above 0."""
+    shares = np.full(len(parts), np.nan)
+    np.divide(parts, wholes, out=shares, where=wholes > 0)
+    return shares
 
 
 def is_last_of_each(values: Integers) -> Booleans:
@@ -84,36 +90,22 @@ def is_last_of_each(values: Integers) -> Booleans:
     return np.append(values[1:] != values[:-1], True)[: len(values)]
 
 
-def individual_ids(
-    table: pa.Table, island: str = "birth_island", birth: str = "birth"
-) -> Integers:
+def individual_ids(table: pa.Table, island: str = "birth_island") -> Integers:
     """Return the id of each row's individual as one number, (N,).
 
-    Args:
-        table: any table with an island and a number of birth.
-        island: column of the island of birth, < 4096.
-        birth: column of the number of birth there.
+    ``island`` is the column of the island of birth, < 4096.
     """
     islands = np.asarray(table[island], np.int64)
-    return islands << _BITS | np.asarray(table[birth], np.int64)
+    return islands << _BITS | np.asarray(table["birth"], np.int64)
 
 
 def residence_ids(table: pa.Table) -> Integers:
-    """Return the id of each row's individual and the island that it lives on, (N,).
-
-    Args:
-        table: ``island`` (where it lives, < 4096), ``birth_island``, ``birth``.
-    """
+    """Return the id of each row's individual and its ``island``, < 4096, (N,)."""
     return np.asarray(table["island"], np.int64) << _PLACE | individual_ids(table)
 
 
 def last_there(table: pa.Table, times: Numbers | Integers) -> pa.Table:
-    """Return the last row of each individual on each island that it lives on.
-
-    Args:
-        table: as for ``residence_ids``.
-        times: (N,) of the rows; times of different islands are not compared.
-    """
+    """Return the last row, by (N,) times, of each individual on each of its islands."""
     ids = residence_ids(table)
     order = np.lexsort((times, ids))
     return table.take(pa.array(order[is_last_of_each(ids[order])]))
@@ -130,19 +122,14 @@ def residence_columns(ids: Integers) -> dict[str, pa.Array]:
 
 
 def rows_of(wanted: Integers, births: pa.Table) -> Integers:
-    """Return the births rows of individuals, (N,); -1 if the birth is missing.
-
-    Args:
-        wanted: (N,) ids as ``individual_ids`` returns them.
-        births: births table of a run.
-    """
-    known = individual_ids(births, "island", "birth")
+    """Return the births rows of ``individual_ids``, (N,); -1 if one is missing."""
+    known = individual_ids(births, "island")
     if not len(known):
         return np.full(len(wanted), -1, np.int64)
     order = np.argsort(known, kind="stable")
     place = np.minimum(np.searchsorted(known, wanted, sorter=order), len(known) - 1)
-    found: Integers = np.where(known[order[place]] == wanted, order[place], -1)
-    return found
+    rows: Integers = np.where(known[order[place]] == wanted, order[place], -1)
+    return rows
 
 
 def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:

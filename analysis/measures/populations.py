@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 from analysis.measures.ancestry import foreign_share, unique_ancestors
 from analysis.measures.diversity import diversity
 from analysis.measures.outputs import POPULATION
-from analysis.measures.population_table import Numbers, PopulationTable
+from analysis.measures.population_table import Numbers, PopulationTable, ratio
 from analysis.measures.run_tables import Problems, RunTables
 from schema.errors import RevolveError
 
@@ -21,14 +21,10 @@ RETENTION_BIRTHS = 120
 
 
 def retention(table: PopulationTable, step: int = RETENTION_BIRTHS) -> Numbers:
-    """Return the share of each population that is still alive later, (G,).
+    """Return the share of each population that is alive ``step`` births later, (G,).
 
     All members count, mature or not. NaN if no population of the island is recorded
     at exactly that number of births.
-
-    Args:
-        table: populations of a run.
-        step: births later.
 
     Source: Hupkes 2016, table 6.2 and figure 6.7.
     """
@@ -50,7 +46,7 @@ def _fitness(run: RunTables) -> Columns:
     np.fmax.at(best, table.group_of, table.fitness)
     return {
         "size": table.sizes.astype(np.float64),
-        "judged": table.sum(table.is_judged.astype(np.float64)),
+        "judged": table.sum(table.is_judged),
         "fitness": table.mean(table.fitness),
         "fitness_best": np.where(np.isfinite(best), best, np.nan),
     }
@@ -58,10 +54,9 @@ def _fitness(run: RunTables) -> Columns:
 
 def _ancestors(run: RunTables) -> Columns:
     """Return unique ancestors, in total and per robot (figure 6.4)."""
-    count = unique_ancestors(run.population_table, run.lines).astype(np.float64)
-    judged = run.population_table.sum(run.population_table.is_judged.astype(np.float64))
-    share = np.full(len(count), np.nan)
-    np.divide(count, judged, out=share, where=judged > 0)
+    table = run.population_table
+    count = unique_ancestors(table, run.lines).astype(np.float64)
+    share = ratio(count, table.sum(table.is_judged))
     return {"ancestors": count, "ancestors_per_robot": share}
 
 
@@ -105,23 +100,21 @@ _POPULATION: dict[str, Callable[[RunTables], Columns]] = {
 
 
 def populations(run: RunTables) -> tuple[pa.Table, Problems]:
-    """Return the measures of each recorded population, and the measures left out.
+    """Return the measures of each recorded population, and why some were left out.
 
-    Returns:
-        One row per ``island`` and ``births``, ascending, with the columns of
-        ``outputs.POPULATION``, null for a measure that was left out; and the reasons.
+    Rows are by ``island`` and ``births``, ascending; measures left out are null.
     """
-    found: Columns = {}
+    measures: Columns = {}
     problems: Problems = {}
     for name, measure in _POPULATION.items():
         try:
-            found |= measure(run)
+            measures |= measure(run)
         except RevolveError as error:
             problems[name] = str(error)
     table = run.population_table
     unknown = np.full(len(table), np.nan)
     columns = {"island": table.islands, "births": table.births} | {
-        name: pa.array(found.get(name, unknown), from_pandas=True)
+        name: pa.array(measures.get(name, unknown), from_pandas=True)
         for name in POPULATION
     }
     return pa.table(columns), problems
@@ -133,7 +126,6 @@ def last_rows(populations: pa.Table) -> list[dict[str, Any]]:
     last = populations.group_by(keys, use_threads=False).aggregate([("births", "max")])
     joined = populations.join(last, keys)
     rows = joined.filter(pc.equal(joined["births"], joined["births_max"]))
-    found: list[dict[str, Any]] = rows.sort_by(
-        [(key, "ascending") for key in keys]
-    ).to_pylist()
-    return found
+    ordered = rows.sort_by([(key, "ascending") for key in keys])
+    last_populations: list[dict[str, Any]] = ordered.to_pylist()
+    return last_populations

@@ -51,11 +51,6 @@ def measure_runs(
 
     They are measured in other processes, also one run: the memory of tables, of Numba
     and of what it compiles is free when figures are drawn.
-
-    Args:
-        runs: the runs.
-        slots: slot that labels a part in tree edit distance.
-        processes: number of runs measured in parallel.
     """
     try:
         pool = ProcessPoolExecutor(min(processes, len(runs)), get_context("spawn"))

@@ -11,8 +11,9 @@ import pyarrow.compute as pc
 from PIL import Image
 
 from analysis.figures.catalogue import DrawnFigure, Section
-from analysis.figures.figure_writer import GAITS, PART_COLOURS, Drawings, Film
+from analysis.figures.figure_writer import Drawings, Film
 from analysis.figures.forms import Tables
+from analysis.figures.robot_figures import GAITS, PART_COLOURS
 from analysis.figures.style import in_order, label
 from analysis.measures.fitness_functions import axis_text
 from analysis.measures.outputs import OUTPUTS

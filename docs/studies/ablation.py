@@ -98,8 +98,8 @@ def kept() -> dict[tuple[str, int], pa.Table]:
 
 def draw() -> None:
     """Write the pictures of the page."""
-    from analysis.figures.ablation import ablation  # noqa: PLC0415 - loads pandas
-    from analysis.figures.brains import changes_over_births  # noqa: PLC0415
+    from analysis.figures.changes import ablation  # noqa: PLC0415 - loads pandas
+    from analysis.figures.courses import changes_over_births  # noqa: PLC0415
 
     for (name, _), rows in kept().items():
         save_small(ablation(rows), f"ablation-{name}")

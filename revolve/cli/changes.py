@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from analysis.comparison import ablation, robustness
-from analysis.figures.ablation import ablation as ablation_figure
-from analysis.figures.robustness import robustness as robustness_figure
+from analysis.figures.changes import ablation as ablation_figure
+from analysis.figures.changes import robustness as robustness_figure
 from coordinator.evolution.generation import random_brain
 from coordinator.evolution.random_streams import Purpose, stream
 from revolve.cli.reevaluation import ReevaluationJob, Study

@@ -40,9 +40,6 @@ class Controller:
 def controllers(births: pa.Table) -> Iterator[Controller | None]:
     """Yield the brain of each birth; None if the table does not have it.
 
-    Args:
-        births: ``genome``, ``robot``.
-
     Raises:
         MalformedMessage: damaged bytes, or no robot beside a genome of another encoding
             than ``revolve-angle``, as in earlier runs.
@@ -131,10 +128,10 @@ def _named(
             return genes[part], copies[part], layer, "", number
         return names.get(place)
 
-    found: dict[tuple[Name, Name], float] = {}
+    weights: dict[tuple[Name, Name], float] = {}
     for (start, end), weight in edges.items():
         source, target = name(start), names.get(end)
         if source is not None and target is not None:
-            found[source, target] = weight
+            weights[source, target] = weight
     parameters = {names[place]: values for place, (_, values) in neurons.items()}
-    return Controller(parameters, found, all(genes))
+    return Controller(parameters, weights, all(genes))

@@ -45,10 +45,6 @@ def change(child: Controller, parent: Controller) -> Change | None:
     abs(difference) / width of the range, a connection by abs(difference of weight),
     each at most 1. The sum of all three attributes is a metric on brains of one origin.
 
-    Args:
-        child: its brain.
-        parent: the other brain.
-
     Source: own definition, after the compatibility distance of NEAT (Stanley and
     Miikkulainen 2002), whose genes are also matched by origin.
     """
@@ -148,15 +144,8 @@ def brain_measures(
 ) -> dict[str, Numbers]:
     """Return the measures of all brains of a run, and distances to first parents.
 
-    Args:
-        births: births of the run, B rows.
-        parents: births rows of each individual's parents; the first is the one whose
-            copy was changed.
-        trees: bodies of the births, row by row.
-
-    Returns:
-        Arrays (B,) by the columns of ``outputs.OUTPUTS["brains"]``: changes are NaN
-        without parents or common origin, the others if the brain is not known.
+    Arrays are (B,): changes are NaN without parents or common origin, the others if the
+    brain is not known. The first parent is the one whose copy was changed.
 
     Raises:
         MalformedMessage: the brains cannot be read.

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.comparison.ablation import COLUMNS, shares, summary
 from analysis.comparison.robustness import Row, table_of
-from analysis.figures.ablation import ablation
+from analysis.figures.changes import ablation
 from analysis.figures.forms import NothingToDraw
 
 HELD, MEAN, DEAD, RANDOM = (

@@ -6,8 +6,8 @@ import plotnine as p9
 import pytest
 
 from analysis.comparison.robustness import COLUMNS, Row, kept, summary, table_of
+from analysis.figures.changes import robustness
 from analysis.figures.forms import NothingToDraw
-from analysis.figures.robustness import robustness
 
 
 def row(

@@ -14,7 +14,14 @@ from analysis.figures.forms import (
     spread_caption,
     stacked,
 )
-from analysis.figures.style import colours, in_order, label, scales, two_line_label
+from analysis.figures.style import (
+    colours,
+    file_name,
+    in_order,
+    label,
+    scales,
+    two_line_label,
+)
 from tests.analysis.drawn import Row, layers, table
 
 
@@ -220,6 +227,20 @@ def test_file_names_say_what_is_shown() -> None:
     assert {"6.2-fitness-at-the-end", "A-connections-at-the-end"} <= set(stems)
     tree = Figure("G-a b", "Ancestry", "", (), list, "robots", "ancestry-of-a b")
     assert tree.stem == "G-ancestry-of-a-b"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("best-robot-of-sw-map=maps/a.png", "best-robot-of-sw-map=maps-a.png"),
+        ("S-sweep-a b~2", "S-sweep-a-b~2"),
+        ("G-ancestry-of-größe", "G-ancestry-of-größe"),
+        ("G-" + "x" * 300, "G-" + "x" * 98),
+        ("x" + "ö" * 300, "x" + "ö" * 49),
+    ],
+)
+def test_file_names_are_safe_and_cut_between_characters(text: str, name: str) -> None:
+    assert file_name(text) == name
 
 
 def test_missing_data_is_named() -> None:

@@ -11,8 +11,8 @@ from matplotlib import pyplot as plt
 from PIL import Image
 from rich.progress import Progress
 
-from analysis.figures import figure_writer
-from analysis.figures.catalogue import Figure
+from analysis.figures import robot_figures
+from analysis.figures.catalogue import Figure, missing
 from analysis.figures.family_tree import Best
 from analysis.figures.figure_writer import FigureWriter, draw_figures
 from analysis.figures.robot_pictures import RobotPicture
@@ -35,21 +35,21 @@ def robot_of(experiment: str, shade: int) -> RobotPicture:
 
 def test_each_experiment_has_files_of_its_own(tmp_path: Path) -> None:
     writer = FigureWriter(tmp_path)
-    names = ("a b", "a-b", "sw-map=maps/a.png", f"sw-list=[{'1,' * 200}]")
+    names = ("a b", "A-b", "sw-map=maps/a.png", f"sw-list=[{'1,' * 200}]")
     for experiment in names:
         writer.add(tree_of(experiment), {})
     films = [writer.add_film(robot_of(name, 60 * at)) for at, name in enumerate(names)]
     pictures = [one.picture for one in writer.drawn]
     assert [path.name for path in pictures[:3]] == [
         "G-ancestry-of-a-b.png",
-        "G-ancestry-of-a-b-2.png",
+        "G-ancestry-of-A-b-2.png",
         "G-ancestry-of-sw-map=maps-a.png.png",
     ]
     assert {path for path in pictures if path.is_file()} == {*tmp_path.glob("*.png")}
     assert len({*pictures}) == len({*tmp_path.glob("*.pdf")}) == len(names)
     assert [one.path.name for one in films[:3]] == [
         "best-robot-of-a-b.gif",
-        "best-robot-of-a-b-2.gif",
+        "best-robot-of-A-b-2.gif",
         "best-robot-of-sw-map=maps-a.png.gif",
     ]
     for at, one in enumerate(films):
@@ -62,7 +62,7 @@ def test_a_left_out_figure_removes_only_its_own_earlier_files(tmp_path: Path) ->
     writer = FigureWriter(tmp_path)
     writer.add(tree_of("b"), {})
     for number in ("G-ancestry", "6.2"):
-        writer.add(figure_writer._missing(number, "there is none"), {})
+        writer.add(missing(number, "there is none"), {})
     assert [path.name for path in tmp_path.glob("*.png")] == ["G-ancestry-of-b.png"]
 
 
@@ -86,7 +86,7 @@ def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors() -> None:
     # The robot, and one ancestor on each level above it.
     chain = tuple((row,) for row in range(LEVELS))
     shown = replace(robot_of("a", 0), family=Family(chain, (), (), {}))
-    tree = figure_writer._tree(shown, 4, table("robots", []), "m/s")
+    tree = robot_figures._tree(shown, 4, table("robots", []), "m/s")
     assert "its ancestors over four levels of reproduction" in str(tree.caption)
 
 

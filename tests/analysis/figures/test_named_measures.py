@@ -3,7 +3,7 @@
 import pyarrow as pa
 from matplotlib.text import Text
 
-from analysis.figures import named_measures
+from analysis.figures.courses import UNITS, measures_over_births
 from tests.analysis.drawn import layers
 from worker.measures.functions import BUILT_IN
 
@@ -19,7 +19,7 @@ def test_figure_is_drawn_without_a_warning() -> None:
     ]  # fmt: skip
     tables = {"named_measures": pa.Table.from_pylist(rows)}
     # Warnings are errors: a scale without a layer that uses it is one.
-    drawn = named_measures.measures_over_births(tables).draw()
+    drawn = measures_over_births(tables).draw()
     (line,) = drawn.axes[0].lines or drawn.axes[0].collections
     assert line is not None
     texts = {text.get_text() for text in drawn.findobj(Text)}
@@ -29,14 +29,12 @@ def test_figure_is_drawn_without_a_warning() -> None:
 def test_a_measure_at_one_number_of_births_is_a_dot() -> None:
     row = {"experiment": "a", "folder": "a-1", "island": 0, "births": 15, "mean": 0.1}
     rows = [{**row, "measure": "height", "about": ""}]
-    figure = named_measures.measures_over_births(
-        {"named_measures": pa.Table.from_pylist(rows)}
-    )
+    figure = measures_over_births({"named_measures": pa.Table.from_pylist(rows)})
     assert layers(figure)["geom_point"]["mean"] == [0.1]
 
 
 def test_units_are_those_of_the_docstrings() -> None:
-    assert named_measures.UNITS.keys() < BUILT_IN.keys()
+    assert UNITS.keys() < BUILT_IN.keys()
     for name, function in BUILT_IN.items():
-        unit = named_measures.UNITS.get(name, "1")
+        unit = UNITS.get(name, "1")
         assert f"[{unit}]" in (function.__doc__ or "").partition("Source")[0], name

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from analysis.figures.brains import changes_over_births
+from analysis.figures.courses import changes_over_births
 from analysis.figures.forms import NothingToDraw
 from analysis.measures.brains.controllers import Controller, of_genome, of_robot
 from analysis.measures.brains.measures import change, recurrent, sensed
