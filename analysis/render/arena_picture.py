@@ -48,13 +48,7 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
         *,
         size: tuple[int, int],
     ) -> None:
-        """Build the model, and place the camera.
-
-        Args:
-            robots: all that have a pose in a frame.
-            settings: of the arena.
-            frames: what the camera must see; at least one pose.
-            size: width and height of pictures [pixels].
+        """Build the model of all robots with a pose in a frame, and place the camera.
 
         Raises:
             ExperimentError: invalid scenery.

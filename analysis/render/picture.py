@@ -1,8 +1,8 @@
 """Pictures of one robot, and their files."""
 
 import io
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -50,11 +50,6 @@ class RobotRenderer(AbstractContextManager["RobotRenderer"]):
         size: tuple[int, int] = (640, 480),
     ) -> None:
         """Build the model, with the robot in neutral pose.
-
-        Args:
-            robot: a valid robot.
-            settings: its part types, simulation, ground and scenery.
-            size: width and height of pictures [pixels].
 
         Raises:
             ExperimentError: invalid scenery.
@@ -114,14 +109,9 @@ class RobotRenderer(AbstractContextManager["RobotRenderer"]):
     def framing(
         self, poses: Sequence[Floats], cut: tuple[float, float]
     ) -> tuple[Floats, float]:
-        """Return where a fixed camera sees a robot and its shadow in some poses.
+        """Return ``look_at`` and ``distance_m`` to see a robot and its shadow in poses.
 
-        Args:
-            poses: (nq,) each; at least one.
-            cut: shares of the picture's height that are cut off above and below.
-
-        Returns:
-            ``look_at`` and ``distance_m`` of ``picture``.
+        Shares of the picture's height may be cut off above and below.
         """
         centres: list[Floats] = []
         lamp = self._stage.data.light_xpos[0]
@@ -138,16 +128,13 @@ class RobotRenderer(AbstractContextManager["RobotRenderer"]):
 def gait_strip(
     pictures: Sequence[Picture], times_s: Sequence[float] = (), *, columns: int = 5
 ) -> Picture:
-    """Return pictures side by side in rows; the rest of the last row is white.
+    """Return pictures of one size in rows; the rest of the last row is white.
 
-    Args:
-        pictures: pictures of one size; at least one.
-        times_s: simulated time of each, written below it [s]; empty: none is written.
-        columns: most pictures in a row.
+    The simulated time of each [s] is written below it, if given.
     """
     if times_s:
         marked = zip(pictures, times_s, strict=True)
-        pictures = [_with_time(each, time_s) for each, time_s in marked]
+        pictures = [_with_time(picture, time_s) for picture, time_s in marked]
     height, width, _ = pictures[0].shape
     columns = min(columns, len(pictures))
     rows = -(-len(pictures) // columns)
@@ -176,33 +163,29 @@ def save_picture(picture: Picture, path: Path) -> None:
     Raises:
         NoPictures: the ending is unknown, or the file cannot be written.
     """
-    try:
+    with _writing(path):
         Image.fromarray(picture).save(path)
-    except OSError as error:
-        raise NoPictures(
-            f"{path}: cannot be written: {error.strerror or error}"
-        ) from None
-    except ValueError as error:
-        raise NoPictures(f"{path}: {error}") from None
 
 
 def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
-    """Write pictures as an animation that repeats (.gif).
-
-    Args:
-        pictures: pictures of one size; at least one.
-        path: path that ends in .gif.
-        interval_s: time between two pictures [s]; a GIF stores hundredths.
+    """Write pictures as a ``gif``.
 
     Raises:
         NoPictures: the file cannot be written.
     """
-    try:
+    with _writing(path):
         path.write_bytes(gif(pictures, interval_s, _COLOURS))
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
-        raise NoPictures(
-            f"{path}: cannot be written: {error.strerror or error}"
-        ) from None
+        why = f"cannot be written: {error.strerror or error}"
+        raise NoPictures(f"{path}: {why}") from None
+    except ValueError as error:
+        raise NoPictures(f"{path}: {error}") from None
 
 
 def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:

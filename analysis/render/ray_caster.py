@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from analysis.render.framing import view_axes
 from schema.robot.trace import Floats
 
 _VISIBLE = np.array([1, 1, 1, 0, 0, 0], np.uint8)
@@ -56,15 +57,10 @@ class RayCaster:
         *,
         floor: tuple[str, Shades, float],
     ) -> None:
-        """Prepare the colours of a model.
+        """Prepare the colours of a model with one white spot light.
 
-        Args:
-            model: with one white spot light; its field of view and its headlight,
-                which is white, apply.
-            height: of pictures [pixels].
-            width: of pictures [pixels].
-            floor: name of the material that has a checker, its two colours, (2, 3)
-                from 0 to 1, and the side of its tiles [m].
+        ``floor`` is the name of the material that has a checker, its two colours,
+        (2, 3) from 0 to 1, and the side of its tiles [m].
         """
         self._model = model
         self._size = height, width
@@ -96,15 +92,8 @@ class RayCaster:
         self, data: mujoco.MjData, camera: mujoco.MjvCamera
     ) -> npt.NDArray[np.uint8]:
         azimuth, elevation = np.radians((camera.azimuth, camera.elevation))
-        ahead = np.array(
-            [
-                np.cos(elevation) * np.cos(azimuth),
-                np.cos(elevation) * np.sin(azimuth),
-                np.sin(elevation),
-            ]
-        )
-        right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
-        axes = np.array([right, np.cross(right, ahead), ahead])
+        axes = view_axes(azimuth, elevation) * [[1.0], [1.0], [-1.0]]
+        ahead = axes[2]
         eye = camera.lookat - camera.distance * ahead
         hits = self._hits(data, eye, self._rays @ axes)
         edges = np.flatnonzero(_edges(hits, self._size))
@@ -128,13 +117,7 @@ class RayCaster:
         return rays / np.sqrt(_products(rays, rays))[:, None]
 
     def _hits(self, data: mujoco.MjData, eye: Floats, rays: Floats) -> _Hits:
-        """Return what rays hit, and its colour in the light.
-
-        Args:
-            data: state, with positions computed.
-            eye: (3,) origin of the rays [m].
-            rays: (N, 3) unit vectors.
-        """
+        """Return what rays, (N, 3) unit vectors, hit, and its colour in the light."""
         geoms, distances, normals = self._cast(data, eye, rays)
         is_sky = geoms < 0
         normals[is_sky] = 0.0, 0.0, 1.0

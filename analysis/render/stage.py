@@ -60,10 +60,10 @@ def _installed() -> str | None:
     """Return the first backend whose library is installed."""
     if find_spec("OpenGL") is None:
         return None
-    found = (
-        name for name, file in _LIBRARIES.items() if ctypes.util.find_library(file)
-    )
-    return next(found, None)
+    for name, library in _LIBRARIES.items():
+        if ctypes.util.find_library(library):
+            return name
+    return None
 
 
 @lru_cache(maxsize=1)
@@ -86,13 +86,7 @@ class Stage:
         size: tuple[int, int],
         elevation: float = LOW,
     ) -> None:
-        """Prepare drawing.
-
-        Args:
-            model: MuJoCo model.
-            size: width and height of pictures [pixels].
-            elevation: of the camera's view, as MuJoCo's [degrees].
-        """
+        """Prepare pictures of a size [pixels], seen from an elevation [degrees]."""
         import mujoco  # noqa: PLC0415 - after its engine is chosen
 
         self.model, self.data = model, mujoco.MjData(model)
@@ -111,12 +105,7 @@ class Stage:
         self._mujoco.mj_camlight(self.model, self.data)
 
     def picture(self, look_at: Floats, distance_m: float) -> Picture:
-        """Return a picture of the present state.
-
-        Args:
-            look_at: (3,) point that the camera looks at [m].
-            distance_m: of the camera from there [m].
-        """
+        """Return a picture of the state, from a distance of a point, (3,) [m]."""
         camera = self._mujoco.MjvCamera()
         camera.lookat[:], camera.distance = look_at, distance_m
         camera.azimuth, camera.elevation = AZIMUTH, self._elevation
@@ -126,15 +115,9 @@ class Stage:
     def framing(
         self, centres: Floats, radii: Floats, cut: tuple[float, float]
     ) -> tuple[Floats, float]:
-        """Return where a camera sees all of some spheres.
+        """Return ``look_at`` and ``distance_m`` to see spheres, as in ``framed``.
 
-        Args:
-            centres: (N, 3) their centres [m]; at least one.
-            radii: (N,) their radii [m].
-            cut: shares of the picture's height that are cut off above and below.
-
-        Returns:
-            ``look_at`` and ``distance_m`` of ``picture``.
+        Shares of the picture's height may be cut off above and below.
         """
         edge, (width, height) = np.tan(np.radians(FIELD_OF_VIEW / 2)), self._size
         above, below = ((1 - 2 * share) * edge for share in cut)
@@ -174,11 +157,8 @@ def furnish(
 ) -> None:
     """Add floor, light and sky to the specification of a model.
 
-    Args:
-        size: width and height of pictures [pixels].
-        shown_light: position of the light that robots read, shown as a ball [m].
-        reach_m: half width of what is shown [m].
-        spec: of the model.
+    A light that robots read is shown as a ball; ``reach_m`` is half the width of what
+    is shown.
     """
     import mujoco  # noqa: PLC0415 - after its engine is chosen
 

@@ -1,12 +1,11 @@
 """Films of arenas, drawn from the poses of a run."""
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
 from analysis.measures.load import read_run
 from analysis.progress import bars
@@ -36,7 +35,7 @@ SPEED = 2.0
 _SIZE = 640, 480
 _COLUMNS = 2
 """Arenas side by side."""
-_CORE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+_POSE = ("sim_time_s", "angles", "x", "y", "z", "qw", "qx", "qy", "qz")
 
 Frames = Mapping[float, Poses]
 """Poses of an arena's robots by simulated time [s], ascending."""
@@ -82,15 +81,10 @@ def film(options: argparse.Namespace) -> int:
 def draw_film(
     folder: Path, span: tuple[float, float], size: tuple[int, int]
 ) -> tuple[list[Picture], list[float]]:
-    """Draw the arenas of a run, side by side.
-
-    Args:
-        folder: the run folder.
-        span: simulated time of start and end [s].
-        size: width and height of an arena [pixels].
+    """Draw the arenas of a run, side by side, each of a size [pixels].
 
     Returns:
-        A picture of each recorded time, and the times [s].
+        A picture of each recorded time in a span [s], and the times [s].
 
     Raises:
         RunFolderError: the folder has no run, or the run has no robot yet.
@@ -100,8 +94,8 @@ def draw_film(
     allow_plugins_of(folder)
     experiment = experiment_from_text(run.document, is_own=True)
     bodies = {one.birth: one.body for one in read_news(run).births}
-    found = read_frames(folder, *span)
-    if not found:
+    islands = read_frames(folder, *span)
+    if not islands:
         if scene_of(experiment).arenas:
             raise NoPictures(
                 f"{folder}: no poses of an arena between {span[0]:g} and {span[1]:g} "
@@ -111,53 +105,39 @@ def draw_film(
             f"{folder}: the run has no arena; for the film of a robot use: revolve "
             "robot render"
         )
-    times_s = sorted({time_s for frames in found.values() for time_s in frames})
+    times_s = sorted({time_s for frames in islands.values() for time_s in frames})
     with ExitStack() as stack, bars(f"rendering {len(times_s)} pictures") as bar:
         renderers = {
             island: stack.enter_context(
                 _renderer(experiment, island, frames, bodies, size)
             )
-            for island, frames in found.items()
+            for island, frames in islands.items()
         }
-        pictures = [
-            gait_strip(
-                [
-                    renderers[island].picture(frames.get(time_s, {}))
-                    for island, frames in found.items()
-                ],
-                [time_s] * len(found),
-                columns=_COLUMNS,
-            )
-            for time_s in bar.track(times_s, description="rendering")
-        ]
+        pictures = []
+        for time_s in bar.track(times_s, description="rendering"):
+            beside = [
+                renderers[island].picture(frames.get(time_s, {}))
+                for island, frames in islands.items()
+            ]
+            times = [time_s] * len(beside)
+            pictures.append(gait_strip(beside, times, columns=_COLUMNS))
     return pictures, times_s
 
 
 def read_frames(folder: Path, start_s: float, end_s: float) -> dict[int, Frames]:
     """Return the poses of a span, by island and time.
 
-    Args:
-        folder: the run folder.
-        start_s: simulated time of the span's start [s].
-        end_s: simulated time of its end [s].
-
     Raises:
         RunFolderError: the table cannot be read.
     """
-    found: dict[int, dict[float, dict[BirthId, np.ndarray]]] = {}
+    islands: dict[int, dict[float, dict[BirthId, np.ndarray]]] = {}
     for island, table in read_poses(folder, start_s, end_s):
-        frames = found.setdefault(island, {})
+        frames = islands.setdefault(island, {})
         for birth, rows in rows_by_robot(table):
-            for time_s, pose in _poses(rows):
-                frames.setdefault(time_s, {})[birth] = pose
-    return {island: dict(sorted(frames.items())) for island, frames in found.items()}
-
-
-def _poses(rows: pa.Table) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield the times and poses of one robot."""
-    columns = [rows[name].to_pylist() for name in ("sim_time_s", "angles", *_CORE)]
-    for time_s, angles, *core in zip(*columns, strict=True):
-        yield time_s, np.array([*core, *angles])
+            columns = [rows[name].to_pylist() for name in _POSE]
+            for time_s, angles, *core in zip(*columns, strict=True):
+                frames.setdefault(time_s, {})[birth] = np.array([*core, *angles])
+    return {island: dict(sorted(frames.items())) for island, frames in islands.items()}
 
 
 def _renderer(

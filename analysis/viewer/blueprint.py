@@ -18,13 +18,7 @@ _GRID = (205, 208, 216)
 def layout(
     scene: Scene, *, follow: BirthId | None = None, motions: Sequence[BirthId] = ()
 ) -> rrb.Blueprint:
-    """Return the layout for a run.
-
-    Args:
-        scene: scene of the run.
-        follow: robot that the camera follows.
-        motions: re-simulated robots, which are shown in a view of their own.
-    """
+    """Return the layout for a run; re-simulated robots have a view of their own."""
     islands, arenas = scene.islands, scene.arenas
     views = [_island_view(scene, each, follow) for each in islands]
     if motions and not arenas:

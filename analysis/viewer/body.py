@@ -66,10 +66,7 @@ class BoxModel:
 def box_model(robot: Robot, space: BodySpace, *, is_plain: bool) -> BoxModel:
     """Return the box model of a robot.
 
-    Args:
-        robot: a valid robot; its brain is ignored.
-        space: its part types.
-        is_plain: one box per part and segment, without thin plates.
+    A plain one has one box per part and segment, without thin plates.
     """
     builder = _Builder(robot, space, is_plain=is_plain)
     for index in range(len(robot.parts)):
@@ -81,7 +78,7 @@ def place(model: BoxModel, roots: Floats, angles: Floats) -> tuple[Float32s, Flo
     """Return the places of a model's boxes.
 
     Args:
-        model: the body.
+        model: boxes of the body.
         roots: (T, 7) position x, y, z [m] and attitude w, x, y, z of the core.
         angles: (T, J) joint angles [rad] or displacements [m], by ascending part.
 
@@ -102,8 +99,8 @@ def place(model: BoxModel, roots: Floats, angles: Floats) -> tuple[Float32s, Flo
     turned, placed = np.stack(attitudes, axis=1), np.stack(places, axis=1)
     offsets = rotated(turned[:, model.segments], model.centres)
     centres = placed[:, model.segments] + offsets
-    found = product(turned[:, model.carried_by], model.attitudes)[:, model.attitude_of]
-    return centres.astype(np.float32), found.astype(np.float32)
+    own = product(turned[:, model.carried_by], model.attitudes)[:, model.attitude_of]
+    return centres.astype(np.float32), own.astype(np.float32)
 
 
 def place_rows(model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
@@ -130,15 +127,7 @@ def place_rows(model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
 def neutral_pose(
     model: BoxModel, spot: tuple[float, float]
 ) -> tuple[Float32s, Float32s]:
-    """Return the places of a model's boxes in neutral pose, standing on the ground.
-
-    Args:
-        model: the body.
-        spot: place of the core's centre in the ground plane, world frame [m].
-
-    Returns:
-        Centres (1, B, 3) and attitudes (1, B, 4), as ``place`` does.
-    """
+    """Return ``place`` of one neutral pose that stands on the ground at a spot [m]."""
     root = np.array([[*spot, 0.0, 1.0, 0.0, 0.0, 0.0]])
     centres, attitudes = place(model, root, np.zeros((1, len(model.parents) - 1)))
     # The lowest corner of a turned box is below its centre by the sum of the heights
@@ -232,10 +221,10 @@ class _Builder:
 
 def _inscribed(boxes: Iterable[Box]) -> list[Box]:
     """Return boxes, with four boxes in place of each cylinder."""
-    found: list[Box] = []
+    inscribed: list[Box] = []
     for box in boxes:
         if not box.is_round:
-            found.append(box)
+            inscribed.append(box)
             continue
         diameter, _, length = box.size
         step = math.pi / _ROUND
@@ -245,13 +234,13 @@ def _inscribed(boxes: Iterable[Box]) -> list[Box]:
             turn = np.array(box.rotation) @ ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
             (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = turn.tolist()
             matrix: Matrix = ((xx, xy, xz), (yx, yy, yz), (zx, zy, zz))
-            found.append(replace(box, size=size, rotation=matrix, is_round=False))
-    return found
+            inscribed.append(replace(box, size=size, rotation=matrix, is_round=False))
+    return inscribed
 
 
 def _plain(boxes: Iterable[Box]) -> list[Box]:
     """Return one box per segment that encloses its boxes; plates only if alone."""
-    found: list[Box] = []
+    plain: list[Box] = []
     for segment in (0, 1):
         own = [box for box in boxes if box.segment == segment]
         thick = [box for box in own if box.size[0] >= _PLATE_M]
@@ -260,10 +249,10 @@ def _plain(boxes: Iterable[Box]) -> list[Box]:
             middles = np.array([box.position for box in chosen])
             low, high = (middles - halves).min(axis=0), (middles + halves).max(axis=0)
             size, middle = (high - low).tolist(), (0.5 * (low + high)).tolist()
-            found.append(
+            plain.append(
                 Box("all", tuple(size), tuple(middle), 0.0, segment, chosen[0].rotation)
             )
-    return found
+    return plain
 
 
 def product(first: Floats, second: Floats) -> Floats:

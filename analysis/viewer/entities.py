@@ -24,12 +24,7 @@ class AncestryNode:
 
 
 def recording_name(experiment: str, folder: str) -> str:
-    """Return the name of a run's recording.
-
-    Args:
-        experiment: name of the experiment.
-        folder: name of the run folder, which usually starts with that.
-    """
+    """Return the name of a run's recording; that of the folder usually says both."""
     return folder if folder.startswith(experiment) else f"{experiment}-{folder}"
 
 

@@ -36,25 +36,22 @@ Surface = Relief | Solid
 def surfaces(
     environment: Environment, simulation: Simulation, light: Vector | None = None
 ) -> tuple[Surface, ...]:
-    """Return the surfaces of rough ground, scenery and the light.
+    """Return the surfaces of rough ground, scenery and the light, a small ball.
 
-    Args:
-        environment: ground and scenery; objects that move are where they start.
-        simulation: of the scenery's defaults.
-        light: position of the light, a small ball [m].
+    Objects of the scenery that move are where they start.
 
     Raises:
         ExperimentError: the scenery is invalid.
     """
-    found: list[Surface] = []
+    shown: list[Surface] = []
     if environment.roughness_m:
-        found.append(_rough(environment))
+        shown.append(_rough(environment))
     if environment.scenery:
-        found += solids(environment.scenery, simulation)
+        shown += solids(environment.scenery, simulation)
     if light is not None:
         size = np.array([LIGHT_M, 0.0, 0.0])
-        found.append(Solid("sphere", size, np.array(light), np.eye(3), LIGHT_COLOUR))
-    return tuple(found)
+        shown.append(Solid("sphere", size, np.array(light), np.eye(3), LIGHT_COLOUR))
+    return tuple(shown)
 
 
 def _rough(environment: Environment) -> Relief:

@@ -6,7 +6,8 @@ dropped, so that a slow viewer neither needs more memory nor blocks the run.
 
 import threading
 from collections import deque
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Self
@@ -196,10 +197,6 @@ class LiveSource:
         """Return the messages received, in order; request lost ones again.
 
         Say when the hub is gone and when it is back.
-
-        Args:
-            timeout_s: time to wait for a message [s].
-            now_s: time of a monotonic clock [s].
         """
         self._has_news.wait(timeout_s)
         self._has_news.clear()
@@ -209,18 +206,12 @@ class LiveSource:
             waiting = self._next()
             if waiting is None:
                 break
-            try:
-                each = self._understood(waiting)
-            except MalformedMessage as error:
-                self._drop(error)
-                continue
-            if each is not None:
-                messages.append(each)
+            with self._dropping():
+                if (message := self._understood(waiting)) is not None:
+                    messages.append(message)
         while self._tokens:
-            try:
+            with self._dropping():
                 self._token(self._tokens.popleft())
-            except MalformedMessage as error:
-                self._drop(error)
         self._look(now_s)
         if self._presence.has_ended and not self._has_told_end:
             self._has_told_end = True
@@ -235,12 +226,18 @@ class LiveSource:
         """Wait for another run than the one that was received first."""
         self._sequel = Sequel()
 
-    def _drop(self, error: MalformedMessage) -> None:
-        with self._lock:
-            self.dropped += 1
-        if not self._has_told:
-            self._has_told = True
-            tell_user(f"dropped a malformed message: {error}; more are only counted")
+    @contextmanager
+    def _dropping(self) -> Iterator[None]:
+        """Count a malformed message; say what is wrong with the first."""
+        try:
+            yield
+        except MalformedMessage as error:
+            with self._lock:
+                self.dropped += 1
+            if not self._has_told:
+                self._has_told = True
+                line = f"dropped a malformed message: {error}; more are only counted"
+                tell_user(line)
 
     def _look(self, now_s: float) -> None:
         """Note whether the hub is there; after its return the state is requested."""

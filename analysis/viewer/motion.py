@@ -37,11 +37,8 @@ def selected_robots(
 ) -> list[BirthId]:
     """Return the robots of ``--robot``, each once, in their order.
 
-    Args:
-        folder: the run folder.
-        wanted: robots named by the user.
-        has_ancestry: add the first parent of each robot, its first parent, and so on,
-            back to a founder.
+    With ancestry the first parent of each robot, its first parent, and so on, back to a
+    founder, are added.
 
     Raises:
         ViewerError: no robot of that name was born.
@@ -49,25 +46,21 @@ def selected_robots(
     births = read_table(folder, "births", ["island", "birth", "parents"])
     rows = (row.values() for row in births.to_pylist())
     parents = {BirthId(island, birth): couple for island, birth, couple in rows}
-    found: dict[BirthId, None] = {}
+    selected: dict[BirthId, None] = {}
     for birth in wanted:
         if birth not in parents:
             raise ViewerError(f"--robot {birth.name}: no robot of that name was born")
-        found[birth] = None
+        selected[birth] = None
         last = birth
         while has_ancestry and parents[last]:
             first = parents[last][0]
             last = BirthId(first["island"], first["birth"])
-            found[last] = None
-    return list(found)
+            selected[last] = None
+    return list(selected)
 
 
 def named_robot(folder: Path, name: str) -> tuple[BirthId, str]:
-    """Return the robot of a run that ``--robot`` names, and a line about it.
-
-    Args:
-        folder: the run folder.
-        name: ``best``, of the last population, or ``best-ever``.
+    """Return the robot that ``--robot`` names, and a line about it.
 
     Raises:
         ViewerError: no robot was evaluated.
@@ -88,14 +81,7 @@ def named_robot(folder: Path, name: str) -> tuple[BirthId, str]:
 def show_motion(
     recording: Recording, motion: Motion, model: BoxModel, lane: int | None
 ) -> None:
-    """Show the motion of a robot.
-
-    Args:
-        recording: recording to log to.
-        motion: motion of the robot.
-        model: model of the robot.
-        lane: lane that it is shown in, from 0; None shows it at its recorded place.
-    """
+    """Show the motion of a robot in a lane, or at its recorded place if it is None."""
     path = motion_path(motion.birth)
     times = motion.poses["sim_time_s"].to_numpy()
     centres, attitudes = place_rows(model, motion.poses)

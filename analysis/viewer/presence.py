@@ -31,12 +31,7 @@ class Presence:
         self._watched = self.coordinators.get(token, self._watched)
 
     def look(self, hubs: frozenset[str], now_s: float) -> None:
-        """Note which hubs are there.
-
-        Args:
-            hubs: ids of the sessions of the connected hubs.
-            now_s: time of a monotonic clock [s].
-        """
+        """Note which hubs are there, by the ids of their sessions."""
         was_there, self.is_hub_there = self.is_hub_there, bool(hubs)
         # A hub that is started again soon has another id.
         if hubs and not (was_there and hubs & self._hubs):

@@ -14,7 +14,7 @@ from schema.parts import BodySpace
 from schema.robot.robot import Part, check_body, check_tree
 from schema.wire.arena import Live
 from schema.wire.poses import PoseArrays
-from schema.wire.updates import Update
+from schema.wire.updates import Birth, Death, Level, Migrant, Update
 
 _LATEST_S = LONGEST_WALL_S
 """Simulated time; the recording has 64 bits of nanoseconds [s]."""
@@ -27,20 +27,16 @@ def check_update(news: Update, scene: Scene) -> None:
         MalformedMessage: an unknown island, a body that breaks the rules of the run, a
             time beyond the limit, a text that is too long.
     """
-    islands = [each.birth.island for each in news.births]
-    islands += [gone.island for gone in news.deaths]
-    islands += [level.island for level in news.levels]
-    for one in news.migrants:
-        islands += [one.island, one.to]
-    if unknown := set(islands) - set(scene.islands):
+    islands = {one.birth.island for one in news.births}
+    placed: list[Death | Level | Migrant] = [*news.deaths, *news.levels, *news.migrants]
+    islands |= {one.island for one in placed} | {one.to for one in news.migrants}
+    if unknown := islands - set(scene.islands):
         raise MalformedMessage(f"update: the run has no island {min(unknown)}")
-    times = [each.sim_time_s for each in news.births]
-    times += [gone.sim_time_s for gone in news.deaths]
-    times += [one.sim_time_s for one in news.migrants]
-    for time_s in times:
-        if time_s is not None and not 0.0 <= time_s <= _LATEST_S:
+    dated: list[Birth | Death | Migrant] = [*news.births, *news.deaths, *news.migrants]
+    for one in dated:
+        if one.sim_time_s is not None and not 0.0 <= one.sim_time_s <= _LATEST_S:
             raise MalformedMessage(
-                f"update: times must be in [0, {_LATEST_S:g}] s, got {time_s}"
+                f"update: times must be in [0, {_LATEST_S:g}] s, got {one.sim_time_s}"
             )
     texts = [gone.reason for gone in news.deaths]
     texts += [text for man in news.workers for text in (man.name, man.platform)]

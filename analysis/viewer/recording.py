@@ -55,14 +55,7 @@ class Recording(AbstractContextManager["Recording"]):
         file: Path | None = None,
         serve: tuple[str, int] | None = None,
     ) -> None:
-        """Open the recording.
-
-        Args:
-            name: name of the recording; other characters than letters, digits, ``_``
-                and ``-`` are replaced.
-            blueprint: layout of the viewer.
-            file: file to write.
-            serve: host and port to serve viewers at; logging never waits for them.
+        """Open the recording; logging never waits for viewers.
 
         Raises:
             ViewerError: the file cannot be written, or the port cannot be served.
@@ -92,8 +85,6 @@ class Recording(AbstractContextManager["Recording"]):
     def flush(self) -> None:
         """Write buffered data to the file."""
         self._stream.flush()
-
-    # --- arenas and robots --------------------------------------------------
 
     def add_scene(self, scene: Scene) -> None:
         """Log the islands of a run, before any robot."""
@@ -128,12 +119,7 @@ class Recording(AbstractContextManager["Recording"]):
         self._stream.log(f"{path}/size", size, static=True)
 
     def ground(self, path: str, surfaces: Sequence[Surface]) -> None:
-        """Log ground and scenery.
-
-        Args:
-            path: entity that it belongs to.
-            surfaces: surfaces above the plane.
-        """
+        """Log ground and scenery above the plane of an entity."""
         for number, surface in enumerate(surfaces):
             drawn = _relief(surface) if isinstance(surface, Relief) else _solid(surface)
             self._stream.log(f"{path}/ground/{number}", drawn, static=True)
@@ -154,14 +140,9 @@ class Recording(AbstractContextManager["Recording"]):
         centres: Float32s,
         attitudes: Float32s,
     ) -> None:
-        """Log poses of a robot in one batch.
+        """Log poses of a robot, as ``place`` returns them, in one batch.
 
-        Args:
-            path: entity of the robot.
-            times_s: (T,) times of the poses [s].
-            births: (T,) births so far, if known.
-            centres: (T, B, 3) centres of the boxes [m].
-            attitudes: (T, B, 4) attitudes of the boxes x, y, z, w.
+        Their times [s], and the births so far if known, are (T,).
         """
         rows, count, _ = centres.shape
         durations = np.round(times_s * 1e9).astype("timedelta64[ns]")
@@ -183,19 +164,10 @@ class Recording(AbstractContextManager["Recording"]):
         self._at(when)
         self._stream.log(path, rr.Clear(recursive=True))
 
-    # --- the rest -----------------------------------------------------------
-
     def level(
         self, island: int, when: TimePoint, size: int, fitness: Sequence[float]
     ) -> None:
-        """Log size and fitness of an island's population.
-
-        Args:
-            island: number of the island.
-            when: time of the population.
-            size: number of living robots.
-            fitness: mean and best; empty if no robot was evaluated.
-        """
+        """Log size, and mean and best fitness if there are, of a population."""
         self._at(when)
         path = island_path(island)
         self._stream.log(f"{path}/size", rr.Scalars(float(size)))

@@ -71,10 +71,8 @@ def span_of(
 ) -> tuple[float, float]:
     """Return the simulated time to show, of the flags of ``revolve view`` [s].
 
-    Args:
-        options: ``run``, ``start`` and ``until``.
-        last_s: time that is shown by default, at the end of the run [s].
-        error: raised if the span ends before it starts.
+    By default it is ``last_s`` at the end of the run. The error is raised if the span
+    ends before it starts.
     """
     end_s = last_time(options.run) if options.until is None else options.until
     start_s = max(0.0, end_s - last_s) if options.start is None else options.start
@@ -86,20 +84,18 @@ def span_of(
 def read_poses(
     folder: Path, start_s: float, end_s: float
 ) -> Iterator[tuple[int, pa.Table]]:
-    """Yield the poses of a span, in pieces of ``CHUNK_S``.
-
-    Args:
-        folder: the run folder.
-        start_s: simulated time of the span's start [s].
-        end_s: simulated time of its end [s].
-
-    Yields:
-        Number of an island, and its rows by time.
+    """Yield islands and their poses in a span, by time, in pieces of ``CHUNK_S``.
 
     Raises:
         RunFolderError: the table cannot be read.
     """
-    poses = _within(folder, start_s, end_s)
+    time = pc.field("sim_time_s")
+    is_in = (time >= start_s) & (time <= end_s)
+    if parquet_files(folder, "poses"):
+        # Reads no more than needed.
+        poses = campaign(folder, "poses").to_table(filter=is_in)
+    else:
+        poses = read_table(folder, "poses", where=is_in)
     times = poses["sim_time_s"].to_numpy()
     chunks = np.floor((times - start_s) / CHUNK_S).astype(np.int64)
     for chunk in np.unique(chunks).tolist():
@@ -121,12 +117,3 @@ def rows_by_robot(poses: pa.Table) -> Iterator[tuple[BirthId, pa.Table]]:
     ends = np.cumsum(counts)
     for robot, start, count in zip(robots.tolist(), ends - counts, counts, strict=True):
         yield BirthId(*robot), poses.take(order[start : start + count])
-
-
-def _within(folder: Path, start_s: float, end_s: float) -> pa.Table:
-    """Return the poses of a span, reading no more than needed."""
-    time = pc.field("sim_time_s")
-    is_in = (time >= start_s) & (time <= end_s)
-    if parquet_files(folder, "poses"):
-        return campaign(folder, "poses").to_table(filter=is_in)
-    return read_table(folder, "poses", where=is_in)

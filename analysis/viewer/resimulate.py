@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -74,13 +74,7 @@ def resimulate(
     simulators: Simulators,
     report: Callable[[float], None],
 ) -> list[Motion]:
-    """Return the motions of robots, in their order.
-
-    Args:
-        run: the run.
-        births: the robots.
-        simulators: functions that simulate.
-        report: called with the progress, 0 to 1.
+    """Return the motions of robots, in their order; report the progress, 0 to 1.
 
     Raises:
         ViewerError: no evaluation or pose of a robot is recorded.
@@ -107,7 +101,8 @@ def _alone(
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {birth.name}: no evaluation is recorded")
-    number = _fittest(rows)
+    fitness = [-math.inf if row["fitness"] is None else row["fitness"] for row in rows]
+    number = fitness.index(max(fitness))
     recorded = rows[number]
     if recorded["simulated_s"] is not None:
         steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
@@ -132,12 +127,6 @@ def _alone(
     # The evaluation combines several simulations; the poses are of another one.
     verdict = _verdict(name, differing, recorded["platform"], "evaluates")
     return Motion(birth, poses, f"{verdict}; shown without disturbances")
-
-
-def _fittest(rows: list[dict[str, Any]]) -> int:
-    """Return the index of the greatest fitness, the first of equal ones."""
-    fitness = [-math.inf if row["fitness"] is None else row["fitness"] for row in rows]
-    return fitness.index(max(fitness))
 
 
 def _in_arena(

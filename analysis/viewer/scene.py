@@ -9,10 +9,9 @@ from analysis.viewer.ground import Surface, surfaces
 from schema.experiment.document import (
     Experiment,
     body_space,
-    island_count,
+    island_experiments,
     light_of,
 )
-from schema.experiment.document import island_experiment as of_island
 from schema.mjcf.model import ring_wall
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
@@ -55,16 +54,9 @@ class Scene:
         return self.surfaces[self.islands.index(islands[0])]
 
     def omissions(self, births: Sequence[BirthId]) -> list[str]:
-        """Return lines that say which ground a recording does not show.
-
-        Args:
-            births: robots that are simulated again.
-        """
-        uneven = {
-            island
-            for island, found in zip(self.islands, self.surfaces, strict=True)
-            if found
-        }
+        """Return lines about the ground that robots simulated again do not show."""
+        grounds = zip(self.islands, self.surfaces, strict=True)
+        uneven = {island for island, surfaces in grounds if surfaces}
         what = "rough ground and scenery are not shown"
         lines = []
         if uneven - self.arenas and not births:
@@ -86,9 +78,8 @@ def scene_of(experiment: Experiment) -> Scene:
     Raises:
         ExperimentError: a plug-in with part types is missing, or scenery is invalid.
     """
-    islands = tuple(range(island_count(experiment)))
-    settings = [of_island(experiment, each) for each in islands]
-    arenas = [each.arena for each in settings]
+    settings = island_experiments(experiment)
+    arenas = [island.arena for island in settings]
     reaches = [
         _MARGIN * max(0.5 * arena.wall_diameter_m, arena.birth_radius_m)
         if arena
@@ -96,17 +87,17 @@ def scene_of(experiment: Experiment) -> Scene:
         for arena in arenas
     ]
     return Scene(
-        islands,
-        frozenset(each for each in islands if arenas[each] is not None),
+        tuple(range(len(settings))),
+        frozenset(number for number, arena in enumerate(arenas) if arena),
         max(reaches),
         body_space(experiment.space),
         tuple(ring_wall(arena) if arena else np.zeros((0, 10)) for arena in arenas),
         tuple(
             surfaces(
-                each.environment,
-                each.simulation,
-                light_of(each.environment, each.arena),
+                island.environment,
+                island.simulation,
+                light_of(island.environment, island.arena),
             )
-            for each in settings
+            for island in settings
         ),
     )

@@ -114,12 +114,9 @@ class Show:
     def move(
         self, arena: int, poses: pa.Table, *, has_all: bool = True
     ) -> pa.Table | None:
-        """Record poses of the robots in an arena.
+        """Record poses of the robots in an arena, rows of the poses table by time.
 
-        Args:
-            arena: number of its island.
-            poses: rows of the poses table, by time; ``record`` is ignored.
-            has_all: remove robots that have no row.
+        If all have a row, the others are removed.
 
         Returns:
             Poses of robots whose births are not known yet; None if there are none.
