@@ -24,11 +24,7 @@ _SURE = 2
 
 
 def differences(tables: Tables) -> str:
-    """Return the differences of fitness between experiments, with intervals.
-
-    Returns:
-        HTML; empty if there is one experiment.
-    """
+    """Return the differences of fitness between experiments; empty for one."""
     if len(set(tables["runs"]["experiment"].to_pylist())) <= 1:
         return ""
     online, offline = map(set, measured_apart(tables["runs"]))
@@ -41,7 +37,7 @@ def differences(tables: Tables) -> str:
     known = {(row["a"], row["b"]): row["p"] for row in every
              if row["measure"] == "fitness" and row["p"] is not None}  # fmt: skip
     every.sort(key=lambda row: (row["apart"], known.get((row["a"], row["b"]), 1.0)))
-    parts = [_differences_of(every, *one) for one in _COMPARED.items()]
+    parts = [_differences_of(every, *titled) for titled in _COMPARED.items()]
     apart = _apart(tables)
     if not any(parts):
         why = apart or (
@@ -94,45 +90,47 @@ def _difference(row: Row, reach: float) -> str:
     """Return a difference in words and as a bar from ``-reach`` to ``reach``."""
     a, b = (f"<b>{escape(label(row[name]))}</b>" for name in "ab")
     both = _interval(row)
-    counts = f"{row['runs_a']} and {counted(row['runs_b'], 'run')}"
     has_two = min(row["runs_a"], row["runs_b"]) >= _SURE
     is_tested = has_two and row["p"] is not None
     p = f"; rank-sum p = {number(row['p'])}" * is_tested
-    at = f"{counts}, at {row['births']} births{p}"
     sign = "+" * (row["difference"] > 0)
-    value = f"<b>{sign}{number(row['difference'])}</b>"
-    if both is None:
-        text = f"{value} ({at})"
-        verdict = "no interval: it needs two finished runs of each (--repeats)"
-        if has_two:
-            verdict = (
-                "no interval: all runs of one are equal, and they are fewer than ten"
-            )
-    else:
-        low, high = both
-        text = f"{value}, 95 % interval {number(low)} to {number(high)} ({at})"
-        verdict = "the interval includes 0: these runs do not tell which is fitter"
-        if row["apart"]:
-            verdict = "in an arena and off-line: this does not show which is fitter"
-        elif low > 0 or high < 0:
-            verdict = _verdict(row, label(row["a"] if low > 0 else row["b"]))
+    text = f"<b>{sign}{number(row['difference'])}</b>"
+    if both is not None:
+        text += f", 95 % interval {number(both[0])} to {number(both[1])}"
+    text += f" ({_counts(row)}, at {row['births']} births{p})"
     return (
         f'<div class="difference"><p>{a} minus {b}: {text}<br>'
-        f'<span class="verdict">{escape(verdict)}</span></p>'
+        f'<span class="verdict">{escape(_verdict(row, both))}</span></p>'
         f"{_bar(row['difference'], both, reach)}</div>"
     )
 
 
-def _verdict(row: Row, higher: str) -> str:
-    """Return what both tests say together, if the interval excludes 0."""
+def _counts(row: Row) -> str:
+    return f"{row['runs_a']} and {counted(row['runs_b'], 'run')}"
+
+
+def _verdict(row: Row, both: tuple[float, float] | None) -> str:
+    """Return what interval and test say together."""
+    if both is None:
+        if min(row["runs_a"], row["runs_b"]) >= _SURE:
+            return "no interval: all runs of one are equal, and they are fewer than ten"
+        return "no interval: it needs two finished runs of each (--repeats)"
+    if row["apart"]:
+        return "in an arena and off-line: this does not show which is fitter"
+    if both[0] <= 0 <= both[1]:
+        return "the interval includes 0: these runs do not tell which is fitter"
+    return _tested(row, label(row["a"] if both[0] > 0 else row["b"]))
+
+
+def _tested(row: Row, higher: str) -> str:
+    """Return what both say if the interval excludes 0."""
     if row["p"] < _LEVEL:
         return f"{higher} is fitter: the interval excludes 0, and p < {_LEVEL:g}"
     verdict = f"undecided: the interval excludes 0, but p is not below {_LEVEL:g}"
     least = 2.0 / comb(row["runs_a"] + row["runs_b"], row["runs_a"])
     if least < _LEVEL:
         return verdict
-    counts = f"{row['runs_a']} and {counted(row['runs_b'], 'run')}"
-    return f"{verdict}; with {counts} it cannot be below {number(least)}"
+    return f"{verdict}; with {_counts(row)} it cannot be below {number(least)}"
 
 
 def _bar(value: float, both: tuple[float, float] | None, reach: float) -> str:

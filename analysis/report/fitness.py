@@ -69,10 +69,8 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
     """Return the plot of runs, their means, and robots fitter than all before.
 
     Robots of arenas are at their greatest fitness, because the lines are means of the
-    fitness at each birth: at their last fitness they could all be below the lines.
-
-    Returns:
-        HTML; empty if no run has two populations.
+    fitness at each birth: at their last fitness they could all be below the lines. It
+    is empty if no run has two populations.
     """
     try:
         shown = course(tables, "fitness")
@@ -180,8 +178,7 @@ def _described(row: Row, fitness: float) -> str:
 def last_populations(tables: Tables, y_text: str = "fitness") -> str:
     """Return the plot of all robots of the last populations, a column per run.
 
-    Returns:
-        HTML; empty if no run has a population, or if there are too many robots.
+    It is empty if no run has a population, or if there are too many robots.
     """
     living = tables["robots"].filter(pc.field("is_last"))
     if not 0 < living.num_rows <= _MOST_DOTS:

@@ -50,13 +50,7 @@ def duration(seconds: float | None) -> str:
 
 
 def folded(title: str, content: str, *, is_open: bool = False) -> str:
-    """Return content that a click on its title shows; empty without content.
-
-    Args:
-        title: text.
-        content: HTML.
-        is_open: whether it is shown from the start.
-    """
+    """Return HTML that a click on its title shows; empty without content."""
     start = "<details open>" if is_open else "<details>"
     return f"{start}<summary>{escape(title)}</summary>{content}</details>" * bool(
         content
@@ -69,12 +63,7 @@ def capitalised(text: str) -> str:
 
 
 def legend(experiments: Sequence[str], of_all: Sequence[str]) -> str:
-    """Return the names of experiments beside their colours.
-
-    Args:
-        experiments: those to show.
-        of_all: all experiments of the report, which determine the colours.
-    """
+    """Return the names of experiments beside their colours, which all determine."""
     paint = colours(of_all)
     marks = "".join(
         f'<span><i style="background:{paint[name]}"></i>{escape(label(name))}</span>'

@@ -8,10 +8,7 @@ import pyarrow as pa
 
 from analysis.figures.forms import Row, Tables
 from analysis.figures.style import colours, in_order, label
-from analysis.measures.fitness_functions import (
-    fitness_unit,
-    functions_of,
-)
+from analysis.measures.fitness_functions import axis_text, functions_of
 from analysis.measures.populations import last_rows
 from analysis.report.fitness import run_names
 from analysis.report.html import cell, duration, folded, table
@@ -50,7 +47,10 @@ def summary(tables: Tables) -> str:
                 str(births[0]) if len(births) == 1 else f"{births[0]} to {births[-1]}"
             ),
             cell(max((best for best, _ in known), default=None)),
-            *(cell(mean(each) if each else None) for each in _columns(known)),
+            *(
+                cell(mean(pair[at] for pair in known) if known else None)
+                for at in range(2)
+            ),
             cell(duration(mean(times) if times else None)),
             cell(sum(failures) if failures else None),
         ]
@@ -80,14 +80,8 @@ def _differing(differs: Mapping[str, str]) -> str:
     return text
 
 
-def _columns(rows: Sequence[tuple[float, float]]) -> list[list[float]]:
-    """Return first and second numbers of pairs."""
-    return [[row[column] for row in rows] for column in range(2)]
-
-
 def _with_unit(function: str) -> str:
-    unit = fitness_unit(function)
-    return f"{function} [{unit}]" if unit else function
+    return axis_text(function, function)
 
 
 def _states(runs: Sequence[Row]) -> str:
@@ -116,11 +110,7 @@ def _summary_note(functions: Collection[str], *, has_islands: bool) -> str:
 
 
 def arenas(tables: Tables) -> str:
-    """Return a sentence about what happened in the arenas of each experiment.
-
-    Returns:
-        HTML; empty if no run has an arena.
-    """
+    """Return a sentence about what happened in each run of arenas; empty for none."""
     names = run_names(tables["runs"])
     lines = []
     for row in tables["runs"].to_pylist():

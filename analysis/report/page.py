@@ -2,7 +2,7 @@
 
 import base64
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from html import escape
 from importlib.resources import files
@@ -70,15 +70,7 @@ def report(
     when: datetime,
     versions: Mapping[str, str],
 ) -> str:
-    """Return the report as HTML.
-
-    Args:
-        tables: by the names of ``outputs``; ``left_out`` contains figures, too.
-        drawings: figures and films.
-        command: the command that made the report.
-        when: its time, UTC.
-        versions: versions of the software.
-    """
+    """Return the report as HTML, with the command, time and software that made it."""
     runs = tables["runs"].to_pylist()
     names = [label(name) for name in in_order(row["experiment"] for row in runs)]
     title = f"Revolve Islands: {', '.join(names)}" if names else "Revolve Islands"
@@ -87,19 +79,14 @@ def report(
         f"{counted(len(runs), 'run')}, {counted(births, 'birth')}; "
         f"written {when:%Y-%m-%d %H:%M} UTC"
     )
-    sections = {
-        key: (head, content)
-        for key, (head, content) in _sections(
-            tables, drawings, command, versions
-        ).items()
-        if content
-    }
+    every = _sections(tables, drawings, command, versions).items()
+    sections = [(key, *section) for key, section in every if section[1]]
     links = "".join(
-        f'<li><a href="#{key}">{head}</a></li>' for key, (head, _) in sections.items()
+        f'<li><a href="#{key}">{head}</a></li>' for key, head, _ in sections
     )
     body = "\n".join(
         f'<section><h2 id="{key}">{head}</h2>\n{content}</section>'
-        for key, (head, content) in sections.items()
+        for key, head, content in sections
     )
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -120,7 +107,7 @@ def _sections(
     tables: Tables, drawings: Drawings, command: str, versions: Mapping[str, str]
 ) -> dict[str, tuple[str, str]]:
     """Return heading and content of all sections by anchor, empty ones included."""
-    by_number = {one.figure.number: one for one in drawings.figures}
+    by_number = {drawn.figure.number: drawn for drawn in drawings.figures}
     has_arena = tables["runs"]["simulated_s"].null_count < tables["runs"].num_rows
     over_births = (*_COURSES[:2], _COURSES[2] + _COURSES_OF_ARENAS * has_arena)
     courses = _of_functions(tables, fitness_over_births, over_births, by_number)
@@ -128,11 +115,12 @@ def _sections(
     plots = {"6.3": courses, "6.2": last}
 
     def shown(section: Section) -> str:
-        return _figures(
-            one
-            for one in drawings.figures
-            if one.figure.section == section and not plots.get(one.figure.number)
+        content = "".join(
+            _figure(drawn)
+            for number, drawn in by_number.items()
+            if drawn.figure.section == section and not plots.get(number)
         )
+        return f'<div class="figures">{content}</div>' if content else ""
 
     return {
         "overview": ("Overview", _overview(tables, courses)),
@@ -146,7 +134,7 @@ def _sections(
         "measures": ("Measures of the experiments", shown("measures") + _own(tables)),
         "learning": ("Lifetime learning", shown("learning")),
         "speed": ("Speed", speed(tables) + shown("speed")),
-        "thesis": ("Findings of the thesis", _thesis(tables) + shown("thesis")),
+        "thesis": ("Findings of the thesis", findings(tables) + shown("thesis")),
         "runs": ("Runs", folded("All runs", all_runs(tables))),
         "left-out": ("Left out", _left_out(tables["left_out"].to_pylist())),
         "tables": ("Tables", folded("Files and columns", _contents(tables))),
@@ -178,14 +166,8 @@ def _of_functions(
 ) -> str:
     """Return an interactive plot for each fitness function, in place of a figure.
 
-    Args:
-        tables: of all runs.
-        draw: returns the plot of some runs, given the label of its y axis.
-        about: number of the figure, title and text of the plot.
-        drawn: figures by number.
-
-    Returns:
-        HTML; empty if nothing can be drawn.
+    It is empty if nothing can be drawn. ``about`` are the figure's number, the title
+    and the text of the plot.
     """
     number, title, text = about
     groups = of_each_function(tables)
@@ -248,15 +230,6 @@ def _film(one: Film, run: str, *, has_arena: bool) -> str:
     )
 
 
-def _thesis(tables: Tables) -> str:
-    return findings(tables["findings"].to_pylist())
-
-
-def _figures(figures: Iterable[DrawnFigure]) -> str:
-    content = "".join(map(_figure, figures))
-    return f'<div class="figures">{content}</div>' if content else ""
-
-
 def _figure(drawn: DrawnFigure) -> str:
     one = drawn.figure
     name = f"{one.title}."
@@ -274,7 +247,10 @@ def _file_of(drawn: DrawnFigure) -> str:
     one = drawn.figure
     thesis = f"figure {one.number} of the thesis; " * one.number[0].isdigit()
     text = f"{thesis}file <code>figures/{escape(drawn.picture.stem)}.pdf</code>, .png"
-    sources = ", ".join(map(_source, one.source))
+    sources = ", ".join(
+        f"<code>{name}</code>" if name in OUTPUTS else escape(name)
+        for name in one.source
+    )
     return f"{capitalised(text)}; source: {sources}."
 
 
@@ -295,12 +271,6 @@ def _embedded(drawn: DrawnFigure) -> str:
         few = small.quantize(_COLOURS, dither=Image.Dither.NONE)
         few.save(stored, kind)
     return f"data:image/{kind};base64,{base64.b64encode(stored.getvalue()).decode()}"
-
-
-def _source(name: str) -> str:
-    """Return a source; the name of a table of measures is set as code."""
-    text = escape(name)
-    return f"<code>{text}</code>" if name in OUTPUTS else text
 
 
 def _left_out(rows: Sequence[Mapping[str, object]]) -> str:

@@ -5,14 +5,14 @@ file (plotly.js alone has 4.7 MB), is readable without scripts, and prints. Each
 has a ``<title>``, which browsers show by themselves; ``page.js`` shows it at once.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
+from matplotlib.ticker import MaxNLocator
+
 WIDTH, HEIGHT = 560, 360
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66, 24, 34, 52
-_MOST_BREAKS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,23 +48,15 @@ def with_margin(values: Iterable[float]) -> tuple[float, float]:
     return low - margin * (low < 0), high + margin
 
 
-def breaks(low: float, high: float, most: int = _MOST_BREAKS) -> list[float]:
-    """Return at most ``most + 1`` round numbers within a range."""
-    rough = (high - low) / most
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(size * power for size in (1, 2, 5, 10) if size * power >= rough)
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [round(count * step, 12) for count in range(first, last + 1)]
+def _breaks(low: float, high: float) -> list[float]:
+    """Return round numbers within a range."""
+    numbers = MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high)
+    slack = 1e-9 * (high - low)
+    return [round(n, 12) for n in numbers if low - slack <= n <= high + slack]
 
 
 def line(axes: Axes, points: Iterable[tuple[float, float]], kind: str) -> str:
-    """Return a line through points.
-
-    Args:
-        axes: of the plot.
-        points: values of x and y.
-        kind: class in the style sheet.
-    """
+    """Return a line through points, of a class in the style sheet."""
     return f'<path class="{kind}" d="{_path(axes, points)}"/>'
 
 
@@ -86,11 +78,8 @@ def dot(x: float, y: float, text: str, radius: float = 3.2) -> str:
 def painted(colour: str, *marks: str, kind: str = "", text: str = "") -> str:
     """Return marks of one colour, with the text that a pointer shows on them.
 
-    Args:
-        colour: CSS colour.
-        marks: SVG.
-        kind: class in the style sheet.
-        text: shown on all marks that have none of their own.
+    It is not shown on marks with a text of their own. ``kind`` is a class in the style
+    sheet.
     """
     title = f"<title>{escape(text)}</title>" if text else ""
     return f'<g class="{kind}" style="color:{colour}">{title}{"".join(marks)}</g>'
@@ -105,22 +94,16 @@ def plot(
     y_text: str,
     x_names: Sequence[tuple[float, str]] | None = None,
 ) -> str:
-    """Return a plot as SVG.
+    """Return a plot as SVG; names at values of x may replace numbers.
 
-    Args:
-        axes: ranges of the axes.
-        marks: SVG of the data.
-        description: of the plot, for screen readers.
-        x_text: label of the x axis.
-        y_text: label of the y axis.
-        x_names: values and names along the x axis in place of numbers.
+    The description is for screen readers.
     """
     right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
-    numbered = [(value, f"{value:g}") for value in breaks(*axes.x_range)]
+    numbered = [(value, f"{value:g}") for value in _breaks(*axes.x_range)]
     frame = [
         f'<path class="grid" d="M{_LEFT} {axes.y(value):.1f}H{right}"/>'
         f'<text class="y" x="{_LEFT - 6}" y="{axes.y(value) + 4:.1f}">{value:g}</text>'
-        for value in breaks(*axes.y_range)
+        for value in _breaks(*axes.y_range)
     ] + [
         f'<text class="x" x="{axes.x(value):.1f}" y="{bottom + 18}">'
         f"{escape(name)}</text>"

@@ -1,9 +1,8 @@
 """Section of the thesis's findings."""
 
-from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Any
 
+from analysis.figures.forms import Row, Tables
 from analysis.report.html import cell, folded, table
 
 _HEADS = ("figure", "finding", "expected", "runs", "mean a", "mean b", "effect",
@@ -17,8 +16,9 @@ _NOTE = (
 )
 
 
-def findings(rows: Sequence[Mapping[str, Any]]) -> str:
+def findings(tables: Tables) -> str:
     """Return a table of the findings' tests; folded if none could be tested."""
+    rows = tables["findings"].to_pylist()
     if not rows:
         return ""
     verdicts = [str(row["verdict"]) for row in rows]
@@ -41,7 +41,7 @@ def findings(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"<p><b>{escape(about)}</b></p>" + folded(title, content, is_open=is_tested)
 
 
-def _line(row: Mapping[str, Any]) -> list[str]:
+def _line(row: Row) -> list[str]:
     verdict = str(row["verdict"])
     kind = verdict.split(maxsplit=1)[0]
     badge = f'<span class="v {kind}">{escape(verdict)}</span>'

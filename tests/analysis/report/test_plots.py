@@ -4,20 +4,7 @@ import re
 
 import pytest
 
-from analysis.report.plots import Axes, breaks, dot, line, plot, with_margin
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "expected"),
-    [
-        (0.0, 105.0, [0, 50, 100]),
-        (0.0, 1.0, [0, 0.2, 0.4, 0.6, 0.8, 1]),
-        (-0.003, 0.105, [0, 0.05, 0.1]),
-        (-1.0, 1.0, [-1, -0.5, 0, 0.5, 1]),
-    ],
-)
-def test_breaks_are_round(low: float, high: float, expected: list[float]) -> None:
-    assert breaks(low, high) == expected
+from analysis.report.plots import Axes, dot, line, plot, with_margin
 
 
 def test_ranges_include_zero_and_all_values() -> None:

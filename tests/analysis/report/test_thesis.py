@@ -27,7 +27,7 @@ def test_the_headline_counts_all_findings(
          "verdict": VERDICTS[each]}
         for each in verdicts
     ]  # fmt: skip
-    text = thesis.findings(table("findings", rows).to_pylist())
+    text = thesis.findings({"findings": table("findings", rows)})
     assert f"<b>{headline}</b>" in text
 
 
