@@ -1,7 +1,5 @@
 """Figures of the speed of an arena: random robots and spiders."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import plotnine as p9
 import pyarrow as pa
@@ -19,11 +17,9 @@ _OURS, _THEIRS = "this machine", "thesis, i7-4790K"
 
 
 def speed(tables: Tables, kind: str) -> p9.ggplot:
-    """Return the real-time factor of arenas by population.
+    """Return the real-time factor of arenas of "arena" or "spider" by population.
 
-    Args:
-        tables: ``benchmark``, rows of ``revolve bench arena|spider --out``.
-        kind: "arena", of random robots, beside the thesis's fit; or "spider".
+    Random robots are beside the thesis's fit.
 
     Raises:
         NothingToDraw: no benchmark was read.
@@ -80,11 +76,9 @@ def _points(rows: pa.Table) -> p9.ggplot:
         )
         + p9.scale_colour_manual({_OURS: "#0072B2", _THEIRS: "#7F7F7F"}, name="")
         + p9.scale_linetype_manual({_OURS: "-", _THEIRS: "--"}, name="")
-        + p9.scale_y_log10(breaks=_TICKS, labels=_plain)
+        + p9.scale_y_log10(
+            breaks=_TICKS, labels=lambda ticks: [f"{tick:g}" for tick in ticks]
+        )
         + p9.labs(x="robots", y="simulated / wall time")
         + theme_of_size(3.6)
     )
-
-
-def _plain(factors: Sequence[float]) -> list[str]:
-    return [f"{factor:g}" for factor in factors]

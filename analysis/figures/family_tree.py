@@ -45,17 +45,14 @@ class Best:
 def best_robots(robots: pa.Table) -> list[Best]:
     """Return the best robot of each experiment, sorted by the experiment's name.
 
-    Args:
-        robots: with the columns of ``outputs``. They are compared as at the
-            end of a run; one whose evaluation failed is none.
+    They are compared as at the end of a run; one whose evaluation failed is none.
     """
-    columns = [each.name for each in fields(Best)]
     is_judged = pc.field("is_last") & pc.invert(pc.field("is_failed"))
-    last = robots.filter(is_judged).select(columns)
-    of: dict[str, list[Row]] = {}
+    last = robots.filter(is_judged).select([field.name for field in fields(Best)])
+    experiments: dict[str, list[Row]] = {}
     for row in last.to_pylist():
-        of.setdefault(row["experiment"], []).append(row)
-    best = (best_of(of[name]) for name in sorted(of))
+        experiments.setdefault(row["experiment"], []).append(row)
+    best = (best_of(experiments[name]) for name in sorted(experiments))
     return [Best(**{**row, "folder": Path(row["folder"])}) for row in best if row]
 
 
@@ -89,12 +86,8 @@ def ordered(
 ) -> list[list[int]]:
     """Return the levels, each sorted so that few lines cross and lines are short.
 
-    Each level is sorted by the mean place of its members' children; then two members
-    of a level are exchanged as long as that improves the drawing.
-
-    Args:
-        levels: from below.
-        edges: (child, parent).
+    Each level, from below, is sorted by the mean place of its members' children; then
+    two members of a level are exchanged as long as that improves the drawing.
 
     Source: Sugiyama, Tagawa, Toda, *Methods for visual understanding of hierarchical
     system structures*, 1981, for the first step; exchanges: own.
@@ -103,11 +96,11 @@ def ordered(
     rows = []
     for level in levels:
         middles = {}
-        for one in level:
-            below = [place[down] for down, up in edges if up == one and down in place]
-            middles[one] = sum(below) / len(below) if below else 0.0
-        row = sorted(level, key=lambda one: (middles[one], one))
-        place |= {one: (at + 0.5) / len(row) for at, one in enumerate(row)}
+        for robot in level:
+            below = [place[down] for down, up in edges if up == robot and down in place]
+            middles[robot] = sum(below) / len(below) if below else 0.0
+        row = sorted(level, key=lambda robot: (middles[robot], robot))
+        place |= {robot: (at + 0.5) / len(row) for at, robot in enumerate(row)}
         rows.append(row)
     best, previous = _cost(rows, edges), math.inf
     while best < previous:
@@ -126,9 +119,9 @@ def ordered(
 def _cost(rows: list[list[int]], edges: Sequence[tuple[int, int]]) -> float:
     """Return the number of crossings plus the horizontal length of all lines."""
     spot = {
-        one: (level, (at + 0.5) / len(row))
+        robot: (level, (at + 0.5) / len(row))
         for level, row in enumerate(rows)
-        for at, one in enumerate(row)
+        for at, robot in enumerate(row)
     }
     lines = [(spot[child], spot[parent]) for child, parent in edges]
     crossings = sum(

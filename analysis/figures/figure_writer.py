@@ -143,8 +143,7 @@ def draw_figures(
         tables: by the names of ``outputs``, and ``benchmark``.
         runs: by their folders.
         folder: an existing folder.
-        simulate: returns the worker's simulation, or raises the reason why robots
-            cannot be rendered.
+        simulate: returns the worker's simulation, or raises why robots cannot be drawn.
         bar: shows progress.
     """
     writer = FigureWriter(folder)

@@ -13,12 +13,8 @@ _COLOURS = (128, 64, 32)
 def film(pictures: Sequence[Picture], interval_s: float) -> bytes:
     """Return pictures as a GIF that repeats.
 
-    A film above ``MOST_BYTES`` gets fewer colours, then every other
-    picture is left out.
-
-    Args:
-        pictures: pictures of one size; at least one.
-        interval_s: time between two pictures [s]; a GIF stores hundredths.
+    A film above ``MOST_BYTES`` gets fewer colours, then every other picture is left
+    out.
     """
     shown = list(pictures)
     while True:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from textwrap import fill
 from typing import Any
 
-import numpy as np
 import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -48,36 +47,29 @@ class NothingToDraw(RevolveError):  # noqa: N818 - a result, not a failure
 
 
 def fitness_panels(tables: Tables) -> dict[str, str]:
-    """Return the fitness function of each experiment; empty if there is only one.
+    """Return titles of panels, the functions, by experiment; empty for one function.
 
     Values of different functions must not share an axis.
-
-    Args:
-        tables: ``runs``; without it, all functions are the same.
-
-    Returns:
-        Titles of panels by experiment: functions, on lines that are not too long.
     """
-    functions = functions_of(tables["runs"]) if "runs" in tables else {}
+    functions = _functions(tables)
     if len(set(functions.values())) <= 1:
         return {}
     return {name: fill(text, _TITLE) for name, text in functions.items()}
 
 
+def _functions(tables: Tables) -> dict[str, str]:
+    return functions_of(tables["runs"]) if "runs" in tables else {}
+
+
 def fitness_text(tables: Tables, text: str) -> str:
     """Return the label of an axis of fitness, with the unit if all runs share one."""
-    names = set(functions_of(tables["runs"]).values()) if "runs" in tables else set()
+    names = set(_functions(tables).values())
     return axis_text(names.pop(), text) if len(names) == 1 else text
 
 
 def fitness_units(tables: Tables) -> dict[str, str]:
-    """Return the unit of each experiment's fitness; empty where it is not known.
-
-    Args:
-        tables: ``runs``; without it, no unit is known.
-    """
-    functions = functions_of(tables["runs"]) if "runs" in tables else {}
-    return {name: fitness_unit(function) for name, function in functions.items()}
+    """Return the unit of each experiment's fitness; empty where it is not known."""
+    return {name: fitness_unit(text) for name, text in _functions(tables).items()}
 
 
 def fitness_note(tables: Tables) -> str:
@@ -95,11 +87,6 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
 
     Each point is a run. A box summarises five or more runs, a bar shows the median of
     fewer. Pale violins show the robots of the last populations at the same births.
-
-    Args:
-        tables: ``outcomes``, and ``robots`` if they have the measure; ``runs`` for
-            the panels of fitness functions.
-        panels: the measures.
 
     Raises:
         NothingToDraw: no finished run has a value.
@@ -215,28 +202,16 @@ def _in_panels(count: int, experiments: list[str], births: dict[str, str]) -> li
 
 
 def stacked(table: pa.Table, panels: Panels) -> Any:  # noqa: ANN401 - pandas
-    """Return the values of the panels' measures as a data frame.
+    """Return the values of the panels' measures: experiment, panel in order, value.
 
-    Args:
-        table: with ``experiment`` and columns of measures; nulls are ignored.
-        panels: at least one of their measures is a column.
-
-    Returns:
-        ``experiment``, ``panel`` (its text; categories in order) and ``value``.
+    Nulls are ignored.
     """
-    texts = list(panels.values())
-    pieces = []
-    for index, measure in enumerate(panels):
-        if measure in table.column_names:
-            known = table.filter(table[measure].is_valid())
-            places = pa.array(np.full(known.num_rows, index))
-            columns = {
-                "experiment": known["experiment"],
-                "panel": pa.DictionaryArray.from_arrays(places, texts),
-                "value": known[measure].cast(pa.float64()),
-            }
-            pieces.append(pa.table(columns))
-    return pa.concat_tables(pieces).to_pandas()
+    known = [measure for measure in panels if measure in table.column_names]
+    frame = table.select(["experiment", *known]).to_pandas()
+    rows = frame.melt("experiment", known, "panel").dropna(subset="value")
+    kinds = rows["panel"].map(dict(panels)).astype("category")
+    order = kinds.cat.set_categories(list(panels.values()))
+    return rows.assign(panel=order, value=rows["value"].astype(float))
 
 
 def _grouped(rows: Any) -> Any:  # noqa: ANN401 - pandas

@@ -19,17 +19,14 @@ def learning_curves(tables: Tables) -> p9.ggplot:
     Raises:
         NothingToDraw: no experiment has two trials.
     """
-    frame = tables["learning_curves"].to_pandas()
-    mean = frame.groupby(["experiment", "trial"], as_index=False)[
-        ["median", "low", "high"]
-    ].mean()
+    groups = tables["learning_curves"].to_pandas().groupby(["experiment", "trial"])
+    mean = groups[["median", "low", "high"]].mean().reset_index()
     mean = _in_lines(mean, "trial", "two trials")
-    colours = scales(tables, in_order(mean["experiment"]))
     return (
         p9.ggplot(mean, p9.aes("trial"))
         + p9.geom_ribbon(p9.aes(ymin="low", ymax="high", fill="experiment"), alpha=0.25)
         + p9.geom_line(p9.aes(y="median", colour="experiment"), size=0.9)
-        + colours
+        + scales(tables, mean["experiment"])
         + p9.expand_limits(y=0)
         + p9.labs(
             x="trial (0: the brain at birth)",
@@ -59,18 +56,18 @@ def learning_gain(tables: Tables) -> p9.ggplot:
     )
     long["when"] = _ordered(long["when"].map(texts), [*texts.values()][::-1])
     grouped = long.groupby(["experiment", "births", "when"], observed=True)["value"]
-    found = grouped.quantile([0.25, 0.5, 0.75]).unstack().reset_index()
-    found.columns = ["experiment", "births", "when", "low", "median", "high"]
-    found = _in_lines(found, "births", f"births in two intervals of {_WIDTH}")
+    quartiles = grouped.quantile([0.25, 0.5, 0.75]).unstack().reset_index()
+    quartiles.columns = ["experiment", "births", "when", "low", "median", "high"]
+    quartiles = _in_lines(quartiles, "births", f"births in two intervals of {_WIDTH}")
     return (
-        p9.ggplot(found, p9.aes("births", "median", fill="when", colour="when"))
+        p9.ggplot(quartiles, p9.aes("births", "median", fill="when", colour="when"))
         + p9.geom_ribbon(p9.aes(ymin="low", ymax="high"), alpha=0.25, colour="none")
         + p9.geom_line(size=0.9)
         + p9.scale_fill_manual(_BEFORE_AFTER, name="")
         + p9.scale_colour_manual(_BEFORE_AFTER, name="")
         + p9.expand_limits(y=0)
         + p9.labs(x="births", y=fitness_text(tables, "fitness of newborns"))
-        + _panels(found)
+        + _panels(quartiles)
     )
 
 
@@ -88,10 +85,9 @@ def bodies_saved(tables: Tables) -> p9.ggplot:
     saved = frame["saved"].astype(float)
     kept = frame["kept"].astype(float) - saved
     frame = frame.assign(**{_SAVED: saved, _KEPT: kept})
-    found = frame.groupby(["experiment", "births", "width"], as_index=False)[
-        [_KEPT, _SAVED]
-    ].mean()
-    long = found.melt(["experiment", "births", "width"], var_name="how")
+    keys = ["experiment", "births", "width"]
+    shares = frame.groupby(keys, as_index=False)[[_KEPT, _SAVED]].mean()
+    long = shares.melt(keys, var_name="how")
     long["how"] = _ordered(long["how"], [_SAVED, _KEPT])
     return (
         p9.ggplot(long, p9.aes("births", "value", fill="how"))
@@ -99,17 +95,17 @@ def bodies_saved(tables: Tables) -> p9.ggplot:
         + p9.scale_fill_manual(["#E69F00", "#7F9FBF"], name="")
         + p9.expand_limits(y=[0, 1])
         + p9.labs(x="births", y="share in the next population")
-        + _panels(found)
+        + _panels(shares)
     )
 
 
 def _in_lines(frame: Any, along: str, needed: str) -> Any:  # noqa: ANN401 - pandas
     """Return the rows of experiments with two points of a line at least."""
     points = frame.groupby("experiment")[along].transform("nunique")
-    found = frame[points > 1]
-    if found.empty:
+    lines = frame[points > 1]
+    if lines.empty:
         raise NothingToDraw(f"no experiment with learning has {needed}")
-    return found
+    return lines
 
 
 def _ordered(names: Any, order: list[str]) -> Any:  # noqa: ANN401 - pandas

@@ -38,48 +38,42 @@ def gaits(
 
     Source: Hupkes 2016, figure 6.10.
     """
-    columns = max(len(one.gait) for one in robot_pictures)
+    columns = max(len(robot.gait) for robot in robot_pictures)
     high = 8.0 / columns * 0.525
     total = len(robot_pictures) * (high + _TITLE_IN)
     figure = Figure(figsize=(8.0, total))
     axes = figure.subplots(len(robot_pictures), columns, squeeze=False)
     top = 1 - _TITLE_IN / total
     figure.subplots_adjust(0, 0, 1, top, wspace=0.02, hspace=_TITLE_IN / high)
-    for row, one in zip(axes, robot_pictures, strict=True):
+    for row, robot in zip(axes, robot_pictures, strict=True):
         for axis in row:
             axis.set_axis_off()
-        for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
+        for axis, picture, time_s in zip(row, robot.gait, robot.times_s, strict=False):
             axis.imshow(picture)
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_GREY, pad=2)
         row[0].annotate(
-            _heading(one, units.get(one.best.experiment, "")), (0, 1), (1, 13),
+            _heading(robot, units.get(robot.best.experiment, "")), (0, 1), (1, 13),
             "axes fraction", "offset points", fontsize=8, color=_INK,
         )  # fmt: skip
     return figure
 
 
-def _heading(one: RobotPicture, unit: str) -> str:
+def _heading(robot: RobotPicture, unit: str) -> str:
     """Return what is written above the pictures of a gait."""
-    way = f"moved {100 * one.moved_m:.2g} cm in {one.times_s[-1]:.1f} s"
-    if one.moved_m < _STILL_M:
+    way = f"moved {100 * robot.moved_m:.2g} cm in {robot.times_s[-1]:.1f} s"
+    if robot.moved_m < _STILL_M:
         way = "stood still in these pictures"
-    fitness = f"{one.best.fitness:.3g} {unit}".rstrip()
-    return f"{label(one.best.experiment)}, fitness {fitness}, {way}"
+    fitness = f"{robot.best.fitness:.3g} {unit}".rstrip()
+    return f"{label(robot.best.experiment)}, fitness {fitness}, {way}"
 
 
 def family_tree(
-    one: RobotPicture,
+    robot: RobotPicture,
     relatives: Family,
     fitness: Mapping[BirthId, float],
     unit: str = "",
 ) -> Figure:
     """Return a robot, its parents above it, and so on, and the founders on top.
-
-    Args:
-        one: pictures of the robot and its family.
-        relatives: its family.
-        fitness: fitness of its relatives.
-        unit: unit of fitness; empty if it is not known.
 
     Source: Hupkes 2016, figures 6.18 to 6.20.
     """
@@ -101,17 +95,17 @@ def family_tree(
     for child, parent in relatives.edges:
         _line(axes, spots[child], spots[parent])
     for row, spot in spots.items():
-        known = fitness.get(one.births[row])
+        known = fitness.get(robot.births[row])
         text = "" if known is None else f"{known:.3g}"
-        text = f"{_name(one, row)}  {text}"
-        _add_picture(axes, one, row, spot, text=text, size=size)
+        text = f"{_name(robot, row)}  {text}"
+        _add_picture(axes, robot, row, spot, text=text, size=size)
     if relatives.founders:
         _add_rim(axes, width, top + _RIM)
     for at, row in enumerate(relatives.founders):
         spot = ((at + 0.5) * width / len(relatives.founders), founders_at)
         colour = FOUNDERS[min(at, len(FOUNDERS) - 1)]
-        text = f"founder {_name(one, row)}"
-        _add_picture(axes, one, row, spot, text=text, size=size, colour=colour)
+        text = f"founder {_name(robot, row)}"
+        _add_picture(axes, robot, row, spot, text=text, size=size, colour=colour)
     axes.set_xlim(0, width)
     axes.set_ylim(-_BELOW, end)
     axes.set_aspect("equal")
@@ -148,10 +142,10 @@ def _add_key(axes: Axes, unit: str, *, is_dotted: bool) -> None:
     )  # fmt: skip
 
 
-def _name(one: RobotPicture, row: int) -> str:
+def _name(robot: RobotPicture, row: int) -> str:
     """Return a robot's number of birth, after its island if that is another one."""
-    island, number = one.births[row]
-    return f"{number}" if island == one.best.birth_island else f"{island}:{number}"
+    island, number = robot.births[row]
+    return f"{number}" if island == robot.best.birth_island else f"{island}:{number}"
 
 
 Spot = tuple[float, float]
@@ -160,7 +154,7 @@ Spot = tuple[float, float]
 
 def _add_picture(
     axes: Axes,
-    one: RobotPicture,
+    robot: RobotPicture,
     row: int,
     spot: Spot,
     *,
@@ -171,7 +165,9 @@ def _add_picture(
     """Put a robot's picture into a figure, with a text below."""
     x, y = spot
     edges = (x - _WIDTH / 2, x + _WIDTH / 2, y, y + _HEIGHT)
-    axes.imshow(one.pictures[row], extent=edges, zorder=2, interpolation="antialiased")
+    axes.imshow(
+        robot.pictures[row], extent=edges, zorder=2, interpolation="antialiased"
+    )
     axes.add_patch(
         Rectangle(
             (edges[0], edges[2]), edges[1] - edges[0], edges[3] - edges[2],

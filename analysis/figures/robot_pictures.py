@@ -90,16 +90,7 @@ def robot_picture(
     origin: Origin,
     has_family: bool,
 ) -> RobotPicture:
-    """Return pictures of a robot, of its gait, and of its family.
-
-    Args:
-        best: the robot, the only one on the first level of its family.
-        births: ``island``, ``birth``, ``genome`` and ``robot`` of the family.
-        relatives: its family.
-        experiment: experiment of the run.
-        simulate: the worker's simulation.
-        origin: seed and run, which determine the noise.
-        has_family: render the family, too.
+    """Return pictures of a robot, of its gait, and of its family, if it has one.
 
     Raises:
         SimulationDiverged: the physics diverged.
@@ -147,17 +138,14 @@ def shown_document(document: str) -> str:
     Pictures need no fitness function. Without those sections they need no plug-in of
     the user's either, unless it defines bodies or brains: of two runs with different
     sources of a plug-in, one process can import only one.
-
-    Args:
-        document: an experiment as JSON.
     """
 
     def without(entries: Mapping[str, Any]) -> dict[str, Any]:
         return {key: value for key, value in entries.items() if key not in _JUDGING}
 
-    found = without(json.loads(document))
-    found["islands"] = [without(each) for each in found.get("islands") or ()]
-    return json.dumps(found)
+    shown = without(json.loads(document))
+    shown["islands"] = list(map(without, shown.get("islands") or ()))
+    return json.dumps(shown)
 
 
 def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:

@@ -79,17 +79,13 @@ def _varied(robots: Any, group: str) -> Any:  # noqa: ANN401 - pandas
 def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     """Return the mean fitness of robots by their extremities, over runs.
 
-    Args:
-        tables: ``extremities``; ``runs`` for the panels of fitness functions.
-        by: "count" or "per_part".
-
     Source: Hupkes 2016, figure 6.14.
     """
     rows = tables["extremities"].filter(pc.field("by") == by)
     keys = ["experiment", "population", "bin"]
     totals = [("fitness", "mean"), ("fitness", "stddev"), ("fitness", "count")]
-    made = rows.group_by(keys).aggregate(totals)
-    shown = made.rename_columns([*keys, "fitness", "sd", "runs"]).to_pandas()
+    over_runs = rows.group_by(keys).aggregate(totals)
+    shown = over_runs.rename_columns([*keys, "fitness", "sd", "runs"]).to_pandas()
     mean = shown["fitness"]
     half = half_interval(shown["sd"].to_numpy(), shown["runs"].to_numpy())
     half[shown["runs"] < BAND_RUNS] = np.nan
@@ -130,9 +126,6 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
 
 def lineages(tables: Tables) -> p9.ggplot:
     """Return all ancestors of the best robots, by number of birth and rank.
-
-    Args:
-        tables: ``lineage``, as ``analysis.figures.family_tree.LINEAGE``.
 
     Raises:
         NothingToDraw: no best robot has parents.

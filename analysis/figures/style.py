@@ -93,19 +93,17 @@ def label(experiment: str) -> str:
     return f"{text} {mark}{number}" if mark else text
 
 
-def short_label(experiment: str) -> str:
-    """Return the short name of an experiment of the thesis, for example in pairs."""
-    return _SHORT.get(experiment) or re.sub(r"^scenario(?=\d)", "", experiment)
-
-
 def pair_name(finding: Mapping[str, Any]) -> str:
     """Return the short names of a finding's experiments; † marks a near-automatic one.
 
-    Args:
-        finding: a row of ``findings``.
+    Names of the thesis are shortened: 1, 2 and 3 are the scenarios.
     """
-    names = "/".join(short_label(finding[key]) for key in "ab" if finding[key])
-    return names + "†" * bool(finding["near_automatic"])
+    experiments = (finding[key] for key in "ab" if finding[key])
+    names = (
+        _SHORT.get(experiment) or re.sub(r"^scenario(?=\d)", "", experiment)
+        for experiment in experiments
+    )
+    return "/".join(names) + "†" * bool(finding["near_automatic"])
 
 
 def two_line_label(experiment: str) -> str:
@@ -125,13 +123,10 @@ def scales(
     *,
     is_filled: bool = True,
 ) -> list[Any]:
-    """Return the colour scales of experiments, with labels and order.
+    """Return the scales of colour, and of fill, of a figure's experiments.
 
-    Args:
-        tables: ``runs``, whose experiments determine the colours, so that they are the
-            same in all figures; without it, those of the figure do.
-        experiments: experiments of the figure.
-        is_filled: add a scale of fill colours.
+    The experiments of ``runs``, if there, determine the colours, so that these are the
+    same in all figures.
     """
     shown = in_order(experiments)
     of_all = tables["runs"]["experiment"].to_pylist() if "runs" in tables else ()
@@ -153,12 +148,8 @@ def lone_points(
 ) -> list[p9.geom_point]:
     """Return a layer with the points that are alone in their line, if there are some.
 
-    A line of one point is not drawn.
-
-    Args:
-        lines: data of a layer of lines.
-        keys: columns that tell lines and panels apart; the first is their colour.
-        aesthetics: columns of further aesthetics of the points.
+    A line of one point is not drawn. Keys are the columns that tell lines and panels
+    apart; the first is their colour.
     """
     alone = lines[lines.groupby(keys)[keys[0]].transform("size") == 1]
     points = p9.geom_point(p9.aes(colour=keys[0], **aesthetics), data=alone, size=1.5)
@@ -191,12 +182,7 @@ def theme_of_size(height_in: float) -> Any:  # noqa: ANN401 - untyped
 
 
 def save(figure: p9.ggplot | Figure, stem: Path) -> None:
-    """Write a figure as PNG and PDF.
-
-    Args:
-        figure: a plotnine or matplotlib figure.
-        stem: path without an ending.
-    """
+    """Write a figure as PNG and PDF, to a path without an ending."""
     with warnings.catch_warnings():
         # A line of one point is not drawn: see ``lone_points``.
         warnings.simplefilter("ignore", PlotnineWarning)

@@ -48,28 +48,22 @@ class SweepRuns(NamedTuple):
 def sweep_runs(tables: Tables, experiment: str) -> SweepRuns:
     """Return the finished runs of a sweep with their settings and outcomes.
 
-    Args:
-        tables: ``sweeps`` and ``outcomes``.
-        experiment: name of the sweep.
-
     Raises:
         NothingToDraw: no run of it is finished.
     """
     rows = tables["sweeps"].to_pandas()
     rows = rows[rows["experiment"] == experiment]
     settings = list(dict.fromkeys(rows["setting"]))
-    points: dict[str, dict[str, Any]] = {}
-    for row in rows.itertuples():
-        value = row.value if np.isnan(row.number) else row.number
-        points.setdefault(row.folder, {})[row.setting] = value
-    outcomes = tables["outcomes"].to_pandas()
-    outcomes = outcomes[outcomes["folder"].isin(points)].reset_index(drop=True)
+    chosen = rows["number"].where(rows["number"].notna(), rows["value"])
+    points = rows.assign(chosen=chosen).pivot(
+        index="folder", columns="setting", values="chosen"
+    )
+    points = points.infer_objects()
+    outcomes = tables["outcomes"].to_pandas().merge(points, on="folder")
     if outcomes.empty:
         raise NothingToDraw(f"no run of the sweep {experiment} is finished")
-    for setting in settings:
-        outcomes[setting] = [points[folder][setting] for folder in outcomes["folder"]]
     # A sweep of fitness is divided into experiments, each with one value of those.
-    settings = [each for each in settings if outcomes[each].nunique() > 1] or settings
+    settings = [name for name in settings if outcomes[name].nunique() > 1] or settings
     known = [name for name in MEASURES if outcomes[name].notna().any()]
     # Off-line populations have a fixed size.
     shown = [name for name in known if name != "size" or outcomes[name].nunique() > 1]
@@ -81,10 +75,6 @@ def sweep_map(tables: Tables, experiment: str) -> Figure:
 
     One setting: a line; two settings with repeated values: a map of the means over
     runs; otherwise one panel per setting, each point a run.
-
-    Args:
-        tables: ``sweeps`` and ``outcomes``.
-        experiment: name of the sweep.
 
     Raises:
         NothingToDraw: no run of it is finished.
@@ -135,10 +125,7 @@ def sweep_caption(tables: Tables, experiment: str) -> str:
 def _best_points(settings: Sequence[str], points: Sequence[tuple[Any, Numbers]]) -> str:
     """Return which point has the highest mean fitness, and how sure this is.
 
-    Args:
-        settings: that are swept.
-        points: values of the settings, and fitness of the runs, of each point that
-            has any.
+    Points are values of the settings, and fitness of the runs that have any.
     """
     if not points:
         return ""
