@@ -46,10 +46,7 @@ def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
         disable=is_log,
         auto_refresh=not is_log,
     )
-    with (
-        progress,
-        _lines(progress, console) if is_log else nullcontext(),
-    ):
+    with progress, _lines(progress, console) if is_log else nullcontext():
         yield progress
 
 

@@ -8,14 +8,7 @@ from statistics import median
 
 import pyarrow as pa
 
-from analysis.comparison.robustness import (
-    RESULT,
-    ROBOT,
-    Columns,
-    Row,
-    line_of,
-    percent,
-)
+from analysis.comparison.robustness import RESULT, ROBOT, Columns, Row, line_of, percent
 from schema.errors import rounded
 
 HELD, MEAN, DEAD = "input at 0", "input at its mean", "motor dead"

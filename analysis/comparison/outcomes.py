@@ -105,10 +105,7 @@ def of_courses(
         return _mean(columns[name][is_inside & (counts % spacing == 0)])
 
     rise = over_tenth("fitness", births) - over_tenth("fitness", births / 2)
-    return {
-        "late_rise": rise,
-        "early_diversity": over_tenth("diversity", births / 10),
-    }
+    return {"late_rise": rise, "early_diversity": over_tenth("diversity", births / 10)}
 
 
 def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) -> float:

@@ -18,13 +18,7 @@ from analysis.figures.forms import (
     fitness_panels,
     fitness_text,
 )
-from analysis.figures.style import (
-    in_order,
-    label,
-    lone_points,
-    scales,
-    theme_of_size,
-)
+from analysis.figures.style import in_order, label, lone_points, scales, theme_of_size
 
 _FEW_RUNS = 10
 """Runs of an experiment up to which each is drawn."""

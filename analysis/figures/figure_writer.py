@@ -14,19 +14,9 @@ from analysis.figures.catalogue import FIGURES, DrawnFigure, Figure
 from analysis.figures.family_tree import LINEAGE, Best
 from analysis.figures.films import film
 from analysis.figures.forms import NothingToDraw, Tables, fitness_units
-from analysis.figures.robot_figures import (
-    gait_figures,
-    robot_pictures,
-    tree_figures,
-)
+from analysis.figures.robot_figures import gait_figures, robot_pictures, tree_figures
 from analysis.figures.robot_pictures import RobotPicture
-from analysis.figures.style import (
-    PICTURE_ENDING,
-    file_name,
-    in_order,
-    label,
-    save,
-)
+from analysis.figures.style import PICTURE_ENDING, file_name, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, LoadedRun
 from analysis.render.picture import Simulate

@@ -221,10 +221,7 @@ def _grouped(rows: Any) -> Any:  # noqa: ANN401 - pandas
 
 
 def _violins(
-    tables: Tables,
-    panels: Panels,
-    functions: Mapping[str, str],
-    experiments: list[str],
+    tables: Tables, panels: Panels, functions: Mapping[str, str], experiments: list[str]
 ) -> list[Any]:
     """Return a layer of the robots of last populations, if they have the measures."""
     robots = tables.get("robots")

@@ -7,12 +7,7 @@ import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.figures.forms import (
-    NothingToDraw,
-    Tables,
-    fitness_panels,
-    fitness_text,
-)
+from analysis.figures.forms import NothingToDraw, Tables, fitness_panels, fitness_text
 from analysis.figures.style import (
     OTHERS,
     in_order,

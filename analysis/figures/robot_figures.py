@@ -10,11 +10,7 @@ from rich.progress import Progress
 from analysis.figures.catalogue import BIRTHS, Figure, missing
 from analysis.figures.family_tree import best_robots, lineage, row_of
 from analysis.figures.pictures import family_tree, gaits
-from analysis.figures.robot_pictures import (
-    RobotPicture,
-    robot_picture,
-    shown_document,
-)
+from analysis.figures.robot_pictures import RobotPicture, robot_picture, shown_document
 from analysis.figures.style import in_order, label
 from analysis.measures.families import family
 from analysis.measures.load import LoadedRun

@@ -17,10 +17,7 @@ _KINDS = {
     "kept": pa.bool_(),
     "saved": pa.bool_(),
 }
-_RUN = {
-    "experiment": "name of the experiment",
-    "folder": "path of the run folder",
-}
+_RUN = {"experiment": "name of the experiment", "folder": "path of the run folder"}
 _ISLAND = {**_RUN, "island": "number of the island", "births": "births there so far"}
 _ROBOT = {"birth_island": "island of birth", "birth": "number of birth there"}
 

@@ -42,10 +42,7 @@ class MeasuredRun:
 
 
 def measure_runs(
-    runs: Sequence[LoadedRun],
-    *,
-    slots: SlotRule = "parent",
-    processes: int = 1,
+    runs: Sequence[LoadedRun], *, slots: SlotRule = "parent", processes: int = 1
 ) -> Iterator[MeasuredRun]:
     """Yield the measures of runs, in their order.
 

@@ -6,14 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.render.stage import (
-    AZIMUTH,
-    HIGH,
-    Picture,
-    Stage,
-    choose_engine,
-    furnish,
-)
+from analysis.render.stage import AZIMUTH, HIGH, Picture, Stage, choose_engine, furnish
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId

@@ -10,13 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from analysis.render.stage import (
-    FIELD_OF_VIEW,
-    Picture,
-    Stage,
-    choose_engine,
-    furnish,
-)
+from analysis.render.stage import FIELD_OF_VIEW, Picture, Stage, choose_engine, furnish
 from schema.errors import RevolveError
 from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity

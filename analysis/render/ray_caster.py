@@ -177,10 +177,7 @@ def _edges(hits: _Hits, size: tuple[int, int]) -> npt.NDArray[np.bool_]:
     geoms, is_lit = hits.geoms.reshape(size), hits.is_lit.reshape(size)
     normals = hits.normals.reshape(*size, 3)
     found = np.zeros(size, bool)
-    for first, second in (
-        (np.s_[1:, :], np.s_[:-1, :]),
-        (np.s_[:, 1:], np.s_[:, :-1]),
-    ):
+    for first, second in ((np.s_[1:, :], np.s_[:-1, :]), (np.s_[:, 1:], np.s_[:, :-1])):
         differs = geoms[first] != geoms[second]
         differs |= is_lit[first] != is_lit[second]
         cosines = np.einsum("ijk,ijk->ij", normals[first], normals[second])

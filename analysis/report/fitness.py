@@ -150,10 +150,7 @@ def _runs(
 
 
 def _dots(
-    axes: Axes,
-    robots: pa.Table,
-    names: Mapping[str, RunName],
-    paint: Mapping[str, str],
+    axes: Axes, robots: pa.Table, names: Mapping[str, RunName], paint: Mapping[str, str]
 ) -> list[str]:
     marks: dict[str, list[str]] = {}
     for row in robots.to_pylist():

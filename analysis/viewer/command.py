@@ -10,20 +10,10 @@ from analysis.viewer.body import box_model
 from analysis.viewer.entities import recording_name
 from analysis.viewer.flags import LAST_S
 from analysis.viewer.live import LiveSource
-from analysis.viewer.motion import (
-    Motion,
-    named_robot,
-    selected_robots,
-    show_motion,
-)
+from analysis.viewer.motion import Motion, named_robot, selected_robots, show_motion
 from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import Recording, ViewerError
-from analysis.viewer.replay import (
-    CHUNK_S,
-    read_news,
-    read_poses,
-    span_of,
-)
+from analysis.viewer.replay import CHUNK_S, read_news, read_poses, span_of
 from analysis.viewer.resimulate import Simulators, resimulate
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show

@@ -6,12 +6,7 @@ import numpy as np
 
 from analysis.viewer.body import Float32s
 from schema.experiment.document import Simulation
-from schema.experiment.environment import (
-    LIGHT_COLOUR,
-    LIGHT_M,
-    Environment,
-    relief,
-)
+from schema.experiment.environment import LIGHT_COLOUR, LIGHT_M, Environment, relief
 from schema.experiment.scenery import Solid, solids
 from schema.parts import Vector
 

@@ -90,9 +90,7 @@ class Window:
         # The viewer's own server, which is not used, listens on this machine only.
         command = [*python_command("rerun"), "--bind", HOST, "--connect"]
         self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
-            [*command, output.url],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            [*command, output.url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_WINDOW_S)

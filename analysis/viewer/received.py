@@ -5,11 +5,7 @@ import pyarrow as pa
 
 from analysis.viewer.scene import Scene
 from schema.errors import InvalidRobot, MalformedMessage
-from schema.limits import (
-    GREATEST_COORDINATE,
-    LONGEST_REASON,
-    LONGEST_WALL_S,
-)
+from schema.limits import GREATEST_COORDINATE, LONGEST_REASON, LONGEST_WALL_S
 from schema.parts import BodySpace
 from schema.robot.robot import Part, check_body, check_tree
 from schema.wire.arena import Live

@@ -31,10 +31,7 @@ _MOST_UNKNOWN = 200
 
 
 def watch(
-    source: LiveSource,
-    output: Output,
-    follow: BirthId | None,
-    stop: threading.Event,
+    source: LiveSource, output: Output, follow: BirthId | None, stop: threading.Event
 ) -> None:
     """Record a run until it ends or ``stop`` is set.
 

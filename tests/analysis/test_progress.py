@@ -7,9 +7,7 @@ import pytest
 from analysis.progress import bars
 
 
-def test_a_log_shows_the_title_once(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_log_shows_the_title_once(capsys: pytest.CaptureFixture[str]) -> None:
     with bars("things [bold] to do: 3") as bar:
         assert list(bar.track(range(3))) == [0, 1, 2]
     output = capsys.readouterr()

@@ -82,25 +82,3 @@ def test_different_fitness_functions_are_named() -> None:
     text = output({"runs": rows}, 200)
     assert "fitness is not compared between different fitness functions" in text
     assert ": a by locomotion; b, c by x:f\n" in text
-
-
-def test_fitness_in_arenas_and_off_line_is_told_apart() -> None:
-    rows: list[dict[str, Any]] = [
-        {"experiment": name, "differs": "", "fitness_function": text, "simulated_s": s}
-        for name, text, s in (
-            ("a", "locomotion", 9.0),
-            ("b", "locomotion", None),
-            ("c", "x:f", 9.0),
-            ("d", "locomotion", None),
-        )
-    ]
-    text = "fitness in arenas (a) is measured in another way than off-line (b, d)"
-    assert text in output({"runs": rows}, 200)
-    assert "another way" not in output({"runs": rows[1:3]}, 200)
-
-
-def test_a_run_without_populations_is_reported() -> None:
-    text = output({"left_out": ROWS["left_out"]}, 80)
-    assert text == (
-        "no population could be measured\nleft out: runs/x: run: broken [red] & gone\n"
-    )

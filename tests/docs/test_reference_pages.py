@@ -21,7 +21,6 @@ from schema.experiment.settings import (
     EvaluationSettings,
     VettingSettings,
 )
-from schema.parts import BUILT_IN
 from schema.tables.columns import TABLES
 
 TOP = Path(__file__).parents[2]
@@ -67,39 +66,6 @@ def test_every_key_of_every_section_is_listed() -> None:
         assert listed == [*section.__struct_encode_fields__]
         meanings = re.findall(r"^\| `\w+` \|.* \| (.*) \|$", part, re.MULTILINE)
         assert len(set(meanings)) == len(listed), "keys with the same description"
-
-
-def test_rows_of_settings_have_type_default_unit_and_meaning() -> None:
-    page = _page("settings.md").splitlines()
-    for row in (
-        (
-            "`tournament_size` | whole number >= 1, <= 1000000000 | `4` |  |"
-            " individuals per tournament"
-        ),
-        "`timestep_s` | number >= 1e-06, <= 10 | `0.005` | s | physics step",
-        (
-            "`light` | list of 3 (number >= -1e+06, <= 1e+06) | not given | m |"
-            " position of the light; no light if not given"
-        ),
-        (
-            "`culling` | [`[selection.culling]`](#selectionculling) | not given |  |"
-            " makes the population vary in size"
-        ),
-        # Two names of one function are listed as such.
-        "`fitness.function` | `locomotion` | another name of `worker.fitness:thesis`",
-    ):
-        assert f"| {row} |" in page
-
-
-def test_names_of_built_in_plugins_are_listed() -> None:
-    listed = re.findall(
-        r"^\| `space.part_types` \| `schema.parts:(\w+)` \|",
-        _page("settings.md"),
-        re.MULTILINE,
-    )
-    assert len(listed) == len(BUILT_IN)
-    for name in ("locomotion", "balance", "cost_of_transport", "cppn", "tournament"):
-        assert f"| `{name}` |" in _page("settings.md")
 
 
 def _flags(parser: argparse.ArgumentParser) -> set[str]:

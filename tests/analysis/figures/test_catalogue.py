@@ -7,13 +7,7 @@ from analysis.comparison.progression import progression
 from analysis.figures.catalogue import FIGURES, Figure
 from analysis.figures.courses import course as figure_course
 from analysis.figures.courses import course_caption, over_births
-from analysis.figures.forms import (
-    NothingToDraw,
-    fitness_panels,
-    over_runs,
-    spread_caption,
-    stacked,
-)
+from analysis.figures.forms import NothingToDraw, over_runs, spread_caption, stacked
 from analysis.figures.style import (
     colours,
     file_name,
@@ -151,16 +145,6 @@ def test_different_births_of_experiments_are_labelled() -> None:
     assert alone.labels.x == ""
 
 
-def test_panels_of_zeros_begin_at_zero() -> None:
-    rows = [{"experiment": "x", "births": 60, "parts": 7.0, "hidden": 0.0}]
-    panels = {"parts": "z", "hidden": "a"}
-    figure = over_runs({"outcomes": table("outcomes", rows)}, panels).draw()
-    lows, highs = zip(*(axes.get_ylim() for axes in figure.axes), strict=True)
-    assert min(lows) > -1.0
-    assert max(highs[1], 1.0) == highs[1]
-    assert lows[1] > -0.1
-
-
 def test_bands_of_three_or_more_runs_are_not_cut_at_the_axes() -> None:
     two = [("a", f"a-{n}", (0.1, 0.2)) for n in range(2)]
     figure = over_births(courses(*two, *THREE), "fitness", "f")
@@ -172,12 +156,6 @@ def test_bands_of_three_or_more_runs_are_not_cut_at_the_axes() -> None:
     low, high = axes.get_ylim()
     assert low < 1.2 - HALF
     assert high > 1.5 + HALF
-
-
-def test_single_runs_are_drawn_without_bands() -> None:
-    figure = over_births(courses(("a", "a-0", (0.1, 0.2))), "fitness", "f")
-    assert set(layers(figure)) == {"geom_line", "geom_blank"}
-    assert figure.data["mean"].tolist() == [0.1, 0.2]
 
 
 def test_a_mean_of_one_point_is_a_dot() -> None:
@@ -286,17 +264,6 @@ def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
         assert scale.palette(2) == [paint["b"], paint["c"]]
 
 
-def test_long_titles_of_panels_have_several_lines() -> None:
-    rows = [
-        {"experiment": name, "fitness_function": text}
-        for name, text in (("a", "light"), ("b", "bobbing:bob (feet = 0.6, hertz = 2)"))
-    ]
-    assert fitness_panels({"runs": table("runs", rows)}) == {
-        "a": "light",
-        "b": "bobbing:bob (feet = 0.6,\nhertz = 2)",
-    }
-
-
 def test_colours_of_many_experiments_differ() -> None:
     """A step of 1 in 8 of red, green or blue can be seen."""
     shades = [
@@ -325,12 +292,6 @@ def test_colours_of_many_experiments_differ() -> None:
 )
 def test_names_of_experiments(name: str, one_line: str, two_lines: str) -> None:
     assert (label(name), two_line_label(name)) == (one_line, two_lines)
-
-
-def test_experiments_of_one_name_have_colours_of_their_own() -> None:
-    names = ["scenario1~2", "scenario1", "scenario2"]
-    assert in_order(names) == ["scenario1", "scenario2", "scenario1~2"]
-    assert len(set(colours(names).values())) == 3
 
 
 def test_each_fitness_function_has_its_own_panel() -> None:

@@ -8,13 +8,7 @@ import pyarrow as pa
 import pytest
 from matplotlib.image import AxesImage
 
-from analysis.figures.family_tree import (
-    Best,
-    best_robots,
-    lineage,
-    ordered,
-    row_of,
-)
+from analysis.figures.family_tree import Best, best_robots, lineage, ordered, row_of
 from analysis.figures.pictures import family_tree, gaits
 from analysis.figures.robot_pictures import FOUNDERS, RobotPicture
 from analysis.figures.robots import lineages
@@ -117,21 +111,6 @@ def test_lineage_is_all_ancestors_parents_first(members: pa.Table) -> None:
     assert sorted(ends) == [(3, 0), (3, 1), (4, 1), (4, 3)]
 
 
-def test_a_lineage_contains_migrants_whose_rows_come_later() -> None:
-    # 0:1 is a child of 0:0 and of 1:0, a migrant whose row comes later.
-    family = births(((0, 0), []), ((0, 1), [(0, 0), (1, 0)]), ((1, 0), []),
-                    rank=[1, 2, 1])  # fmt: skip
-    found = lineage(family, "x", 1)
-    assert found["order"].to_pylist() == [0, 2, 1]
-    assert found["number"].to_pylist() == [0, 0, 1]
-    shown = lineages({"lineage": found})
-    lines = next(
-        layer._data for layer in shown.layers if "segment" in type(layer.geom).__name__
-    )
-    assert list(zip(lines["number"], lines["to"], strict=True)) == [(1, 0), (1, 0)]
-    shown.draw()
-
-
 def test_the_best_robot_is_the_fittest_of_the_last_population() -> None:
     rows = [
         {"experiment": "b", "folder": "f", "island": 3, "birth_island": 0, "birth": n,
@@ -169,11 +148,6 @@ def test_a_level_is_sorted_by_the_level_below() -> None:
         [1, 2],
         [4, 3],
     ]
-
-
-def test_related_members_of_a_level_are_neighbours() -> None:
-    edges = [(0, 1), (0, 2), (0, 3), (1, 3)]
-    assert ordered([[0], [1, 2, 3]], edges) == [[0], [2, 1, 3]]
 
 
 @pytest.fixture

@@ -30,12 +30,6 @@ def test_density_and_lines_are_those_of_robots_that_differ() -> None:
     figure.draw()
 
 
-def test_runs_of_one_robot_each_have_a_density_without_lines() -> None:
-    figure = variability(measured(("a", "a-0", 0.2), ("a", "a-1", 0.4)))
-    assert set(layers(figure)) == {"geom_density"}
-    figure.draw()
-
-
 @pytest.mark.parametrize("other", [("b", "b-0", 0.4), ("a", "a-1", 0.2)])
 def test_robots_that_do_not_differ_have_no_density(
     other: tuple[str, str, float],

@@ -103,12 +103,6 @@ def test_measures_of_populations_by_hand(
         ], name
 
 
-def test_lines_of_ancestors_are_bits_of_their_rows() -> None:
-    assert ancestors(parents_of(FAMILY)) == [0, 0, 0b11, 0b111, 0b1111]
-    born = births((A, [G]), (F, []), (G, [F]))
-    assert ancestors(parents_of(born)) == [0b110, 0, 0b010]
-
-
 def test_an_individual_that_is_its_own_ancestor_is_refused() -> None:
     with pytest.raises(RunFolderError, match="row 0 descends from itself"):
         ancestors(parents_of(births((A, [B]), (B, [A]))))
@@ -246,11 +240,7 @@ def test_robots_have_their_last_fitness() -> None:
     names = ["birth", "fitness", "is_last", "ancestors", "is_failed"]
     assert [
         [*row.values()] for row in robots(RunTables(tables)).select(names).to_pylist()
-    ] == [
-        [0, 0.2, True, 0, False],
-        [1, 0.0, False, 0, True],
-        [2, 0.3, True, 2, False],
-    ]
+    ] == [[0, 0.2, True, 0, False], [1, 0.0, False, 0, True], [2, 0.3, True, 2, False]]
 
 
 def test_a_failure_counts_as_the_least_fitness_below_0() -> None:

@@ -22,8 +22,7 @@ def test_off_line_each_robot_counts_with_its_last_evaluation() -> None:
     tables = run(
         births=BORN,
         population=population(
-            (0, 2, {(0, 0): 0.5, (0, 1): 0.25}),
-            (0, 3, {(0, 1): 0.25, (0, 2): None}),
+            (0, 2, {(0, 0): 0.5, (0, 1): 0.25}), (0, 3, {(0, 1): 0.25, (0, 2): None})
         ),
         evaluations=table(
             "evaluations",

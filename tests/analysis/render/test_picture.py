@@ -21,7 +21,7 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
-from analysis.render.ray_caster import RayCaster, _checker
+from analysis.render.ray_caster import RayCaster
 from schema.experiment.environment import Environment
 from schema.formats.files import settings_of, write_robot
 from schema.robot.brain import INPUT, Brain, Neuron
@@ -112,9 +112,7 @@ def test_objects_and_the_light_are_rendered_and_do_not_move_the_camera(
     assert yellow[1] > 20
 
 
-def test_a_pose_moves_the_robot_before_a_fixed_camera(
-    renderer: RobotRenderer,
-) -> None:
+def test_a_pose_moves_the_robot_before_a_fixed_camera(renderer: RobotRenderer) -> None:
     pose = np.array([0.0, 0.0, 0.0225, 1.0, 0.0, 0.0, 0.0])
     there = pose.copy()
     there[0] += 0.05
@@ -158,22 +156,6 @@ def simulate(*_: object, **__: object) -> NoReturn:
 def main(words: list[str]) -> int:
     """Run ``revolve robot render``."""
     return render(parser().parse_args(words[1:]), simulate)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--gait", "0"), "--gait: must be a whole number >= 1, got '0'"),
-        (("--width", "-5"), "--width: must be a whole number in 16..4096, got '-5'"),
-    ],
-)
-def test_invalid_flags_are_refused(
-    words: tuple[str, str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["robot render", "a.yaml", "a.png", *words])
-    assert end.value.code == 2
-    assert message in capsys.readouterr().err
 
 
 @pytest.fixture
@@ -269,23 +251,6 @@ def test_a_shadow_falls_away_from_the_light(monkeypatch: pytest.MonkeyPatch) -> 
             made.picture(pose, look_at=spot)[60, 80] for pose in (low, high)
         )
     assert (dark < 0.8 * bright).all()
-
-
-@pytest.mark.parametrize(
-    ("place", "width", "share"),
-    [
-        ((0.5, 0.5), 0.1, 1.0),  # within a tile of the first colour
-        ((1.5, 0.5), 0.1, 0.0),  # within one of the second
-        ((1.0, 0.5), 0.5, 0.5),  # on the edge between both
-        ((1.1, 0.5), 0.4, 0.25),  # a quarter of the pixel is in the first tile
-        ((0.3, -7.7), 2.0, 0.5),  # two tiles wide: as much of each
-    ],
-)
-def test_a_checker_is_averaged_over_a_pixel(
-    place: tuple[float, float], width: float, share: float
-) -> None:
-    found = _checker(np.array([place]), np.array([width]))
-    assert found == pytest.approx([share], abs=1e-5)
 
 
 def test_framing_shows_the_whole_shadow_of_a_robot_in_the_air(

@@ -12,7 +12,6 @@ import pyarrow.compute as pc
 import pytest
 from PIL import Image
 
-from analysis.comparison.progression import progression
 from analysis.figures.figure_writer import Drawings
 from analysis.measures.outputs import schema
 from analysis.report import page as report_page
@@ -149,12 +148,6 @@ def test_numbers_verdicts_and_provenance_are_shown(read: Reader, text: str) -> N
     assert text in read.text
 
 
-@pytest.mark.parametrize("text", ["0.02", "size mean mean over"])
-def test_what_means_nothing_is_not_shown(read: Reader, text: str) -> None:
-    """The interval of a single run, and the meaning of a measure that is equal."""
-    assert text not in read.text
-
-
 def compared(*rows: dict[str, Any]) -> str:
     """Return the section of differences of rows of the comparison."""
     row = {"measure": "fitness", "a": "a", "b": "b", "births": 9, "runs_a": 3,
@@ -269,14 +262,6 @@ def test_dots_over_births_are_at_the_greatest_fitness_of_robots() -> None:
     assert "In arenas" not in text
 
 
-def test_a_robot_has_a_mark_in_each_plot_that_it_belongs_to(read: Reader) -> None:
-    text = "robot 0:2, soft, run 1, seed 7 fitness 0.3; 9 parts, 3 motors, 2 hidden"
-    # In both plots: fitter than all before, and in the last population.
-    assert read.text.count(text) == 2
-    # Robot 1 is less fit than robot 0.
-    assert read.text.count("robot 0:1, soft, run 1") == 1
-
-
 def test_findings_are_folded_unless_one_is_tested(read: Reader) -> None:
     assert "What the measures mean" in read.folds
     assert "All 2 findings" in read.unfolded
@@ -286,20 +271,6 @@ def test_findings_are_folded_unless_one_is_tested(read: Reader) -> None:
     assert "None of the 1 findings can be tested" in others.text
     assert "All 1 findings" in others.folds
     assert "All 1 findings" not in others.unfolded
-
-
-def test_one_experiment_has_no_comparison() -> None:
-    given = tables()
-    alone = given["runs"].slice(0, 1)
-    others = {"comparison": given["comparison"].slice(0, 0), "runs": alone}
-    mine = {
-        name: given[name].filter(pc.field("folder") == "soft-0")
-        for name in ("populations", "robots")
-    }
-    mine["progression"] = progression(mine["populations"])
-    read = read_page({**given, **mine, **others})
-    assert "Difference" not in read.text
-    assert "#comparison" not in read.links
 
 
 def test_a_report_without_runs_has_no_empty_sections() -> None:

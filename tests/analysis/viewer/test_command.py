@@ -18,7 +18,7 @@ from analysis.measures.load import read_run
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
 from analysis.viewer.command import view
-from analysis.viewer.entities import TimePoint, recording_name
+from analysis.viewer.entities import TimePoint
 from analysis.viewer.flags import parser
 from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
@@ -127,16 +127,6 @@ def test_views_of_a_mixed_archipelago_name_arenas_and_populations() -> None:
                      "Arena 4", "Arena 5"]  # fmt: skip
 
 
-def test_an_output_is_a_window_by_default(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("DISPLAY", ":0")
-    file = tmp_path / "a.rrd"
-    assert Output.of(None, None).has_window
-    assert Output.of(file, None) == Output(file, None, has_window=False)
-    assert Output.of(None, "127.0.0.1:0").url == "rerun+http://127.0.0.1:0/proxy"
-
-
 @pytest.mark.skipif(sys.platform == "darwin", reason="there is always a screen")
 def test_a_window_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
@@ -233,8 +223,3 @@ def test_plug_ins_of_a_running_run_are_those_of_its_folder(tmp_path: Path) -> No
     options = parser().parse_args(["--connect", str(tmp_path), "--save", "a.rrd"])
     with pytest.raises(RunFolderError, match=r"run\.json: damaged"):
         view(options, Simulators(*[NotImplemented] * 3))
-
-
-def test_a_recording_has_the_names_of_experiment_and_folder() -> None:
-    assert recording_name("pond", "pond-seed1") == "pond-seed1"
-    assert recording_name("pond", "zoo") == "pond-zoo"

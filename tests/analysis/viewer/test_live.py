@@ -13,13 +13,7 @@ from schema.agent.service import session_config
 from schema.agent.topics import Member
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode
-from schema.wire.updates import (
-    Birth,
-    Page,
-    Update,
-    decode_page,
-    pages_of,
-)
+from schema.wire.updates import Birth, Page, Update, decode_page, pages_of
 
 PATIENCE_S = 30.0
 CHIEF = Member("default", "coordinator", "chief.1")
@@ -109,9 +103,7 @@ class Chief:
         if len(self.asked) == 1:
             # As a coordinator publishes: behind the pages.
             self._session.put(
-                self._member.events,
-                encode(news(8)),
-                priority=zenoh.Priority.DATA_LOW,
+                self._member.events, encode(news(8)), priority=zenoh.Priority.DATA_LOW
             )
 
 

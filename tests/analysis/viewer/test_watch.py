@@ -90,9 +90,7 @@ def test_a_stop_before_the_first_message_is_reported(
 
 
 def test_waiting_for_a_run_is_reported_once(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     times = iter([0.0, 0.0, 1.0, 2.5, 3.0, 16.0])
     clock = SimpleNamespace(monotonic=lambda: next(times))
