@@ -14,13 +14,7 @@ from schema.plugins.permission import allow
 
 
 def main(arguments: list[str]) -> int:
-    """Run ``revolve analyze``, ``robot render`` or ``view``.
-
-    Args:
-        arguments: the command's name first.
-
-    Returns:
-        Exit code.
+    """Run ``analyze``, ``robot render`` or ``view``; return the exit code.
 
     Raises:
         RunFolderError: no run is found.
@@ -100,11 +94,7 @@ def parser(command: str) -> Flags:
 
 
 def _simulation() -> Callable[..., Any]:
-    """Return the worker's simulation, after choosing the renderer's backend.
-
-    Raises:
-        MissingExtra: a library for rendering is not installed.
-    """
+    """Return the worker's simulation, after choosing the renderer's backend."""
     with extra("pictures need", "pictures"):
         from analysis.render.stage import choose_engine
 

@@ -43,16 +43,11 @@ _LIBRARIES = (
 def analyze(
     options: argparse.Namespace, words: Sequence[str], simulate: Callable[[], Simulate]
 ) -> int:
-    """Measure runs, draw figures, and write the report.
+    """Measure runs, draw figures, and write the report; return the exit code.
 
-    Args:
-        options: ``runs``, ``out``, ``slots``, ``processes``.
-        words: words of the command line, for the report.
-        simulate: returns the worker's simulation, or raises the reason why robots
-            cannot be rendered.
-
-    Returns:
-        0; measures and figures that are left out are no failure.
+    The words of the command line are for the report. ``simulate`` returns the worker's
+    simulation, or raises the reason why robots cannot be rendered. Measures and figures
+    that are left out are no failure.
 
     Raises:
         RunFolderError: no run is found, or the output folder cannot be written.
@@ -123,13 +118,9 @@ def _write_measures(
     folder: Path,
     only: str = "",
 ) -> None:
-    """Write measures, and remove those that an earlier analysis wrote.
+    """Write all measures, or one; remove those that an earlier analysis wrote.
 
-    Args:
-        tables: by name; the table ``left_out`` is added to them.
-        left_out: its rows.
-        folder: folder of the measures.
-        only: the table to write; all if empty.
+    The table ``left_out`` is added to them.
     """
     rows = [asdict(one) for one in left_out]
     tables["left_out"] = pa.Table.from_pylist(rows, schema("left_out"))
@@ -150,7 +141,6 @@ def _listed(figures: Sequence[DrawnFigure]) -> str:
 
 
 def _versions() -> dict[str, str]:
-    """Return the versions of the software."""
     versions = {"python": platform.python_version(), "system": platform.platform()}
     for name in _LIBRARIES:
         try:

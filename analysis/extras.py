@@ -15,9 +15,7 @@ class MissingExtra(RevolveError):  # noqa: N818 - names what is missing
 def extra(what: str, name: str) -> Iterator[None]:
     """Report a library that cannot be imported, with the extra that installs it.
 
-    Args:
-        what: beginning of the message, such as ``pictures need``.
-        name: of the extra.
+    ``what`` begins the message, such as ``pictures need``.
 
     Raises:
         MissingExtra: a library is not installed.

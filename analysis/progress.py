@@ -13,13 +13,7 @@ from schema.agent.terminal.progress_line import SPAN_S, print_line
 
 
 def replaced(file: Path, what: str, others: str) -> Iterator[str]:
-    """Yield a line that a file of an earlier command is replaced, if there is one.
-
-    Args:
-        file: that this command will write.
-        what: it is.
-        others: what else is replaced.
-    """
+    """Yield a line that a file of an earlier command, and others, are replaced."""
     if file.is_file():
         written = datetime.fromtimestamp(file.stat().st_mtime, UTC)
         text = f"replaces {what} of {written:%Y-%m-%d %H:%M} UTC, {others}"
@@ -28,12 +22,7 @@ def replaced(file: Path, what: str, others: str) -> Iterator[str]:
 
 @contextmanager
 def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
-    """Show progress bars on a terminal; in a log, a title, and lines at intervals.
-
-    Args:
-        title: text printed in a log.
-        columns: columns of the bars; rich's default if none are given.
-    """
+    """Show progress bars on a terminal; in a log, a title, and lines at intervals."""
     console = Console(stderr=True)
     is_log = not console.is_terminal
     if is_log:

@@ -15,11 +15,8 @@ from analysis.measures.populations import last_rows
 from schema.agent.terminal.progress_line import print_line
 from schema.errors import rounded
 
-_FITNESS = ("fitness", "fitness_best")
 _BORDERS, _BORDER = 3, 1
 """Characters of a column besides its cells, and of a table besides its columns."""
-_FIGURE = "figure "
-"""Prefix of the name of a figure that was left out."""
 _FOLDED = 12
 """Least width of a folded column of words."""
 
@@ -27,9 +24,7 @@ _FOLDED = 12
 def show(tables: dict[str, pa.Table], console: Console) -> None:
     """Print each run's last populations, the findings, and what was left out.
 
-    Args:
-        tables: by the names of ``analysis.measures.outputs``.
-        console: console to print on; nothing is cut off, however narrow it is.
+    Nothing is cut off, however narrow the console is.
     """
     populations = _last_populations(tables["populations"])
     if populations:
@@ -59,7 +54,7 @@ def _left_out(rows: Sequence[Mapping[str, str]]) -> list[str]:
         if row["folder"]:
             lines.append(f"left out: {row['folder']}: {row['what']}: {row['why']}")
         else:
-            whys.setdefault(row["why"], []).append(row["what"].removeprefix(_FIGURE))
+            whys.setdefault(row["why"], []).append(row["what"].removeprefix("figure "))
     if whys:
         each = "; ".join(f"{', '.join(names)} ({why})" for why, names in whys.items())
         lines.append(f"left out: figures {each}")
@@ -74,11 +69,7 @@ def _print_table(
 ) -> None:
     """Print rows as a table, or as one line each if the console is too narrow.
 
-    Args:
-        console: console to print on.
-        heads: heads of the columns.
-        rows: cells of the rows.
-        words: columns that may be folded; the others are numbers.
+    Columns of words may be folded; the others are numbers.
     """
     table = Table()
     needed = _BORDER
@@ -114,7 +105,10 @@ def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
             + (f" {row['island']}" if row["folder"] in divided else ""),
             str(row["births"]),
             str(row["judged"]),
-            *("-" if row[name] is None else rounded(row[name]) for name in _FITNESS),
+            *(
+                "-" if row[name] is None else rounded(row[name])
+                for name in ("fitness", "fitness_best")
+            ),
         )
         for row in rows
     ]

@@ -64,25 +64,19 @@ def summary(table: pa.Table) -> str:
     return line_of(table, _of_best, _of_last)
 
 
-def _of_best(rows: Sequence[Row]) -> str:
-    name = f"{rows[0]['island']}:{rows[0]['birth']}"
-    undisturbed = rows[0]["undisturbed"]
-    if undisturbed is None:
-        return f"the best ever, {name}, has no fitness without changes"
-    if undisturbed <= 0:
-        return f"the best ever, {name}, has a fitness of {rounded(undisturbed)}"
+def _of_best(name: str, rows: Sequence[Row]) -> str:
     kept = [
         f"{percent(share)} without {row['kind']}"
         for row in rows
         if row["group"] == HELD and row["scope"] == KIND
         and (share := row["share"]) is not None
     ]  # fmt: skip
-    for text, found in (
+    for text, known in (
         ("without sensors", shares(rows, HELD, ALL)),
         ("with sensors at their mean", shares(rows, MEAN, ALL)),
         ("with a random brain", shares(rows, RANDOM, ONE)),
     ):
-        kept += [f"{percent(median(found))} {text}"] if found else []
+        kept += [f"{percent(median(known))} {text}"] if known else []
     single = (row for row in rows if (row["group"], row["scope"]) == (DEAD, ONE))
     # Without some motors a robot gains: these carry nothing.
     dead = [row for row in single if row["share"] is not None and row["share"] <= 1.0]
@@ -90,7 +84,7 @@ def _of_best(rows: Sequence[Row]) -> str:
     carried = [
         f"the {row['change']} carries {percent(1 - row['share'])}" for row in first
     ]
-    line = f"the best ever, {name} ({_fitness(rows[0])})"
+    line = f"{name} ({_fitness(rows[0])})"
     line += f", keeps {', '.join(kept)}" if kept else ""
     return "; ".join([line, *([", ".join(carried)] if carried else [])])
 
@@ -112,8 +106,8 @@ def _of_last(robots: Sequence[Sequence[Row]]) -> str:
         (f"without {'its' if one else 'their'} most important motor", DEAD, ONE, True),
         ("with a random brain", RANDOM, ONE, False),
     ):
-        found = [shares(rows, group, scope) for rows in robots]
-        known = [min(each) if least else median(each) for each in found if each]
+        own = [shares(rows, group, scope) for rows in robots]
+        known = [min(each) if least else median(each) for each in own if each]
         texts += [f"{percent(median(known))} {text}"] if known else []
     if not texts:
         return ""

@@ -5,7 +5,7 @@ is that of this project, and the text names it. Source: Hupkes 2016, chapters 6 
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 Direction = Literal[">", "<", "=", "!=", "some"]
 
@@ -69,25 +69,13 @@ def _of(
     measure: str,
     expected: Direction,
     *pairs: Pair,
-    births: int = 0,
-    is_automatic: bool = False,
-    is_spread: bool = False,
-    share: float = 1.0,
+    **rest: Any,  # noqa: ANN401 - of a claim
 ) -> list[Claim]:
     """Return one claim per pair of experiments, with both names in the text."""
+    topic = text.format(a="A", b="B")
     return [
         Claim(
-            figure,
-            text.format(a=a, b=b),
-            measure,
-            a,
-            expected,
-            b,
-            share=share,
-            is_spread=is_spread,
-            is_automatic=is_automatic,
-            births=births,
-            topic=text.format(a="A", b="B"),
+            figure, text.format(a=a, b=b), measure, a, expected, b, topic=topic, **rest
         )
         for a, b in pairs
     ]
@@ -100,27 +88,17 @@ def _all(
     expected: Direction,
     reference: float = 0.0,
     *,
-    margin: float = 0.0,
     of: tuple[str, ...] = _EVOLVED,
-    births: int = 0,
-    is_automatic: bool = False,
+    **rest: Any,  # noqa: ANN401 - of a claim
 ) -> list[Claim]:
     """Return one claim per experiment that compares it with a number."""
     return [
         Claim(
-            figure,
-            f"{a}: {text}",
-            measure,
-            a,
-            expected,
-            reference=reference,
-            margin=margin,
-            is_automatic=is_automatic,
-            births=births,
-            topic=text,
+            figure, f"{a}: {text}", measure, a, expected, reference=reference,
+            topic=text, **rest,
         )
         for a in of
-    ]
+    ]  # fmt: skip
 
 
 _TO_3 = ((_THREE, _ONE), (_THREE, _TWO))

@@ -85,12 +85,13 @@ def summary(table: pa.Table) -> str:
 
 def line_of(
     table: pa.Table,
-    of_best: Callable[[Sequence[Row]], str],
+    of_best: Callable[[str, Sequence[Row]], str],
     of_last: Callable[[Sequence[Sequence[Row]]], str],
 ) -> str:
     """Return a line about a run's best robot ever, last population, and failures.
 
-    ``of_best`` describes a robot by its rows, ``of_last`` several by the rows of each.
+    ``of_best`` describes a named robot of positive fitness by its rows, ``of_last``
+    several by the rows of each.
     """
     robots: dict[tuple[int, int], list[Row]] = {}
     rows = table.to_pylist()
@@ -98,7 +99,18 @@ def line_of(
         robots.setdefault((row["island"], row["birth"]), []).append(row)
     best = next(own for own in robots.values() if own[0]["is_best"])
     last = [own for own in robots.values() if own[0]["is_last"]]
-    texts = [of_best(best), of_last(last)]
+    name, undisturbed = (
+        f"{best[0]['island']}:{best[0]['birth']}",
+        best[0]["undisturbed"],
+    )
+    if undisturbed is None:
+        text = f"the best ever, {name}, has no fitness without changes"
+    elif undisturbed <= 0:
+        fitness = rounded(undisturbed)
+        text = f"the best ever, {name}, has a fitness of {fitness} without changes"
+    else:
+        text = of_best(f"the best ever, {name}", best)
+    texts = [text, of_last(last)]
     if failed := sum(row["fitness"] is None for row in rows):
         texts.append(f"{failed} of {len(rows)} evaluations failed")
     return "; ".join(filter(None, texts))
@@ -114,20 +126,15 @@ def _of_last(robots: Sequence[Sequence[Row]]) -> str:
     )
 
 
-def _of_best(rows: Sequence[Row]) -> str:
-    name = f"{rows[0]['island']}:{rows[0]['birth']}"
-    undisturbed, share = rows[0]["undisturbed"], kept(rows)
-    if undisturbed is None:
-        return f"the best ever, {name}, has no fitness without changes"
+def _of_best(name: str, rows: Sequence[Row]) -> str:
+    share, fitness = kept(rows), rounded(rows[0]["undisturbed"])
     if share is None:
-        fitness = rounded(undisturbed)
-        return f"the best ever, {name}, has a fitness of {fitness} undisturbed"
+        return f"{name}, has a fitness of {fitness} without changes"
     known = sorted((r["share"], r["change"]) for r in rows if r["share"] is not None)
     (low, worst), (high, gain) = known[0], known[-1]
     return (
-        f"the best ever, {name}, keeps {percent(share)} of its fitness "
-        f"({rounded(undisturbed)}) on average, from {percent(low)} under {worst} to "
-        f"{percent(high)} under {gain}"
+        f"{name}, keeps {percent(share)} of its fitness ({fitness}) on average, from "
+        f"{percent(low)} under {worst} to {percent(high)} under {gain}"
     )
 
 

@@ -70,23 +70,14 @@ def course(tables: Tables, measure: str) -> Course:
         raise NothingToDraw(f"no run has {measure} at two numbers of births")
     rows = tables["progression"].filter(pc.field("measure") == measure)
     mean = mean_of_all_runs(rows, by_run)
-    lasts = _grouped(by_run, [("births", "max"), ("folder", "count_distinct")])
-    sizes = {name: row["folder_count_distinct"] for name, row in lasts.items()}
-    shared = {
-        name: row["births_max"]
-        for name, row in _grouped(mean, [("births", "max")]).items()
-    }
+    runs = by_run.to_pandas().groupby("experiment")
+    shared = mean.to_pandas().groupby("experiment")["births"].max().to_dict()
     ends = {
         name: shared.get(name, 0)
-        for name, row in lasts.items()
-        if shared.get(name, 0) < row["births_max"]
+        for name, last in runs["births"].max().items()
+        if shared.get(name, 0) < last
     }
-    return Course(_thinned(by_run), mean, sizes, ends)
-
-
-def _grouped(table: pa.Table, totals: list[Any]) -> dict[str, dict[str, int]]:
-    rows = table.group_by("experiment", use_threads=False).aggregate(totals)
-    return {row["experiment"]: row for row in rows.to_pylist()}
+    return Course(_thinned(by_run), mean, runs["folder"].nunique().to_dict(), ends)
 
 
 def _thinned(by_run: pa.Table) -> pa.Table:

@@ -1,6 +1,6 @@
 """Draws all figures that the data allows; records why the others are left out."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from glob import escape
@@ -12,16 +12,18 @@ from rich.progress import Progress
 
 from analysis.figures.catalogue import FIGURES, DrawnFigure, Figure
 from analysis.figures.family_tree import LINEAGE, Best
-from analysis.figures.films import film
 from analysis.figures.forms import NothingToDraw, Tables, fitness_units
 from analysis.figures.robot_figures import gait_figures, robot_pictures, tree_figures
 from analysis.figures.robot_pictures import RobotPicture
 from analysis.figures.style import PICTURE_ENDING, file_name, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, LoadedRun
-from analysis.render.picture import Simulate
+from analysis.render.picture import Simulate, gif
+from analysis.render.stage import Picture
 
 _FILM = "best-robot-of-"
+MOST_BYTES = 700_000
+"""Size of a film up to which it keeps all colours and pictures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,23 @@ class FigureWriter:
     def _remove(self, pattern: str) -> None:
         for path in self._folder.glob(pattern):
             path.unlink()
+
+
+def film(pictures: Sequence[Picture], interval_s: float) -> bytes:
+    """Return pictures as a GIF that repeats.
+
+    A film above ``MOST_BYTES`` gets fewer colours, then every other picture is left
+    out.
+    """
+    shown = list(pictures)
+    while True:
+        for colours in (128, 64, 32):
+            stored = gif(shown, interval_s, colours)
+            if len(stored) <= MOST_BYTES:
+                return stored
+        if len(shown) == 1:
+            return stored
+        shown, interval_s = shown[::2], 2 * interval_s
 
 
 def _place(drawn: DrawnFigure) -> tuple[bool, list[int], str]:

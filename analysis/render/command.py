@@ -27,9 +27,6 @@ PICTURE_ENDING = ".png"
 def render(options: argparse.Namespace, simulate: Simulate) -> int:
     """Render a robot in neutral pose or in motion; return the exit code.
 
-    Returns:
-        0 if the picture was written.
-
     Raises:
         NoPictures: the file name has another ending, the file cannot be written, or
             ``--gait`` exceeds the number of ticks.
@@ -63,7 +60,6 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
 
 
 def _check_gait(gait: int | None, world: Simulation) -> None:
-    """Refuse more pictures than there are ticks."""
     ticks = -(-world.evaluation_steps // world.brain_steps)
     most = ticks - ticks // 2
     if gait is not None and gait > most:

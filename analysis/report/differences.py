@@ -201,7 +201,7 @@ def all_differences(tables: Tables) -> str:
 
 
 def _equal(rows: Sequence[Row]) -> str:
-    """Return how many measures of a pair are equal in all runs; empty for none."""
+    """Return which measures of a pair are equal in all runs; empty for none."""
     names = [_words(row["measure"]) for row in rows if row["p"] is None]
     if not names:
         return ""

@@ -152,10 +152,10 @@ def _own(tables: Tables) -> str:
 
 
 def _overview(tables: Tables, courses: str) -> str:
-    left = f"<div>{courses}</div>" if courses else ""
-    right = f"<div>{text}</div>" if (text := differences(tables)) else ""
-    both = f'<div class="duo">{left}{right}</div>' if left or right else ""
-    return summary(tables) + arenas(tables) + both
+    parts = (f"<div>{part}</div>" for part in (courses, differences(tables)) if part)
+    both = "".join(parts)
+    beside = f'<div class="duo">{both}</div>' if both else ""
+    return summary(tables) + arenas(tables) + beside
 
 
 def _of_functions(

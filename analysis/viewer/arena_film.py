@@ -42,10 +42,7 @@ Frames = Mapping[float, Poses]
 
 
 def film(options: argparse.Namespace) -> int:
-    """Write a film of the arenas of a run.
-
-    Returns:
-        0.
+    """Write a film of the arenas of a run; return the exit code.
 
     Raises:
         RunFolderError: the folder has no run, or the run has no robot yet.

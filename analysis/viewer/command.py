@@ -29,10 +29,7 @@ from schema.tables.description import allow_plugins_of
 
 
 def view(options: argparse.Namespace, simulators: Simulators) -> int:
-    """Show a run in the viewer.
-
-    Returns:
-        0.
+    """Show a run in the viewer; return the exit code.
 
     Raises:
         RunFolderError: the folder has no run, or the run has no robot yet.
@@ -80,7 +77,14 @@ def _replay(
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         recording.add_scene(scene)
         show = Show(recording, scene.space)
-        span = _span(options) if scene.arenas else None
+        span = None
+        if scene.arenas:
+            span = span_of(options, LAST_S, ViewerError)
+            if span[0] > 0.0:
+                tell_user(
+                    f"showing poses from {span[0]:g} s to {span[1]:g} s; use --from "
+                    "and --until for others"
+                )
         with bars(f"recording {name}") as bar:
             task = bar.add_task("births", total=None)
             show.tell(news)
@@ -117,11 +121,14 @@ def _motions(
     options: argparse.Namespace, run: LoadedRun, simulators: Simulators
 ) -> list[Motion]:
     """Return the motion of the robots of ``--robot``; print if it is as recorded."""
-    names = [each for each in options.robot if isinstance(each, str)]
-    known = {name: named_robot(run.folder, name) for name in names}
-    for _, line in known.values():
-        tell_user(line)
-    wanted = [known[each][0] if each in known else each for each in options.robot]
+    wanted: list[BirthId] = []
+    for robot in options.robot:
+        if isinstance(robot, BirthId):
+            wanted.append(robot)
+        else:
+            birth, line = named_robot(run.folder, robot)
+            wanted.append(birth)
+            tell_user(line)
     births = selected_robots(run.folder, wanted, has_ancestry=options.ancestry)
     if not births:
         return []
@@ -133,14 +140,3 @@ def _motions(
     for motion in motions:
         tell_user(motion.verdict)
     return motions
-
-
-def _span(options: argparse.Namespace) -> tuple[float, float]:
-    """Return the simulated time to show; print it if it is not the whole run."""
-    start_s, end_s = span_of(options, LAST_S, ViewerError)
-    if start_s > 0.0:
-        tell_user(
-            f"showing poses from {start_s:g} s to {end_s:g} s; use --from and --until "
-            "for others"
-        )
-    return start_s, end_s

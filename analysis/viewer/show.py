@@ -96,11 +96,11 @@ class Show:
     def tell(self, news: Update) -> None:
         """Record everything new in a message."""
         came: list[Birth | Level] = [*news.births, *news.levels]
-        for each in sorted(came, key=lambda one: one.births):
-            if isinstance(each, Birth):
-                self._born(each)
+        for message in sorted(came, key=lambda message: message.births):
+            if isinstance(message, Birth):
+                self._born(message)
             else:
-                self._level(each)
+                self._level(message)
         # A birth at the time of a death comes before the death.
         for gone in sorted(news.deaths, key=lambda gone: gone.births):
             self._departed(gone)

@@ -11,8 +11,7 @@ from PIL import Image
 from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure, Figure
 from analysis.figures.family_tree import Best
-from analysis.figures.figure_writer import Drawings, Film
-from analysis.figures.films import film
+from analysis.figures.figure_writer import Drawings, Film, film
 from analysis.measures.outputs import schema
 from analysis.report.page import report
 

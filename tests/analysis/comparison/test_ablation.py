@@ -77,13 +77,6 @@ def test_line_about_a_run() -> None:
         "the best ever, 0:7 (fitness 0.1000 alone, 0.3000 recorded), keeps 100 % "
         "without sensors"
     )
-    failed = [row(7, HELD, "all", None, undisturbed=None)]
-    assert summary(table_of(failed, COLUMNS)) == (
-        "the best ever, 0:7, has no fitness without changes; 1 of 1 evaluations failed"
-    )
-    still = [row(7, HELD, "all", 0.1, undisturbed=-0.2)]
-    said = summary(table_of(still, COLUMNS))
-    assert said == "the best ever, 0:7, has a fitness of -0.2000"
 
 
 def test_figure_orders_motors_by_what_robots_lose() -> None:

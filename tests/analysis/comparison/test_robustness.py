@@ -61,7 +61,7 @@ def test_line_about_a_run() -> None:
     )
     still = [row(7, "start", 0.1, -0.2)]
     assert summary(table_of(still, COLUMNS)) == (
-        "the best ever, 0:7, has a fitness of -0.2000 undisturbed"
+        "the best ever, 0:7, has a fitness of -0.2000 without changes"
     )
 
 

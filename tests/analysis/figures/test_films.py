@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from analysis.figures import films
-from analysis.figures.films import film
+from analysis.figures import figure_writer
+from analysis.figures.figure_writer import film
 from analysis.render.stage import Picture
 
 
@@ -35,7 +35,7 @@ def test_a_film_above_the_limit_loses_colours_then_pictures(
 ) -> None:
     rng = np.random.default_rng(1)
     pictures = [rng.integers(0, 255, (40, 40, 3), np.uint8) for _ in range(8)]
-    monkeypatch.setattr(films, "MOST_BYTES", 5000)
+    monkeypatch.setattr(figure_writer, "MOST_BYTES", 5000)
     stored = film(pictures, 0.1)
     assert len(stored) <= 5000
     found = read(stored)
