@@ -96,7 +96,6 @@ def _measured(
     options: argparse.Namespace,
     bar: Progress,
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
-    """Return the tables of all runs, and what was left out."""
     slots: SlotRule = "own" if options.slots == "own" else "parent"
     measuring = measure_runs(runs, slots=slots, processes=options.processes)
     measured = list(bar.track(measuring, len(runs), description="measuring runs"))
@@ -133,7 +132,6 @@ def _write_measures(
 
 
 def _listed(figures: Sequence[DrawnFigure]) -> str:
-    """Return the numbers of the figures as text."""
     if not figures:
         return "no figure could be drawn; see the line 'left out: figures'"
     numbers = ", ".join(one.figure.number for one in figures)

@@ -118,7 +118,6 @@ def _sizes(figure: str, per_part: str, what: str, measure: str) -> list[Claim]:
 
 
 def _in_order(claims: list[Claim]) -> tuple[Claim, ...]:
-    """Return claims in the order of the thesis's figures and sections."""
     return tuple(
         sorted(claims, key=lambda claim: [int(n) for n in claim.figure.split(".")])
     )

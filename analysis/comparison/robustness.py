@@ -99,17 +99,14 @@ def line_of(
         robots.setdefault((row["island"], row["birth"]), []).append(row)
     best = next(own for own in robots.values() if own[0]["is_best"])
     last = [own for own in robots.values() if own[0]["is_last"]]
-    name, undisturbed = (
-        f"{best[0]['island']}:{best[0]['birth']}",
-        best[0]["undisturbed"],
-    )
+    name = f"the best ever, {best[0]['island']}:{best[0]['birth']}"
+    undisturbed = best[0]["undisturbed"]
     if undisturbed is None:
-        text = f"the best ever, {name}, has no fitness without changes"
+        text = f"{name}, has no fitness without changes"
     elif undisturbed <= 0:
-        fitness = rounded(undisturbed)
-        text = f"the best ever, {name}, has a fitness of {fitness} without changes"
+        text = f"{name}, has a fitness of {rounded(undisturbed)} without changes"
     else:
-        text = of_best(f"the best ever, {name}", best)
+        text = of_best(name, best)
     texts = [text, of_last(last)]
     if failed := sum(row["fitness"] is None for row in rows):
         texts.append(f"{failed} of {len(rows)} evaluations failed")

@@ -67,7 +67,6 @@ def _label(row: dict[str, object]) -> str:
 
 
 def _place(label: str) -> tuple[int, int, str]:
-    """Return the sort key of a row of the figure."""
     blocks = ("at 0", "at mean", "motor dead", "all motors", "random")
     block = next(number for number, text in enumerate(blocks) if text in label)
     if label.endswith(_MOTOR):
@@ -83,7 +82,6 @@ def _ordinal(number: int) -> str:
 
 
 def _known_shares(table: pa.Table) -> Any:  # noqa: ANN401 - pandas
-    """Return the rows of a table that have a share, as a data frame."""
     rows = table.filter(table["share"].is_valid())
     if not rows:
         raise NothingToDraw("no robot has a positive fitness without changes")

@@ -198,7 +198,6 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
 
 
 def _mean(rows: Any, keys: list[str]) -> Any:  # noqa: ANN401 - pandas
-    """Return the mean value of each group."""
     return rows.groupby(keys, as_index=False)["value"].mean()
 
 

@@ -175,7 +175,6 @@ def draw_figures(
 
 
 def _sweeps(tables: Tables) -> Iterator[Figure]:
-    """Yield the map of each sweep."""
     rows = tables.get("sweeps")
     for name in in_order(rows["experiment"].to_pylist() if rows else ()):
         yield Figure(

@@ -215,7 +215,6 @@ def stacked(table: pa.Table, panels: Panels) -> Any:  # noqa: ANN401 - pandas
 
 
 def _grouped(rows: Any) -> Any:  # noqa: ANN401 - pandas
-    """Return the values of each experiment and panel."""
     groups = rows.groupby(["experiment", "panel"], observed=True, as_index=False)
     return groups["value"]
 

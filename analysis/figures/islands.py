@@ -114,8 +114,8 @@ def migration_graph(tables: Tables) -> p9.ggplot:
     spots = {name: _spots(rows, name) for name in names}
     places = []
     for row in edges.to_pylist():
-        known = spots[row["experiment"]]
-        places.append(row | _arrow(known[row["island"]], known[row["to"]]))
+        own = spots[row["experiment"]]
+        places.append(row | _arrow(own[row["island"]], own[row["to"]]))
     islands = [
         {"experiment": name, "island": island, "x": x, "y": y}
         for name in names

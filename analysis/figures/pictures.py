@@ -59,7 +59,6 @@ def gaits(
 
 
 def _heading(robot: RobotPicture, unit: str) -> str:
-    """Return what is written above the pictures of a gait."""
     way = f"moved {100 * robot.moved_m:.2g} cm in {robot.times_s[-1]:.1f} s"
     if robot.moved_m < _STILL_M:
         way = "stood still in these pictures"

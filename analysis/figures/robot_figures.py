@@ -37,7 +37,6 @@ _SOURCE = ("robots", BIRTHS)
 
 
 def _tree_number(experiment: str) -> str:
-    """Return the number of an experiment's family tree."""
     return _TREES.get(experiment, f"G-{experiment}")
 
 
@@ -128,7 +127,6 @@ def tree_figures(
 
 
 def _tree(robot: RobotPicture, ancestors: int, robots: pa.Table, unit: str) -> Figure:
-    """Return the figure of one experiment's best robot and its family."""
     best, relatives = robot.best, robot.family
     assert relatives is not None
     number = _tree_number(best.experiment)

@@ -65,7 +65,6 @@ def _settings(run: LoadedRun) -> dict[str, Any]:
 
 
 def _mark_swept(section: dict[str, Any], words: Sequence[str]) -> None:
-    """Replace the value of a dotted key, if it is there."""
     for word in words[:-1]:
         section = section.get(word) or {}
     if words[-1] in section:
@@ -82,7 +81,6 @@ def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _compared(mine: LoadedRun, other: LoadedRun) -> list[str]:
-    """Return the differences of the settings of two runs."""
     # A plug-in that only one of them has is named by another setting.
     found = [
         f"source of plug-in {name} (plugins/{name}.py in the run folders): digest "

@@ -156,7 +156,6 @@ def _different(runs: list[LoadedRun], left_out: list[LeftOut]) -> list[LoadedRun
 
 
 def _without_births(experiment: Experiment) -> str:
-    """Return an experiment as JSON without numbers of planned births."""
     islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
     return experiment_text(structs.replace(experiment, births=1, islands=islands))
 
@@ -227,7 +226,6 @@ def _details(folder: Path) -> dict[str, Any]:
 
 
 def _plugins(details: dict[str, Any]) -> dict[str, str]:
-    """Return the digest of the source of each plug-in of a run, by module."""
     known = details.get("plugins") or {}
     names = modules_named(details["document"].encode())
     return {name: known[name].digest if name in known else "unknown" for name in names}
@@ -297,7 +295,6 @@ def _named(table: pa.Table) -> pa.Table:
 
 
 def _check_there(run: LoadedRun, name: str) -> None:
-    """Raise if a table of a finished run is missing."""
     arenas = [island.arena is not None for island in run.islands]
     expected = {
         "evaluations": not all(arenas),

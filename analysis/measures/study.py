@@ -82,7 +82,8 @@ def measure_run(run: LoadedRun, slots: SlotRule) -> MeasuredRun:
         left_out.append(LeftOut(folder, "interactions", why))
     left_out += [LeftOut(folder, f"measure {one}", problems[one]) for one in problems]
     if not run.is_finished:
-        born, planned = tables["births"].num_rows, planned_births(run)
+        born = tables["births"].num_rows
+        planned = sum(island.births for island in run.islands)
         why = f"the run is not finished: {born} of {planned} births are recorded"
         left_out.append(LeftOut(folder, "comparison", why))
     if "named_measures" in measures:
@@ -96,7 +97,6 @@ def measure_run(run: LoadedRun, slots: SlotRule) -> MeasuredRun:
 
 
 def _chosen(run: LoadedRun) -> pa.Table:
-    """Return one row per swept setting."""
     rows = [
         {
             "setting": setting,
@@ -106,11 +106,6 @@ def _chosen(run: LoadedRun) -> pa.Table:
         for setting, value in run.point.items()
     ]
     return pa.Table.from_pylist(rows, run_schema("sweeps"))
-
-
-def planned_births(run: LoadedRun) -> int:
-    """Return the number of births of all islands in a finished run."""
-    return sum(island.births for island in run.islands)
 
 
 def _summary(
@@ -125,7 +120,7 @@ def _summary(
         "run_id": run_columns(run.folder)["run_id"],
         "state": run.state,
         "births": tables["births"].num_rows,
-        "planned": planned_births(run),
+        "planned": sum(island.births for island in run.islands),
         "islands": len(run.islands),
         "differs": run.differs,
         "function": run.settings.fitness.function,
@@ -142,7 +137,6 @@ def _summary(
 
 
 def _living(population: pa.Table) -> int:
-    """Return the number of robots in the last populations of arenas."""
     in_arenas = population.filter(pc.field("is_online"))
     last = in_arenas.group_by("island").aggregate([("births", "max")])
     here = in_arenas.join(last, "island")
@@ -150,7 +144,6 @@ def _living(population: pa.Table) -> int:
 
 
 def _failures(tables: Mapping[str, pa.Table]) -> int:
-    """Return the number of failed evaluations and of diverged robots of arenas."""
     failed = pc.equal(tables["evaluations"]["status"], "failed")
     diverged = pc.equal(tables["deaths"]["reason"], "diverged")
     return sum(pc.sum(column).as_py() or 0 for column in (failed, diverged))

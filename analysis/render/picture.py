@@ -139,7 +139,6 @@ def gait_strip(
 
 
 def _with_time(picture: Picture, time_s: float) -> Picture:
-    """Return a picture with its time below, in black on white."""
     height, width, _ = picture.shape
     size = max(10, width // 16)
     image = Image.new("RGB", (width, height + 3 * size // 2), "white")

@@ -188,7 +188,6 @@ def _edges(hits: _Hits, size: tuple[int, int]) -> npt.NDArray[np.bool_]:
 
 
 def _products(first: Floats, second: Floats) -> Floats:
-    """Return the scalar products of pairs of vectors, (N, 3) each."""
     products: Floats = np.einsum("ij,ij->i", first, second)
     return products
 

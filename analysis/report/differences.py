@@ -123,7 +123,6 @@ def _verdict(row: Row, both: tuple[float, float] | None) -> str:
 
 
 def _tested(row: Row, higher: str) -> str:
-    """Return what both say if the interval excludes 0."""
     if row["p"] < _LEVEL:
         return f"{higher} is fitter: the interval excludes 0, and p < {_LEVEL:g}"
     verdict = f"undecided: the interval excludes 0, but p is not below {_LEVEL:g}"
@@ -201,7 +200,6 @@ def all_differences(tables: Tables) -> str:
 
 
 def _equal(rows: Sequence[Row]) -> str:
-    """Return which measures of a pair are equal in all runs; empty for none."""
     names = [_words(row["measure"]) for row in rows if row["p"] is None]
     if not names:
         return ""

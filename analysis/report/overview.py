@@ -67,7 +67,6 @@ def summary(tables: Tables) -> str:
 
 
 def _differing(differs: Mapping[str, str]) -> str:
-    """Return how the settings of each experiment differ from those of another one."""
     lines = [
         f"<p>{escape(label(name))}: {escape(text)}</p>"
         for name, text in differs.items()

@@ -143,7 +143,6 @@ def _sections(
 
 
 def _own(tables: Tables) -> str:
-    """Return a table of the docstrings of own measures."""
     rows = tables["named_measures"].to_pylist() if "named_measures" in tables else ()
     lines = {(row["measure"], row["about"]) for row in rows if row["about"]}
     return table(

@@ -49,7 +49,6 @@ def with_margin(values: Iterable[float]) -> tuple[float, float]:
 
 
 def _breaks(low: float, high: float) -> list[float]:
-    """Return round numbers within a range."""
     numbers = MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high)
     slack = 1e-9 * (high - low)
     return [round(n, 12) for n in numbers if low - slack <= n <= high + slack]

@@ -144,7 +144,6 @@ def _renderer(
     bodies: Mapping[BirthId, tuple[Part, ...] | None],
     size: tuple[int, int],
 ) -> ArenaRenderer:
-    """Return the renderer of an arena."""
     robots: dict[BirthId, Robot] = {}
     for birth in sorted({birth for poses in frames.values() for birth in poses}):
         body = bodies[birth]

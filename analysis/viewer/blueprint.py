@@ -44,7 +44,6 @@ def layout(
 
 
 def _framed(root: rrb.Horizontal | rrb.Spatial3DView, timeline: str) -> rrb.Blueprint:
-    """Return a layout with collapsed side panels."""
     return rrb.Blueprint(
         root,
         rrb.BlueprintPanel(state="collapsed"),
@@ -55,7 +54,6 @@ def _framed(root: rrb.Horizontal | rrb.Spatial3DView, timeline: str) -> rrb.Blue
 
 
 def _curves(name: str, islands: Sequence[int], what: str) -> rrb.TimeSeriesView:
-    """Return the view of one curve per island, over the whole time."""
     all_of_it = rr.TimeRange(
         start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
     )
@@ -85,7 +83,6 @@ def _island_view(
 
 
 def _motion(births: Sequence[BirthId], *, is_online: bool) -> rrb.Spatial3DView:
-    """Return the view of re-simulated robots."""
     middle = len(births) // 2 // LANES * LANES + LANES // 2
     near = 0.9 if is_online else 0.9 + 0.7 * min(len(births), LANES)
     return rrb.Spatial3DView(

@@ -60,7 +60,6 @@ def view(options: argparse.Namespace, simulators: Simulators) -> int:
 def _replay(
     options: argparse.Namespace, output: Output, simulators: Simulators
 ) -> None:
-    """Record a run from its tables, and keep serving the recording."""
     folder: Path = options.run
     run = read_run(folder)
     allow_plugins_of(folder)
@@ -109,7 +108,6 @@ def _replay(
 
 
 def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) -> None:
-    """Refuse flags that do not apply to this run."""
     if not is_online and (options.start, options.until) != (None, None):
         raise ViewerError("--from and --until: this run has no arena and no poses")
     if options.follow and options.follow not in born:

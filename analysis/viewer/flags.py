@@ -88,5 +88,4 @@ def _robot_name(text: str) -> BirthId:
 
 
 def _selected(text: str) -> BirthId | str:
-    """Return the individual of a flag, or the name of one."""
     return text if text in (BEST, BEST_EVER) else _robot_name(text)

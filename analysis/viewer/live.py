@@ -138,7 +138,10 @@ class LiveSource:
                 self._session = opened.enter_context(open_session(config))
             except zenoh.ZError:
                 raise NetworkError(why_no_hub(self._connect, self._hub.tls)) from None
-            put = zenoh.handlers.Callback(self._take, indirect=False)
+            put = zenoh.handlers.Callback(
+                lambda sample: self._put(str(sample.key_expr), sample.payload),
+                indirect=False,
+            )
             token = zenoh.handlers.Callback(self._take_token, indirect=False)
             tokens = agents_alive(self._fleet, "coordinator")
             self._declared = [
@@ -154,9 +157,6 @@ class LiveSource:
     def __exit__(self, *_: object) -> None:
         self._opened.close()
 
-    def _take(self, sample: zenoh.Sample) -> None:
-        self._put(str(sample.key_expr), sample.payload)
-
     def _take_token(self, sample: zenoh.Sample) -> None:
         self._tokens.append(sample)
         self._has_news.set()
@@ -166,11 +166,11 @@ class LiveSource:
         if reply.ok is None:
             return
         replier = reply.replier_id
-        if replier is None or str(replier.zid) != member.session:
+        if replier is not None and str(replier.zid) == member.session:
+            self._put(member.state, reply.ok.payload, asked=member.alive)
+        else:
             with self._lock:
                 self.dropped += 1
-            return
-        self._put(member.state, reply.ok.payload, asked=member.alive)
 
     def _put(self, key: str, payload: zenoh.ZBytes, asked: str = "") -> None:
         with self._lock:

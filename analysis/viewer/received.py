@@ -6,8 +6,7 @@ import pyarrow as pa
 from analysis.viewer.scene import Scene
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.limits import GREATEST_COORDINATE, LONGEST_REASON, LONGEST_WALL_S
-from schema.parts import BodySpace
-from schema.robot.robot import Part, check_body, check_tree
+from schema.robot.robot import check_body, check_tree
 from schema.wire.arena import Live
 from schema.wire.poses import PoseArrays
 from schema.wire.updates import Birth, Death, Level, Migrant, Update
@@ -40,17 +39,12 @@ def check_update(news: Update, scene: Scene) -> None:
         raise MalformedMessage(
             f"update: texts must have <= {LONGEST_REASON} characters"
         )
-    for each in news.births:
-        if each.body is not None:
-            _check_body(each.body, scene.space)
-
-
-def _check_body(body: tuple[Part, ...], space: BodySpace) -> None:
-    try:
-        check_tree(body)
-        check_body(body, space)
-    except InvalidRobot as error:
-        raise MalformedMessage(f"update: {error}") from None
+    for body in (one.body for one in news.births if one.body is not None):
+        try:
+            check_tree(body)
+            check_body(body, scene.space)
+        except InvalidRobot as error:
+            raise MalformedMessage(f"update: {error}") from None
 
 
 def received_poses(live: Live, scene: Scene) -> pa.Table:

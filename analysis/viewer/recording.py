@@ -214,7 +214,6 @@ class Recording(AbstractContextManager["Recording"]):
         self._stream.log("workers", document, static=True)
 
     def _at(self, when: TimePoint) -> None:
-        """Set the time of the next data."""
         self._stream.reset_time()
         if when.sim_time_s is not None:
             time = np.timedelta64(round(when.sim_time_s * 1e9), "ns")

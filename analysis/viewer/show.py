@@ -173,7 +173,6 @@ class Show:
                 del self._shown[key]
 
     def _leave(self, gone: Death) -> None:
-        """Remove a robot's boxes, once."""
         robot = self._shown.get((gone.island, gone.birth))
         if robot is not None and not robot.is_gone:
             robot.is_gone = True
@@ -232,7 +231,6 @@ def _coarse(numbers: Float32s, grains: float) -> Float32s:
 
 
 def _process_pool(workers: tuple[WorkerInfo, ...]) -> str:
-    """Return a table of the workers, as Markdown."""
     lines = ["| worker | platform | arenas |", "|---|---|---|"]
     for man in workers:
         arenas = ", ".join(map(str, man.shards)) or "-"
