@@ -17,8 +17,7 @@ import numpy as np
 from schema.errors import FitnessUndefined, error_text
 from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
-from schema.robot.sums import sum_in_order
-from schema.robot.trace import Trace
+from schema.robot.trace import Trace, sum_in_order
 
 FitnessFunction = Callable[[Trace, Any], float]
 """Function that ``fitness.function`` names: fitness of a trace; finite, maximised."""

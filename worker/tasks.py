@@ -15,8 +15,7 @@ from msgspec import Meta, Struct
 from schema.errors import ExperimentError
 from schema.experiment.section import Angle, Coordinate, Extent, Limit, NotNegative
 from schema.plugins.needs import needs
-from schema.robot.sums import sum_in_order
-from schema.robot.trace import Floats, Trace
+from schema.robot.trace import Floats, Trace, sum_in_order
 
 _Place = tuple[Coordinate, Coordinate]
 

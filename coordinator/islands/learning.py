@@ -21,7 +21,7 @@ from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment
 from schema.experiment.learning import Learning
 from schema.robot.robot import Robot
-from schema.robot.sums import sum_in_order
+from schema.robot.trace import sum_in_order
 from schema.wire.messages import Evaluate
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from schema.robot.sums import sum_in_order
+from schema.robot.trace import sum_in_order
 
 
 @pytest.mark.parametrize(
