@@ -99,7 +99,7 @@ class Loop:
         throttle: limits the speed of arenas; None: no limit.
         checks: cross-checks to make.
         confirm: raises if this process may no longer write to the run.
-        watch: called with each row, for viewers.
+        watch: called with each row, for viewers; None without any.
         client: identifies this run to the fleet.
         shard_requests: the advances of the arenas.
     """
@@ -114,7 +114,7 @@ class Loop:
     throttle: RealTimeThrottle | None = None
     checks: Checks = NO_CHECKS
     confirm: Callable[[], None] = lambda: None
-    watch: Callable[[Record], None] = lambda _record: None
+    watch: Callable[[Record], None] | None = None
 
     def __post_init__(self) -> None:
         """Connect the state machines; ``start`` starts them."""
@@ -301,7 +301,8 @@ class Loop:
 
     def _write(self, record: Record) -> None:
         self.rows.write(record)
-        self.watch(record)
+        if self.watch is not None:
+            self.watch(record)
 
     def _handled(
         self, number: int, event: Event

@@ -136,7 +136,7 @@ class RunSession:
                 throttle=RealTimeThrottle(speed) if speed else None,
                 checks=checks,
                 confirm=held.confirm,
-                watch=self.feed.unread.append if self.feed else lambda _record: None,
+                watch=self.feed.unread.append if self.feed else None,
             )
             self._births, self._simulated = RateMeter(), RateMeter()
             self._opened = stack.pop_all()
