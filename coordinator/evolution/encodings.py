@@ -29,7 +29,6 @@ from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import with_brain
 from schema.robot.robot import Robot, check_robot
-from schema.wire.protobuf import encode_robot
 
 WHERE = "encoding.type"
 BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {
@@ -77,77 +76,37 @@ class IslandEncoding:
         name: of the experiment's key ``encoding.type``.
         types: part types by name.
         no_child: reason of a failed attempt at which it gave no genome.
+        stores_robots: births hold the robot, as its genome does not suffice.
+        random: returns the genome of a random robot; ``ExperimentError`` if no robot
+            meets the restrictions.
+        mate: returns the genome of the child of two; None if the attempt fails.
+        develop: returns the robot that a genome describes; ``InvalidRobot`` if it is
+            not well formed or breaks a limit of ``[space]``, never of the thesis's.
+        to_bytes: returns a genome as bytes.
     """
+
+    random: Callable[[np.random.Generator, BirthId], object]
+    mate: Callable[[Any, Any, np.random.Generator, BirthId], object | None]
+    develop: Callable[[Any], Robot]
+    to_bytes: Callable[[Any], bytes]
 
     def __init__(self, encoding: Encoding[Any], experiment: Experiment) -> None:
         self.name = experiment.encoding.type
         self.types, self._kinds = types_of(experiment)
         self._encoding = encoding
-        self._mates = encoding if isinstance(encoding, OneStepMating) else None
-        self._space = experiment.space
-        self._is_thesis = self.name == REVOLVE_ANGLE
-        self._own = WHERE, type(encoding), self.name
-        if ":" not in self.name:
-            self._own = "brain.type", type(encoding), experiment.brain.type
+        self.stores_robots = self.name != REVOLVE_ANGLE
         self.no_child = "its parents' genomes gave no child"
-        if self._is_thesis:
+        code: RevolveAngle | _CheckedCode = _CheckedCode(encoding, self, experiment)
+        self.develop = code.develop
+        # Not of a user's subclass.
+        if not self.stores_robots and isinstance(encoding, RevolveAngle):
             self.no_child = (
                 "crossover found no fitting subtree, or the child had no motor"
             )
-
-    def _named(self) -> AbstractContextManager[None]:
-        """Return a context that names the own code that raises."""
-        key, plugin, path = self._own
-        return naming_plugin(key, plugin, path) if ":" in path else nullcontext()
-
-    def random(self, rng: np.random.Generator, birth: BirthId) -> object:
-        """Return the genome of a random robot.
-
-        Raises:
-            ExperimentError: the method raises, or no robot meets the restrictions.
-        """
-        with self._named():
-            return self._encoding.random(rng, birth)
-
-    def mate(
-        self, first: object, second: object, rng: np.random.Generator, birth: BirthId
-    ) -> object | None:
-        """Return the genome of a child, None if the attempt fails.
-
-        Raises:
-            ExperimentError: a method raises.
-        """
-        if self._mates is not None:
-            with self._named():
-                return self._mates.mate(first, second, rng, birth)
-        with self._named():
-            child = self._encoding.crossover(first, second, rng)
-        if child is None:
-            return None
-        with self._named():
-            return self._encoding.mutate(child, rng, birth)
-
-    def develop(self, genome: object) -> Robot:
-        """Return the robot that a genome describes.
-
-        Raises:
-            InvalidRobot: the robot is not well formed, or breaks a limit of
-                ``[space]``; never of the thesis's encoding.
-            ExperimentError: the method raises.
-        """
-        if self._is_thesis:
-            return self._encoding.develop(genome)
-        with self._named():
-            found: object = self._encoding.develop(genome)
-            parts, brain = (getattr(found, each, None) for each in ("parts", "brain"))
-            if not isinstance(parts, tuple | list) or not isinstance(brain, Brain):
-                raise broken("develop", "return a Robot", found)
-            # The Python API has a class of its own.
-            robot = Robot(tuple(parts), brain)
-            self.check(robot)
-            if problem := outside_limits(robot, self._space, self.types):
-                raise InvalidRobot(f"{WHERE}: {self.name!r}: {problem}")
-        return robot
+            self.develop = encoding.develop
+            if ":" not in experiment.brain.type:
+                code = encoding
+        self.random, self.mate, self.to_bytes = code.random, code.mate, code.to_bytes
 
     def check(self, robot: Robot) -> None:
         """Raise unless a robot has the part types and a brain of the experiment.
@@ -156,18 +115,6 @@ class IslandEncoding:
             InvalidRobot: it does not.
         """
         check_robot(robot, self.types, self._kinds)
-
-    def to_bytes(self, genome: object) -> bytes:
-        """Return a genome as bytes.
-
-        Raises:
-            ExperimentError: the method raises, or returns no or too many bytes.
-        """
-        with self._named():
-            data: object = self._encoding.to_bytes(genome)
-            if not isinstance(data, bytes) or len(data) > ROBOT_BYTES:
-                raise broken("to_bytes", f"return <= {ROBOT_BYTES} bytes", data)
-        return data
 
     def from_bytes(self, data: bytes) -> object:
         """Return the genome of some bytes.
@@ -210,7 +157,7 @@ class IslandEncoding:
         Raises:
             InvalidRobot: the encoding cannot describe the robot.
         """
-        if self._is_thesis:
+        if not self.stores_robots:
             return with_brain(cast("Node", genome), robot, self.types)
         return self.from_robot(robot)
 
@@ -219,16 +166,62 @@ class IslandEncoding:
         """Whether it makes a genome of a given robot."""
         return isinstance(self._encoding, RobotEncoding)
 
-    def stored_robot(self, robot: Robot, learnt: Robot | None = None) -> bytes | None:
-        """Return the column ``robot`` of births; None if the genome is enough.
 
-        Args:
-            robot: what develops from the genome.
-            learnt: the same with a brain that it has learnt.
-        """
-        if learnt is not None:
-            return encode_robot(learnt)
-        return None if self._is_thesis else encode_robot(robot)
+class _CheckedCode:
+    """Calls of an encoding that may run own code, with checks of what it returns.
+
+    Errors of own code are ``ExperimentError``, with its name.
+    """
+
+    def __init__(
+        self, encoding: Encoding[Any], used: IslandEncoding, experiment: Experiment
+    ) -> None:
+        self._encoding, self._used = encoding, used
+        self._mates = encoding if isinstance(encoding, OneStepMating) else None
+        self._space = experiment.space
+        self._own = WHERE, type(encoding), used.name
+        if ":" not in used.name:
+            self._own = "brain.type", type(encoding), experiment.brain.type
+
+    def _named(self) -> AbstractContextManager[None]:
+        """Return a context that names the own code that raises."""
+        key, plugin, path = self._own
+        return naming_plugin(key, plugin, path) if ":" in path else nullcontext()
+
+    def random(self, rng: np.random.Generator, birth: BirthId) -> object:
+        with self._named():
+            return self._encoding.random(rng, birth)
+
+    def mate(
+        self, first: object, second: object, rng: np.random.Generator, birth: BirthId
+    ) -> object | None:
+        with self._named():
+            if self._mates is not None:
+                return self._mates.mate(first, second, rng, birth)
+            child = self._encoding.crossover(first, second, rng)
+            return None if child is None else self._encoding.mutate(child, rng, birth)
+
+    def develop(self, genome: object) -> Robot:
+        name, types = self._used.name, self._used.types
+        with self._named():
+            developed: object = self._encoding.develop(genome)
+            parts = getattr(developed, "parts", None)
+            brain = getattr(developed, "brain", None)
+            if not isinstance(parts, tuple | list) or not isinstance(brain, Brain):
+                raise broken("develop", "return a Robot", developed)
+            # The Python API has a class of its own.
+            robot = Robot(tuple(parts), brain)
+            self._used.check(robot)
+            if problem := outside_limits(robot, self._space, types):
+                raise InvalidRobot(f"{WHERE}: {name!r}: {problem}")
+        return robot
+
+    def to_bytes(self, genome: object) -> bytes:
+        with self._named():
+            data: object = self._encoding.to_bytes(genome)
+            if not isinstance(data, bytes) or len(data) > ROBOT_BYTES:
+                raise broken("to_bytes", f"return <= {ROBOT_BYTES} bytes", data)
+        return data
 
 
 def outside_limits(robot: Robot, space: Space, types: BodySpace) -> str:

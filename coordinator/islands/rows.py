@@ -11,6 +11,7 @@ from schema.robot.genome import Node, walk
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, motor_count
 from schema.tables.columns import Row
+from schema.wire.protobuf import encode_robot
 
 
 def named(birth: BirthId, island: int) -> dict[str, int | None]:
@@ -41,6 +42,9 @@ def birth_record(
     """
     with at_birth(candidate.birth):
         genome = encoding.to_bytes(candidate.genome)
+    stored = candidate.learnt
+    if stored is None and encoding.stores_robots:
+        stored = candidate.robot
     row = {
         "island": candidate.birth.island,
         "birth": candidate.birth.number,
@@ -57,7 +61,7 @@ def birth_record(
         "sim_time_s": sim_time_s,
         "x": place and place[0],
         "y": place and place[1],
-        "robot": encoding.stored_robot(candidate.robot, candidate.learnt),
+        "robot": stored and encode_robot(stored),
     }
     return Record("births", row)
 

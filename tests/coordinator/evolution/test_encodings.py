@@ -12,6 +12,7 @@ from coordinator.evolution.encodings import encoding_of, outside_limits
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
 from coordinator.evolution.revolve_angle import RevolveAngle
+from coordinator.islands.rows import birth_record
 from schema.errors import ExperimentError, InvalidRobot, UnknownPlugin
 from schema.experiment.document import EncodingSection, Experiment, Space
 from schema.parts import BUILT_IN
@@ -48,7 +49,7 @@ def test_the_thesis_encoding_draws_what_its_functions_draw() -> None:
     assert encoding.from_bytes(encode_genome(child)) == child
     robot = encoding.develop(child)
     assert encoding.from_robot(robot) == genome_of(robot)
-    assert encoding.stored_robot(robot) is None
+    assert not encoding.stores_robots
 
 
 def test_steps_of_the_thesis_encoding_keep_its_rules() -> None:
@@ -110,12 +111,12 @@ def test_an_own_encoding_gets_its_parameters(own_encoding: Own) -> None:
     assert {len(encoding.develop(each).parts) for each in genomes} == {3, 4}
 
 
-def test_robots_of_an_own_encoding_are_stored(own_encoding: Own) -> None:
-    encoding = encoding_of(own_encoding())
-    robot = encoding.develop(encoding.random(rng(), BIRTH))
-    stored = encoding.stored_robot(robot)
-    assert stored is not None
-    assert decode_robot(stored) == robot
+def test_births_of_an_own_encoding_hold_the_robot(own_encoding: Own) -> None:
+    experiment = own_encoding()
+    born = Breeder(experiment, 7, 0).candidate(BIRTH, 0, ())
+    assert born is not None
+    row = birth_record(born, born.individual(0), encoding_of(experiment)).row
+    assert decode_robot(row["robot"]) == born.robot
 
 
 def use(experiment: Experiment) -> None:

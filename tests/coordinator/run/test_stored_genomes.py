@@ -36,7 +36,9 @@ def stored(
             {
                 "birth": number,
                 "genome": encoding.to_bytes(candidate.genome),
-                "robot": encoding.stored_robot(candidate.robot),
+                "robot": encode_robot(candidate.robot)
+                if encoding.stores_robots
+                else None,
             }
         )
     columns = {"birth": pa.int64(), "genome": pa.binary(), "robot": pa.binary()}
