@@ -17,6 +17,7 @@ import numpy as np
 from schema.errors import FitnessUndefined, error_text
 from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_argument, fitness_function
+from schema.robot.results import Evaluation
 from schema.robot.trace import Trace, sum_in_order
 
 FitnessFunction = Callable[[Trace, Any], float]
@@ -56,6 +57,40 @@ class TraceFunction:
                 f"{self.name} must return a finite number, got {value}"
             )
         return value
+
+
+@dataclass(frozen=True, slots=True)
+class Functions:
+    """Functions of an experiment that compute numbers from traces.
+
+    Attributes:
+        fitness: its fitness function.
+        measures: its measures, in its order.
+        channels: that these functions declare.
+    """
+
+    fitness: TraceFunction
+    measures: tuple[TraceFunction, ...]
+    channels: tuple[str, ...]
+
+    def evaluation(self, trace: Trace, simulated_s: float) -> Evaluation:
+        """Return the evaluation of a trace.
+
+        Args:
+            trace: with all channels that the functions declare.
+            simulated_s: simulated time, warm-up included [s].
+
+        Raises:
+            FitnessUndefined: the fitness function or a measure raised or gave no
+                finite number.
+        """
+        return Evaluation(
+            self.fitness.value(trace),
+            path_velocity(trace),
+            straight_velocity(trace),
+            simulated_s,
+            tuple([measure.value(trace) for measure in self.measures]),
+        )
 
 
 def load_fitness(fitness: Fitness) -> TraceFunction:

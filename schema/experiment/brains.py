@@ -5,7 +5,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar, cast
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from schema.errors import ExperimentError
 from schema.experiment.document import BrainSection, Experiment, Space, body_space
@@ -17,7 +16,7 @@ from schema.plugins.load import load_object
 from schema.plugins.origin import naming_plugin
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import BrainType, NeuronType
-from schema.robot.brain import Brain, NeuronKinds, Widths
+from schema.robot.brain import NeuronKinds, Widths
 from schema.robot.cpg import CpgParameters, cpg_neurons
 from schema.robot.neurons import BUILT_IN_NEURONS
 
@@ -124,16 +123,6 @@ def brain_half(
 def widths(space: Space) -> Widths:
     """Return the greatest numbers of neurons in an experiment."""
     return Widths(space.max_inputs, space.max_outputs, space.max_hidden)
-
-
-def with_room(settings: EvaluationSettings, brain: Brain) -> EvaluationSettings:
-    """Return settings that hold a brain, also one that their search does not allow."""
-    counts = brain.count("input"), brain.count("output"), brain.count("hidden")
-    needed = zip(("max_inputs", "max_outputs", "max_hidden"), counts, strict=True)
-    more = {key: n for key, n in needed if n > getattr(settings.space, key)}
-    if not more:
-        return settings
-    return replace(settings, space=replace(settings.space, **more))
 
 
 @lru_cache(maxsize=64)

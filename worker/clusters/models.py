@@ -127,7 +127,7 @@ class ModelCache:
             furnish=self._furnish,
         ).compile()
         solo = Cluster((birth,), {"": robot}, model, self.settings)
-        channels = Channels(robot, model, self.settings)
+        channels = Channels(solo.views[0].placed, self.settings)
         return Body(robot, bounding_spheres(model), solo, channels)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:

@@ -16,7 +16,7 @@ from schema.robot.trace import Floats, Trace
 from schema.wire.arena import Casualty, Judgement
 from schema.wire.protobuf import encode_robot
 from worker.clusters.models import Body
-from worker.measures.functions import evaluation_of
+from worker.measures.functions import functions_of
 from worker.robot.brains import Controls
 from worker.robot.recording import Channels
 
@@ -164,7 +164,7 @@ class ArenaRobot:
         if self.window.has_fitness:
             trace = self.window.trace(self.body.channels, self.robot)
             try:
-                evaluation = evaluation_of(trace, settings, age_s)
+                evaluation = functions_of(settings).evaluation(trace, age_s)
             except FitnessUndefined as error:
                 reason = f"fitness undefined: {error}"
                 return Casualty(self.birth, step, reason, place)

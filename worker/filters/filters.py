@@ -1,6 +1,7 @@
 """Filters between the sensors, brains and motors of robots: noise, faults, pushes."""
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Protocol
 
 import mujoco
@@ -32,16 +33,29 @@ class Filter(Protocol):
 
 def filtered_readings(filters: Iterable[Filter], tick: int, values: Floats) -> Floats:
     """Return readings (R, N) after all filters, in their order."""
-    for each in filters:
-        values = each.readings(tick, values)
+    for stage in filters:
+        values = stage.readings(tick, values)
     return values
 
 
 def filtered_outputs(filters: Iterable[Filter], tick: int, values: Floats) -> Floats:
     """Return outputs (R, O) after all filters, in their order."""
-    for each in filters:
-        values = each.outputs(tick, values)
+    for stage in filters:
+        values = stage.outputs(tick, values)
     return values
+
+
+@lru_cache(maxsize=64)
+def has_filters(settings: EvaluationSettings) -> bool:
+    """Return whether any filter acts in the evaluations of some settings."""
+    clock = settings.simulation
+    return bool(
+        settings.calibration
+        or clock.sensor_noise
+        or clock.actuator_noise
+        or settings.ablation is not None
+        or settings.environment.push_impulse
+    )
 
 
 def filters_of(
@@ -64,7 +78,7 @@ def filters_of(
         InvalidRobot: an ablation of another robot.
     """
     clock, environment = settings.simulation, settings.environment
-    width, found = widths(settings.space), list[Filter]()
+    width, filters = widths(settings.space), list[Filter]()
     further: tuple[Floats, Floats] | None = None
     if settings.calibration:
         calibrated = Calibrated(
@@ -74,17 +88,17 @@ def filters_of(
             tick_s=clock.tick_s,
             width=width,
         )
-        found.append(calibrated)
+        filters.append(calibrated)
         further = calibrated.noise
     if clock.sensor_noise or clock.actuator_noise or further:
         births = (identity.birth,)
-        found.append(
+        filters.append(
             Noise(
                 clock, width, identity.origin, births, identity.trial, further=further
             )
         )
     if settings.ablation is not None:
-        found.append(Ablated(settings.ablation, robot, means))
+        filters.append(Ablated(settings.ablation, robot, means))
     if environment.push_impulse:
-        found.append(Pushes(environment, clock, identity, *state))
-    return tuple(found)
+        filters.append(Pushes(environment, clock, identity, *state))
+    return tuple(filters)

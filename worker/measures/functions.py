@@ -1,6 +1,5 @@
-"""Fitness and measures that an experiment names: functions, values, channels."""
+"""Fitness and measures that an experiment names, loaded, and their channels."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -11,9 +10,8 @@ from schema.plugins.load import load_function, load_object
 from schema.plugins.needs import channels_of
 from schema.plugins.parameters import parameters_type, read_parameters
 from schema.plugins.protocols import MeasureFunction
-from schema.robot.results import Evaluation
-from schema.robot.trace import Trace
 from worker.fitness import (
+    Functions,
     TraceFunction,
     load_fitness,
     path_velocity,
@@ -83,21 +81,6 @@ def _measure(name: str, table: dict[str, Any] | None, where: str) -> TraceFuncti
     return TraceFunction(f"measure {name}", found, (parameters,))
 
 
-@dataclass(frozen=True, slots=True)
-class Functions:
-    """Functions of an experiment that compute numbers from traces.
-
-    Attributes:
-        fitness: its fitness function.
-        measures: its measures, in its order.
-        channels: that these functions declare.
-    """
-
-    fitness: TraceFunction
-    measures: tuple[TraceFunction, ...]
-    channels: tuple[str, ...]
-
-
 @lru_cache(maxsize=64)
 def functions_of(settings: EvaluationSettings | ArenaSettings) -> Functions:
     """Return the functions that the settings of a request name.
@@ -108,28 +91,3 @@ def functions_of(settings: EvaluationSettings | ArenaSettings) -> Functions:
     fitness, measures = load_fitness(settings.fitness), measures_of(settings.measures)
     functions = [fitness.function, *(each.function for each in measures)]
     return Functions(fitness, measures, channels_of(functions))
-
-
-def evaluation_of(
-    trace: Trace, settings: EvaluationSettings | ArenaSettings, simulated_s: float
-) -> Evaluation:
-    """Return the evaluation of a trace.
-
-    Args:
-        trace: with all channels that the functions of the settings declare.
-        settings: fitness and measures.
-        simulated_s: simulated time, warm-up included [s].
-
-    Raises:
-        FitnessUndefined: the fitness function or a measure raised or gave no finite
-            number.
-        ExperimentError: an unknown fitness function or measure.
-    """
-    functions = functions_of(settings)
-    return Evaluation(
-        functions.fitness.value(trace),
-        path_velocity(trace),
-        straight_velocity(trace),
-        simulated_s,
-        tuple(measure.value(trace) for measure in functions.measures),
-    )

@@ -8,23 +8,30 @@ from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
+from msgspec.structs import replace
 
 from schema.errors import SimulationDiverged, one_line
-from schema.experiment.brains import with_room
 from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.mjcf.model import solo_spec
+from schema.robot.brain import Brain
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats, Trace
-from worker.filters.filters import filtered_outputs, filtered_readings, filters_of
+from worker.filters.filters import (
+    filtered_outputs,
+    filtered_readings,
+    filters_of,
+    has_filters,
+)
 from worker.measures.functions import functions_of
 from worker.robot.brains import controls_of
-from worker.robot.engine_view import EngineView
+from worker.robot.devices import Sensors, Servos
 from worker.robot.engine_warnings import silence_engine, warning_names
 from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_sensors import Surroundings
-from worker.robot.recording import Channels, probed_channels, step_with
+from worker.robot.placed import PlacedRobot
+from worker.robot.recording import Channels, Probe, probed_channels, step_with
 from worker.robot.solo_brains import SoloNetwork, solo_brain
 
 Watch = Callable[[mujoco.MjData], None]
@@ -68,15 +75,15 @@ class ControlLoop:
             InvalidRobot: neurons of other types, or an ablation of another robot.
         """
         silence_engine()
-        self._settings = settings = with_room(settings, robot.brain)
+        self._settings = settings = _with_room(settings, robot.brain)
         self._robot, self._identity, self._means = robot, identity, means
         self._clock, self._light = settings.simulation, settings.environment.light
         self._end = self._clock.evaluation_steps
         self._tick_steps = self._clock.brain_steps
         self.watch: Watch | None = None
-        space = body_space(settings.space)
+        self._space = body_space(settings.space)
         try:
-            spec = solo_spec(robot, space, self._clock, settings.environment)
+            spec = solo_spec(robot, self._space, self._clock, settings.environment)
             self.model: mujoco.MjModel = spec.compile()
         except ValueError as error:
             raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
@@ -87,11 +94,10 @@ class ControlLoop:
         robot, settings, model = self._robot, self._settings, self.model
         self.data = data = mujoco.MjData(model)
         self._core, self._velocities = data.qpos[:3].data, data.qvel.data
-        self._view = EngineView(robot, model, data, settings)
-        self._sensors = self._view.sensors
-        probe = self._view.probe
-        is_working = probe and "energy" in probed_channels(settings)
-        self._working = [probe] if probe and is_working else []
+        self._placed = placed = PlacedRobot(robot, self._space, model, data)
+        width, has_light = settings.space.max_inputs, self._light is not None
+        self._sensors = Sensors(placed, width=width, has_light=has_light)
+        self._servos = Servos(placed)
         ticks = self._end // self._tick_steps + 1
         self._brain = solo_brain(controls_of(settings), robot.brain, ticks)
         if isinstance(self._brain, SoloNetwork):
@@ -99,12 +105,21 @@ class ControlLoop:
         self._is_guarded = isinstance(self._brain, GuardedBank)
         self._readings = self._sensors.readings
         self._inputs = self._readings[:, : robot.brain.count("input")]
-        state = model, data
-        self._filters = filters_of(robot, settings, self._identity, state, self._means)
-        self._channels = Channels(robot, model, settings)
+        self._filters = None
+        if has_filters(settings):
+            identity, means = self._identity, self._means
+            self._filters = filters_of(robot, settings, identity, (model, data), means)
+        self._channels, self._probe, self._has_work = None, None, False
+        if functions_of(settings).channels:
+            self._channels = Channels(placed, settings)
+            if probed := probed_channels(settings):
+                self._probe, self._has_work = Probe(placed), "energy" in probed
         self._positions: list[float] = []
         self._rows: list[Floats] = []
         self._undisturbed: Floats = self._inputs
+        self.now, self._next_sample = 0, self._clock.warmup_steps
+        self._tick, self._is_unread = 0, True
+
         self.now, self._next_sample = 0, self._clock.warmup_steps
         self._tick, self._is_unread = 0, True
 
@@ -151,7 +166,7 @@ class ControlLoop:
         outputs = self._think() if action is None else 0.5 + 0.5 * action[np.newaxis]
         if self._filters:
             outputs = filtered_outputs(self._filters, self._tick, outputs)
-        self._view.servos.drive(outputs[0])
+        self._servos.drive(outputs[0])
         if self.watch is not None:
             self.watch(self.data)
         self._tick += 1
@@ -166,21 +181,11 @@ class ControlLoop:
 
     def trace(self) -> Trace:
         """Return the samples of the window, once it is over."""
-        return self._channels.trace(
-            self._robot,
-            self._clock.pose_steps * self._clock.timestep_s,
-            np.array(self._positions).reshape(-1, 3),
-            self._rows,
-        )
-
-    @property
-    def fitness(self) -> float:
-        """Fitness, once the window is over.
-
-        Raises:
-            FitnessUndefined: the fitness function raised or gave no finite number.
-        """
-        return functions_of(self._settings).fitness.value(self.trace())
+        interval_s = self._clock.pose_steps * self._clock.timestep_s
+        positions = np.array(self._positions).reshape(-1, 3)
+        if self._channels is None:
+            return Trace(interval_s, positions, self._placed.constants(self._settings))
+        return self._channels.trace(self._robot, interval_s, positions, self._rows)
 
     def _think(self) -> Floats:
         """Return the outputs of the robot's own brain, (1, O)."""
@@ -195,20 +200,29 @@ class ControlLoop:
 
     def _step_to(self, until: int) -> None:
         """Step the physics with constant commands; sample on the way."""
-        model, data, working = self.model, self.data, self._working
+        model, data = self.model, self.data
         while self.now < until:
             if self.now == self._next_sample:
                 # After the tick, as in an arena: a sample has the readings of its step.
                 self._sample()
             stop = min(until, self._next_sample)
-            step_with(working, model, data, stop - self.now)
+            if self._probe is not None and self._has_work:
+                step_with([self._probe], model, data, stop - self.now)
+            else:
+                mujoco.mj_step(model, data, stop - self.now)
             self.now = stop
 
     def _sample(self) -> None:
         self._positions += self._core.tolist()
         self._next_sample += self._clock.pose_steps
-        if self._channels.names:
-            row = self._view.row(self._channels, 0, self._undisturbed)
+        if self._channels is not None:
+            row = self._channels.row(
+                self.data.qpos[self._placed.joints],
+                self.data.qvel[self._placed.dofs],
+                probe=None if self._probe is None else self._probe.read(),
+                readings=self._undisturbed,
+                neighbours=0,
+            )
             self._rows.append(row)
 
     def _finish(self) -> None:
@@ -216,7 +230,7 @@ class ControlLoop:
 
         That may be the end, where the brain does not tick.
         """
-        if self._channels.names:
+        if self._channels is not None:
             self.observe()
         self._sample()
         data = self.data
@@ -250,3 +264,13 @@ class ControlLoop:
         time_s = self.now * self._clock.timestep_s
         reason = warning_names(self.data.warning.number) or "state not finite"
         raise SimulationDiverged(f"physics diverged by {time_s:.3f} s: {reason}")
+
+
+def _with_room(settings: EvaluationSettings, brain: Brain) -> EvaluationSettings:
+    """Return settings that hold a brain, also one that their search does not allow."""
+    counts = brain.count("input"), brain.count("output"), brain.count("hidden")
+    needed = zip(("max_inputs", "max_outputs", "max_hidden"), counts, strict=True)
+    more = {key: n for key, n in needed if n > getattr(settings.space, key)}
+    if not more:
+        return settings
+    return replace(settings, space=replace(settings.space, **more))

@@ -16,10 +16,9 @@ import numpy as np
 from schema.errors import ExperimentError
 from schema.parts import Sensor, Vector
 from schema.robot.trace import Floats
-from worker.robot.contacts import contact_reader
 from worker.robot.light import brightness
 from worker.robot.own_sensors import OwnSensors, Surroundings
-from worker.robot.placed import PlacedRobot
+from worker.robot.placed import PlacedRobot, contact_reader
 
 LOWEST_OUTPUT = 1e-5
 HIGHEST_OUTPUT = 0.99999

@@ -5,17 +5,46 @@ workers.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from msgspec.structs import replace
 
+from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import Simulation
 from schema.experiment.identity import Identity
 from schema.experiment.robust import RANGES, Robust
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
 from worker.filters.random_streams import DrawPurpose, stream
+
+
+def evaluate_disturbed(
+    once: Callable[[EvaluationSettings, Identity], Evaluation],
+    settings: EvaluationSettings,
+    rules: Robust,
+    identity: Identity,
+) -> Evaluation:
+    """Return one evaluation of several disturbed simulations.
+
+    Args:
+        once: returns the evaluation of one simulation.
+        settings: of the evaluation.
+        rules: its section ``robust``.
+        identity: of the evaluation.
+
+    Raises:
+        SimulationDiverged, SensorFailed, FitnessUndefined: of one simulation, with
+            its number.
+    """
+    evaluations: list[Evaluation] = []
+    for drawn, drawn_identity in disturbances(settings, rules, identity):
+        try:
+            evaluations.append(once(drawn, drawn_identity))
+        except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
+            number = f"draw {len(evaluations) + 1} of {rules.draws}"
+            raise type(error)(f"{number}: {error}") from None
+    return combined(evaluations, rules)
 
 
 def disturbances(

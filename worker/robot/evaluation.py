@@ -5,15 +5,14 @@ from functools import lru_cache
 import numpy as np
 from msgspec.structs import replace
 
-from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
-from worker.measures.functions import evaluation_of
+from worker.measures.functions import functions_of
 from worker.robot.control_loop import ControlLoop, Watch
-from worker.robot.disturbances import combined, disturbances
+from worker.robot.disturbances import evaluate_disturbed
 
 
 def evaluate(
@@ -34,43 +33,25 @@ def evaluate(
         watch: as for ``simulate``, of each simulation.
 
     Raises:
-        SimulationDiverged: the physics diverged; with reason and simulated time.
-        SensorFailed: a sensor of a plug-in raised or gave wrong values.
         FitnessUndefined: the fitness function or a measure raised or gave no finite
             number.
-        ExperimentError: a sensor that has no stimulus in this environment, or an
-            unknown fitness function or measure.
-        InvalidRobot: neurons of other types than the experiment's.
+        RevolveError: as of ``simulate``.
     """
+
+    def once(drawn: EvaluationSettings, drawn_identity: Identity) -> Evaluation:
+        trace = simulate(robot, drawn, watch=watch, identity=drawn_identity)
+        return judge(trace, drawn)
+
     if settings.robust is None:
-        return judge(
-            simulate(robot, settings, watch=watch, identity=identity), settings
-        )
-    evaluations: list[Evaluation] = []
-    for drawn, drawn_identity in disturbances(settings, settings.robust, identity):
-        try:
-            trace = simulate(robot, drawn, watch=watch, identity=drawn_identity)
-            evaluations.append(judge(trace, drawn))
-        except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
-            number = f"draw {len(evaluations) + 1} of {settings.robust.draws}"
-            raise type(error)(f"{number}: {error}") from None
-    return combined(evaluations, settings.robust)
+        return once(settings, identity)
+    return evaluate_disturbed(once, settings, settings.robust, identity)
 
 
 def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:
-    """Return the evaluation of a trace.
-
-    Args:
-        trace: that ``simulate`` returned for these settings.
-        settings: simulation, fitness and measures.
-
-    Raises:
-        FitnessUndefined: the fitness function or a measure raised or gave no finite
-            number.
-        ExperimentError: an unknown fitness function or measure.
-    """
+    """Return the evaluation of a trace of ``simulate``; raises as ``evaluate``."""
     clock = settings.simulation
-    return evaluation_of(trace, settings, clock.evaluation_steps * clock.timestep_s)
+    simulated_s = clock.evaluation_steps * clock.timestep_s
+    return functions_of(settings).evaluation(trace, simulated_s)
 
 
 def simulate(
@@ -108,11 +89,6 @@ def mean_inputs(
     """Return the mean of each input of a brain over all ticks of an evaluation, (I,).
 
     Inputs are what the brain receives: readings after calibration and noise.
-
-    Args:
-        robot: a checked robot.
-        settings: as for ``simulate``.
-        identity: of the evaluation.
 
     Raises:
         RevolveError: as for ``simulate``.

@@ -1,12 +1,19 @@
-"""Places of a robot's elements in a model, which other robots may share."""
+"""Places of a robot's elements in a model, which other robots may share; contacts."""
+
+from collections.abc import Callable
 
 import mujoco
 
+from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.parts import BodySpace
 from schema.robot.robot import Robot
 
 FREE, FREE_DOFS = 7, 6
 """Numbers of a free joint's position and orientation, and of its velocity."""
+_IN_GAP = 1
+"""Why the engine excludes a contact from the forces."""
+ReadContacts = Callable[[], list[list[int]]]
+"""Returns the pairs of geoms in contact in the last step, as plain numbers."""
 
 
 class PlacedRobot:
@@ -43,3 +50,37 @@ class PlacedRobot:
         self.dofs = slice(dof, dof + FREE_DOFS + joints)
         geom = int(model.body_geomadr[self.root])
         self.geoms = (geom, geom + int(model.body_geomnum[bodies].sum()))
+
+    def constants(
+        self, settings: EvaluationSettings | ArenaSettings
+    ) -> dict[str, object]:
+        """Return the channels of its traces that always exist."""
+        return {
+            "light": settings.light,
+            "robot": self.robot,
+            "mass": float(self.model.body_subtreemass[self.root]),
+            "gravity": settings.simulation.gravity,
+        }
+
+
+def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:
+    """Return a function that returns the contacts of the last step.
+
+    The engine also reports geoms that are farther apart than their ``margin`` but
+    within the ``gap`` of scenery. They exert no force on each other: no contact.
+
+    Args:
+        model: a compiled model.
+        data: the model's state.
+    """
+    contacts = data.contact
+
+    def read_all() -> list[list[int]]:
+        pairs: list[list[int]] = contacts.geom.tolist()
+        return pairs
+
+    def read_some() -> list[list[int]]:
+        pairs: list[list[int]] = contacts.geom[contacts.exclude != _IN_GAP].tolist()
+        return pairs
+
+    return read_some if model.geom_gap.any() else read_all

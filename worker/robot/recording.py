@@ -11,14 +11,12 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.robot import Robot
 from schema.robot.trace import RECORDED, Floats, Trace
 from worker.measures.functions import functions_of
-from worker.robot.contacts import contact_reader
-from worker.robot.placed import FREE, FREE_DOFS, PlacedRobot
+from worker.robot.placed import FREE, FREE_DOFS, PlacedRobot, contact_reader
 
 Indices = npt.NDArray[np.intp]
 PROBED = ("joint_torque", "energy", "contact")
@@ -40,22 +38,11 @@ class Channels:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        model: mujoco.MjModel,
-        settings: EvaluationSettings | ArenaSettings,
+        self, placed: PlacedRobot, settings: EvaluationSettings | ArenaSettings
     ) -> None:
-        """Lay out the channels that an experiment's functions declare.
-
-        Args:
-            robot: the robot.
-            model: in which it is alone.
-            settings: fitness and measures.
-        """
-        wanted = functions_of(settings).channels
-        free = model.joint("free").id
-        # Without the free joints of the robot and of objects in scenery.
-        joints = int((model.jnt_type != mujoco.mjtJoint.mjJNT_FREE).sum())
+        """Lay out the channels that the functions of an experiment declare."""
+        robot, wanted = placed.robot, functions_of(settings).channels
+        joints = placed.dofs.stop - placed.dofs.start - FREE_DOFS
         inputs = robot.brain.count("input")
         sizes = {
             "core_attitude": 4,
@@ -74,13 +61,9 @@ class Channels:
         for name in self.names:
             self._spans[name] = slice(self.width, self.width + sizes[name])
             self.width += sizes[name]
-        self._constants: dict[str, Any] = {
-            "light": settings.light,
-            "mass": float(model.body_subtreemass[model.jnt_bodyid[free]]),
-            "gravity": settings.simulation.gravity,
-        }
+        self._constants = placed.constants(settings)
         if "part_position" in wanted:
-            shapes = shapes_of(robot, body_space(settings.space))
+            shapes = shapes_of(robot, placed.space)
             self._constants["part_position"] = place_parts(robot, shapes)[1]
 
     def row(
@@ -185,8 +168,8 @@ class Probe:
         power = np.abs(self._torques(now) * now)
         self.numbers[0] += self._timestep_s * float(power.sum())
 
-    def read(self) -> None:
-        """Read torques and contacts."""
+    def read(self) -> Floats:
+        """Read torques and contacts; return ``numbers``."""
         part_of, parts = self._part_of, self._parts
         self.numbers[self._driven] = self._torques(self._velocities[self._dofs])
         self.numbers[parts:] = 0.0
@@ -194,6 +177,7 @@ class Probe:
             if (one in part_of) != (other in part_of):
                 touching = part_of[one if one in part_of else other]
                 self.numbers[parts + touching] = 1.0
+        return self.numbers
 
     def _torques(self, now: Floats) -> Floats:
         """Return the torques that acted in the last step.

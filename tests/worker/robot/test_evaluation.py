@@ -28,12 +28,12 @@ from schema.wire.protobuf import encode_robot
 from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
     FitnessFunction,
+    Functions,
     TraceFunction,
     path_velocity,
     straight_velocity,
 )
-from worker.measures import functions
-from worker.measures.functions import Functions
+from worker.robot import evaluation
 from worker.robot.evaluation import evaluate, simulate
 from worker.serve.jobs import answer_evaluation
 
@@ -239,7 +239,7 @@ def test_undefined_fitness_is_a_result(
     message: str,
 ) -> None:
     named = Functions(TraceFunction("own:function", function, (None,)), (), ())
-    monkeypatch.setattr(functions, "functions_of", lambda _settings: named)
+    monkeypatch.setattr(evaluation, "functions_of", lambda _settings: named)
     with pytest.raises(FitnessUndefined, match=message):
         evaluate(turtle, SETTINGS)
     work = Evaluate(NOBODY, turtle)

@@ -17,6 +17,7 @@ class EngineView:
     """A robot's slice of a model and its state, with its sensors and motors.
 
     Attributes:
+        placed: places of its elements.
         model, data: that hold the robot.
         joints, dofs: its slices of qpos and qvel.
         qpos, qvel, ctrl: its part of the state, live.
@@ -37,7 +38,7 @@ class EngineView:
         """Find a robot in a model by the prefix of its names."""
         self.model, self.data = model, data
         space = body_space(settings.space)
-        placed = PlacedRobot(robot, space, model, data, prefix)
+        self.placed = placed = PlacedRobot(robot, space, model, data, prefix)
         self.joints, self.dofs = placed.joints, placed.dofs
         self.root, self.geoms = placed.root, placed.geoms
         self.sensors = Sensors(
@@ -53,23 +54,18 @@ class EngineView:
         self.qvel: Floats = data.qvel[self.dofs]
         self.ctrl: Floats = data.ctrl[self.servos.actuators]
 
-    def row(
-        self, channels: Channels, neighbours: int, readings: Floats | None = None
-    ) -> Floats:
+    def row(self, channels: Channels, neighbours: int) -> Floats:
         """Return a sample of the present state as a row.
 
         Args:
             channels: of the robot.
             neighbours: number of robots near it.
-            readings: (1, I') of its sensors, I' >= I; None are the latest.
         """
-        if self.probe is not None:
-            self.probe.read()
         return channels.row(
             self.qpos,
             self.qvel,
-            probe=None if self.probe is None else self.probe.numbers,
-            readings=self.sensors.readings if readings is None else readings,
+            probe=None if self.probe is None else self.probe.read(),
+            readings=self.sensors.readings,
             neighbours=neighbours,
         )
 
