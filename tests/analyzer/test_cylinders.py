@@ -7,13 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from analyzer.overlap import (
-    Boxes,
-    bounding_box,
-    intersecting_parts,
-    place_boxes,
-    round_separation,
-)
+from analyzer.cylinders import Solid, least_separation
+from analyzer.report import Boxes, bounding_box, intersecting_parts, place_boxes
 from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, IDENTITY, Matrix, PartType, Shape, Slot, cylinder
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
@@ -29,17 +24,12 @@ ON_SIDE: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
 
 def bodies(
     rotation: list[Floats], centre: list[tuple[float, ...]], half: Floats, *, both: bool
-) -> Boxes:
+) -> tuple[Solid, Solid]:
     """Return two bodies, a cylinder and a box or another cylinder."""
-    return Boxes(
-        np.ones(2, dtype=np.intp),
-        np.stack(rotation),
-        np.array(centre),
-        half,
-        np.zeros((2, 3)),
-        np.zeros((2, 3)),
-        0.0,
-        (0, 1) if both else (0,),
+    places = [np.array(place, dtype=float) for place in centre]
+    return (
+        Solid(rotation[0], places[0], half[0], is_round=True),
+        Solid(rotation[1], places[1], half[1], is_round=both),
     )
 
 
@@ -61,7 +51,7 @@ def test_parallel_cylinders_are_apart_by_their_distance_less_the_radii() -> None
         pair = bodies(
             [np.eye(3)] * 2, [(0, 0, 0), (reach, reach, 0.4)], half, both=True
         )
-        assert round_separation(pair, 0, 1) == pytest.approx(gap, abs=1e-9)
+        assert least_separation(*pair) == pytest.approx(gap, abs=1e-9)
 
 
 def test_a_cube_at_the_side_of_a_cylinder_is_met_at_its_edge() -> None:
@@ -69,7 +59,7 @@ def test_a_cube_at_the_side_of_a_cylinder_is_met_at_its_edge() -> None:
     half = np.array([(0.5, 0.5, 1.0), (0.4, 0.4, 0.4)])
     pair = bodies([np.eye(3)] * 2, [(0, 0, 0), (1.0, 1.0, 0)], half, both=False)
     expected = 0.6 * math.sqrt(2) - 0.5
-    assert round_separation(pair, 0, 1) == pytest.approx(expected, abs=1e-9)
+    assert least_separation(*pair) == pytest.approx(expected, abs=1e-9)
 
 
 def test_coins_on_edge_meet_at_a_rim() -> None:
@@ -79,7 +69,7 @@ def test_coins_on_edge_meet_at_a_rim() -> None:
     for gap in (0.02, -0.03):
         pair = bodies([np.eye(3), upright], [(0, 0, 0), (0, 0, 0.6 + gap)], half,
                       both=True)  # fmt: skip
-        assert round_separation(pair, 0, 1) == pytest.approx(gap, abs=1e-9)
+        assert least_separation(*pair) == pytest.approx(gap, abs=1e-9)
 
 
 def disc(radius: float, axis: Matrix, reach: float) -> PartType:
@@ -140,7 +130,7 @@ def test_discs_beside_the_core_meet_later_than_their_boxes(
 # --- oracle ------------------------------------------------------------------
 
 
-def pairs(count: int, *, both: bool) -> Iterator[tuple[Boxes, float]]:
+def pairs(count: int, *, both: bool) -> Iterator[tuple[tuple[Solid, Solid], float]]:
     """Yield random pairs of bodies and their distances as MuJoCo finds them."""
     spec = mujoco.MjSpec()
     kinds = ("CYLINDER", "CYLINDER" if both else "BOX")
@@ -171,7 +161,7 @@ def pairs(count: int, *, both: bool) -> Iterator[tuple[Boxes, float]]:
 def test_random_pairs_are_as_far_apart_as_in_mujoco(*, both: bool) -> None:
     apart = together = 0
     for pair, distance in pairs(200, both=both):
-        found = round_separation(pair, 0, 1)
+        found = least_separation(*pair)
         if distance > 1e-4:
             apart += 1
             assert 0.0 < found < distance + 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from analyzer.overlap import Boxes, intersecting_parts, place_boxes, separation
+from analyzer.report import Boxes, intersecting_parts, place_boxes, separation
 from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, Box, Shape
 from schema.robot.robot import Part, Robot
