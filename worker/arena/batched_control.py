@@ -14,8 +14,8 @@ from schema.robot.trace import Floats
 from worker.clusters.robot import ArenaRobot
 from worker.filters.filters import Filter, filtered_outputs, filtered_readings
 from worker.filters.noise import Noise
+from worker.robot.banks import broken_rows
 from worker.robot.brains import Controls
-from worker.robot.guarded_bank import broken_rows, guarded_bank
 
 
 class BatchedControllers:
@@ -88,7 +88,7 @@ class BatchedControllers:
 
     def _rows_of(self, robots: Sequence[ArenaRobot]) -> tuple[Bank, tuple[Filter, ...]]:
         """Return a bank at rest and the filters of some robots."""
-        bank = guarded_bank(self._controls, [robot.packed for robot in robots])
+        bank = self._controls.guarded_bank([robot.packed for robot in robots])
         if not self._is_noisy:
             return bank, ()
         births = [robot.birth for robot in robots]

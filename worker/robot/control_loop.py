@@ -25,14 +25,13 @@ from worker.filters.filters import (
     has_filters,
 )
 from worker.measures.functions import functions_of
-from worker.robot.brains import controls_of
+from worker.robot.banks import GuardedBank, broken_rows
+from worker.robot.brains import SoloNetwork, controls_of, solo_brain
 from worker.robot.devices import Sensors, Servos
 from worker.robot.engine_warnings import silence_engine, warning_names
-from worker.robot.guarded_bank import GuardedBank, broken_rows
 from worker.robot.own_sensors import Surroundings
 from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Channels, Probe, probed_channels, step_with
-from worker.robot.solo_brains import SoloNetwork, solo_brain
 
 Watch = Callable[[mujoco.MjData], None]
 

@@ -29,9 +29,8 @@ from tests.worker.arena_cases import (
     state_of,
 )
 from worker.arena.world import World
-from worker.robot.brains import Controls
+from worker.robot.brains import Controls, solo_brain
 from worker.robot.evaluation import simulate
-from worker.robot.solo_brains import solo_brain
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)

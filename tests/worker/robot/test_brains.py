@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -14,8 +13,8 @@ from schema.experiment.document import Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
-from worker.robot.brains import Controls, NetworkBank, PackedNetwork, pack
-from worker.robot.guarded_bank import GuardedBank, broken_rows
+from worker.robot.banks import GuardedBank, NetworkBank, PackedNetwork, broken_rows
+from worker.robot.brains import pack
 from worker.robot.own_neurons import STATE_LIMIT
 
 WIDTH = widths(Space())
@@ -159,10 +158,7 @@ def test_complex_outputs_of_a_brain_type_are_a_failed_result() -> None:
             outputs = np.full((1, WIDTH.outputs), 0.5)
             return cast("Floats", outputs + 1j) if age_ticks else outputs
 
-    controls = SimpleNamespace(
-        width=WIDTH, tick_s=TICK_S, is_checked=True, bank=lambda _: Complex()
-    )
-    bank = GuardedBank(cast("Controls", controls), [()])
+    bank = GuardedBank(lambda _: Complex(), [()], WIDTH.outputs)
     readings = np.zeros((1, WIDTH.inputs))
     assert not broken_rows(bank, bank.step(readings, 0.0))
     outputs = bank.step(readings, 1.0)

@@ -9,9 +9,8 @@ from schema.errors import ExperimentError
 from schema.experiment.document import BrainSection, Space
 from schema.robot.brain import INPUT, Brain, Connection, Neuron
 from schema.robot.cpg import PHASE_OSCILLATOR
-from worker.robot.brains import Controls
+from worker.robot.brains import Controls, solo_brain
 from worker.robot.check_controls import check_controls
-from worker.robot.solo_brains import solo_brain
 
 TICK_S = 0.125
 

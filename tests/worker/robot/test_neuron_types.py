@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -16,10 +14,9 @@ from schema.plugins.protocols import NeuronType
 from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
 from schema.robot.neurons import BUILT_IN_NEURONS, Tick
 from schema.robot.trace import Floats
-from worker.robot.brains import Controls, NetworkBank, NetworkControl, pack
-from worker.robot.guarded_bank import GuardedBank, broken_rows
+from worker.robot.banks import GuardedBank, NetworkBank, broken_rows
+from worker.robot.brains import Controls, NetworkControl, pack, solo_brain
 from worker.robot.own_neurons import STATE_LIMIT
-from worker.robot.solo_brains import solo_brain
 
 WIDTH = widths(Space())
 TICK_S = 0.125
@@ -169,14 +166,11 @@ def reason_of(kind: NeuronType, last: int, reading: float = 0.0) -> str:
     control = NetworkControl(NoParameters(), (kind,))
     neurons = (Neuron("input", INPUT, 0), Neuron("output", kind.name, 0))
     brain = Brain(neurons, (Connection(0, 1, 1.0),))
-    controls = SimpleNamespace(
-        width=WIDTH,
-        tick_s=TICK_S,
-        is_checked=True,
-        bank=lambda packed: control.bank(packed, WIDTH, TICK_S),
+    bank = GuardedBank(
+        lambda packed: control.bank(packed, WIDTH, TICK_S),
+        [control.pack(brain, WIDTH)],
+        WIDTH.outputs,
     )
-    packed = control.pack(brain, WIDTH)
-    bank = GuardedBank(cast("Controls", controls), [packed])
     readings = np.zeros((1, WIDTH.inputs))
     for tick in range(last):
         assert not broken_rows(bank, bank.step(readings, float(tick)))

@@ -9,9 +9,9 @@ from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.robot import Robot
-from worker.robot.brains import NetworkBank, pack
+from worker.robot.banks import NetworkBank
+from worker.robot.brains import SoloNetwork, pack
 from worker.robot.own_neurons import STATE_LIMIT
-from worker.robot.solo_brains import SoloNetwork
 
 WIDTH = widths(Space())
 TICK_S = 0.125
