@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import inf
 
 from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
-from coordinator.islands.events import Verdict
+from coordinator.islands.events import Verdict, Vetted
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
@@ -77,12 +77,13 @@ class VettingQueue:
         if candidate is None or event.attempt < candidate.attempt:
             return []
         del self._in_vetting[number]
-        if event.report and event.report.is_viable:
+        if isinstance(event, Vetted) and event.report.is_viable:
             self._viable[number] = candidate
             if number == self._next:
                 self.take_number()
             return []
-        return self._try(number, candidate.attempt + 1, candidate.couple, event.reason)
+        why = event.report.reason if isinstance(event, Vetted) else event.reason
+        return self._try(number, candidate.attempt + 1, candidate.couple, why)
 
     def _is_new(self, event: Verdict, candidate: Candidate | None) -> bool:
         """Return whether an answer belongs to no request so far."""

@@ -16,6 +16,7 @@ from coordinator.islands.events import (
     JournalledEvent,
     Order,
     Verdict,
+    Vetted,
 )
 from coordinator.run.requests import requester_of
 from schema.robot.ids import BirthId
@@ -120,13 +121,12 @@ def _answer(event: Answered) -> Fields:
         outcome = asdict(found) if found else {"reason": event.reason}
         return {"trial": event.trial, **outcome, **_worker(event.provenance)}
     fields: Fields = {"attempt": event.attempt}
+    if not isinstance(event, Vetted):
+        return {**fields, "reason": event.reason}
     report = event.report
-    if report is not None:
-        fields["verdict"] = "viable" if report.is_viable else "not viable"
-        fields |= {"motors": report.motors, "mass": report.mass}
-        if report.is_viable:
-            return fields
-    return {**fields, "reason": event.reason}
+    fields["verdict"] = "viable" if report.is_viable else "not viable"
+    fields |= {"motors": report.motors, "mass": report.mass}
+    return fields if report.is_viable else {**fields, "reason": report.reason}
 
 
 def _audit(event: Audited) -> Fields:

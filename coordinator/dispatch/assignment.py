@@ -161,7 +161,8 @@ class Assignment:
     def wake_s(self) -> float | None:
         """Time at which the next ``Ticked`` is needed [s]; None: it is not."""
         wakes = [pool.wake_s for pool in self._pools.values()]
-        wakes.append(self.homes.wake_s)
+        if self.homes.shards:
+            wakes.append(self.homes.wake_s)
         return min((wake_s for wake_s in wakes if wake_s is not None), default=None)
 
     def _look(self, now_s: float) -> Iterator[DispatchCommand]:

@@ -311,12 +311,16 @@ class Dispatch(Assignment):
         for pool in self._pools.values():
             if pool.end_backoffs(event.now_s):
                 yield from self._assign(pool)
-        self.homes.tick(event.now_s)
-        if event.now_s >= self._next_look_s:
+        is_look_due = event.now_s >= self._next_look_s
+        if is_look_due:
             self._next_look_s = event.now_s + LOOK_S
             yield from self._look(event.now_s)
-            yield from self._look_at_advances(event.now_s)
-        yield from self._assign_advances()
+        self.homes.now_s = event.now_s
+        if self.homes.shards:
+            self.homes.wait()
+            if is_look_due:
+                yield from self._look_at_advances(event.now_s)
+            yield from self._assign_advances()
 
     def _progressed(self, event: Progressed) -> Iterator[DispatchCommand]:
         if pool := self._pool_of.get(event.agent):

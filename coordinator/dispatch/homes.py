@@ -67,6 +67,7 @@ class Homes:
     """The shards of all runs, and the choice of their workers.
 
     Attributes:
+        now_s: the time [s].
         shards: by number.
         deadlines: of advances, by shard.
         rebuilt: number of assigned advances that start from a rebuilt state.
@@ -79,12 +80,12 @@ class Homes:
             workers: the workers, whose load includes advances.
             allows_drift: a shard may move to another platform if its own is gone.
         """
+        self.now_s = 0.0
         self.shards: dict[int, Home] = {}
         self.deadlines = Deadlines(LEAST_S)
         self.rebuilt = 0
         self._workers = workers
         self._allows_drift = allows_drift
-        self._now_s = 0.0
         self._is_crowded = False
 
     @property
@@ -93,7 +94,7 @@ class Homes:
         wakes = (home.drifts_at_s for home in self.shards.values())
         # A shard that may drift by now waits for a worker, not for a time.
         return min(
-            (wake for wake in wakes if wake is not None and wake > self._now_s),
+            (wake for wake in wakes if wake is not None and wake > self.now_s),
             default=None,
         )
 
@@ -142,19 +143,18 @@ class Homes:
         limit_s = self.deadlines.limit_s(shard, home.advance.job.simulated_s)
         return limit_s * 2.0 ** min(home.misses, _MOST_DOUBLINGS)
 
-    def tick(self, now_s: float) -> None:
-        """Set the time, and the times from which shards that wait may drift.
+    def wait(self) -> None:
+        """Set the times from which shards that wait may drift.
 
         A shard has none while a worker of its platform is connected.
         """
-        self._now_s = now_s
         for home in self.shards.values():
             if not (self._allows_drift and home.may_drift):
                 continue
             if home.advance is None or not home.platform or self._equal(home):
                 home.drifts_at_s = None
             elif home.drifts_at_s is None:
-                home.drifts_at_s = now_s + DRIFT_S
+                home.drifts_at_s = self.now_s + DRIFT_S
 
     def settle(self) -> Iterator[int | Crowded]:
         """Bind the shards that wait; yield those whose advances are to be sent.
@@ -215,7 +215,7 @@ class Homes:
     def fit(self, home: Home) -> list[str]:
         """Return the workers that may hold a shard, by name."""
         fit = self._equal(home)
-        if fit or home.drifts_at_s is None or self._now_s < home.drifts_at_s:
+        if fit or home.drifts_at_s is None or self.now_s < home.drifts_at_s:
             return fit
         return sorted(self._workers.fit(home.client))
 

@@ -49,11 +49,6 @@ class Vetted(Message, frozen=True, tag=True):
     attempt: int
     report: Report
 
-    @property
-    def reason(self) -> str:
-        """Reason why it cannot be built or simulated; empty if it can."""
-        return self.report.reason
-
 
 class VettingFailed(Message, frozen=True, tag=True):
     """The analyzer failed on a candidate and would fail again."""
@@ -61,7 +56,6 @@ class VettingFailed(Message, frozen=True, tag=True):
     birth: BirthId
     attempt: int
     reason: str
-    report: ClassVar[None] = None
 
 
 Verdict = Vetted | VettingFailed

@@ -23,6 +23,7 @@ from coordinator.islands.events import (
     Record,
     Started,
     Verdict,
+    Vetted,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.learning import IslandLearning, NewbornLearning
@@ -158,9 +159,10 @@ class Island:
         candidate = found.candidate
         if not isinstance(event, Verdict):
             return self._judged_newborn(found, event)
-        if not (event.report and event.report.is_viable):
-            attempt = candidate.attempt + 1
-            return [self._begin(event.birth, attempt, candidate.couple, event.reason)]
+        if not (isinstance(event, Vetted) and event.report.is_viable):
+            attempt, couple = candidate.attempt + 1, candidate.couple
+            why = event.report.reason if isinstance(event, Vetted) else event.reason
+            return [self._begin(event.birth, attempt, couple, why)]
         found.is_viable = True
         if self._learning is None:
             return [Evaluate(candidate.birth, candidate.robot)]

@@ -131,7 +131,8 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             nonce = read_description(path).nonce
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
             self.epoch = _next_epoch(path)
-            replace_text(path / EPOCH, str(self.epoch))
+            self._mark = str(self.epoch).encode()
+            replace_bytes(path / EPOCH, self._mark)
         except BaseException:
             self.close()
             raise
@@ -175,6 +176,9 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             RunFolderError: one has opened the folder, the folder is gone, or the
                 file with the epoch is damaged.
         """
+        with contextlib.suppress(OSError):
+            if (self.path / EPOCH).read_bytes() == self._mark:
+                return
         try:
             epoch = _read_epoch(self.path)
         except RunFolderError as error:
