@@ -31,7 +31,7 @@ from schema.agent.network import Agent
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
-from schema.experiment.document import body_space
+from schema.experiment.document import Experiment, body_space
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.settings import evaluation_settings
 from schema.robot.genome import develop
@@ -176,29 +176,55 @@ def null_rate(seconds: float) -> Rate:
         return measure(Stream(fleet, _IN_FLIGHT), seconds)
 
 
-def birth_cost(births: int) -> Rate:
-    """Measure whole births without physics, journal and tables included."""
-    shipped = read_experiment("scenario1")
-    experiment = msgspec.structs.replace(shipped, births=births)
-    bodies = {
-        "worker": (null_workers.process, 1),
+@contextmanager
+def live_run(
+    experiment: Experiment, body: Body, workers: int
+) -> Iterator[tuple[RunSession, JobRouter]]:
+    """Start a run on a fleet of its own, with journal and tables.
+
+    Args:
+        experiment: of the run.
+        body: function of the workers' processes.
+        workers: their number.
+    """
+    bodies: dict[AgentKind, tuple[Body, int]] = {
+        "worker": (body, workers),
         "analyzer": (analyzer.service.process, 1),
     }
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        real_fleet(bodies) as fleet,  # type: ignore[arg-type]
-    ):
+    with tempfile.TemporaryDirectory() as folder, real_fleet(bodies) as fleet:
         details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
         run = RunSession(RunFolder(Path(folder) / "run", details), fleet)
         run.start()
-        wall_s, cpu_s = time.perf_counter(), time.process_time()
-        while not run.loop.is_finished:
-            now_s = time.monotonic()
-            ends = fleet.listen(0.1, now_s)
-            run.loop.act(now_s, ends.get(run.loop.client, ()))
-        wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
+        yield run, fleet
         run.close()
-    return Rate(births / wall_s, cpu_s / births)
+
+
+def measure_run(run: RunSession, fleet: JobRouter, is_done: Callable[[], bool]) -> Rate:
+    """Measure the evaluations of a run until a condition holds."""
+    count, wall_s, cpu_s = 0, time.perf_counter(), time.process_time()
+    while not is_done():
+        now_s = time.monotonic()
+        ends = fleet.listen(0.1, now_s).get(run.loop.client, ())
+        run.loop.act(now_s, ends)
+        count += sum(
+            isinstance(end, Deliver) and end.job.kind == "evaluate" for end in ends
+        )
+    wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
+    return Rate(count / wall_s, cpu_s / max(1, count))
+
+
+def birth_cost(births: int, parts: float = 12.0) -> Rate:
+    """Measure whole births without physics, journal and tables included.
+
+    Args:
+        births: number of births.
+        parts: mean number of parts of the founders.
+    """
+    shipped = read_experiment("scenario1")
+    generation = msgspec.structs.replace(shipped.generation, parts_mean=parts)
+    experiment = msgspec.structs.replace(shipped, births=births, generation=generation)
+    with live_run(experiment, null_workers.process, 1) as (run, fleet):
+        return measure_run(run, fleet, lambda: run.loop.is_finished)
 
 
 def main(seconds: float, workers: int, births: int) -> None:

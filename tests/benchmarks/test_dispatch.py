@@ -13,13 +13,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
 import analyzer.service
 import worker.serve.service
-from coordinator.dispatch.events import DispatchEvent, Returned
+from coordinator.dispatch.events import DispatchEvent, Joined, Left, Returned
 from coordinator.dispatch.fleet import JobRouter
+from coordinator.dispatch.pool import AHEAD_S
 from coordinator.network.service import Network
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
@@ -38,7 +40,10 @@ from tests.benchmarks.dispatch_bench import (
     LEAST_NULL_PER_S,
     LEAST_WORKERS,
     MOST_NULL_CPU_S,
+    Rate,
     birth_cost,
+    live_run,
+    measure_run,
     null_rate,
 )
 from tests.benchmarks.fleet_model import Setting, most_workers
@@ -52,6 +57,12 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 UTILISATION = 0.95
 RUNS = 8
 BIRTHS = 60
+CPU_PER_BIRTH_S = 1.5e-3
+SECOND_WORKER = 1.85
+TURNS = 10
+TURN_S = 2.0
+JOINING_S = 0.3
+LEAVING_S = AHEAD_S + 0.2  # time to finish the jobs that a leaving worker has
 
 
 class TimedNetwork:
@@ -141,3 +152,58 @@ def test_coordinator_serves_a_thousand_workers_at_ten_seconds_per_evaluation() -
     rate = outcome.births_per_s
     print(f"\n{1e3 * cost:.2f} ms per birth: {reached} workers, {rate:.0f} births/s")
     assert reached >= LEAST_WORKERS
+
+
+@pytest.mark.parametrize("parts", [12.0, 25.0], ids=["founders", "evolved"])
+def test_cpu_per_birth(parts: float) -> None:
+    """Founders of scenario 1 have 12 parts on average, its evolved robots 25.
+
+    Without physics nothing evolves, so founders of the second size are generated.
+    """
+    rate = birth_cost(1500, parts)
+    print(f"\n{rate.per_s:.0f} births/s, {1e3 * rate.cpu_s:.2f} ms CPU per birth")
+    assert rate.cpu_s <= CPU_PER_BIRTH_S
+
+
+def test_gain_of_a_second_worker() -> None:
+    """Compare the evaluations per second of two workers with those of one.
+
+    Coordinator, analyzer, two workers, real physics, network, journal and tables
+    share the machine. Children of random founders are bred, vetted and evaluated as
+    in scenario 1, with two differences: the brood does not end during the
+    measurement, so no worker waits for its last child, and 60 births are in flight.
+    One of the two workers leaves and joins in alternate turns, so that changes of the
+    machine's speed affect both settings equally. The jobs of a leaving worker go to
+    the other one, so births are still committed and each setting includes the
+    breeding and vetting of its own births. The leaving worker finishes its current
+    jobs and is idle before the turn is measured.
+    """
+    shipped = read_experiment("scenario1")
+    selection = replace(shipped.selection, children=9_000, window=60)
+    experiment = replace(shipped, births=10_000, selection=selection)
+    rates: dict[int, list[float]] = {1: [], 2: []}
+    cpu_s = []
+    with live_run(experiment, worker.serve.service.process, 2) as (run, fleet):
+
+        def measure_for(seconds: float) -> Rate:
+            end_s = time.monotonic() + seconds
+            return measure_run(run, fleet, lambda: time.monotonic() >= end_s)
+
+        name = fleet.dispatch.names("worker")[1]
+        joins = Joined(name, "worker", 1, fleet.dispatch.platform(name))
+        measure_for(TURN_S)
+        for turn in range(2 * TURNS):
+            workers = 1 + turn % 2
+            fleet.tell(Left(name) if workers == 1 else joins)
+            measure_for(LEAVING_S if workers == 1 else JOINING_S)
+            rate = measure_for(TURN_S)
+            rates[workers].append(rate.per_s)
+            cpu_s.append(rate.cpu_s)
+    one, two = np.mean(rates[1]), np.mean(rates[2])
+    gains = np.divide(rates[2], rates[1])
+    error = gains.std(ddof=1) / np.sqrt(TURNS)
+    print(
+        f"\none worker {one:.1f}/s, two {two:.1f}/s: {two / one:.3f} +- {error:.3f}; "
+        f"coordinator {1e3 * np.median(cpu_s):.2f} ms CPU per birth"
+    )
+    assert two / one >= SECOND_WORKER
