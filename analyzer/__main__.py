@@ -6,9 +6,6 @@ from schema.agent.flags import Flags
 def main(arguments: list[str]) -> int:
     """Serve until stopped.
 
-    Args:
-        arguments: the command's name first.
-
     Returns:
         0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
     """

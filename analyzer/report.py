@@ -41,9 +41,6 @@ _NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 def answer(request: Request) -> Report:
     """Return the report on the body of a request; a brain in it is ignored.
 
-    Args:
-        request: a ``Vet`` with ``VettingSettings``.
-
     Raises:
         MalformedMessage: other work.
         ExperimentError: the settings are invalid or name what does not exist.

@@ -7,9 +7,6 @@ from schema.agent.supervisor import cores
 def main(arguments: list[str]) -> int:
     """Run one of the worker's commands and return its exit code.
 
-    Args:
-        arguments: the command's name first.
-
     Returns:
         ``worker``: 0 after Ctrl-C or SIGTERM, 130 after a second Ctrl-C; ``bench``: 0
         if the measurement meets its requirement, 1 if not.

@@ -19,9 +19,6 @@ from worker.robot.robustness import rejudge, small_changes, summary
 def main(arguments: list[str]) -> int:
     """Simulate a robot, print its evaluation, and return the exit code.
 
-    Args:
-        arguments: the command's name, ``robot simulate``, first.
-
     Returns:
         0 if it was evaluated.
 

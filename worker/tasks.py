@@ -44,10 +44,6 @@ def directed_locomotion(trace: Trace, parameters: Directed) -> float:
     a is the net distance along the heading, b the greatest distance from the straight
     line through the start, both in the ground plane [m]; T is the duration [s].
 
-    Args:
-        trace: of any robot.
-        parameters: heading, weight and limit.
-
     Source: own definition.
     """
     angle = radians(parameters.heading_deg)
@@ -85,10 +81,6 @@ def target(trace: Trace, parameters: Targets) -> float:
     or the duration. f is 0 if it is above the limit, or if the robot starts at all
     targets; it is negative if the core ends farther from the next one.
 
-    Args:
-        trace: of any robot.
-        parameters: targets, distance and limit.
-
     Source: own definition.
     """
     places = [(float(x), float(y)) for x, y in trace.core_position[:, :2]]
@@ -120,10 +112,6 @@ def light(trace: Trace, parameters: Light) -> float:
 
     The brightness at distance d from the light is min(1, (full_within_m / d)^2), that
     of a light sensor that faces the light, hidden or not.
-
-    Args:
-        trace: of a robot in a world with a light.
-        parameters: distance of full brightness.
 
     Raises:
         ExperimentError: the world has no light.

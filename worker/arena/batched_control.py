@@ -30,12 +30,7 @@ class BatchedControllers:
     """
 
     def __init__(self, settings: ArenaSettings, controls: Controls) -> None:
-        """Initialise without robots.
-
-        Args:
-            settings: of the arena.
-            controls: brains of the arena.
-        """
+        """Initialise without robots."""
         simulation = settings.simulation
         self._settings, self._controls = settings, controls
         self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
@@ -55,10 +50,6 @@ class BatchedControllers:
     def tick(self, step: int, robots: Sequence[ArenaRobot]) -> Floats:
         """Update all brains with the latest readings and return their outputs.
 
-        Args:
-            step: of the arena.
-            robots: R, those of the last ``gather``.
-
         Returns:
             (R, O) unclipped; may be a view that the next tick overwrites.
         """
@@ -71,10 +62,6 @@ class BatchedControllers:
 
     def first_tick(self, step: int, robot: ArenaRobot) -> str:
         """Update a newborn's brain alone and command its motors.
-
-        Args:
-            step: of the arena.
-            robot: the newborn, not yet in the bank.
 
         Returns:
             Why its brain broke; empty if it did not.

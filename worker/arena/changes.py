@@ -98,11 +98,6 @@ def newborn(
 
     The caller adds the first sample to its window.
 
-    Args:
-        insertion: birth, robot, place and heading.
-        population: that it is to join.
-        step: of the arena.
-
     Raises:
         ExperimentError: a sensor that has no stimulus in the arena.
     """

@@ -21,12 +21,7 @@ class Samples:
     """Adds samples to the windows of an arena's robots."""
 
     def __init__(self, settings: ArenaSettings, population: ArenaPopulation) -> None:
-        """Find out which channels are recorded.
-
-        Args:
-            settings: of the arena.
-            population: its living robots.
-        """
+        """Find out which channels are recorded."""
         wanted = functions_of(settings).channels
         self._population = population
         self._is_recorded = bool(wanted)
@@ -107,13 +102,7 @@ class PoseLog:
         self._samples: list[tuple[int, Layout, Floats, Floats]] = []
 
     def add(self, step: int, layout: Layout, state: Floats) -> None:
-        """Add a sample.
-
-        Args:
-            step: of the arena.
-            layout: of the state.
-            state: of all clusters.
-        """
+        """Add a sample."""
         if layout.robot_rows.robots:
             roots, angles = state[layout.roots], state[layout.joints]
             self._samples.append((step, layout, roots, angles))

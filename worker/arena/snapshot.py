@@ -60,14 +60,7 @@ def state_of(
     population: ArenaPopulation,
     casualties: Sequence[Casualty],
 ) -> ArenaState:
-    """Return an arena's whole state; equal states give equal bytes.
-
-    Args:
-        settings: of the arena.
-        step: of the arena.
-        population: the living robots.
-        casualties: not yet reported.
-    """
+    """Return an arena's whole state; equal states give equal bytes."""
     return ArenaState(
         settings=_digest(settings),
         step=step,
@@ -83,11 +76,6 @@ def read_snapshot(
     settings: ArenaSettings, data: bytes, population: ArenaPopulation
 ) -> tuple[int, list[Casualty]]:
     """Fill an empty population from a snapshot.
-
-    Args:
-        settings: of the arena.
-        data: the snapshot.
-        population: without robots.
 
     Returns:
         The arena's step, and the casualties not yet reported.

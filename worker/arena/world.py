@@ -96,9 +96,6 @@ class World:
         body and motion of the robot go on. A window that is restarted has the present
         sample as its first.
 
-        Args:
-            changes: made before the next advance.
-
         Raises:
             UnexpectedEvent: a robot that does not live here, lives here already, is
                 named twice, is born between two ticks of the controllers, or has its
@@ -133,11 +130,7 @@ class World:
         return self._report()
 
     def step_to(self, until: int) -> None:
-        """Begin an advance: step to some step before its end, without judging robots.
-
-        Args:
-            until: step to reach.
-        """
+        """Begin an advance: go to a step before its end, without judging robots."""
         while self.step < until:
             self._advance_interval(self._schedule.moments(self.step, until))
 
@@ -155,11 +148,6 @@ class World:
     @classmethod
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
         """Return the world of a snapshot; it continues equal to the last bit.
-
-        Args:
-            settings: those of the snapshot.
-            data: the snapshot.
-            threads: that step clusters, including the caller's.
 
         Raises:
             MalformedMessage: not a snapshot, or of other settings.

@@ -131,10 +131,6 @@ def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
 def run(options: argparse.Namespace, robots: RobotSource) -> int:
     """Run one of the two benchmarks and print the results.
 
-    Args:
-        options: as ``add_commands`` parses them.
-        robots: source of random robots.
-
     Returns:
         0.
 

@@ -66,10 +66,6 @@ def time_evaluations(robots: Iterable[Robot], settings: EvaluationSettings) -> T
 
     Both are timed alternately, and the least time of each counts, as other load on the
     machine only adds time. Robots whose evaluation fails are left out.
-
-    Args:
-        robots: checked robots.
-        settings: of their evaluation.
     """
     count, whole, bare = 0, 0.0, 0.0
     failures: list[str] = []
@@ -126,10 +122,6 @@ def _replay(
 
 def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
     """Run one of the commands ``revolve bench ...``.
-
-    Args:
-        arguments: the command's name first.
-        robots: source of random robots.
 
     Returns:
         0 if the measurement meets its goal, 1 if not.

@@ -55,12 +55,7 @@ class EngineView:
         self.ctrl: Floats = data.ctrl[self.servos.actuators]
 
     def row(self, channels: Channels, neighbours: int) -> Floats:
-        """Return a sample of the present state as a row.
-
-        Args:
-            channels: of the robot.
-            neighbours: number of robots near it.
-        """
+        """Return a sample of the present state as a row."""
         return channels.row(
             self.qpos,
             self.qvel,
@@ -79,12 +74,7 @@ class EngineView:
             self.probe.numbers[:] = other.probe.numbers
 
     def touched_of(self, other: "EngineView", touched: Iterable[int]) -> set[int]:
-        """Return which of the robot's geoms are in contact in another model.
-
-        Args:
-            other: its view of that model.
-            touched: geoms in contact there.
-        """
+        """Return which of the robot's geoms are in contact in another model."""
         first, end = other.geoms
         shift = self.geoms[0] - first
         return {geom + shift for geom in touched if first <= geom < end}

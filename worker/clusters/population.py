@@ -95,12 +95,7 @@ class ArenaPopulation:
         self._settle(kept)
 
     def begin(self, plan: Sequence[int], is_merge: Sequence[bool]) -> Rollout:
-        """Start to handle an interval that all clusters have been stepped through.
-
-        Args:
-            plan: steps to each moment from the one before.
-            is_merge: whether each moment is a check for merges.
-        """
+        """Start to handle an interval that all clusters have been stepped through."""
         self.rollout = Rollout(tuple(plan), tuple(is_merge))
         self.rollout.read(self.layout)
         return self.rollout
@@ -243,11 +238,6 @@ def _touching(
     members: Group, cluster_of: Mapping[BirthId, Cluster], moment: int
 ) -> list[tuple[int, int]]:
     """Return which members of a new cluster were in contact in their former ones.
-
-    Args:
-        members: of the new cluster.
-        cluster_of: the former cluster of each.
-        moment: of the interval.
 
     Returns:
         Pairs of indices of members, ascending.

@@ -40,12 +40,7 @@ class FitnessWindow:
     """
 
     def __init__(self, simulation: Simulation, born: int) -> None:
-        """Initialise an empty window.
-
-        Args:
-            simulation: its clocks.
-            born: the arena's step at birth.
-        """
+        """Initialise an empty window."""
         self.born = born
         self._clock = simulation
         self._intervals = simulation.window_steps // simulation.pose_steps
@@ -82,12 +77,7 @@ class FitnessWindow:
         return len(self.positions) - 1 >= max(1, LEAST_SHARE * self._intervals)
 
     def trace(self, channels: Channels, robot: Robot) -> Trace:
-        """Return the trace of the samples, at least two.
-
-        Args:
-            channels: of the rows.
-            robot: with its present brain.
-        """
+        """Return the trace of the samples, at least two."""
         interval_s = self._clock.pose_steps * self._clock.timestep_s
         return channels.trace(robot, interval_s, np.array(self.positions), self.rows)
 
@@ -152,10 +142,6 @@ class ArenaRobot:
 
         Velocities and fitness are 0, and there are no measures, until the window is
         long enough for a fitness.
-
-        Args:
-            step: of the arena.
-            settings: of the arena.
         """
         age_s = (step - self.window.born) * settings.simulation.timestep_s
         x, y, z = self.view.qpos[:3].tolist()

@@ -115,11 +115,7 @@ class StateColumns:
     """
 
     def __init__(self, moments: int) -> None:
-        """Initialise without clusters.
-
-        Args:
-            moments: K, the most that an interval has.
-        """
+        """Initialise without clusters."""
         self.states = np.zeros((moments, 0))
         self._starts: dict[Cluster, int] = {}
         self._end = 0
@@ -164,13 +160,7 @@ class Layout:
     def __init__(
         self, clusters: Sequence[Cluster], robot_rows: RobotRows, columns: StateColumns
     ) -> None:
-        """Place the clusters and compute the indices.
-
-        Args:
-            clusters: all of an arena, each once.
-            robot_rows: all robots.
-            columns: of all clusters.
-        """
+        """Place the clusters and compute the indices."""
         self.robot_rows = robot_rows
         self.clusters = tuple(clusters)
         rows = [
@@ -326,12 +316,7 @@ class Rollout:
     """
 
     def __init__(self, plan: tuple[int, ...], is_merge: tuple[bool, ...]) -> None:
-        """Initialise at the first moment, without states.
-
-        Args:
-            plan: steps to each moment from the one before.
-            is_merge: whether each moment is a check for merges.
-        """
+        """Initialise at the first moment, without states."""
         self.plan = plan
         checks = [moment for moment, is_due in enumerate(is_merge) if is_due]
         self._after_merges = max(checks, default=-1) + 1

@@ -88,12 +88,7 @@ HELD, MEAN, DEAD = "input at 0", "input at its mean", "motor dead"
 
 
 def all_ablations(robot: Robot, space: BodySpace) -> tuple[AblationCase, ...]:
-    """Return the ablations of a robot: one by one, by kind, and all together.
-
-    Args:
-        robot: the robot.
-        space: its part types.
-    """
+    """Return the ablations of a robot: one by one, by kind, and all together."""
     inputs, motors = _inputs(robot, space), _motors(robot, space)
     return (
         *_changes(HELD, "sensors", inputs, partial(_held, value=0.0)),

@@ -56,12 +56,7 @@ class Pushes:
         return values
 
     def outputs(self, tick: int, values: Floats) -> Floats:
-        """Set the force on the robot until the next tick; return the outputs.
-
-        Args:
-            tick: its number, from the start of the evaluation.
-            values: of the brain.
-        """
+        """Set the force on the robot until the next tick; return the outputs."""
         number, since = divmod(tick, self._every)
         is_push = number > 0 and since == 0
         fx, fy = self._forces[number - 1] if is_push else (0.0, 0.0)

@@ -39,9 +39,6 @@ class CheckedControls(Protocol):
 def check_controls(controls: CheckedControls) -> None:
     """Raise unless brains keep the contract of ``BrainControl`` on random brains.
 
-    Args:
-        controls: the brains.
-
     Raises:
         ExperimentError: states that are not 0 at birth or not changed in place;
             outputs or states of another type or shape, or not finite; a robot that

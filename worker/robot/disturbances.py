@@ -27,12 +27,6 @@ def evaluate_disturbed(
 ) -> Evaluation:
     """Return one evaluation of several disturbed simulations.
 
-    Args:
-        once: returns the evaluation of one simulation.
-        settings: of the evaluation.
-        rules: its section ``robust``.
-        identity: of the evaluation.
-
     Raises:
         SimulationDiverged, SensorFailed, FitnessUndefined: of one simulation, with
             its number.

@@ -68,10 +68,6 @@ def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:
 
     The engine also reports geoms that are farther apart than their ``margin`` but
     within the ``gap`` of scenery. They exert no force on each other: no contact.
-
-    Args:
-        model: a compiled model.
-        data: the model's state.
     """
     contacts = data.contact
 
