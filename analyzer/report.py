@@ -206,11 +206,6 @@ def intersecting_parts(
 def separation(boxes: Boxes, first: Indices, second: Indices) -> Floats:
     """Return the greatest separation of boxes along their 15 axes.
 
-    Args:
-        boxes: all boxes.
-        first: (K,) indices of the first box of each pair.
-        second: (K,) indices of the second box of each pair.
-
     Returns:
         (K,) [m]: a positive value is a gap (at most the distance), zero is contact, a
         negative value is minus the depth.

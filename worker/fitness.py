@@ -106,22 +106,14 @@ def load_fitness(fitness: Fitness) -> TraceFunction:
 
 @lru_cache(maxsize=1)  # both the fitness and the record of a robot need it
 def path_velocity(track: Trace) -> float:
-    """Return path length over time in the ground plane [m/s].
-
-    Args:
-        track: (T, 3) positions; T >= 2.
-    """
+    """Return path length over time in the ground plane [m/s]."""
     steps = np.diff(track.core_position, axis=0)
     lengths = map(math.hypot, steps[:, 0].tolist(), steps[:, 1].tolist())
     return sum_in_order(lengths) / track.duration_s
 
 
 def straight_velocity(track: Trace) -> float:
-    """Return net distance over time in the ground plane [m/s].
-
-    Args:
-        track: (T, 3) positions; T >= 2.
-    """
+    """Return net distance over time in the ground plane [m/s]."""
     x, y = (track.core_position[-1, :2] - track.core_position[0, :2]).tolist()
     return math.hypot(x, y) / track.duration_s
 

@@ -151,9 +151,7 @@ def turning(trace: Trace, parameters: Turning) -> float:
     Rolling over does not count. b is the greatest distance of the core from its start
     in the ground plane [m]; T is the duration [s].
 
-    Args:
-        trace: of any robot; it turns by less than half a turn between two samples.
-        parameters: direction, weight and limit.
+    The core turns by less than half a turn between two samples.
 
     Source: own definition.
     """
@@ -188,10 +186,6 @@ def balance(trace: Trace, parameters: Balance) -> float:
     core's own z axis is tilted from the vertical by more than ``tilt_deg``. b is the
     greatest distance of the core from its start in the ground plane [m].
 
-    Args:
-        trace: of any robot; ``environment.push_impulse`` makes it hard to stand.
-        parameters: tilt, weight and limit.
-
     Source: own definition.
     """
     least = cos(radians(parameters.tilt_deg))
@@ -220,12 +214,7 @@ def _within(value: float, limit: float) -> float:
 
 
 def _vertical_turn(before: Floats, after: Floats) -> float:
-    """Return the vertical component of the rotation between two attitudes [rad].
-
-    Args:
-        before: (4,) unit quaternion w, x, y, z, body to world frame.
-        after: likewise.
-    """
+    """Return the vertical component of the rotation between two attitudes [rad]."""
     (a, b, c, d), (w, x, y, z) = before.tolist(), after.tolist()
     # after times the inverse of before: the rotation in the world frame.
     real = w * a + x * b + y * c + z * d

@@ -131,12 +131,6 @@ def diverged(
 
     In a cluster, only members whose own state is implausible are lost. If there is
     none, an error or a warning of the engine removes all members.
-
-    Args:
-        population: the living robots.
-        rollout: their states, at the present moment.
-        step: of the arena.
-        reads_warnings: read the engine's warnings even if all states are plausible.
     """
     is_plausible = _is_plausible(rollout.max_velocity)
     if not is_plausible:

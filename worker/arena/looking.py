@@ -20,12 +20,6 @@ def look(
 ) -> list[Casualty]:
     """Write the readings of some robots' light sensors and own sensors.
 
-    Args:
-        population: all robots of the arena; sensors see all of them.
-        robots: whose sensors to read, by birth.
-        step: of the arena.
-        settings: of the arena.
-
     Returns:
         The robots with a sensor that failed.
     """

@@ -28,12 +28,7 @@ class Samples:
         self._counts_neighbours = "neighbours" in wanted
 
     def first(self, step: int, robot: ArenaRobot) -> None:
-        """Add the sample of a newborn at its place.
-
-        Args:
-            step: of the arena.
-            robot: not moved since its first readings, and part of the population.
-        """
+        """Add the sample of a newborn at its place."""
         row: Floats | None = None
         if self._is_recorded:
             places = [one.place for one in self._population.robots]
@@ -43,12 +38,7 @@ class Samples:
         robot.window.add(step, robot.place, row)
 
     def add(self, step: int, state: Floats) -> None:
-        """Add a sample of each robot, at the present moment of an interval.
-
-        Args:
-            step: of the arena.
-            state: of all clusters, (W,) in the order of the layout.
-        """
+        """Add a sample of each robot, at the present moment of an interval."""
         layout, robots = self._population.layout, self._population.robots
         places = state[layout.roots[:, :3]].tolist()
         for robot, (x, y, z) in zip(robots, places, strict=True):
@@ -79,11 +69,7 @@ class Samples:
             robot.window.add(step, robot.place, row)
 
     def _neighbours(self, places: Sequence[Sequence[float]]) -> list[int]:
-        """Return how many robots are near each one; 0 if nothing needs it.
-
-        Args:
-            places: of the cores, by birth [m].
-        """
+        """Return how many robots are near each one; 0 if nothing needs it."""
         if not self._counts_neighbours:
             return [0] * len(places)
         at = np.array(places)

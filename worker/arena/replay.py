@@ -50,11 +50,6 @@ def alone(
 ) -> tuple[Evaluation, pa.Table]:
     """Return a robot's evaluation, and its poses at every tick of its controller.
 
-    Args:
-        robot: a checked robot.
-        settings: as for ``evaluate``.
-        identity: of the evaluation; the rows have its birth.
-
     Returns:
         The evaluation; rows of the poses table, without ``record``.
 

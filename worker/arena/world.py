@@ -53,10 +53,7 @@ class World:
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
         """Initialise an empty arena.
 
-        Args:
-            settings: of the arena.
-            threads: that step clusters, including the caller's; results do not depend
-                on their number.
+        Results do not depend on the number of threads, the caller's included.
         """
         silence_engine()
         clock = settings.simulation
@@ -115,9 +112,6 @@ class World:
 
     def advance(self, until: int) -> Advance:
         """Advance the arena to a step.
-
-        Args:
-            until: step to reach, later than the present one.
 
         Raises:
             UnexpectedEvent: ``until`` is not later than the present step.

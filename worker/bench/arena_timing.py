@@ -22,13 +22,7 @@ Place = tuple[float, float]
 def birth_places(
     rng: np.random.Generator, count: int, settings: ArenaSettings
 ) -> list[Place]:
-    """Return random places as of on-line births, at a distance from earlier ones.
-
-    Args:
-        rng: to draw from.
-        count: number of places.
-        settings: radius, least distance and tries.
-    """
+    """Return random places as of on-line births, at a distance from earlier ones."""
     arena = settings.arena
     places: list[Place] = []
     for _ in range(count):
@@ -60,12 +54,6 @@ def time_arena(
     """Return the simulated time of an arena and the time that it takes [s].
 
     That is wall time, or CPU time of the thread if there is one thread.
-
-    Args:
-        settings: of the arena.
-        robots: inserted at the start; this is not timed.
-        seconds: simulated time [s].
-        threads: that step clusters.
     """
     clock = time.thread_time if threads == 1 else time.perf_counter
     second = round(1.0 / settings.simulation.timestep_s)

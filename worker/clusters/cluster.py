@@ -116,11 +116,7 @@ class Cluster:
     ) -> None:
         """Create the state of a model.
 
-        Args:
-            births: of the members, ascending.
-            robots: of the members, by the prefixes of their names in the model.
-            model: that holds them.
-            settings: of the arena.
+        Robots are named by the prefixes of their names in the model.
         """
         self.members = births
         self.model, self.data = model, mujoco.MjData(model)

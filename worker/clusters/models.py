@@ -147,12 +147,7 @@ class ModelCache:
         )
 
     def cluster(self, births: tuple[BirthId, ...], bodies: Sequence[Body]) -> Cluster:
-        """Return the cluster of some robots, in its initial state.
-
-        Args:
-            births: of the robots, ascending.
-            bodies: of the robots.
-        """
+        """Return the cluster of some robots, in its initial state."""
         if len(births) == 1:
             found = bodies[0].solo
         elif births in self._clusters:

@@ -128,8 +128,7 @@ class ArenaPopulation:
     def split(self, state: Floats) -> None:
         """Split clusters whose parts have drifted apart.
 
-        Args:
-            state: present state, (W,) in the order of the layout.
+        ``state`` is the present one, (W,) in the order of the layout.
         """
         rows = self.robot_rows.rows
         groups: list[Group] = []

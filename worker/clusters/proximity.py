@@ -138,11 +138,7 @@ class RobotBounds:
         return first[is_once].tolist(), second[is_once].tolist()
 
     def overlaps(self, margins: Floats) -> Mask:
-        """Return whether the bounding boxes of R > 0 robots overlap, (R, R).
-
-        Args:
-            margins: (R,) that each robot's box is extended by [m].
-        """
+        """Return whether the bounding boxes of R > 0 robots overlap, (R, R)."""
         robot_rows = self._layout.robot_rows
         low = self._hulls.min(axis=0) - robot_rows.hulls[3]
         high = self._hulls.max(axis=0) + robot_rows.hulls[3]
@@ -180,12 +176,7 @@ class Proximity:
         return [list(compress(pairs, row)) for row in is_near.tolist()]
 
     def pairs_to_keep(self, bounds: RobotBounds, pairs: Pairs) -> Pairs:
-        """Return which pairs of one cluster must stay in one cluster.
-
-        Args:
-            bounds: at one moment.
-            pairs: at least one.
-        """
+        """Return which pairs of one cluster must stay in one cluster."""
         margins = self._margins(bounds)
         most = margins[0] + (0.5 * self._split_m + _ROUNDING_M)
         overlaps = bounds.overlaps(most)[*zip(*pairs, strict=True)]

@@ -48,13 +48,7 @@ class FitnessWindow:
         self.rows: deque[Floats] = deque(maxlen=self._intervals + 1)
 
     def add(self, step: int, position: Vector, row: Floats | None = None) -> None:
-        """Add a sample, one every ``pose_steps`` of the arena.
-
-        Args:
-            step: of the arena.
-            position: of the core's centre, world frame [m].
-            row: of the channels; None if none is recorded.
-        """
+        """Add a sample, one every ``pose_steps`` of the arena."""
         if step - self.born >= self._clock.warmup_steps:
             self.positions.append(position)
             if row is not None:
@@ -106,15 +100,7 @@ class ArenaRobot:
         window: FitnessWindow,
         place: Vector,
     ) -> None:
-        """Initialise in its own cluster, with a brain that starts at its birth.
-
-        Args:
-            birth: its name.
-            body: its engine models.
-            controls: brains of the arena.
-            window: its latest positions.
-            place: of the core's centre, world frame [m].
-        """
+        """Initialise in its own cluster, with a brain that starts at its birth."""
         self.birth, self.body, self.view = birth, body, body.solo.views[0]
         self.window, self.place = window, place
         self.set_brain(body.robot.brain, controls, window.born)
@@ -122,11 +108,8 @@ class ArenaRobot:
     def set_brain(self, brain: Brain, controls: Controls, start: int) -> None:
         """Replace the brain; all its states are 0.
 
-        Args:
-            brain: new brain, which fits the body.
-            controls: brains of the arena.
-            start: step of its first tick, until which commands are held and from
-                which its age counts.
+        Until ``start``, the step of its first tick, commands are held; its age counts
+        from then on.
 
         Raises:
             SimulationDiverged: the code of a user does not take the brain.

@@ -89,10 +89,6 @@ class RobotRows:
     ) -> tuple[Indices, Indices, Indices]:
         """Return all pairs of a sphere of each of two bodies.
 
-        Args:
-            first: (P,) bodies, of the N.
-            second: likewise.
-
         Returns:
             (S,) first and second spheres, and (P,) numbers of pairs.
         """
@@ -202,31 +198,19 @@ class Layout:
         return found
 
     def velocities(self, states: Floats) -> Floats:
-        """Return the absolute velocities of all robots, one after another, (L, V).
-
-        Args:
-            states: (L, W).
-        """
+        """Return all robots' absolute velocities in states (L, W), (L, V)."""
         found = states.take(self._velocities, axis=1)
         return np.asarray(np.abs(found, out=found))
 
     def speeds(self, velocities: Floats) -> Floats:
-        """Return an upper bound on the speed of each robot's points, (L, R) [m/s].
-
-        Args:
-            velocities: (L, V) absolute.
-        """
+        """Return bounds on the speeds of robots' points, (L, R) [m/s], from (L, V)."""
         if not len(self._first_velocities):
             return np.zeros((len(velocities), 0))
         terms = velocities * self.robot_rows.weights
         return np.asarray(np.add.reduceat(terms, self._first_velocities, axis=1))
 
     def hulls(self, states: Floats) -> Floats:
-        """Return x and y of the centres of all bodies' hulls, (L, 2, N) [m].
-
-        Args:
-            states: (L, W).
-        """
+        """Return x, y of all hulls' centres in states (L, W), (L, 2, N) [m]."""
         terms = states.take(self._rows, axis=1)
         terms *= self.robot_rows.hulls[:3]
         centres = terms[:, :, 0] + terms[:, :, 1]

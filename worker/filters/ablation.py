@@ -22,11 +22,6 @@ class Ablated:
     ) -> None:
         """Look up the inputs and motors.
 
-        Args:
-            ablation: of the robot.
-            robot: the robot.
-            means: (I,) of its inputs, for those that are held at their mean.
-
         Raises:
             InvalidRobot: it has no such input or motor.
         """

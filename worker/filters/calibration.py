@@ -32,15 +32,7 @@ class Calibrated:
         tick_s: float,
         width: Widths,
     ) -> None:
-        """Initialise with no value on its way.
-
-        Args:
-            robot: the robot.
-            space: its part types.
-            entries: of the experiment.
-            tick_s: time between brain ticks [s].
-            width: of every network.
-        """
+        """Initialise with no value on its way."""
         known = {entry.part: entry for entry in entries}
         own = [
             (space[part.kind], known.get(part.kind) or Calibration(part=part.kind))
@@ -58,17 +50,15 @@ class Calibrated:
     def readings(self, _tick: int, values: Floats) -> Floats:
         """Return what the brain receives at a tick, without noise, (1, N).
 
-        Args:
-            values: (1, N) true readings; before the first tick they were the same.
+        ``values`` are (1, N) true readings; before the first tick they were the same.
         """
         return self._sensors.pass_on(values[0], values[0])[np.newaxis]
 
     def outputs(self, _tick: int, values: Floats) -> Floats:
         """Return the outputs that reach the motors at a tick, without noise, (1, O).
 
-        Args:
-            values: (1, O) of the network, clipped here to [0, 1]; before the first
-                tick they were neutral.
+        ``values`` are (1, O) of the network, clipped here to [0, 1]; before the first
+        tick they were neutral.
         """
         moved = np.clip(values[0], 0.0, 1.0) - NEUTRAL
         late = self._motors.pass_on(moved, np.zeros(len(moved))) + NEUTRAL

@@ -67,12 +67,7 @@ def filters_of(
 ) -> tuple[Filter, ...]:
     """Return the filters of an evaluation, in the order in which they act.
 
-    Args:
-        robot: the robot.
-        settings: of the evaluation.
-        identity: of the evaluation; noise and pushes depend on it.
-        state: model and data of the robot, to which forces are written.
-        means: of the inputs, for those that are held at their mean; as ``mean_inputs``.
+    Noise and pushes depend on the identity; ``means`` are those of ``mean_inputs``.
 
     Raises:
         InvalidRobot: an ablation of another robot.

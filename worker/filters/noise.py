@@ -36,14 +36,8 @@ class Noise:
     ) -> None:
         """Initialise the streams.
 
-        Args:
-            simulation: holds the standard deviations.
-            width: of every network.
-            origin: run and island of the evaluation or arena.
-            births: of the robots, one per row.
-            trial: number of each robot's evaluation, from 0.
-            further: standard deviations of further noise on each reading, (I,), and
-                on each output, (O,); None is none.
+        ``further`` are standard deviations of further noise on each reading, (I,), and
+        on each output, (O,).
         """
         self._width, self._origin = width, origin
         self._on_readings: float | Floats = simulation.sensor_noise
@@ -60,9 +54,7 @@ class Noise:
     def readings(self, tick: int, values: Floats) -> Floats:
         """Return readings with sensor noise.
 
-        Args:
-            tick: its number, from the start of the evaluation or arena.
-            values: (R, N), the first N <= I; not modified.
+        ``values`` are (R, N), the first N <= I.
 
         Returns:
             (R, N); the readings themselves if sensors have no noise.
@@ -74,10 +66,6 @@ class Noise:
 
     def outputs(self, tick: int, values: Floats) -> Floats:
         """Return network outputs with actuator noise.
-
-        Args:
-            tick: its number, from the start of the evaluation or arena.
-            values: (R, O), unclipped; not modified.
 
         Returns:
             (R, O), unclipped; the outputs themselves if motors have no noise.

@@ -29,15 +29,7 @@ class Pushes:
         model: mujoco.MjModel,
         data: mujoco.MjData,
     ) -> None:
-        """Draw the directions.
-
-        Args:
-            environment: with pushes.
-            simulation: its clocks.
-            identity: of the evaluation.
-            model: a compiled model of the robot.
-            data: the model's state, to which the forces are written.
-        """
+        """Draw the directions."""
         tick_s = simulation.tick_s
         self._every = max(1, round(environment.push_interval_s / tick_s))
         steps = simulation.evaluation_steps

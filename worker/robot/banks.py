@@ -53,7 +53,8 @@ class NetworkBank:
 
     Attributes:
         states: (R, K S) outputs and hidden states after the last tick, then the other
-            states of neurons of users' types; may be copied and written to save, move
+            states of neurons of users' types, of which K is the greatest number of a
+            neuron; may be copied and written to save, move
             and restore robots.
     """
 
@@ -64,14 +65,7 @@ class NetworkBank:
         tick_s: float,
         values: int = 1,
     ) -> None:
-        """Start all networks at state 0.
-
-        Args:
-            networks: packed with ``width``.
-            width: of the arrays.
-            tick_s: time between two ticks [s].
-            values: greatest number of states of a neuron, K.
-        """
+        """Start all networks at state 0."""
         count, states = len(networks), width.states
         self._tick_s = tick_s
         self._weights = np.empty((count, states, width.inputs + states))
@@ -148,13 +142,7 @@ class GuardedBank:
     def __init__(
         self, bank: Callable[[Sequence[Any]], Bank], packed: Sequence[Any], outputs: int
     ) -> None:
-        """Initialise brains at rest.
-
-        Args:
-            bank: returns brains that are updated together.
-            packed: brains in the form of their brain type.
-            outputs: number O of outputs of a brain.
-        """
+        """Initialise brains at rest."""
         self._bank_of, self._packed, self._width = bank, packed, outputs
         self._bank = bank(packed)
         self.failed: dict[int, str] = {}
@@ -213,12 +201,7 @@ def story_of(error: Exception) -> str:
 
 
 def broken_rows(bank: Bank, outputs: Floats) -> dict[int, str]:
-    """Return why brains failed, or are no longer finite, by row, ascending.
-
-    Args:
-        bank: the brains after a tick.
-        outputs: (R, O) of that tick.
-    """
+    """Return why brains failed, or are no longer finite, by row, ascending."""
     if not isinstance(bank, GuardedBank):
         return {}
     is_finite = np.isfinite(bank.states).all(axis=1)

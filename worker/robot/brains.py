@@ -149,13 +149,7 @@ def pack(
     width: Widths,
     types: Mapping[str, NeuronType] = BUILT_IN_NEURONS,
 ) -> PackedNetwork:
-    """Return a brain as arrays of fixed width.
-
-    Args:
-        brain: a checked brain that fits the widths.
-        width: of the arrays.
-        types: neuron types by name.
-    """
+    """Return a brain as arrays of fixed width."""
     first = {"input": 0, "output": width.inputs, "hidden": width.inputs + width.outputs}
     following = dict(first)
     places: list[int] = []
@@ -248,10 +242,6 @@ class SoloNetwork:
 
     def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
         """Update the network once; see ``NetworkBank.step``.
-
-        Args:
-            readings: (1, I) sensor readings, finite; unused inputs 0.
-            age_ticks: number of the tick, 0 at birth.
 
         Returns:
             (1, O) output states, a view that the next tick overwrites.

@@ -72,14 +72,7 @@ def _run(
     *,
     has_ages: bool = False,
 ) -> list[Floats]:
-    """Return outputs and states after each tick; restore them once on the way.
-
-    Args:
-        controls: the brains.
-        rows: numbers of the robots.
-        moved_at: tick before which the states are restored; none if there is no such.
-        has_ages: the ages are an array, not one number.
-    """
+    """Return outputs and states after each tick; restore them once on the way."""
     packed = [controls.pack(_brain(controls, number)) for number in rows]
     kept = controls.bank(()).states.shape[1]
     rng = np.random.default_rng(0)

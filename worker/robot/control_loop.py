@@ -59,13 +59,8 @@ class ControlLoop:
     ) -> None:
         """Build the model and start.
 
-        Args:
-            robot: a checked robot; it may have more neurons than ``[space]`` allows in
-                a search.
-            settings: body space, simulation and environment; of fitness and measures
-                the channels that they declare.
-            identity: of the evaluation; noise and pushes depend on it.
-            means: of the inputs, for those that ``settings.ablation`` holds there.
+        The robot may have more neurons than ``[space]`` allows in a search; ``means``
+        are values for the inputs that ``settings.ablation`` holds at their mean.
 
         Raises:
             SimulationDiverged: the engine cannot build the robot.

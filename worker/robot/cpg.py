@@ -80,13 +80,7 @@ class CpgBank:
     def __init__(
         self, packed: Sequence[PackedCpg], width: Widths, tick_s: float
     ) -> None:
-        """Start all oscillators at their phase offsets.
-
-        Args:
-            packed: of the robots.
-            width: of the arrays.
-            tick_s: time between two ticks [s].
-        """
+        """Start all oscillators at their phase offsets."""
         count = width.outputs
         self._coupling = np.zeros((len(packed), count, count))
         numbers = np.zeros((4, len(packed), count))

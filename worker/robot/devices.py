@@ -52,11 +52,6 @@ class Sensors:
     ) -> None:
         """Find the sensors.
 
-        Args:
-            placed: the robot in a model.
-            width: number I of readings, at least the robot's inputs.
-            has_light: the world has a light.
-
         Raises:
             ExperimentError: a light sensor in a world without light.
         """
@@ -152,8 +147,7 @@ class Sensors:
     def look(self, around: Surroundings) -> None:
         """Read light sensors and own ones.
 
-        Args:
-            around: what they see; frames of all bodies must be those of the state.
+        Frames of all bodies must be those of the state.
 
         Raises:
             SensorFailed: as of ``OwnSensors.read``.

@@ -46,11 +46,7 @@ def disturbances(
 ) -> Iterator[tuple[EvaluationSettings, Identity]]:
     """Yield the settings of each simulation of an evaluation, and its identity.
 
-    Args:
-        settings: of the evaluation.
-        rules: its section ``robust``.
-        identity: of the evaluation. The identities of the simulations differ in the
-            trial, so that each has noise of its own.
+    The identities differ in the trial, so that each simulation has its own noise.
     """
     for number in range(rules.draws):
         rng = stream(
@@ -106,10 +102,6 @@ def combined(found: Sequence[Evaluation], rules: Robust) -> Evaluation:
 
     Its fitness follows the rules, its length is that of one simulation, and all else
     are means.
-
-    Args:
-        found: at least one, all of one length.
-        rules: the section ``robust``.
     """
     return Evaluation(
         _taken([each.fitness for each in found], rules),

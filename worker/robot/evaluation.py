@@ -26,11 +26,7 @@ def evaluate(
 
     With the section ``robust`` it combines several simulations.
 
-    Args:
-        robot: a robot that passes ``check_robot`` in the settings' body space.
-        settings: body space, simulation, environment, fitness and measures.
-        identity: of the evaluation; noise, pushes and disturbances depend on it.
-        watch: as for ``simulate``, of each simulation.
+    The robot passes ``check_robot``; ``watch`` is that of ``simulate``.
 
     Raises:
         FitnessUndefined: the fitness function or a measure raised or gave no finite
@@ -63,11 +59,7 @@ def simulate(
 ) -> Trace:
     """Return the trace of a robot alone, as ``ControlLoop`` simulates it.
 
-    Args:
-        robot: a checked robot.
-        settings: as of ``ControlLoop``.
-        watch: called with the state at each tick, after the commands.
-        identity: of the evaluation; noise and pushes depend on it.
+    ``watch`` is called with the state at each tick, after the commands.
 
     Raises:
         RevolveError: as of ``ControlLoop`` and its ``step``.

@@ -49,10 +49,8 @@ class OwnNeurons:
     def __init__(self, networks: Sequence[Sequence[OwnNeuron]], states: int) -> None:
         """Sort the neurons by type.
 
-        Args:
-            networks: the neurons of each network.
-            states: S, number of neurons of a network; column k S + s holds state k of
-                neuron s.
+        ``states`` is S, the number of neurons of a network; column k S + s holds state
+        k of neuron s.
         """
         found: dict[str, list[tuple[int, OwnNeuron]]] = {}
         for robot, neurons in enumerate(networks):

@@ -147,10 +147,6 @@ class OwnSensors:
     def read(self, readings: Floats, around: Surroundings) -> None:
         """Read all of them; frames of the bodies must be those of the state.
 
-        Args:
-            readings: (I,) where to write.
-            around: what the sensors see beside the robot.
-
         Raises:
             SensorFailed: a sensor raised, or gave a wrong number of values or one
                 that is not finite.

@@ -107,14 +107,7 @@ class Channels:
         positions: Floats,
         rows: Iterable[Floats],
     ) -> Trace:
-        """Return the trace of some samples.
-
-        Args:
-            robot: the robot with its present brain.
-            interval_s: between two samples [s].
-            positions: (T, 3) of the core [m].
-            rows: of the samples, T of them; none if no channel is recorded.
-        """
+        """Return the trace of some samples."""
         constants = self._constants | {"robot": robot}
         if not self.names:
             return Trace(interval_s, positions, constants)
@@ -184,9 +177,6 @@ class Probe:
 
         The integrator is implicit in velocity: a servo that is not at its limit acts
         with the torque of the velocity after the step.
-
-        Args:
-            now: velocities of the driven joints after the step.
         """
         torques = self._forces + self._slopes * (now - self._before)
         is_limited = np.abs(self._forces) >= self._limits

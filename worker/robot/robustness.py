@@ -72,8 +72,7 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
 def small_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
     """Return settings with finer time steps, less friction, and raised starts.
 
-    Args:
-        settings: to change, without ``robust``.
+    The settings have no ``robust``.
 
     Source: own definition.
     """
@@ -87,8 +86,7 @@ def all_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
     raised or tilted. Sensors or motors have noise; the mean of several evaluations
     counts. A plane becomes rough or steeper; rough ground gets other bumps.
 
-    Args:
-        settings: to change, without ``robust``.
+    The settings have no ``robust``.
 
     Source: own definition.
     """
@@ -162,13 +160,7 @@ def rejudge(
     changes: Iterable[ChangedSettings],
     evaluator: Callable[[Robot, EvaluationSettings], Evaluation] = evaluate,
 ) -> Iterator[tuple[ChangedSettings, float | None]]:
-    """Yield each change and the fitness under it; None if the evaluation failed.
-
-    Args:
-        robot: a checked robot.
-        changes: changed settings.
-        evaluator: function that returns the evaluation of a robot.
-    """
+    """Yield each change and the fitness under it; None if the evaluation failed."""
     for change in changes:
         try:
             yield change, evaluator(robot, change.settings).fitness
@@ -177,12 +169,7 @@ def rejudge(
 
 
 def summary(fitness: float, found: Sequence[float | None]) -> str:
-    """Return one line that says how much of its fitness a robot keeps.
-
-    Args:
-        fitness: without changes.
-        found: under changes, at least one; None of an evaluation that failed.
-    """
+    """Return one line that says how much of its fitness a robot keeps."""
     known = [each for each in found if each is not None]
     under = f"under {len(found)} small changes of time step, friction and start"
     if not known:
