@@ -1,6 +1,5 @@
 """Arithmetic of the fidelity benchmark."""
 
-import math
 import re
 from pathlib import Path
 
@@ -8,23 +7,19 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, RunFolderError
-from schema.experiment.document import Experiment, Fitness, Islands, Simulation
-from schema.plugins.permission import allow
+from schema.errors import ExperimentError
+from schema.experiment.document import Experiment, Islands, Simulation
 from schema.robot.brain import Brain
 from schema.robot.robot import Robot
 from tests.benchmarks.fidelity import (
     Evaluated,
-    changed,
     compare,
     main,
     read_population,
     sample_thirds,
-    spearman,
 )
 from tests.benchmarks.run_folder import write_run
 from tests.worker.conftest import random_robot
-from worker.robot.robustness import finer
 
 
 def test_each_third_is_sampled_equally() -> None:
@@ -36,18 +31,6 @@ def test_each_third_is_sampled_equally() -> None:
     assert len(set(chosen.tolist())) == 12
     with pytest.raises(ExperimentError, match="3 x 11 robots are needed"):
         sample_thirds(fitness, 11, 1)
-
-
-def test_finer_simulation_has_the_same_duration() -> None:
-    world = finer(Simulation(warmup_steps=600))
-    assert world.timestep_s == pytest.approx(0.001)
-    assert (world.brain_steps, world.pose_steps) == (125, 200)
-    assert (world.window_steps, world.warmup_steps) == (12_000, 3000)
-
-
-def test_folder_without_a_run_is_rejected(tmp_path: Path) -> None:
-    with pytest.raises(RunFolderError, match="no run is there"):
-        read_population(tmp_path)
 
 
 def test_robots_have_the_settings_of_their_islands(tmp_path: Path) -> None:
@@ -82,43 +65,6 @@ def test_same_simulation_agrees_and_a_diverging_one_counts_zero() -> None:
     assert same[0].tolist() == same[1].tolist() != [0.0]
     wild = replace(short, timestep_s=0.5, servo_armature=0.0, servo_stiffness=1e9)
     assert compare([one], lambda _experiment: wild)[1].tolist() == [0.0]
-
-
-def test_undefined_fitness_counts_zero(tmp_path: Path) -> None:
-    (tmp_path / "undefined.py").write_text("def value(trace, fitness):\n    1 / 0\n")
-    allow([str(tmp_path / "undefined.py")])
-    experiment = Experiment(
-        name="test",
-        simulation=Simulation(window_steps=80),
-        fitness=Fitness(function="undefined:value"),
-    )
-    one = Evaluated(random_robot(1), experiment)
-    assert compare([one], lambda each: finer(each.simulation)).tolist() == [[0], [0]]
-
-
-def test_correlation_of_equal_numbers_is_undefined() -> None:
-    for first in ([0.5], [0.0, 0.0]):
-        assert math.isnan(spearman(np.array(first), np.arange(1.0 * len(first))))
-
-
-@pytest.mark.parametrize(
-    ("changes", "problem"),
-    [
-        (
-            ["pose_steps=48", "brain_steps=33"],
-            "simulation.window_steps: .* multiple of .* = 48, got 1000",
-        ),
-        (["armatur=0.1"], "simulation.armatur: no such key"),
-    ],
-)
-def test_changes_are_checked_together_with_the_run(
-    changes: list[str], problem: str
-) -> None:
-    """125 divides the run's window of 1000 steps, not the default one of 2400."""
-    run = Experiment(name="test", simulation=Simulation(window_steps=1000))
-    with pytest.raises(ExperimentError, match=problem):
-        changed(changes, run)
-    assert changed(["pose_steps=125"], run).pose_steps == 125
 
 
 def test_random_robots_agree_with_finer_steps(

@@ -1,7 +1,5 @@
 """Exact fitness of hand-made tracks, and the contract of fitness functions."""
 
-from typing import cast
-
 import numpy as np
 import pytest
 from msgspec import Struct
@@ -28,44 +26,30 @@ def track(*points: tuple[float, float, float], interval_s: float = 0.25) -> Trac
     return Trace(interval_s, np.array(points))
 
 
-def test_both_velocities_are_equal_along_a_line() -> None:
-    """0.5 m in two steps of 0.25 s: v = s = 1 m/s."""
-    found = track((0, 0, 0), (0.25, 0, 0), (0.5, 0, 0))
-    assert (path_velocity(found), straight_velocity(found)) == (1.0, 1.0)
-
-
-def test_detour_counts_for_the_path_only() -> None:
-    """Legs of 3 and 4 make a path of 7 and a distance of 5, in 0.5 s."""
-    found = track((1, 1, 0), (4, 1, 0), (4, 5, 0))
-    assert (path_velocity(found), straight_velocity(found)) == (14.0, 10.0)
-
-
-def test_height_does_not_count() -> None:
-    found = track((0, 0, 5), (0, 0, 2), (0, 0, 0))
-    assert thesis(found, WEIGHTS) == 0.0
-
-
-def test_closed_path_counts_for_the_path_only() -> None:
-    found = track((0, 0, 0), (0.125, 0, 0), (0, 0, 0))
-    assert thesis(found, WEIGHTS) == 0.5
-
-
-def test_straight_velocity_counts_five_times() -> None:
-    """V = s = 0.125 m/s: f = 0.125 + 5 * 0.125."""
-    assert thesis(track((0, 0, 0), (0.03125, 0, 0)), WEIGHTS) == 0.75
+@pytest.mark.parametrize(
+    ("points", "path", "straight"),
+    [
+        (((0, 0, 0), (0.25, 0, 0), (0.5, 0, 0)), 1.0, 1.0),
+        # Legs of 3 and 4 make a path of 7 and a distance of 5, in 0.5 s.
+        (((1, 1, 0), (4, 1, 0), (4, 5, 0)), 14.0, 10.0),
+        # Height does not count.
+        (((0, 0, 5), (0, 0, 2), (0, 0, 0)), 0.0, 0.0),
+        (((0, 0, 0), (0.125, 0, 0), (0, 0, 0)), 0.5, 0.0),
+        (((8, -4, 1), (8.03125, -4, 1)), 0.125, 0.125),
+    ],
+)
+def test_straight_velocity_counts_five_times(
+    points: tuple[tuple[float, float, float], ...], path: float, straight: float
+) -> None:
+    found = track(*points)
+    assert (path_velocity(found), straight_velocity(found)) == (path, straight)
+    assert thesis(found, Fitness(limit=100.0)) == path + 5 * straight
 
 
 def test_fitness_above_the_limit_is_zero() -> None:
     weights = Fitness(path_weight=1.0, straight_weight=1.0)
     assert thesis(track((0, 0, 0), (0.125, 0, 0)), weights) == 1.0
     assert thesis(track((0, 0, 0), (0.126, 0, 0)), weights) == 0.0
-
-
-def test_only_differences_of_position_count() -> None:
-    here = track((0, 0, 0), (0.25, 0.125, 0), (0.5, 0, 0))
-    there = track((8, -4, 1), (8.25, -3.875, 1), (8.5, -4, 1))
-    weights = Fitness(limit=10.0)
-    assert thesis(here, weights) == thesis(there, weights) > 0
 
 
 def test_default_function_keeps_the_contract() -> None:
@@ -80,18 +64,6 @@ def _writes(track: Trace, fitness: Fitness) -> float:
     return fitness.limit
 
 
-def _is_text(_track: Trace, _fitness: Fitness) -> float:
-    return cast("float", "fast")
-
-
-def _is_array(track: Trace, _fitness: Fitness) -> float:
-    return cast("float", track.core_position)
-
-
-def _is_endless(_track: Trace, _fitness: Fitness) -> float:
-    return float("inf")
-
-
 def _counts_calls() -> FitnessFunction:
     calls: list[int] = []
 
@@ -100,14 +72,6 @@ def _counts_calls() -> FitnessFunction:
         return float(len(calls)) + fitness.limit
 
     return count
-
-
-def _always_raises(_track: Trace, _fitness: Fitness) -> float:
-    raise ZeroDivisionError("by nothing")
-
-
-def _undeclared(trace: Trace, _fitness: Fitness) -> float:
-    return float(trace.energy[-1])
 
 
 class Light(Struct, frozen=True):
@@ -141,11 +105,6 @@ def test_parameters_of_a_function_without_a_struct_are_refused() -> None:
         fitness_argument(_writes, own)
 
 
-def test_function_that_always_raises_is_refused() -> None:
-    with pytest.raises(ZeroDivisionError, match="by nothing"):
-        check_function(_always_raises, WEIGHTS)
-
-
 def test_the_reason_of_a_failure_is_one_line() -> None:
     def raises(_trace: Trace) -> float:
         raise ValueError("two\n  lines")
@@ -167,11 +126,17 @@ def test_function_may_raise_for_some_traces() -> None:
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (_undeclared, r"trace.energy is not recorded: declare it with @needs"),
+        (
+            lambda trace, _: trace.energy[-1],
+            r"energy is not recorded: .* @needs",
+        ),
         (_writes, "must not write to its arguments"),
-        (_is_text, "must return a number, got 'fast'"),
-        (_is_array, r"must return a number, got array\([\s\S]{74}\.\.\. for a"),
-        (_is_endless, "must return a finite number, got inf"),
+        (lambda *_: "fast", "must return a number, got 'fast'"),
+        (
+            lambda trace, _: trace.core_position,
+            r"a number, got array\(",
+        ),
+        (lambda *_: float("inf"), "must return a finite number, got inf"),
         (_counts_calls(), "must return the same twice"),
     ],
 )

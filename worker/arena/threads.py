@@ -14,20 +14,11 @@ class ThreadTeam:
     """Threads that share jobs; one submission per thread is cheaper than one per job.
 
     Attributes:
-        threads: number of threads, including the caller's.
+        threads: number of threads, including the caller's; at least 1.
     """
 
     def __init__(self, threads: int = 1) -> None:
-        """Initialise; the other threads start with the first jobs.
-
-        Args:
-            threads: number of threads, including the caller's; >= 1.
-
-        Raises:
-            ValueError: fewer than one thread.
-        """
-        if threads < 1:
-            raise ValueError(f"threads must be >= 1, got {threads}")
+        """Initialise; the other threads start with the first jobs."""
         self.threads = threads
         self._others = ThreadPoolExecutor(max(1, threads - 1), "arena")
 

@@ -21,17 +21,6 @@ def test_every_job_runs_once(threads: int, count: int) -> None:
     assert done == [3] * count
 
 
-def test_threads_run_concurrently() -> None:
-    """Three jobs that wait for each other need three threads."""
-    pool, gate = ThreadTeam(3), threading.Barrier(3)
-
-    def job() -> None:
-        gate.wait(timeout=30)
-
-    pool.run([job] * 3)
-    pool.close()
-
-
 def test_error_of_a_job_is_raised_and_the_pool_stays_usable() -> None:
     pool, done = ThreadTeam(2), []
 
@@ -43,11 +32,6 @@ def test_error_of_a_job_is_raised_and_the_pool_stays_usable() -> None:
     pool.run([lambda: done.append(3)] * 2)
     pool.close()
     assert sorted(done) == [1, 2, 3, 3]
-
-
-def test_pool_without_threads_is_rejected() -> None:
-    with pytest.raises(ValueError, match="got 0"):
-        ThreadTeam(0)
 
 
 def test_close_stops_the_threads() -> None:

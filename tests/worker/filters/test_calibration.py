@@ -73,20 +73,6 @@ def test_other_part_types_are_ideal() -> None:
     assert found.noise is None
 
 
-def test_ideal_responses_change_nothing() -> None:
-    ideal = replace(SETTINGS, calibration=(Calibration(part="ActiveHinge"),))
-    found, plain = evaluate(spider(), ideal), evaluate(spider(), SETTINGS)
-    # Sums with 0.5 may round the last bit of an output.
-    assert found.fitness == pytest.approx(plain.fitness, rel=1e-3)
-
-
-def test_gain_zero_stops_a_robot() -> None:
-    still = Calibration(part="ActiveHinge", motor=Response(gain=0.0))
-    found = evaluate(spider(), replace(SETTINGS, calibration=(still,)))
-    assert evaluate(spider(), SETTINGS).fitness > 0.01
-    assert abs(found.fitness) < 1e-4
-
-
 def test_noise_is_of_the_parts_and_of_the_identity() -> None:
     motor = Response(noise=0.2)
     found = calibrated(Calibration(part="ActiveHinge", motor=motor)).noise

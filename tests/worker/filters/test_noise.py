@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schema.errors import MalformedMessage
 from schema.experiment.brains import widths
 from schema.experiment.document import Simulation, Space
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
-from schema.experiment.settings import ArenaSettings
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -79,13 +77,6 @@ def test_noise_has_mean_zero_and_the_configured_deviation() -> None:
     ticks = np.corrcoef(found[:-1].ravel(), found[1:].ravel())[0, 1]
     neurons = np.corrcoef(found[:, :-1].ravel(), found[:, 1:].ravel())[0, 1]
     assert max(abs(ticks), abs(neurons)) < 3 / np.sqrt(found.size)
-
-
-@pytest.mark.parametrize("other", OTHERS)
-def test_noise_of_different_identities_is_uncorrelated(other: Identity) -> None:
-    ours, theirs = drawn(IDENTITY), drawn(other)
-    assert abs(np.corrcoef(ours.ravel(), theirs.ravel())[0, 1]) < 0.05
-    assert np.array_equal(drawn(IDENTITY), ours)
 
 
 def test_noise_is_independent_of_other_robots_and_order_of_ticks() -> None:
@@ -210,13 +201,6 @@ def test_outputs_are_clipped_after_the_noise(turtle: Robot) -> None:
     assert found.max() == pytest.approx(HIGHEST_OUTPUT, abs=1e-9)
 
 
-def test_extreme_noise_keeps_positions_finite(robot_of: Robots) -> None:
-    loudest = replace(LOUD, sensor_noise=1e6, actuator_noise=1e6)
-    for seed in range(4):
-        track = simulate(robot_of(seed), with_simulation(loudest), identity=IDENTITY)
-        assert np.isfinite(track.core_position).all()
-
-
 # --- arenas -----------------------------------------------------------------------
 
 
@@ -284,23 +268,3 @@ def test_noise_is_independent_of_threads_advances_and_restores(
     pieces.advance(200)
     assert pieces.digest() == expected[0]
     pieces.close()
-
-
-def test_snapshot_of_another_run_is_rejected(turtle: Robot) -> None:
-    world = populated(NOISY, [Insertion(A, turtle, (0.0, 0.0))])
-    other: ArenaSettings = replace(NOISY, origin=replace(ORIGIN, seed=8))
-    with pytest.raises(MalformedMessage, match="other settings"):
-        World.restore(other, world.snapshot())
-
-
-def test_arena_without_noise_is_equal_in_every_run(robot_of: Robots) -> None:
-    newborns = crowd(robot_of, 3, 0.4)
-    worlds = [
-        populated(replace(SETTINGS, origin=origin), newborns)
-        for origin in (Origin(), ORIGIN)
-    ]
-    found = []
-    for world in worlds:
-        seconds(world, 1.0)
-        found.append([state_of(world, one.birth) for one in newborns])
-    assert found[0] == found[1]
