@@ -204,7 +204,7 @@ class SoloNetwork:
     """One network of the thesis's neuron types, with a known maximum of ticks.
 
     Equal to a ``NetworkBank`` of one to the last bit
-    (tests/worker/robot/test_solo_brains.py), at less than half of its cost. An
+    (tests/worker/robot/test_brains.py), at less than half of its cost. An
     oscillator's state depends only on its age; all its states are
     computed before the first tick. Kinds of neurons that the network lacks cost
     nothing.

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schema.errors import MalformedMessage
-from schema.experiment.document import Fitness, Measures
+from schema.experiment.document import Measures
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import (
     ArenaSettings,
@@ -20,7 +19,7 @@ from schema.robot.brain import Brain, Connection
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
-from schema.wire.arena import Advance, BrainChange, Casualty, Changes, Insertion
+from schema.wire.arena import Advance, BrainChange, Changes, Insertion
 from worker.arena.world import World
 from worker.measures import functions
 from worker.measures.functions import BUILT_IN
@@ -167,27 +166,3 @@ def test_measures_do_not_change_the_arena(turtle: Robot) -> None:
         each.fitness for each in other.judgements
     ]
     assert [each.measures for each in one.judgements] == [(), ()]
-
-
-def test_snapshot_without_a_recording_is_refused(turtle: Robot) -> None:
-    world = World(settings())
-    inserted(world, turtle, (0.0, 0.0))
-    world.advance(200)
-    other = replace(SETTINGS, simulation=CLOCK)
-    with pytest.raises(MalformedMessage, match="snapshot"):
-        World.restore(other, world.snapshot())
-
-
-def test_undefined_measure_removes_the_robot(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(functions.BUILT_IN, "height", lambda _trace: 1 / 0)
-    forget()
-    world = World(settings(fitness=Fitness()))
-    inserted(world, turtle, (0.0, 0.0))
-    found = world.advance(400)
-    forget()
-    assert found.judgements == ()
-    (fallen,) = found.casualties
-    assert isinstance(fallen, Casualty)
-    assert fallen.reason.startswith("fitness undefined: measure height raised Zero")

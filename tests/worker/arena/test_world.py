@@ -26,7 +26,6 @@ from tests.worker.arena_cases import (
     populated,
     seconds,
     settings_of,
-    state_of,
 )
 from worker.arena.world import World
 from worker.robot.brains import Controls, solo_brain
@@ -38,23 +37,6 @@ TICK, EXCHANGE = 25, 800
 """Physics steps between two ticks, and before a brain is exchanged."""
 
 
-@pytest.mark.slow
-def test_advances_are_independent_of_threads(robot_of: Robots) -> None:
-    """The run has births, deaths, merges and falls."""
-    found = []
-    for threads in (1, 2, 4):
-        world = populated(SETTINGS, crowd(robot_of, 14, 0.7), threads)
-        advances = [seconds(world, 2.0)]
-        world.apply(
-            Changes(world.births[:3], crowd(robot_of, 4, 0.3, seed=2, first=20))
-        )
-        advances.append(seconds(world, 2.0))
-        assert world.population.merges > 0
-        world.close()
-        found.append(advances)
-    assert found[0] == found[1] == found[2]
-
-
 def test_result_is_independent_of_the_number_of_advances(robot_of: Robots) -> None:
     newborns = crowd(robot_of, 6, 0.4)
     whole, pieces = populated(SETTINGS, newborns), populated(SETTINGS, newborns)
@@ -63,37 +45,6 @@ def test_result_is_independent_of_the_number_of_advances(robot_of: Robots) -> No
         last = pieces.advance(until)
     assert last.digest == once.digest
     assert last.judgements == once.judgements
-
-
-def test_robot_alone_has_the_track_of_an_off_line_simulation(turtle: Robot) -> None:
-    """With the same drop and warm-up, at the origin: the same track to the last bit."""
-    world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
-    advance = world.advance(600 + 2400)
-    simulation = replace(SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m)
-    settings = EvaluationSettings(
-        space=SETTINGS.space, simulation=simulation, fitness=SETTINGS.fitness
-    )
-    track = simulate(turtle, settings)
-    own = np.array(world.population.find(A).window.positions)
-    assert np.array_equal(own, track.core_position)
-    assert advance.judgements[0].is_mature
-
-
-def test_births_and_deaths_do_not_affect_distant_robots(robot_of: Robots) -> None:
-    far = crowd(robot_of, 4, 0.4)
-    calm, busy = populated(SETTINGS, far), populated(SETTINGS, far)
-    seconds(calm, 3.0)
-    for turn in range(3):
-        others = [
-            Insertion(BirthId(0, 10 * turn + number), robot_of(number), (5.0, y))
-            for number, y in ((10, 0.0), (11, 0.2))
-        ]
-        gone = tuple(birth for birth in busy.births if birth.number >= 10)
-        busy.apply(Changes(gone, tuple(others)))
-        seconds(busy, 1.0)
-    for insertion in far:
-        birth = insertion.birth
-        assert state_of(calm, birth) == state_of(busy, birth)
 
 
 def test_invalid_changes_change_nothing(robot_of: Robots) -> None:

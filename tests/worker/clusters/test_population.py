@@ -1,6 +1,5 @@
 """Merges and splits of clusters; no contact of robots is missed."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -62,12 +61,6 @@ def test_no_contact_is_missed_in_long_runs(robot_of: Robots) -> None:
     for radius_m, drop_m in ((1.4, 0.25), (0.9, 0.25), (0.5, 0.5), (0.35, 1.0)):
         world, oracle = live(
             robot_of, radius_m=radius_m, drop_m=drop_m, lives=8, seed=7
-        )
-        sys.stdout.write(
-            f"\nradius {radius_m} m, drop {drop_m} m: {oracle.pair_steps} pair-steps "
-            f"in contact, {len(oracle.missed)} missed, "
-            f"{world.population.merges} merges, "
-            f"{world.population.splits} splits"
         )
         assert oracle.missed == []
         pair_steps += oracle.pair_steps

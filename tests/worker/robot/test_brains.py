@@ -1,4 +1,4 @@
-"""Controllers: formulas, and independence of the robots of a batch."""
+"""Brains: formulas, independence of the robots of a batch, and robots alone."""
 
 import math
 from collections.abc import Callable
@@ -10,11 +10,11 @@ import pytest
 from schema.errors import InvalidRobot
 from schema.experiment.brains import widths
 from schema.experiment.document import Space
-from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
+from schema.robot.brain import INPUT, Brain, Connection, Neuron, check_widths
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
 from worker.robot.banks import GuardedBank, NetworkBank, PackedNetwork, broken_rows
-from worker.robot.brains import pack
+from worker.robot.brains import SoloNetwork, pack
 from worker.robot.own_neurons import STATE_LIMIT
 
 WIDTH = widths(Space())
@@ -29,25 +29,14 @@ def outputs_of(brain: Brain, readings: list[float], ticks: int) -> list[float]:
     return [float(bank.step(row, float(tick))[0, 0]) for tick in range(ticks)]
 
 
-def test_widths_are_the_limits_of_the_experiment() -> None:
-    assert Widths(10, 10, 10) == WIDTH
-    assert WIDTH.states == 20
-
-
-def test_simple_neuron_scales_the_input_above_its_bias() -> None:
-    brain = Brain(
-        (Neuron("input", INPUT, 0), Neuron("output", "Simple", 1, (0.25, 0.5))),
-        (Connection(0, 1, 0.75),),
-    )
-    assert outputs_of(brain, [2.0], 1) == [0.5 * (0.75 * 2.0 - 0.25)]
-
-
-def test_sigmoid_of_the_input_above_its_bias() -> None:
-    brain = Brain(
-        (Neuron("input", INPUT, 0), Neuron("output", "Sigmoid", 1, (0.25, 0.5))),
-        (Connection(0, 1, 0.75),),
-    )
-    expected = 1.0 / (1.0 + math.exp(-0.5 * (0.75 * 2.0 - 0.25)))
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [("Simple", 0.625), ("Sigmoid", 1.0 / (1.0 + math.exp(-0.625)))],
+)
+def test_neurons_of_the_input_above_their_bias(kind: str, expected: float) -> None:
+    """0.5 (0.75 * 2 - 0.25) = 0.625."""
+    neurons = Neuron("input", INPUT, 0), Neuron("output", kind, 1, (0.25, 0.5))
+    brain = Brain(neurons, (Connection(0, 1, 0.75),))
     assert outputs_of(brain, [2.0], 1) == pytest.approx([expected], abs=1e-15)
 
 
@@ -74,24 +63,6 @@ def test_all_neurons_are_updated_from_the_previous_states() -> None:
         (Connection(0, 2, 1.0), Connection(2, 1, 1.0)),
     )
     assert outputs_of(brain, [3.0], 3) == [0.0, 3.0, 3.0]
-
-
-def test_growing_state_stops_at_the_limit() -> None:
-    brain = Brain(
-        (
-            Neuron("output", "Simple", 0, (-1.0, 1.0)),
-            Neuron("hidden", "Simple", 0, (0.0, 1.0)),
-        ),
-        (
-            Connection(0, 0, 1e300),
-            Connection(0, 1, -1e300),
-            Connection(1, 0, 1e300),
-            Connection(1, 1, 1e300),
-        ),
-    )
-    found = outputs_of(brain, [], 20)
-    assert np.isfinite(found).all()
-    assert max(map(abs, found)) == STATE_LIMIT
 
 
 @pytest.mark.parametrize("period", [0.0, 1e-300, 1e-9, -1.0])
@@ -163,3 +134,59 @@ def test_complex_outputs_of_a_brain_type_are_a_failed_result() -> None:
     assert not broken_rows(bank, bank.step(readings, 0.0))
     outputs = bank.step(readings, 1.0)
     assert "complex128" in broken_rows(bank, outputs)[0]
+
+
+# --- a robot alone, against a bank of one -------------------------------------
+
+SQUEEZED = Neuron("hidden", "Sigmoid", 0, (0.3, 0.7))
+LINEAR = Neuron("output", "Simple", 0, (-0.2, 0.9))
+SWINGING = Neuron("output", "Oscillator", 0, (1.7, 0.4, 0.8))
+
+
+def agree(brain: Brain, ticks: int, seed: int) -> np.ndarray[tuple[int], np.dtype]:
+    """Compare all states after each tick and return the last ones."""
+    network = pack(brain, WIDTH)
+    solo = SoloNetwork(network, WIDTH, TICK_S, ticks)
+    bank = NetworkBank([network], WIDTH, TICK_S)
+    rng = np.random.default_rng(seed)
+    for tick in range(ticks):
+        readings = rng.normal(0.0, 5.0, (1, WIDTH.inputs))
+        expected = bank.step(readings, float(tick))
+        assert solo.step(readings, float(tick)).tobytes() == expected.tobytes()
+        assert solo.states.tobytes() == bank.states.tobytes()
+    return solo.states
+
+
+def test_random_brains_equal_those_of_a_bank(robot_of: Callable[[int], Robot]) -> None:
+    for seed in range(100):
+        agree(robot_of(seed).brain, 96, seed)
+
+
+@pytest.mark.parametrize(
+    "neurons",
+    [
+        (SQUEEZED,),
+        (LINEAR,),
+        (SWINGING,),
+        (SQUEEZED, LINEAR),
+        (SQUEEZED, SWINGING),
+        (LINEAR, SWINGING),
+        (SQUEEZED, LINEAR, SWINGING),
+    ],
+    ids=lambda neurons: "-".join(neuron.kind for neuron in neurons),
+)
+def test_every_mixture_of_neuron_types_equals_that_of_a_bank(
+    neurons: tuple[Neuron, ...],
+) -> None:
+    edges = tuple(
+        Connection(source, target, 0.3 + 0.2 * source - 0.4 * target)
+        for source in range(len(neurons))
+        for target in range(len(neurons))
+    )
+    agree(Brain(neurons, edges), 40, 1)
+
+
+def test_growing_states_stop_at_the_limit() -> None:
+    wild = Neuron("hidden", "Oscillator", 0, (1e-300, 0.3, 1e99))
+    brain = Brain((LINEAR, wild), (Connection(0, 0, 1e300), Connection(1, 0, 0.5)))
+    assert np.abs(agree(brain, 30, 2)).max() == STATE_LIMIT
