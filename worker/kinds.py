@@ -9,7 +9,7 @@ from schema.experiment.kinds import Kind, sections_of, takes
 from schema.experiment.settings import FITNESS, fitness_function
 from schema.plugins.simple_traces import check_function
 from worker.fitness import load_fitness
-from worker.measures.functions import BUILT_IN, measures_of
+from worker.measures import BUILT_IN, measures_of
 
 
 def single_measures(measures: Measures) -> Iterator[Measures]:

@@ -17,7 +17,7 @@ from schema.parts import ACTIVE_HINGE, PartType
 from tests.documents import parse_experiment
 from tests.own_brains import write_module
 from worker.kinds import check_fitness
-from worker.measures.functions import BUILT_IN, measures_of
+from worker.measures import BUILT_IN, measures_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 

@@ -14,7 +14,7 @@ from worker.clusters.cluster import Cluster
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Layout
-from worker.measures.functions import functions_of
+from worker.measures import functions_of
 
 
 class Samples:

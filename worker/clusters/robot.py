@@ -16,7 +16,7 @@ from schema.robot.trace import Floats, Trace
 from schema.wire.arena import Casualty, Judgement
 from schema.wire.protobuf import encode_robot
 from worker.clusters.models import Body
-from worker.measures.functions import functions_of
+from worker.measures import functions_of
 from worker.robot.brains import Controls
 from worker.robot.recording import Channels
 

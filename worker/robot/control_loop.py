@@ -24,7 +24,7 @@ from worker.filters.filters import (
     filters_of,
     has_filters,
 )
-from worker.measures.functions import functions_of
+from worker.measures import functions_of
 from worker.robot.banks import GuardedBank, broken_rows
 from worker.robot.brains import SoloNetwork, controls_of, solo_brain
 from worker.robot.devices import Sensors, Servos

@@ -10,7 +10,7 @@ from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
-from worker.measures.functions import functions_of
+from worker.measures import functions_of
 from worker.robot.control_loop import ControlLoop, Watch
 from worker.robot.disturbances import evaluate_disturbed
 

@@ -15,7 +15,7 @@ from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.robot import Robot
 from schema.robot.trace import RECORDED, Floats, Trace
-from worker.measures.functions import functions_of
+from worker.measures import functions_of
 from worker.robot.placed import FREE, FREE_DOFS, PlacedRobot, contact_reader
 
 Indices = npt.NDArray[np.intp]

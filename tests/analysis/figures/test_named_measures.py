@@ -5,7 +5,7 @@ from matplotlib.text import Text
 
 from analysis.figures.courses import UNITS, measures_over_births
 from tests.analysis.drawn import layers
-from worker.measures.functions import BUILT_IN
+from worker.measures import BUILT_IN
 
 
 def test_figure_is_drawn_without_a_warning() -> None:

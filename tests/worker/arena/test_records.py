@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+import worker.measures
 from schema.experiment.document import Measures
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import (
@@ -21,8 +22,7 @@ from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
 from schema.wire.arena import Advance, BrainChange, Changes, Insertion
 from worker.arena.world import World
-from worker.measures import functions
-from worker.measures.functions import BUILT_IN
+from worker.measures import BUILT_IN
 from worker.robot.evaluation import simulate
 
 SETTINGS = arena_settings_of(read_experiment("scenario3"))
@@ -33,8 +33,8 @@ NAMES = tuple(BUILT_IN)
 
 def forget() -> None:
     """Forget the functions of earlier tests."""
-    functions.measures_of.cache_clear()
-    functions.functions_of.cache_clear()
+    worker.measures.measures_of.cache_clear()
+    worker.measures.functions_of.cache_clear()
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> tuple[ArenaSettings, list[Trace
         traces.append(trace)
         return 0.0
 
-    monkeypatch.setitem(functions.BUILT_IN, "keep", keep)
+    monkeypatch.setitem(worker.measures.BUILT_IN, "keep", keep)
     forget()
     measures = Measures(names=("keep", *NAMES))
     return replace(SETTINGS, simulation=CLOCK, arena=ARENA, measures=measures), traces

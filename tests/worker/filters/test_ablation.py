@@ -130,7 +130,7 @@ def readings(trace: Trace) -> float:
 
 
 def test_means_are_those_of_all_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("worker.measures.functions.BUILT_IN", {"readings": readings})
+    monkeypatch.setattr("worker.measures.BUILT_IN", {"readings": readings})
     clock = Simulation(window_steps=1000, pose_steps=TICK_STEPS)
     settings = replace(SETTINGS, simulation=clock)
     recorded = replace(settings, measures=Measures(names=("readings",)))

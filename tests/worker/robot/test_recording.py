@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+import worker.measures
 from schema.experiment.document import Measures, body_space
 from schema.experiment.environment import Environment
 from schema.experiment.file import read_experiment
@@ -16,7 +17,6 @@ from schema.parts import BUILT_IN
 from schema.plugins.needs import needs
 from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
-from worker.measures import functions
 from worker.robot.evaluation import evaluate, simulate
 from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Probe
@@ -33,9 +33,9 @@ def everything(monkeypatch: pytest.MonkeyPatch) -> EvaluationSettings:
     def all_channels(_trace: Trace) -> float:
         return 1.0
 
-    monkeypatch.setitem(functions.BUILT_IN, "everything", all_channels)
-    functions.measures_of.cache_clear()
-    functions.functions_of.cache_clear()
+    monkeypatch.setitem(worker.measures.BUILT_IN, "everything", all_channels)
+    worker.measures.measures_of.cache_clear()
+    worker.measures.functions_of.cache_clear()
     return replace(PLAIN, simulation=CLOCK, measures=Measures(names=("everything",)))
 
 

@@ -4,11 +4,11 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+import worker.measures
 from schema.errors import ExperimentError
 from schema.experiment.document import Measures
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import evaluation_settings_of
-from worker.measures import functions
 from worker.serve.checks import checked_evaluation
 
 SETTINGS = evaluation_settings_of(read_experiment("scenario1"))
@@ -21,7 +21,7 @@ def test_unknown_measure_is_refused() -> None:
 
 
 def test_faulty_measure_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(functions.BUILT_IN, "faulty", lambda _trace: float("nan"))
+    monkeypatch.setitem(worker.measures.BUILT_IN, "faulty", lambda _trace: float("nan"))
     settings = replace(SETTINGS, measures=Measures(names=("height", "faulty")))
     with pytest.raises(ExperimentError, match=r"test_checks.py:\d+: must return a fin"):
         checked_evaluation(msgspec.json.encode(settings))
