@@ -54,10 +54,6 @@ def naming_arguments() -> Iterator[None]:
 def in_order(name: str, values: Iterable[T]) -> Iterable[T]:
     """Return an argument with values whose order is defined.
 
-    Args:
-        name: of the argument, for messages.
-        values: of the argument.
-
     Raises:
         RevolveError: a set, or nothing with values.
     """

@@ -32,14 +32,7 @@ _PROBLEMS = msgspec.msgpack.Decoder(Problem)
 def start(
     module: str, *words: str, is_quiet: bool = False, files: Sequence[int] = ()
 ) -> "subprocess.Popen[bytes]":
-    """Start a module of ours in a process that ends when its input is closed.
-
-    Args:
-        module: name of the module.
-        words: of its command line.
-        is_quiet: drop its standard output.
-        files: descriptors that it inherits.
-    """
+    """Start a module of ours in a process that ends when its input is closed."""
     return subprocess.Popen(
         [*python_command(module), *words],
         stdin=subprocess.PIPE,
@@ -65,12 +58,7 @@ class Child:
     """Process that runs ``revolve.child``; ends with ``end``."""
 
     def __init__(self, words: Sequence[str], *, is_quiet: bool = False) -> None:
-        """Start it.
-
-        Args:
-            words: ``simulate``, or ``command`` and the words of the command.
-            is_quiet: drop its standard output.
-        """
+        """Start it."""
         self.connection, theirs = Pipe()
         with theirs:
             file = theirs.fileno()
@@ -86,10 +74,6 @@ class Child:
 
 def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:
     """Run a command of ``revolve`` in a process of its own; return its exit code.
-
-    Args:
-        words: of the command line.
-        is_quiet: drop the command's standard output.
 
     Raises:
         RevolveError: the command's error, of the same class, or the line that it has
@@ -175,11 +159,7 @@ class Simulator:
         return self._child
 
     def _death(self) -> str:
-        """Return why the process has ended, and forget it.
-
-        Raises:
-            KeyboardInterrupt: it was interrupted.
-        """
+        """Return why the process has ended, and forget it."""
         assert self._child is not None
         code = self._child.process.wait()
         self._child.end()

@@ -175,11 +175,7 @@ class Engine:
         self._open.clear()
 
     def _serve(self, fleet: JobRouter) -> None:
-        """Pass on orders and answers until closed.
-
-        Raises:
-            RevolveError: no worker can do a job any more.
-        """
+        """Pass on orders and answers until closed."""
         alone_s = done_s = time.monotonic()
         is_told = False
         while not self._is_closing:
@@ -215,11 +211,7 @@ class Engine:
         return f"{joined} and cannot do the jobs, the last of them {agent}: {why}"
 
     def _do_chores(self, fleet: JobRouter) -> None:
-        """Tell the user what is wrong with agents.
-
-        Raises:
-            RevolveError: no worker can do a job any more.
-        """
+        """Tell the user what is wrong with agents."""
         for fenced in fleet.fenced():
             fleet.faults.note("fenced", fenced.agent, fenced.reason)
         for line in fleet.faults.lines():

@@ -338,11 +338,7 @@ def _job_of(settings: EvaluationSettings) -> tuple[bytes, float]:
 
 
 def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
-    """Return the result that the end of an evaluation gives.
-
-    Raises:
-        JobRefused: several workers cannot do it.
-    """
+    """Return the result that the end of an evaluation gives."""
     if end.is_deadly:
         return Result(failure=f"{QUARANTINED}{end.reason}")
     if end.reason:
@@ -355,11 +351,7 @@ def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
 
 
 def _path_of(function: str | Callable[[Any], Any]) -> str:
-    """Return the name by which workers import a function.
-
-    Raises:
-        ExperimentError: it is no function, or has no such name.
-    """
+    """Return the name by which workers import a function."""
     if isinstance(function, str):
         return function
     given: object = function
@@ -378,27 +370,14 @@ def _path_of(function: str | Callable[[Any], Any]) -> str:
 
 
 def _read_value(data: bytes, *, expected: Expected) -> object:
-    """Return the value of a call, or its failure.
-
-    Args:
-        data: bytes of the answer.
-        expected: epoch and number of the job.
-
-    Raises:
-        MalformedMessage: not an answer, the answer to another request, or no value.
-    """
+    """Return the value of a call, or its failure."""
     answer = read_answer(data, expected, CallValue, VALUE_BYTES + ANSWER_BYTES)
     result = answer.result
     return unpack_value(result.value) if isinstance(result, CallValue) else result
 
 
 def _value(end: Deliver, *, number: int) -> object:
-    """Return the value that the end of a call gives.
-
-    Raises:
-        JobRefused: several workers cannot do it, or it ends their processes.
-        RevolveError: the function has failed.
-    """
+    """Return the value that the end of a call gives."""
     if end.reason:
         raise refusal(end)
     if isinstance(end.answer, Failure):

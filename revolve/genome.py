@@ -102,11 +102,7 @@ def _encoding(experiment: Experiment) -> IslandEncoding:
 
 
 def _birth(rng: np.random.Generator) -> BirthId:
-    """Return a random id that makes the new genes of a genome distinct.
-
-    Raises:
-        RevolveError: no generator.
-    """
+    """Return a random id that makes the new genes of a genome distinct."""
     if not isinstance(rng, np.random.Generator):
         raise RevolveError(
             f"rng: must be a numpy.random.Generator, got {shown(rng)}; "

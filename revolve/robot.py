@@ -225,10 +225,6 @@ def checked(
 ) -> PlainRobot:
     """Return a robot as the rooms have it.
 
-    Args:
-        robot: the robot.
-        types: the allowed part types and neuron types.
-
     Raises:
         InvalidRobot: it is not well formed with these types.
     """

@@ -235,11 +235,7 @@ def _named(row: Row | None) -> str:
 
 
 def _check_births(rows: object) -> None:
-    """Raise unless an argument has rows of the table ``births``.
-
-    Raises:
-        RevolveError: anything else.
-    """
+    """Raise unless an argument has rows of the table ``births``."""
     if not isinstance(rows, pa.Table):
         kind = type(rows).__name__
         raise RevolveError(f"births: must be a pyarrow.Table, got a {kind}")

@@ -59,9 +59,6 @@ _EXAMPLES = {
 def main(arguments: list[str]) -> int:
     """Send one request to a running coordinator and print its reply.
 
-    Args:
-        arguments: the command's name first.
-
     Returns:
         0 if done, 1 if refused.
 
@@ -80,11 +77,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _coordinator(options: argparse.Namespace) -> str:
-    """Return the name of the coordinator whose run ``--run`` selects.
-
-    Raises:
-        NetworkError: not exactly one coordinator has such a run.
-    """
+    """Return the name of the coordinator whose run ``--run`` selects."""
     found = ask_status(options)
     runs = [run for status in found.values() for run in status.runs]
     selected = selected_names(options.run, map(_name, runs))
@@ -122,12 +115,7 @@ def _action(options: argparse.Namespace) -> OperatorAction:
 
 
 def _robot(options: argparse.Namespace) -> Robot:
-    """Return the robot of a file.
-
-    Raises:
-        InvalidRobot: the file holds no robot.
-        ExperimentError: an invalid experiment.
-    """
+    """Return the robot of a file."""
     robot, *_ = read_with_settings(Path(options.file), options.experiment)
     return robot
 

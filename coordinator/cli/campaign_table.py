@@ -36,13 +36,7 @@ class RunOutcome:
 
 
 def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome:
-    """Return the outcome of a run from its folder, which may be damaged.
-
-    Args:
-        folder: run folder.
-        experiment: its name.
-        has_failed: as in ``RunOutcome``.
-    """
+    """Return the outcome of a run from its folder, which may be damaged."""
     if has_failed:
         return RunOutcome(experiment, has_failed=True)
     try:
@@ -97,11 +91,7 @@ def columns(outcomes: Iterable[RunOutcome]) -> dict[str, list[str]]:
 
 
 def show_outcomes(outcomes: Iterable[RunOutcome]) -> None:
-    """Print the table on standard output, with lines that explain it.
-
-    Args:
-        outcomes: of all runs, in any order.
-    """
+    """Print the table on standard output, with lines that explain it."""
     known = list(outcomes)
     points = {run.experiment: run.point for run in known if run.point}
     functions = {run.experiment: run.function for run in known if run.function}

@@ -72,10 +72,6 @@ def connected_agents(
 ) -> Iterator[tuple[Network | LocalAgents, list[ProcessPool]]]:
     """Open the connection to agents and start the processes of a deployment.
 
-    Args:
-        folder: of the run or campaign; gets the file with the hub's address.
-        deployment: what to open and start.
-
     Yields:
         The connection, and the process pools, which need regular supervision.
     """

@@ -155,11 +155,7 @@ def _count_begun(folder: Path, campaign: Campaign) -> int:
 
 
 def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
-    """Return all runs of a campaign, and the finished ones without any evaluation.
-
-    Raises:
-        RunFolderError: a folder of the campaign holds a different run.
-    """
+    """Return all runs of a campaign, and the finished ones without any evaluation."""
     planned, failed = [], []
     for path, details in campaign.runs(folder):
         status = unbegun_status(path, details)
@@ -194,11 +190,7 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
 
 
 def _is_to_be_rewritten(folder: Path) -> bool:
-    """Return whether a run's state or finished tables are damaged; tell the user so.
-
-    Raises:
-        RunFolderError: such a table cannot be written again.
-    """
+    """Return whether a run's state or finished tables are damaged; tell the user so."""
     try:
         if read_state(folder) != "finished":
             return False

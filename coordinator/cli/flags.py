@@ -89,9 +89,6 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
     """Return the flags with which ``revolve resume`` does what the command does.
 
     They are those of agents, limits and checks.
-
-    Args:
-        options: of ``run``, ``coordinator`` or ``resume``.
     """
     named = vars(options).items()
     values: dict[str, object] = {f"--{k.replace('_', '-')}": v for k, v in named}

@@ -21,9 +21,6 @@ from schema.agent.supervisor import stop_on_signals
 def main(arguments: list[str]) -> int:
     """Route messages until Ctrl-C; return the exit code.
 
-    Args:
-        arguments: the command's name first.
-
     Raises:
         NetworkError: an address that cannot be listened on, or invalid certificates.
     """

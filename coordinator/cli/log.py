@@ -31,9 +31,6 @@ POLL_S = 0.5
 def main(arguments: list[str]) -> int:
     """Print the events of a run's journal; only read its files.
 
-    Args:
-        arguments: the command's name first.
-
     Returns:
         0 if all events are printed, 1 if the journal is damaged behind them, or has
         none of the birth or island that the flags name.
@@ -65,11 +62,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _journal_of(folder: Path, *, is_followed: bool) -> Path:
-    """Return the path of a run's journal.
-
-    Raises:
-        RunFolderError: there is no journal, and no unfinished run to wait for.
-    """
+    """Return the path of a run's journal."""
     path = folder / NAME
     check_folder(folder)
     if path.exists() or (is_followed and holds_run(folder)):
@@ -83,15 +76,7 @@ def _journal_of(folder: Path, *, is_followed: bool) -> Path:
 
 
 def _events(path: Path, *, is_followed: bool) -> Iterator[tuple[int, JournalledEvent]]:
-    """Yield record number and event of all records that are not void.
-
-    Args:
-        path: the journal.
-        is_followed: wait for more records until the run is finished.
-
-    Raises:
-        RunFolderError: the journal is damaged or cannot be read.
-    """
+    """Yield record number and event of all records that are not void."""
     position = Position()
     is_last = False
     while not is_last:
@@ -123,11 +108,7 @@ def _events(path: Path, *, is_followed: bool) -> Iterator[tuple[int, JournalledE
 
 
 def _read(path: Path, start: int, *, is_followed: bool) -> bytes:
-    """Return the bytes of a journal from ``start`` on.
-
-    Raises:
-        RunFolderError: it is no journal, was cut, or cannot be read.
-    """
+    """Return the bytes of a journal from ``start`` on."""
     try:
         with path.open("rb") as file:
             if is_empty(path, file.read(len(MAGIC))):

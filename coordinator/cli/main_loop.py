@@ -41,13 +41,6 @@ def execute_runs(
 ) -> RunScheduler:
     """Execute runs until all are finished or a signal stops them.
 
-    Args:
-        folder: of the run or campaign; gets the file with the hub's address.
-        planned: the runs.
-        deployment: processes and network.
-        conclude: called with each finished run.
-        report: called with each run that failed, and the error.
-
     Returns:
         The scheduler, stopped: what is finished and what failed.
     """
@@ -127,11 +120,7 @@ def _place_to_join(folder: Path, deployment: Deployment) -> str:
 def _open_metrics(
     address: tuple[str, int] | None, stack: ExitStack
 ) -> Callable[[Status, int], None] | None:
-    """Serve metrics until the stack is closed; return what publishes a snapshot.
-
-    Raises:
-        NetworkError: an address that cannot be listened on, or a missing package.
-    """
+    """Serve metrics until the stack is closed; return what publishes a snapshot."""
     if address is None:
         return None
     from coordinator.cli.metrics import MetricsServer
@@ -157,11 +146,7 @@ class _Server:
         self._live: LiveServer | None = None
 
     def serve(self, now_s: float) -> None:
-        """Answer what has arrived.
-
-        Args:
-            now_s: the time, of any clock that only goes forward [s].
-        """
+        """Answer what has arrived."""
         for order in self._network.queries.orders():
             order.reply(answer_operator(self._scheduler, order.data, now_s))
         run = self._scheduler.watched

@@ -86,11 +86,7 @@ class Display:
         self._live.stop()
 
     def update(self, now_s: float) -> None:
-        """Show the present state.
-
-        Args:
-            now_s: the time, of any clock that only goes forward [s].
-        """
+        """Show the present state."""
         status = self._scheduler.status(now_s)
         if self._has_bars:
             bars = _bars(status, self._recoveries(), self._console.width)
@@ -148,12 +144,7 @@ class Display:
 
 
 def _waiting(run: RunSession, missing: Sequence[str]) -> Iterator[str]:
-    """Yield what a run waits for although its coordinator has agents.
-
-    Args:
-        run: the run.
-        missing: kinds of agents of which no run has one.
-    """
+    """Yield what a run waits for although its coordinator has agents."""
     kinds = [f"{kind}s" for kind in run.lacking]
     lacking = [kind for kind in kinds if kind not in missing]
     name = run.held.path.name
@@ -199,11 +190,6 @@ def _bars(status: Status, notes: Sequence[str], width: int) -> Table:
     """Return a row of each bar: the count first, the least important last.
 
     Only the last column is cut where the terminal is narrow.
-
-    Args:
-        status: of all runs.
-        notes: about what else is going on.
-        width: of the terminal in characters.
     """
     name = Column(no_wrap=True, overflow="ellipsis", max_width=max(12, width // 3))
     rest = Column(no_wrap=True, overflow="ellipsis", ratio=1)

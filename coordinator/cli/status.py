@@ -58,9 +58,6 @@ class Source(NamedTuple):
 def main(arguments: list[str]) -> int:
     """Show the progress of runs.
 
-    Args:
-        arguments: the command's name first.
-
     Returns:
         0 if done, 1 if a run is damaged or has failed.
 
@@ -90,11 +87,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _at_hub(options: argparse.Namespace) -> dict[str, Status]:
-    """Return the status of each coordinator at an address, by its name.
-
-    Raises:
-        NetworkError: no coordinator answers; without ``--connect`` with what to do.
-    """
+    """Return the status of each coordinator at an address, by its name."""
     connect_of(options)  # an invalid address needs other advice
     try:
         return ask_status(options)
@@ -120,12 +113,7 @@ def ask_status(options: argparse.Namespace) -> dict[str, Status]:
 def ask(
     options: argparse.Namespace, request: OperatorRequest, only: str = ""
 ) -> dict[str, OperatorReply]:
-    """Return the replies of the coordinators at ``--connect``, by their names.
-
-    Args:
-        options: options of the command line with the network's flags.
-        request: request to all coordinators, or to one.
-        only: name of the only coordinator to ask; "" asks all.
+    """Return the replies of all coordinators, or of the only one, by their names.
 
     Raises:
         NetworkError: no coordinator answers.

@@ -94,13 +94,7 @@ def waiting_text(missing: Sequence[str]) -> str:
 
 
 def state_of(run: RunStatus, status: Status, *, is_live: bool) -> str:
-    """Return the state of a run for a table.
-
-    Args:
-        run: one run of the status.
-        status: of all runs.
-        is_live: a coordinator reported it, so that its agents are known.
-    """
+    """Return the state of a run for a table."""
     missing = missing_agents(status)
     is_waiting = is_live and missing and run.state == "running"
     return waiting_text(missing) if is_waiting else run.state
@@ -146,13 +140,7 @@ _COLUMNS: dict[str, Cells] = {
 
 
 def run_table(status: Status, name_of: Cells, *, is_live: bool) -> Table:
-    """Return a table of runs without the columns that are empty in all rows.
-
-    Args:
-        status: of the runs.
-        name_of: returns the name of a run.
-        is_live: as for ``state_of``.
-    """
+    """Return a table of runs without the columns that are empty in all rows."""
     columns: dict[str, Cells] = {
         "run": name_of,
         "state": lambda run: state_of(run, status, is_live=is_live),
@@ -163,12 +151,7 @@ def run_table(status: Status, name_of: Cells, *, is_live: bool) -> Table:
 
 
 def table_of(columns: dict[str, list[str]], **settings: str) -> Table:
-    """Return a table without lines.
-
-    Args:
-        columns: the cells of each column, by its head.
-        settings: of all columns but the first.
-    """
+    """Return a table without lines."""
     table = Table(box=None, pad_edge=False)
     for number, head in enumerate(columns):
         table.add_column(head, **(settings if number else {}))  # type: ignore[arg-type]

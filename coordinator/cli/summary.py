@@ -56,10 +56,6 @@ class Conclusion:
 def conclude(folder: Path, experiment: Experiment) -> Conclusion:
     """Write the best robot of the last population; return the summary of a run.
 
-    Args:
-        folder: of a finished run with its tables.
-        experiment: of the run.
-
     Raises:
         RunFolderError: a table cannot be read, or the robot cannot be written.
     """
@@ -206,11 +202,7 @@ def _read_best(folder: Path, best: Row, experiment: Experiment) -> tuple[int, Ro
 
 
 def _write_best(robot: Robot, folder: Path, experiment: Experiment) -> str:
-    """Write the best robot of a run to a file; return a line about the file.
-
-    Raises:
-        RunFolderError: the disk is full or failed.
-    """
+    """Write the best robot of a run to a file; return a line about the file."""
     file = folder / BEST
     with storage_errors(file):
         try:
@@ -233,11 +225,7 @@ def _windows(islands: Iterable[Experiment]) -> list[str]:
 
 
 def has_evaluated(folder: Path) -> bool:
-    """Return whether at least one evaluation of a finished run succeeded.
-
-    Raises:
-        RunFolderError: a table cannot be read.
-    """
+    """Return whether at least one evaluation of a finished run succeeded."""
     evaluations = read_table(folder, "evaluations", ["status"])
     is_success = pc.not_equal(evaluations["status"], "failed")
     samples = read_table(folder, "fitness", ["record"]).num_rows

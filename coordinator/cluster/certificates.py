@@ -25,14 +25,7 @@ _EARLIER = timedelta(hours=1)
 
 
 def make_authority(certificate: Path, key: Path, name: str, now: datetime) -> None:
-    """Write a new authority's certificate and its private key (mode 0600).
-
-    Args:
-        certificate: file to write (PEM).
-        key: file to write (PEM, PKCS#8); who has it can issue certificates.
-        name: common name.
-        now: the time, in UTC.
-    """
+    """Write a new authority's certificate and private key (PEM, PKCS#8, mode 0600)."""
     own = ec.generate_private_key(ec.SECP256R1())
     end = now + timedelta(days=AUTHORITY_DAYS)
     builder = _builder(name, name, own.public_key(), now, end)

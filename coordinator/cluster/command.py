@@ -25,9 +25,6 @@ RESTART = "copy members/hub/access.json to the hub, and restart it"
 def main(arguments: list[str]) -> int:
     """Create or change a kit, or list its certificates; return the exit code.
 
-    Args:
-        arguments: the command's name first.
-
     Raises:
         RevolveError: no kit, a name that is used or unknown, or a full disk.
     """

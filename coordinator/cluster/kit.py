@@ -63,12 +63,7 @@ Clock = Callable[[], datetime]
 
 
 class Kit:
-    """A kit's folder.
-
-    Attributes:
-        folder: where it is.
-        cluster: its content.
-    """
+    """A kit's folder."""
 
     def __init__(self, folder: Path, cluster: ClusterKit, clock: Clock) -> None:
         self.folder = folder
@@ -183,11 +178,7 @@ class Kit:
         self._write()
 
     def write_samples(self, program: str) -> None:
-        """Write the samples for systemd, SLURM, Compose and Apptainer.
-
-        Args:
-            program: path of the command ``revolve`` on the members' machines.
-        """
+        """Write the samples for systemd, SLURM, Compose and Apptainer."""
         cluster = self.cluster
         target = self.folder / "samples"
         target.mkdir(exist_ok=True)

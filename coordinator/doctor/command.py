@@ -37,9 +37,6 @@ _RENDER_S = 4.5
 def main(arguments: list[str]) -> int:
     """Print one line for each check, within about five seconds.
 
-    Args:
-        arguments: the command's name first.
-
     Returns:
         0 if no check failed, else 1.
     """

@@ -10,13 +10,7 @@ _MOST_NAMES = 5
 
 
 def no_hub(connect: str, why: str, *, is_wanted: bool) -> Finding:
-    """Return the finding about a hub without connection.
-
-    Args:
-        connect: its address.
-        why: there is no connection.
-        is_wanted: the user has named it; else this user needs none.
-    """
+    """Return the finding about a hub without connection."""
     advice = "start the hub, or check --connect, name service and firewall"
     text = "none is running: revolve run needs none, revolve coordinator starts one"
     return judged("hub", text, (is_wanted, "fail", f"{connect}: {why}", advice))

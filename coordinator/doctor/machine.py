@@ -118,13 +118,7 @@ def check_pictures(code: int | None, output: str) -> Finding:
 
 
 def check_disk(place: Path, free: int, *, is_writable: bool) -> Finding:
-    """Check the disk of run folders.
-
-    Args:
-        place: folder where runs are made.
-        free: space for this user [bytes].
-        is_writable: this user may make a folder there.
-    """
+    """Check the disk of run folders."""
     text, closed = f"{free / GIB:.1f} GiB free in {place}", f"{place} cannot be written"
     return judged(
         "disk",
@@ -136,12 +130,7 @@ def check_disk(place: Path, free: int, *, is_writable: bool) -> Finding:
 
 
 def check_runtime(place: str, error: str) -> Finding:
-    """Check the directory where this user's processes meet.
-
-    Args:
-        place: the directory, if it can be used.
-        error: why it cannot be used; says what to do.
-    """
+    """Check the directory where this user's processes meet."""
     text = f"{place}, for this user only"
     return judged("sockets", text, (bool(error), "fail", error, ""))
 

@@ -95,10 +95,6 @@ def end_rendering(
 ) -> tuple[int | None, str]:
     """Return exit code and last line of a rendering process.
 
-    Args:
-        process: is killed if it does not end in time.
-        timeout_s: how long to wait for it [s].
-
     Returns:
         The code, None if it did not end in time; the line may be empty.
     """

@@ -45,11 +45,7 @@ _NAMED = {"EXPERIMENT", "NAME|FILE.toml"}
 
 
 def main(arguments: list[str]) -> int:
-    """Print a completion script; return the exit code.
-
-    Args:
-        arguments: the command's name first.
-    """
+    """Print a completion script; return the exit code."""
     import shtab
 
     options = parser().parse_args(arguments[1:])

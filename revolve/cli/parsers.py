@@ -8,11 +8,7 @@ from schema.agent.flags import Flags
 
 
 def parser_of(command: str) -> Flags:
-    """Return the parser of a command.
-
-    Args:
-        command: a key of ``COMMANDS``.
-    """
+    """Return the parser of a command."""
     parser: Flags = import_module(COMMANDS[command][0]).parser(command)
     return parser
 

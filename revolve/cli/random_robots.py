@@ -17,12 +17,6 @@ def main(arguments: list[str]) -> int:
 
     They are the founders, vetted, of the experiment's first run with the seed.
 
-    Args:
-        arguments: the command's name, ``robot random``, first.
-
-    Returns:
-        0 once all files are written.
-
     Raises:
         ExperimentError: no such experiment, or it allows (nearly) no robot.
         InvalidRobot: a file cannot be written.

@@ -27,9 +27,6 @@ _EXAMPLES = {
 def main(arguments: list[str]) -> int:
     """Re-evaluate robots, write table and figure, and return the exit code.
 
-    Args:
-        arguments: the command's name first.
-
     Raises:
         RunFolderError: no run, an unfinished one, or a folder that cannot be written.
         MissingExtra: a library is not installed.

@@ -48,10 +48,6 @@ def _reevaluated(jobs: Sequence[ReevaluationJob], workers: int) -> Iterator[Row]
     """Yield a row for each job with columns, in their order; show progress.
 
     Equal evaluations are computed once.
-
-    Args:
-        jobs: evaluations, for each robot the one without a change first.
-        workers: worker processes on this machine.
     """
     robots = counted(len({id(job.one) for job in jobs}), "robot")
     title = f"re-evaluating {robots} {len(jobs)} times in all"
@@ -100,10 +96,6 @@ def write_results(options: Namespace, study: Study) -> None:
     """Evaluate; write a table and its figure; print a line about each run and file.
 
     An earlier table in the folder is replaced, as the report of ``analyze`` is.
-
-    Args:
-        options: of the command: runs, output folder and workers.
-        study: what to evaluate and write.
 
     Raises:
         RunFolderError: no run, an unfinished one, or a folder that cannot be written.

@@ -183,9 +183,6 @@ def _make_private(place: Path) -> None:
 def hub_of(place: str) -> str:
     """Return the address that a user means: an address, or a run folder's.
 
-    Args:
-        place: an address, "hub", or a folder of a run or campaign that is active.
-
     Raises:
         NetworkError: neither; or the folder's file is missing or damaged.
     """

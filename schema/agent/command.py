@@ -160,14 +160,7 @@ def check_load(
     processes: int,
     options: argparse.Namespace,
 ) -> None:
-    """Exit with an error if a command is to start too many processes.
-
-    Args:
-        flags: the command's parser.
-        flag: name of the flag with the number.
-        processes: the number.
-        options: with ``oversubscribe``.
-    """
+    """Exit with an error if a command is to start too many processes."""
     most = most_processes()
     if processes > most and not options.oversubscribe:
         flags.error(
@@ -235,14 +228,7 @@ def run_pool(
     arguments: list[str],
     processes: int,
 ) -> int:
-    """Run a command that serves jobs until Ctrl-C, and return its exit status.
-
-    Args:
-        role: "worker" or "analyzer".
-        body: run by each process, with its agent and its slot.
-        arguments: of the user, after the command's name.
-        processes: default number of processes.
-    """
+    """Run a command that serves jobs until Ctrl-C, and return its exit status."""
     flags = parser(role, processes)
     options = flags.parse_args(arguments)
     try:
@@ -283,11 +269,7 @@ def run_pool(
 
 
 def _name(given: str | None, connect: str, tls: Tls | None) -> str:
-    """Return an agent's name: with TLS that of its certificate, else the machine's.
-
-    Raises:
-        NetworkError: an invalid name, or another one than the certificate's.
-    """
+    """Return an agent's name: with TLS that of its certificate, else the machine's."""
     name = name_at(connect, tls, given or host_name())
     if tls and given not in (None, name):
         raise NetworkError(
@@ -310,12 +292,7 @@ def name_at(hub: str, tls: Tls | None, default: str) -> str:
 
 
 def parser(role: Role, processes: int) -> Flags:
-    """Return the parser of ``revolve worker`` or ``revolve analyzer``.
-
-    Args:
-        role: "worker" or "analyzer".
-        processes: default number of processes.
-    """
+    """Return the parser of ``revolve worker`` or ``revolve analyzer``."""
     flags = Flags(
         prog=f"revolve {role}",
         description=f"Serve coordinators as {role} until Ctrl-C.",

@@ -109,16 +109,7 @@ def add_count(
     *,
     most: int | None = None,
 ) -> None:
-    """Add a flag for a whole number.
-
-    Args:
-        flags: parser that gets the flag.
-        name: name of the flag.
-        default: value if the flag is not given; ``what`` explains None.
-        what: meaning of the number, for the help.
-        least: smallest number allowed; not negative.
-        most: greatest number allowed; None for no limit.
-    """
+    """Add a flag for a whole number from ``least`` on; ``what`` explains None."""
     flags.add_argument(
         name,
         type=whole_number(least, most),
@@ -142,12 +133,7 @@ def add_plugins(flags: argparse.ArgumentParser) -> None:
 
 
 def add_settings(flags: argparse.ArgumentParser, default: str) -> None:
-    """Add the flags for the settings of a robot file (``run_settings.experiment_of``).
-
-    Args:
-        flags: parser that gets the flags.
-        default: the settings if no experiment is named.
-    """
+    """Add the flags for the settings of a robot file; ``default`` describes them."""
     flags.add_argument(
         "--experiment",
         metavar="NAME|FILE.toml",

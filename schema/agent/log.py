@@ -21,12 +21,7 @@ _LOGGER = "revolve"
 
 
 class _Handler(logging.Handler):
-    """Writes records to what is standard error at the time.
-
-    Attributes:
-        form: "plain", "time" or "json".
-        process: name of this process.
-    """
+    """Writes records to what is standard error at the time."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -161,12 +161,7 @@ def hub_config(
 
 
 def cannot_listen(address: str, error: str) -> NetworkError:
-    """Return the error for an address that a hub cannot listen on.
-
-    Args:
-        address: where it was to listen.
-        error: the engine's message.
-    """
+    """Return the error for an address that a hub cannot listen on."""
     if "in use" in error or "acquire lock" in error:
         why = f"it is in use; to share its workers: --connect {address}"
     else:
@@ -200,14 +195,7 @@ def client_config(connect: str, tls: Tls | None = None) -> str:
 def _common(
     protocols: set[str], tls: Tls | None, side: str, **checks: bool
 ) -> dict[str, Any]:
-    """Return the settings of hub and clients: no discovery, no shared memory.
-
-    Args:
-        protocols: of the addresses.
-        tls: files for a ``tls/`` address.
-        side: "listen" or "connect".
-        checks: settings of TLS on that side.
-    """
+    """Return the settings of hub and clients: no discovery, no shared memory."""
     link: dict[str, Any] = {
         "protocols": sorted(protocols),
         "tx": {"lease": LEASE_MS, "keep_alive": 4, "queue": _QUEUE},

@@ -45,12 +45,7 @@ def wire_version() -> str:
 
 
 def cpu_class(machine: str, flags: Collection[str]) -> str:
-    """Return the architecture and its level.
-
-    Args:
-        machine: name of the architecture.
-        flags: features of the CPU, as Linux names them.
-    """
+    """Return the architecture and its level."""
     reached = machine
     if machine in {"x86_64", "amd64"}:
         reached = "x86_64_v1"

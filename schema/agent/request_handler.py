@@ -84,11 +84,7 @@ Compute = Callable[[Request], Result]
 
 
 def answer(compute: Compute, request: Request) -> bytes:
-    """Return the encoded answer to a request.
-
-    Raises:
-        Exception: that of ``compute``.
-    """
+    """Return the encoded answer to a request."""
     began_s = time.perf_counter()
     result = compute(request)
     wall_s = time.perf_counter() - began_s
@@ -100,13 +96,6 @@ class Server:
     """Answers single requests; knows the newest coordinator of each run.
 
     The thread that makes it does the jobs.
-
-    Attributes:
-        compute: does the work.
-        agent: this agent.
-        slot: its slot in a pool.
-        counts: counts of its replies.
-        watch: over the current job.
     """
 
     compute: Compute
@@ -215,12 +204,7 @@ class Server:
             self.slot.end_process(is_blamed=True)
 
     def _check(self, request: Request) -> None:
-        """Raise unless this agent takes a request.
-
-        Raises:
-            PluginDiffers: a plug-in that is missing or has another source here.
-            RevolveError: an older epoch than the newest one of its run.
-        """
+        """Raise unless this agent takes a request."""
         newest = max(self._epochs.pop(request.run, 0), request.epoch)
         _remember(request.run, newest, self._epochs)
         coordinator = (request.run, request.epoch)

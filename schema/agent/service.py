@@ -73,10 +73,6 @@ def open_session(config: zenoh.Config, *, is_agent: bool = False) -> zenoh.Sessi
     descriptor to standard error, see ``revolve.command.main``. ZENOH_RUNTIME has none:
     with some values a hub cannot forward, with others the engine panics.
 
-    Args:
-        config: of the session.
-        is_agent: this process is a worker or an analyzer.
-
     Raises:
         zenoh.ZError: no hub answers, or an address cannot be listened on.
     """
@@ -93,12 +89,7 @@ def open_session(config: zenoh.Config, *, is_agent: bool = False) -> zenoh.Sessi
 
 
 def session_config(text: str, member: Member) -> zenoh.Config:
-    """Return the configuration of a process's session, with its id.
-
-    Args:
-        text: of a hub or a client, as JSON5.
-        member: the process.
-    """
+    """Return the configuration of a process's session, with its id."""
     config = zenoh.Config.from_json5(text)
     config.insert_json5("id", json.dumps(member.session))
     return config
@@ -345,12 +336,7 @@ def serve(
 
 
 def own_agent(agent: Agent, index: int) -> Agent:
-    """Return the agent of one process of a pool.
-
-    Args:
-        agent: agent of the whole pool.
-        index: index of the process in the pool.
-    """
+    """Return the agent of one process of a pool."""
     return replace(
         agent,
         name=unique_name(f"{agent.name}-{index}"),
@@ -366,14 +352,7 @@ def serve_as_process(
     slot: ProcessSlot,
     outlet: Outlet | None = None,
 ) -> None:
-    """Serve as one process of a pool until a signal or until the parent is gone.
-
-    Args:
-        compute: as for ``serve``.
-        agent: of this process, or of the whole pool if it has no version yet.
-        slot: of the process; only the first one writes messages about the hub.
-        outlet: as for ``serve``.
-    """
+    """Serve as one process of a pool until a signal or until the parent is gone."""
     allow(agent.plugins)
     stop = stop_on_signals()
     stop_with_parent(stop)

@@ -49,9 +49,6 @@ def prepare_stop(words: list[str]) -> None:
 
     Call it in the main thread. The first signal raises ``KeyboardInterrupt`` unless
     the command installs another handler.
-
-    Args:
-        words: of the command line, for the advice how to start again.
     """
     advise(f"stopped; to start again: {shlex.join(['revolve', *words])}")
 

@@ -116,11 +116,7 @@ class ProcessSlot:
     deaths: tuple[Crash, ...] = ()
 
     def end_process(self, *, is_blamed: bool) -> None:
-        """End this process, whose job waits without end; its supervisor restarts it.
-
-        Args:
-            is_blamed: the job counts as the cause.
-        """
+        """End this process, whose job waits without end; its supervisor restarts it."""
         if self.note is None:
             return
         if not is_blamed:
@@ -129,12 +125,7 @@ class ProcessSlot:
 
     @contextmanager
     def doing(self, task: RunningJob, cpu_limit_s: float) -> Iterator[None]:
-        """Note a job while it is done.
-
-        Args:
-            task: the job, for the process that supervises this one.
-            cpu_limit_s: CPU time after which this process is ended [s].
-        """
+        """Note a job while it is done; end this process after some CPU time [s]."""
         if self.note is None:
             yield
             return
@@ -155,9 +146,6 @@ class JobWatch:
     """Time since the current job last used CPU.
 
     One thread begins and ends jobs, another one measures.
-
-    Attributes:
-        task: the current job; None between jobs.
     """
 
     def __init__(
@@ -205,9 +193,6 @@ def thread_clock(thread: int) -> Callable[[], float]:
     """Return a clock of the CPU time of a thread [s].
 
     Where the system has none, the clock is that of the whole process.
-
-    Args:
-        thread: identifier of a running thread of this process.
     """
     if (clock_id := getattr(time, "pthread_getcpuclockid", None)) is None:
         return time.process_time

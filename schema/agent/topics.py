@@ -128,10 +128,6 @@ def member_of(key: str) -> Member:
 def check_name(name: str, what: str) -> str:
     """Return a name if it is valid in a key.
 
-    Args:
-        name: of a fleet or a process.
-        what: what it names, for the message.
-
     Raises:
         NetworkError: empty, too long, or with other characters.
     """

@@ -22,9 +22,6 @@ class ProgressLine(AbstractContextManager["ProgressLine"]):
 
     A line that is updated on a terminal; in a log, a line every ``SPAN_S`` if it has
     changed.
-
-    Args:
-        console: console to print on; standard error by default.
     """
 
     def __init__(self, console: Console | None = None) -> None:
@@ -37,12 +34,7 @@ class ProgressLine(AbstractContextManager["ProgressLine"]):
         self._line.stop()
 
     def update(self, text: str, now_s: float) -> None:
-        """Show the progress.
-
-        Args:
-            text: the progress in words.
-            now_s: time of a monotonic clock [s].
-        """
+        """Show the progress."""
         if self._console.is_terminal:
             self._line.start()
             self._line.update(Text(text))
@@ -55,9 +47,6 @@ class ProgressLine(AbstractContextManager["ProgressLine"]):
 @contextmanager
 def progress_if_long(text: str) -> Iterator[Callable[[str], None]]:
     """Show the progress of a task that takes longer than ``SOON_S``.
-
-    Args:
-        text: the progress at the start.
 
     Yields:
         A function that takes the present progress in words, as often as it changes.
