@@ -5,8 +5,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from revolve.cli.commands import COMMANDS
-from revolve.cli.parsers import actions, parser_of
+from revolve.cli.commands import COMMANDS, actions, parser_of
 from schema.agent.flags import Flags
 
 _HEAD = """# Commands

@@ -72,6 +72,35 @@ class Child:
         end(self.process)
 
 
+class Workers:
+    """The command ``revolve worker``, which starts and restarts processes.
+
+    It ends when its standard input is closed: by ``close``, or with this process,
+    however it ends. A Ctrl-C of the terminal does not reach it.
+    """
+
+    def __init__(self, address: str, count: int, plugins: Sequence[str]) -> None:
+        """Start processes that serve a hub and may import some modules and files."""
+        self.plugins = tuple(plugins)
+        words = [word for entry in plugins for word in ("--plugins", entry)]
+        given = ["--connect", address, "--processes", str(count), "--until-closed"]
+        self._process = start("revolve", "worker", *given, *words)
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code; None while it runs."""
+        return self._process.poll()
+
+    def close(self) -> None:
+        """Tell it to end; its processes finish their jobs."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+    def end(self) -> None:
+        """Wait for its end; kill it and its processes after a grace time."""
+        end(self._process)
+
+
 def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:
     """Run a command of ``revolve`` in a process of its own; return its exit code.
 

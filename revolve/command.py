@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from importlib import import_module
 from types import ModuleType
 
-from revolve.cli.commands import COMMANDS
+from revolve.cli.commands import COMMANDS, actions
 from revolve.strangers import stranger
 
 _UNDECODED = (
@@ -149,7 +149,6 @@ def _unknown_action(words: list[str], room: ModuleType) -> str:
     others = [name.split()[1] for name in COMMANDS if name.startswith(f"{words[0]} ")]
     if not others or words[1:2] == [] or words[1].startswith("-"):
         return ""
-    actions = import_module("revolve.cli.parsers").actions
     allowed = [*actions(room.parser(words[0])), *others]
     if words[1] in allowed:
         return ""

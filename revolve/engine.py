@@ -40,14 +40,11 @@ class WantedJob:
     """A job that is wanted.
 
     Attributes:
-        kind: of the job.
-        work: what to do.
         settings: JSON of the settings of the work.
         read: decodes and checks an answer, given ``expected``, epoch and number.
         settle: returns the future's value for the end of the job, or raises.
         simulated_s: as of ``Job``.
         origin: as of ``Request``.
-        future: gets the value or the exception.
     """
 
     kind: JobKind

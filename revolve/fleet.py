@@ -21,11 +21,11 @@ from coordinator.islands.events import QUARANTINED
 from coordinator.network.service import Network
 from coordinator.run.requests import Expected, failure_of, read_answer, read_evaluation
 from revolve.arguments import in_order, naming_arguments, whole_number
+from revolve.children import Workers
 from revolve.engine import Engine, WantedJob
 from revolve.evaluation import Result, result_of, settings_for
 from revolve.experiment import Experiment
 from revolve.robot import Robot, checked
-from revolve.workers import Workers
 from schema.agent.command import connect_of, name_at, tls_of
 from schema.agent.network import DEFAULT_FLEET, Tls
 from schema.agent.supervisor import cores, most_processes

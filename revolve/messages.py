@@ -21,8 +21,6 @@ class Task(msgspec.Struct, frozen=True):
 
     Attributes:
         settings: JSON of ``EvaluationSettings``.
-        robot: to simulate or to draw.
-        plugins: modules that may be imported.
         is_judged: compute the fitness, too.
         size: width and height of a picture [pixels], instead of a simulation.
     """
@@ -38,8 +36,6 @@ class Outcome(msgspec.Struct, frozen=True):
     """Outcome of a task.
 
     Attributes:
-        trace: of a simulation.
-        evaluation: its numbers, if it was to be judged.
         failure: why there is no evaluation, or no trace.
         picture: PNG.
         problem: why nothing could be done.

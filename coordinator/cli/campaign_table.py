@@ -19,11 +19,9 @@ class RunOutcome:
     """Outcome of one run of a campaign.
 
     Attributes:
-        experiment: its name.
         best: fitness of the best robot of the last population; None: there is none.
         took_s: from start to end by the clock, pauses included [s]; None: no end.
         has_failed: it was not finished, or no evaluation succeeded.
-        function: fitness functions, as ``fitness_text``; empty if unknown.
         point: settings that a sweep chose, as text; empty without a sweep.
     """
 

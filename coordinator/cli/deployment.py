@@ -39,13 +39,7 @@ class Deployment:
         listen: address of the hub beside its own Unix socket; None: only that socket.
         connect: address of an existing hub; None: this process is the hub.
         certificates: those that may connect to this hub; None: all of the authority.
-        quiet: show no progress.
-        fsync: survive power loss, too.
         speed: limit of simulated seconds per second for arenas; None: no limit.
-        view: open a viewer; the run does not wait for it.
-        checks: cross-checks of workers, and the reaction to quarantined robots.
-        allows_drift: an arena may continue on another platform if its own is gone.
-        metrics: host and port at which to serve metrics; None: nowhere.
         resume_flags: with which ``revolve resume`` has the same agents again.
     """
 

@@ -60,7 +60,6 @@ class EventFilter:
     Attributes:
         island: island that handles the event.
         origin: island of a robot's birth.
-        birth: number of a robot's birth.
     """
 
     island: int | None = None

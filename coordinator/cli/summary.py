@@ -43,9 +43,7 @@ class Conclusion:
     """Summary of a finished run.
 
     Attributes:
-        text: lines for the user.
         failures: line about failed evaluations; empty if there are none.
-        has_evaluated: at least one evaluation succeeded.
     """
 
     text: str

@@ -32,7 +32,6 @@ class CertificateHolder(msgspec.Struct):
     """A certificate of a lab.
 
     Attributes:
-        name: common name.
         role: what its owner may do; "hub" only listens.
         expires: when the newest certificate of this name ends, in UTC.
         is_revoked: the hub does not accept it.

@@ -10,16 +10,9 @@ from pathlib import Path
 from schema.agent.capacity import group_numbers, system_text
 from schema.agent.import_path import environment
 from schema.agent.platform_tag import wire_version
-from schema.agent.version import VERSION
+from schema.agent.version import LIBRARIES, VERSION, installed
 from schema.plugins.permission import GROUP
 
-_LIBRARIES = {
-    "MuJoCo": "mujoco-core",
-    "Zenoh": "eclipse-zenoh",
-    "Arrow": "pyarrow",
-    "NumPy": "numpy",
-    "Protobuf": "protobuf",
-}
 # In a process of its own: a broken driver may end it.
 _RENDER = """
 import sys
@@ -38,16 +31,12 @@ print(engine)
 
 def versions() -> dict[str, str | None]:
     """Return the version of each package, None for those that are missing."""
-    found: dict[str, str | None] = {
+    return {
         "Revolve Islands": VERSION,
         "messages": wire_version().partition("+")[2],
+        **{name: installed(package) for name, package in LIBRARIES.items()},
+        "Python": platform.python_version(),
     }
-    for name, package in _LIBRARIES.items():
-        try:
-            found[name] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            found[name] = None
-    return {**found, "Python": platform.python_version()}
 
 
 def available_bytes(meminfo: Path = Path("/proc/meminfo")) -> int | None:

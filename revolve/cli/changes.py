@@ -1,41 +1,122 @@
 """Re-evaluation of the robots of finished runs under changes, or without some parts."""
 
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
 
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 from msgspec.structs import replace
+from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
 from analysis.comparison import ablation, robustness
+from analysis.comparison.robustness import table_of
 from analysis.figures.changes import ablation as ablation_figure
 from analysis.figures.changes import robustness as robustness_figure
+from analysis.figures.forms import NothingToDraw
+from analysis.figures.style import save
+from analysis.progress import bars, replaced
 from coordinator.evolution.generation import random_brain
 from coordinator.evolution.random_streams import Purpose, stream
-from revolve.cli.reevaluation import ReevaluationJob, Study
 from revolve.cli.winners import Chosen, chosen_robots
-from revolve.robot import plain
+from revolve.evaluation import Result
+from revolve.fleet import Fleet
+from revolve.robot import Robot, plain
+from schema.errors import counted
 from schema.experiment.document import REVOLVE_ANGLE, body_space
+from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
+from schema.robot.robot import Robot as PlainRobot
+from schema.tables.description import make_folder
 from worker.filters.ablation import all_ablations
 from worker.robot.robustness import all_changes
 
+Row = dict[str, Any]
 
-def study_of(command: str) -> Study:
-    """Return what ``robustness`` or ``ablate`` evaluates and writes."""
+
+class ReevaluationJob(NamedTuple):
+    """Evaluation of a robot of a run, or of another robot in its place.
+
+    The evaluation without a change has no row, and so no columns; it precedes the
+    others of its robot.
+    """
+
+    one: Chosen
+    columns: Row | None
+    settings: EvaluationSettings
+    robot: Robot | PlainRobot
+
+
+def _reevaluated(jobs: Sequence[ReevaluationJob], workers: int) -> Iterator[Row]:
+    """Yield a row for each job with columns, in their order; show progress.
+
+    Equal evaluations are computed once.
+    """
+    robots = counted(len({id(job.one) for job in jobs}), "robot")
+    title = f"re-evaluating {robots} {len(jobs)} times in all"
+    columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
+    with Fleet(workers) as fleet, bars(title, *columns, TimeRemainingColumn()) as bar:
+        known: dict[tuple[object, ...], Future[Result]] = {}
+        for job in jobs:
+            key = job.robot, job.settings, job.one.identity
+            if key not in known:
+                # Settings of a request; an experiment has no ablation.
+                known[key] = fleet._submit(*key)  # noqa: SLF001 - of this package
+        undisturbed: float | None = None
+        for job in bar.track(jobs, description="re-evaluating"):
+            result = known[job.robot, job.settings, job.one.identity].result()
+            if job.columns is None:
+                undisturbed = result.fitness
+                continue
+            yield {
+                **job.one.row,
+                "undisturbed": undisturbed,
+                **job.columns,
+                "fitness": result.fitness,
+                "failure": result.failure,
+            }
+
+
+def write_results(command: str, options: Namespace) -> None:
+    """Evaluate; write a table and its figure; print a line about each run and file.
+
+    An earlier table in the folder is replaced, as the report of ``analyze`` is.
+
+    Raises:
+        RunFolderError: no run, an unfinished one, or a folder that cannot be written.
+        RevolveError: no worker is left.
+    """
+    study: ModuleType
     if command == "robustness":
-        return Study(
-            "robustness",
-            robustness.COLUMNS,
-            robustness.summary,
-            robustness_figure,
-            _change_jobs,
+        name, study, figure, jobs = command, robustness, robustness_figure, _change_jobs
+    else:
+        name, study, figure, jobs = (
+            "ablation",
+            ablation,
+            ablation_figure,
+            _ablation_jobs,
         )
-    return Study(
-        "ablation",
-        ablation.COLUMNS,
-        ablation.summary,
-        ablation_figure,
-        _ablation_jobs,
-    )
+    wanted = jobs(options)
+    stem: Path = options.out / name
+    make_folder(stem.parent)
+    path = stem.with_suffix(".parquet")
+    for line in replaced(path, "the table", "its runs and its figure"):
+        print(line, flush=True)
+    table = table_of(_reevaluated(wanted, options.workers), study.COLUMNS)
+    pq.write_table(table, path)
+    for folder in options.runs:
+        own = table.filter(pc.field("folder") == str(folder))
+        print(f"{folder}: {study.summary(own)}")
+    print(f"{path}: {table.num_rows} evaluations under changes")
+    try:
+        save(figure(table), stem)
+    except NothingToDraw as error:
+        print(f"left out: figure: {error}")
+    else:
+        print(f"{stem}.png: figure, also as PDF")
 
 
 def _change_jobs(options: Namespace) -> list[ReevaluationJob]:

@@ -1,4 +1,8 @@
-"""The commands of `revolve`: their modules and summaries."""
+"""The commands of `revolve`: their modules, summaries and parsers."""
+
+import argparse
+from importlib import import_module
+from typing import Any
 
 _COORDINATOR = "coordinator.__main__"
 COMMANDS = {
@@ -33,3 +37,22 @@ The module's ``main`` gets the arguments, the command's name first; its ``parser
 returns the parser of the command with that name. Names of two words take precedence
 over their first word; ``main`` gets them as one argument.
 """
+
+
+def parser_of(command: str) -> Any:  # noqa: ANN401 - its module is costly to import
+    """Return the parser of a command, a ``schema.agent.flags.Flags``."""
+    return import_module(COMMANDS[command][0]).parser(command)
+
+
+def subparsers_of(parser: argparse.ArgumentParser) -> Any:  # noqa: ANN401 - as above
+    """Return what holds the actions of a parser; None if it has none."""
+    for action in parser._actions:  # noqa: SLF001 - argparse has no public access
+        if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - the same
+            return action
+    return None
+
+
+def actions(parser: argparse.ArgumentParser) -> dict[str, Any]:
+    """Return the parsers of a command's actions, such as ``list`` of ``arena``."""
+    holder = subparsers_of(parser)
+    return {} if holder is None else dict(holder.choices)

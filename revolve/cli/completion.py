@@ -7,8 +7,7 @@ loaded by this command only.
 import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
-from revolve.cli.commands import COMMANDS
-from revolve.cli.parsers import actions, parser_of, subparsers_of
+from revolve.cli.commands import COMMANDS, actions, parser_of, subparsers_of
 from schema.agent.flags import Flags
 from schema.experiment.file import shipped_experiments
 

@@ -38,9 +38,8 @@ def main(arguments: list[str]) -> int:
     # Before matplotlib is imported: it refuses backends of other programs.
     os.environ["MPLBACKEND"] = "agg"
     with extra(f"{command} needs", "analysis"):
-        from revolve.cli.changes import study_of
-        from revolve.cli.reevaluation import write_results
-    write_results(options, study_of(command))
+        from revolve.cli.changes import write_results
+    write_results(command, options)
     return 0
 
 

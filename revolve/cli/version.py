@@ -2,36 +2,25 @@
 
 import platform
 import subprocess
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from schema.agent.version import VERSION
+from schema.agent.version import LIBRARIES, VERSION, installed
 
-_LIBRARIES = {
-    "mujoco": "mujoco-core",
-    "zenoh": "eclipse-zenoh",
-    "pyarrow": "pyarrow",
-    "numpy": "numpy",
-}
 _ROOT = Path(__file__).resolve().parents[2]
 
 
 def version_text() -> str:
     """Return the lines of ``revolve --version``; nothing large is imported."""
-    libraries = ", ".join(f"{name} {_of(dist)}" for name, dist in _LIBRARIES.items())
+    libraries = ", ".join(
+        f"{name} {installed(package) or 'not installed'}"
+        for name, package in LIBRARIES.items()
+    )
     return (
         f"revolve {VERSION}{_commit(_ROOT)}\n"
         f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
         f" {platform.release()}\n"
         f"{libraries}"
     )
-
-
-def _of(distribution: str) -> str:
-    try:
-        return version(distribution)
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def _commit(root: Path) -> str:

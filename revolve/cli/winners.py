@@ -39,8 +39,6 @@ class Chosen(NamedTuple):
         document: settings of its island, for an evaluation alone.
         settings: of the recorded evaluation, with its duration; of a robot of an arena,
             of an evaluation alone.
-        robot: the robot.
-        run: its run.
         identity: of the recorded evaluation, which determines noise, pushes and
             disturbances; of a robot of an arena, of a first evaluation there.
     """

@@ -8,7 +8,7 @@ Unix socket, which only the hub's user can open, have all rights.
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import msgspec
 
@@ -30,7 +30,7 @@ _MOST_BYTES = 1 << 20
 Flow = Literal["ingress", "egress"]
 
 
-class Permission(msgspec.Struct, frozen=True):
+class Permission(NamedTuple):
     """Messages that a certificate may exchange with the hub.
 
     Attributes:
@@ -89,11 +89,7 @@ def permissions(certificate: Certificate) -> list[Permission]:
             Permission(
                 "ingress", ("put",), tuple(f"{each}/cancelled" for each in agents)
             ),
-            Permission(
-                "egress",
-                _SERVE,
-                ("revolve/*/w/**", "revolve/*/an/**"),
-            ),
+            Permission("egress", _SERVE, ("revolve/*/w/**", "revolve/*/an/**")),
             Permission("egress", ("query", "put", "delete"), (own,)),
             Permission("egress", ("declare_subscriber",), (f"{coordinators}/**",)),
             watch,
@@ -121,25 +117,35 @@ def access_control(certificates: Iterable[Certificate]) -> dict[str, Any]:
     """
     known = list(certificates)
     check_certificates(known)
-    subjects: list[dict[str, Any]] = [{"id": "socket", "link_protocols": [UNIX]}]
-    rules: list[dict[str, Any]] = [
-        _rule(f"all {flow}", flow, _ALL, ("**",)) for flow in _FLOWS
+    everything = [Permission(flow, _ALL, ("**",)) for flow in get_args(Flow)]
+    rights: list[tuple[dict[str, Any], list[Permission]]] = [
+        ({"id": "socket", "link_protocols": [UNIX]}, everything)
     ]
-    policies = [{"rules": [rule["id"] for rule in rules], "subjects": ["socket"]}]
     for certificate in known:
-        subject = f"{certificate.role} {certificate.name}"
+        name = f"{certificate.role} {certificate.name}"
+        subject = {"id": name, "cert_common_names": [certificate.name]}
+        rights.append((subject, permissions(certificate)))
+    rules: list[dict[str, Any]] = []
+    policies = []
+    for subject, allowed in rights:
         own = [
-            _rule(f"{subject} {number}", each.flow, each.messages, each.keys)
-            for number, each in enumerate(permissions(certificate))
+            {
+                "id": f"{subject['id']} {number}",
+                "permission": "allow",
+                "flows": [each.flow],
+                "messages": each.messages,
+                "key_exprs": each.keys,
+            }
+            for number, each in enumerate(allowed)
         ]
-        subjects.append({"id": subject, "cert_common_names": [certificate.name]})
-        policies.append({"rules": [r["id"] for r in own], "subjects": [subject]})
         rules += own
+        ids = [rule["id"] for rule in own]
+        policies.append({"rules": ids, "subjects": [subject["id"]]})
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": subjects,
+        "subjects": [subject for subject, _ in rights],
         "policies": policies,
     }
 
@@ -185,18 +191,3 @@ def read_certificates(file: Path) -> list[Certificate]:
             f"{file}: must be a JSON list of objects with name and role: {error}"
         ) from None
     return found
-
-
-_FLOWS: tuple[Flow, ...] = get_args(Flow)
-
-
-def _rule(
-    name: str, flow: Flow, messages: tuple[str, ...], keys: tuple[str, ...]
-) -> dict[str, Any]:
-    return {
-        "id": name,
-        "permission": "allow",
-        "flows": [flow],
-        "messages": list(messages),
-        "key_exprs": list(keys),
-    }

@@ -39,14 +39,7 @@ def certificate_name(file: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class CertificateFacts:
-    """What is known of a certificate.
-
-    Attributes:
-        name: common name.
-        begins, ends: when it is valid.
-        is_issued: by the given authority.
-        fits_key: the private key is its own.
-    """
+    """What is known of a certificate."""
 
     name: str
     begins: datetime

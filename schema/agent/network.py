@@ -49,7 +49,6 @@ class Tls:
 
     Attributes:
         ca: certificate of the authority that signed all certificates of a fleet.
-        certificate: own certificate.
         key: own private key (PKCS#8).
     """
 
@@ -65,12 +64,8 @@ class Agent:
     Attributes:
         role: "worker" or "analyzer".
         name: never used by another process.
-        connect: address of the hub.
-        fleet: name of the fleet.
         slots: jobs at a time; one process does one.
-        tls: files, for a ``tls/`` address.
         platform: tag of CPU, system and libraries.
-        version: of Revolve Islands.
         threads: that advance one arena together.
         cpu_limit_s: CPU time limit of a job [s].
         wait_limit_s: time that a job may wait without using CPU time [s].

@@ -6,12 +6,10 @@ Two machines with equal tags give equal results; others may.
 import platform
 from collections.abc import Collection
 from functools import cache
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as installed
 from pathlib import Path
 
 from schema.agent.capacity import system_text
-from schema.agent.version import VERSION
+from schema.agent.version import VERSION, installed
 from schema.wire.codec import format_digest
 from schema.wire.messages import OF_AGENTS
 
@@ -31,8 +29,8 @@ def platform_tag() -> str:
     system = platform.system().lower()
     machine = cpu_class(platform.machine().lower(), cpu_flags(Path("/proc/cpuinfo")))
     library, number = platform.libc_ver()
-    numpy = _version("numpy")
-    mujoco = _version("mujoco-core")
+    numpy = installed("numpy") or "0"
+    mujoco = installed("mujoco-core") or "0"
     # Without the name of a C library, use the release of the system.
     library = f"{library}{number}" if library else platform.release()
     return f"{system}-{machine}-{library}-mujoco{mujoco}-numpy{numpy}"
@@ -63,11 +61,3 @@ def cpu_flags(cpuinfo: Path) -> frozenset[str]:
         if key.strip().lower() in {"flags", "features"}:
             return frozenset(value.split())
     return frozenset()
-
-
-@cache
-def _version(distribution: str) -> str:
-    try:
-        return installed(distribution)
-    except PackageNotFoundError:
-        return "0"

@@ -55,10 +55,7 @@ class ReplyCounts:
     """Counts of an agent's replies.
 
     Attributes:
-        answered: jobs with an answer.
         refused: jobs with a reason, malformed requests included.
-        malformed: requests that do not decode.
-        skipped: cancelled jobs.
         cancels: cancellations that do not decode.
         crowd: requests that were dropped because too many waited.
     """

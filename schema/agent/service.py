@@ -104,13 +104,11 @@ class HubWatch:
     """Presence of the hub, as the user was told.
 
     Attributes:
-        address: of the hub.
         say: called with a line when the hub is back.
         warn: called with a line when the hub is lost, or a run is refused.
         give_up_after_s: time without a hub after which ``seen`` raises [s].
         tells_first: say that the hub is there the first time, too.
         tls: files for a ``tls/`` address, to tell why the hub refuses them.
-        fleet: name of the fleet.
     """
 
     address: str

@@ -106,7 +106,6 @@ class ProcessSlot:
     """A process's slot in a pool.
 
     Attributes:
-        index: of the slot.
         note: of its current job; None without a supervisor.
         deaths: of earlier processes in this slot, oldest first.
     """

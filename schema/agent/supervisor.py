@@ -123,9 +123,7 @@ class _Place:
     """A slot, its process if one is running, and when to start the next one.
 
     Attributes:
-        slot: slot of the process.
         process: the running one; None: it is to be started.
-        started_s: when the last one was started [s].
         due_s: when the next one is to be started [s].
         pause_s: of the next one that exits by itself [s].
         code: exit code of the last one if it exited by itself.

@@ -28,8 +28,6 @@ class Member:
     """A process of a fleet; a fleet serves many runs.
 
     Attributes:
-        fleet: name of the fleet.
-        role: what the process is.
         name: its own, never used again.
         jobs: key that takes one ``Request`` and gives one ``Answer``.
         session: id of the process's Zenoh session, hexadecimal. A hub accepts one

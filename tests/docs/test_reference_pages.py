@@ -11,8 +11,7 @@ import pytest
 from docs import messages_reference, settings_reference
 from docs.reference_pages import PAGES
 from docs.struct_tables import attributes, rows
-from revolve.cli.commands import COMMANDS
-from revolve.cli.parsers import parser_of
+from revolve.cli.commands import COMMANDS, parser_of
 from schema.experiment.document import Experiment
 from schema.experiment.section import PluginSection, Section
 from schema.experiment.settings import (

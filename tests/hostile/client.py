@@ -67,6 +67,16 @@ _NOBODY = "no-such-run-of-anybody"
 _ROLES: tuple[Role, ...] = ("worker", "analyzer", "coordinator")
 _FAR = 10**12
 """Number of a job that no run reaches."""
+_KINDS = (
+    *("jobs", "jobs", "jobs", "command", "command", "events", "events"),
+    *("cancelled", "info", "state", "arena", "token", "anywhere"),
+)
+"""Ends of keys of what it sends; frequent ones several times."""
+_ENDS = {
+    "arena": ("arena/0/pose", "arena/1/pose", f"arena/{2**32}/pose"),
+    "anywhere": ("*", "jobs", "info", "alive", "state", "command", "x/y"),
+}
+_PUBLISHED = ("events", "cancelled", "arena")
 
 
 class HostileClient:
@@ -82,12 +92,8 @@ class HostileClient:
     ) -> None:
         """Open a session and listen.
 
-        Args:
-            seed: of all messages; the threads of the network draw from the next one.
-            address: of the hub.
-            stack: closes the sessions.
-            sent: number of sent messages by kind; increases.
-            came: number of replies by kind; increases.
+        The threads of the network draw from the next seed. The numbers of messages
+        that it sent and that came, by kind, increase.
         """
         self.sent, self.came = sent, came
         self._mutator = Mutator(seed)
@@ -158,29 +164,36 @@ class HostileClient:
         return len(self._members)
 
     def send(self) -> None:
-        """Send one hostile message."""
+        """Send one hostile message: a token, or bytes on a key of a process."""
         draw = self._mutator.random
-        actions: tuple[Callable[[Member], None], ...] = (
-            self._job,
-            self._job,
-            self._job,
-            self._cancel,
-            self._ask,
-            self._order,
-            self._order,
-            self._news,
-            self._news,
-            self._poses,
-            self._token,
-            self._anything,
-        )
         member = draw.choice([*self._members, *self._members, *self._liars])
-        draw.choice(actions)(member)
+        kind = draw.choice(_KINDS)
+        if kind == "token":
+            self._token(member)
+            return
+        prefix = member.alive.removesuffix("/alive")
+        key = f"{prefix}/{draw.choice(_ENDS.get(kind, (kind,)))}"
+        data = self._message(kind)
+        if kind in _PUBLISHED or (kind == "anywhere" and draw.random() < 0.5):
+            self._put(key, data, kind)
+        else:
+            sender = draw.choice((b"", b"x", draw.randbytes(8)))
+            self._get(key, data, f"{kind} to {member.role}", sender)
 
-    # --- what it hears ----------------------------------------------------------
+    def _message(self, kind: str) -> bytes:
+        """Return a mutated message, or a valid one that nobody is waiting for."""
+        draw = self._mutator.random
+        heard = list(self._heard[kind]) or _samples()
+        if draw.random() < 0.2 and kind == "jobs":
+            return self._renamed(draw.choice(heard))
+        if draw.random() < 0.2 and kind == "cancelled":
+            return fingerprint(draw.choice(list(self._heard["jobs"]) or _samples()))
+        if draw.random() < 0.1 and kind == "events":
+            return encode(update())
+        return self._mutator.message(_ORDERS if kind == "command" else heard)
 
     def _hear(self, sample: zenoh.Sample) -> None:
-        kind = str(sample.key_expr).rpartition("/")[2]
+        kind = str(sample.key_expr).rpartition("/")[2].replace("pose", "arena")
         if len(sample.payload) < 100_000:
             self._heard[kind].append(sample.payload.to_bytes())
 
@@ -190,8 +203,7 @@ class HostileClient:
         kind = key.rpartition("/")[2]
         with self._lock:
             if query.payload is not None and kind == "jobs" and "liar" not in key:
-                role = "analysis" if "/an/" in key else "evaluation"
-                self._heard[role].append(query.payload.to_bytes())
+                self._heard[kind].append(query.payload.to_bytes())
             self._reply(query, kind, "foreign")
 
     def _lie_as(self, liar: Member) -> Callable[[zenoh.Query], None]:
@@ -228,12 +240,6 @@ class HostileClient:
                 query.reply(key, self._replier.message(_answers(kind)))
                 self.sent[f"{who} reply to {kind}"] += 1
 
-    # --- what it sends ----------------------------------------------------------
-
-    def _message(self, kind: str) -> bytes:
-        samples = list(self._heard[kind]) or _samples()
-        return self._mutator.message(samples)
-
     def _get(self, key: str, data: bytes, kind: str, sender: bytes = b"") -> None:
         self._free.acquire()
         self.sent[kind] += 1
@@ -255,16 +261,6 @@ class HostileClient:
         self.sent[kind] += 1
         self._session.put(key, data, congestion_control=zenoh.CongestionControl.BLOCK)
 
-    def _job(self, member: Member) -> None:
-        """Send a job: mutated, of another role, or of another run and epoch."""
-        draw = self._mutator.random
-        kind = draw.choice(("evaluation", "analysis"))
-        data = self._message(kind)
-        if draw.random() < 0.2:
-            data = self._renamed(draw.choice(list(self._heard[kind]) or _samples()))
-        sender = draw.choice((b"", b"x", draw.randbytes(8)))
-        self._get(member.jobs, data, f"job to {member.role}", sender)
-
     def _renamed(self, data: bytes) -> bytes:
         """Return a request of another coordinator, without what takes time to do."""
         draw = self._mutator.random
@@ -284,32 +280,6 @@ class HostileClient:
             )
         )
 
-    def _cancel(self, member: Member) -> None:
-        """Cancel a job that was heard, or none."""
-        draw = self._mutator.random
-        known = list(self._heard["evaluation"]) + list(self._heard["analysis"])
-        valid = draw.random() < 0.2 and known
-        heard = fingerprint(draw.choice(known)) if valid else b""
-        data = heard or self._message("cancelled")
-        self._put(member.cancelled, data, "cancellation")
-
-    def _ask(self, member: Member) -> None:
-        key = self._mutator.random.choice((member.info, member.state))
-        self._get(key, self._message("info"), f"query of {key.rpartition('/')[2]}")
-
-    def _order(self, member: Member) -> None:
-        self._get(member.command, self._mutator.message(_ORDERS), "order")
-
-    def _news(self, member: Member) -> None:
-        draw = self._mutator.random
-        forged = encode(update())
-        data = forged if draw.random() < 0.1 else self._message("events")
-        self._put(member.events, data, "news")
-
-    def _poses(self, member: Member) -> None:
-        shard = self._mutator.random.choice((0, 0, 0, 1, 2**32))
-        self._put(member.poses(shard), self._message("pose"), "poses")
-
     def _token(self, member: Member) -> None:
         """Declare a token of another role, of a process that is there, or of none."""
         draw = self._mutator.random
@@ -326,18 +296,6 @@ class HostileClient:
         self.sent["token"] += 1
         token = self._session.liveliness().declare_token(key)
         token.undeclare()  # type: ignore[no-untyped-call]
-
-    def _anything(self, member: Member) -> None:
-        """Put or get any bytes on any key of a process, wildcards included."""
-        draw = self._mutator.random
-        prefix = member.alive.removesuffix("/alive")
-        end = draw.choice(("*", "jobs", "info", "alive", "state", "command", "x/y"))
-        key = f"{prefix}/{end}"
-        data = self._mutator.message(_samples())
-        if draw.random() < 0.5:
-            self._put(key, data, "put anywhere")
-        else:
-            self._get(key, data, "query anywhere")
 
 
 def _info(liar: Member) -> bytes:

@@ -145,15 +145,7 @@ _WORKER = Member("default", "worker", "w.00000001")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A decoder.
-
-    Attributes:
-        name: of the decoder.
-        decode: takes bytes.
-        samples: valid messages.
-        errors: that it may raise.
-        share: how often it is tested, relative to the others.
-    """
+    """A decoder, valid messages, the errors that it may raise, how often it runs."""
 
     name: str
     decode: Callable[[bytes], object]

@@ -44,11 +44,7 @@ class Mutator:
         )
 
     def message(self, samples: Sequence[bytes]) -> bytes:
-        """Return random bytes, or a changed sample.
-
-        Args:
-            samples: valid messages of one kind.
-        """
+        """Return random bytes, or a changed sample."""
         draw = self.random
         if draw.random() < 0.05:
             return draw.randbytes(draw.randrange(_LONGEST))

@@ -9,11 +9,9 @@ from collections import defaultdict
 
 import pytest
 
-from revolve.cli.commands import COMMANDS
-from revolve.cli.parsers import actions, parser_of
+from revolve.cli.commands import COMMANDS, actions, parser_of
 from revolve.command import main
 from schema.agent.flags import Flags
-from schema.agent.supervisor import cores
 
 
 @pytest.fixture(scope="module")
@@ -134,22 +132,6 @@ def test_an_error_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert said.count("\n") == 1
 
 
-def test_commands_start_four_workers_per_core_at_most(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    most = 4 * cores()
-    for command in ("ablate", "robustness"):
-        with pytest.raises(SystemExit):
-            main([command, "runs/a", "--workers", str(most + 1)])
-        wanted = f"--workers: must be a whole number in 1..{most}, got '{most + 1}'"
-        assert wanted in capsys.readouterr().err
-
-
-def test_actions_are_those_of_the_command() -> None:
-    assert list(actions(parser_of("robot"))) == ["check", "convert", "show"]
-    assert actions(parser_of("status")) == {}
-
-
 def test_the_version_names_what_decides_results(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -157,7 +139,7 @@ def test_the_version_names_what_decides_results(
     own, machine, libraries = capsys.readouterr().out.splitlines()
     assert re.match(r"revolve \d+\.\d+\.\d+|revolve not installed", own)
     assert re.match(r"Python 3\.\d+\.\d+, \w+ \w+", machine)
-    for name in ("mujoco", "zenoh", "pyarrow", "numpy"):
+    for name in ("MuJoCo", "Zenoh", "Arrow", "NumPy"):
         assert re.search(rf"\b{name} \d+\.\d+", libraries)
 
 

@@ -1,10 +1,7 @@
 """Robots, genomes and their evaluation, against the command's results."""
 
 import math
-import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -19,9 +16,9 @@ from revolve.experiment import document_of
 from revolve.robot import plain
 from schema.experiment.settings import evaluation_settings_of
 from tests.own_brains import write_module
+from tests.system.workspace import Workspace
 from worker.robot.evaluation import evaluate as evaluate_here
 
-TOP = Path(__file__).parents[2]
 pytestmark = pytest.mark.system
 
 _WIDE = """
@@ -38,38 +35,23 @@ def _wide_robot(experiment: rv.Experiment) -> rv.Robot:
     robot = rv.Robot.random(experiment, seed=2)
     rng = np.random.default_rng(3)
     old = robot.brain.neurons
-    part = next(n.part for n in old if n.layer == "output")
-    added = tuple(rv.Neuron("hidden", "Simple", part, (0.0, 0.9)) for _ in range(780))
-    outputs = [i for i, n in enumerate(old) if n.layer == "output"]
     kept = tuple(n for n in old if n.layer != "hidden")
-    first = len(kept)
-    edges = [
-        rv.Connection(source, first + index, float(rng.normal()))
-        for index in range(780)
-        for source in outputs
-    ]
-    edges += [
-        rv.Connection(first + index, target, float(rng.normal()))
-        for index in range(780)
-        for target in outputs
-    ]
-    return rv.Robot(robot.parts, rv.Brain((*kept, *added), tuple(edges)), experiment)
+    outputs = [i for i, n in enumerate(old) if n.layer == "output"]
+    part = old[outputs[0]].part
+    added = tuple(rv.Neuron("hidden", "Simple", part, (0.0, 0.9)) for _ in range(780))
+    hidden = range(len(kept), len(kept) + len(added))
+    ends = [(source, target) for target in hidden for source in outputs]
+    ends += [(source, target) for source in hidden for target in outputs]
+    edges = tuple(rv.Connection(*each, float(rng.normal())) for each in ends)
+    return rv.Robot(robot.parts, rv.Brain((*kept, *added), edges), experiment)
 
 
 def _by_command(robot: rv.Robot, experiment: rv.Experiment, folder: Path) -> float:
     """Return the fitness that the command prints with all digits."""
     robot.write(folder / "robot.yaml")
     (folder / "mine.toml").write_text(experiment.to_toml())
-    words = ["robot", "simulate", "robot.yaml", "--experiment", "mine.toml"]
-    done = subprocess.run(
-        [sys.executable, "-m", "revolve", *words],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(TOP)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    found = re.search(r"^fitness: +(\S+)$", done.stdout, re.MULTILINE)
+    words = ("robot", "simulate", "robot.yaml", "--experiment", "mine.toml")
+    found = re.search(r"^fitness: +(\S+)$", Workspace(folder).run(*words), re.MULTILINE)
     assert found
     return float(found[1])
 
@@ -104,21 +86,6 @@ def test_trace_gives_the_velocities_of_the_result() -> None:
     assert np.array_equal(again.core_position, trace.core_position)
 
 
-def test_file_keeps_the_robot(tmp_path: Path) -> None:
-    robot = rv.Robot.random(seed=9, number=2)
-    for name in ("a.yaml", "a.pb", "a.xml"):
-        robot.write(tmp_path / name)
-        assert rv.Robot.read(tmp_path / name) == robot
-    assert rv.Robot.random(seed=9, number=3) != robot
-
-
-def test_damaged_file_holds_no_robot(tmp_path: Path) -> None:
-    file = tmp_path / "robot.pb"
-    file.write_bytes(b"\x00\xff")
-    with pytest.raises(rv.InvalidRobot, match=r"robot\.pb: not the bytes of a Robot"):
-        rv.Robot.read(file)
-
-
 def test_robot_without_experiment_may_have_any_built_in_neuron(tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     file.write_text(
@@ -136,28 +103,19 @@ def test_robot_without_experiment_may_have_any_built_in_neuron(tmp_path: Path) -
     assert rv.evaluate(robot, cpg).fitness is not None
 
 
-def test_invalid_robot_raises_before_anything_runs() -> None:
+def test_invalid_robot_raises_before_anything_runs(tmp_path: Path) -> None:
     robot = rv.Robot.random(seed=1)
     broken = rv.Robot(robot.parts[:1] + robot.parts, robot.brain)
     with pytest.raises(rv.InvalidRobot, match="body"):
         rv.evaluate(broken)
     with pytest.raises(rv.InvalidRobot, match="must end in one of"):
         rv.Robot.read("robot.doc")
+    (tmp_path / "robot.pb").write_bytes(b"\x00\xff")
+    with pytest.raises(rv.InvalidRobot, match=r"robot\.pb: not the bytes of a Robot"):
+        rv.Robot.read(tmp_path / "robot.pb")
     path: Any = "robot.yaml"
     with pytest.raises(rv.InvalidRobot, match=r"got 'robot\.yaml': Robot\.read reads"):
         rv.evaluate(path)
-
-
-def test_seeds_and_sizes_of_another_kind_are_refused() -> None:
-    robot = rv.Robot.random(seed=1)
-    for name, ask in (
-        ("seed", lambda: rv.Robot.random(seed=2**64)),
-        ("number", lambda: rv.Robot.random(number=2**32)),
-        ("width", lambda: robot.picture(0, 16)),
-        ("height", lambda: robot.picture(16, 4097)),
-    ):
-        with pytest.raises(rv.RevolveError, match=f"^{name}: must be a whole number"):
-            ask()
 
 
 def test_values_of_another_type_are_refused(tmp_path: Path) -> None:
@@ -291,16 +249,6 @@ def test_genome_needs_a_generator() -> None:
         genome.mate(genome, wrong)
 
 
-def test_picture_is_a_png() -> None:
-    robot = rv.Robot.random(seed=1)
-    try:
-        picture = robot.picture(64, 48)
-    except rv.RevolveError as error:
-        pytest.skip(str(error))
-    assert picture.startswith(b"\x89PNG")
-    assert robot._repr_png_() is not None
-
-
 def test_genomes_of_other_encodings() -> None:
     patterns = rv.Experiment.read("scenario1", encoding={"type": "cppn"})
     rng = np.random.default_rng(1)
@@ -320,3 +268,21 @@ def test_genomes_of_other_encodings() -> None:
     wrong: Any = child.develop()
     with pytest.raises(rv.RevolveError, match="other: must be a Genome, got <Robot"):
         child.mate(wrong, rng)
+
+
+def test_seeds_and_sizes_are_checked_and_a_picture_is_a_png() -> None:
+    robot = rv.Robot.random(seed=1)
+    for name, ask in (
+        ("seed", lambda: rv.Robot.random(seed=2**64)),
+        ("number", lambda: rv.Robot.random(number=2**32)),
+        ("width", lambda: robot.picture(0, 16)),
+        ("height", lambda: robot.picture(16, 4097)),
+    ):
+        with pytest.raises(rv.RevolveError, match=f"^{name}: must be a whole number"):
+            ask()
+    try:
+        picture = robot.picture(64, 48)
+    except rv.RevolveError as error:
+        pytest.skip(str(error))
+    assert picture.startswith(b"\x89PNG")
+    assert robot._repr_png_() is not None

@@ -117,8 +117,3 @@ def test_wrong_keys_and_values_raise_one_line(
         Experiment.read("scenario1", **changes)
     assert expected in str(raised.value)
     assert "\n" not in str(raised.value)
-
-
-def test_unknown_experiment_names_the_nearest() -> None:
-    with pytest.raises(ExperimentError, match="did you mean 'scenario1'"):
-        Experiment.read("scenaro1")

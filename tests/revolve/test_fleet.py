@@ -5,10 +5,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
-from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
@@ -19,11 +17,12 @@ import pytest
 import revolve as rv
 from coordinator.cluster.kit import ClusterKit, Kit
 from coordinator.network.service import Network
-from revolve.workers import Workers
+from revolve.children import Workers
 from schema.agent.supervisor import cores
 from schema.plugins import permission
 from schema.wire.calls import call_settings
-from tests.own_brains import write_module
+from tests.system.fleet import agent_processes
+from tests.system.workspace import wait_until
 
 TOP = Path(__file__).parents[2]
 pytestmark = pytest.mark.system
@@ -35,30 +34,10 @@ def robots(count: int) -> list[rv.Robot]:
     return [rv.Robot.random(SHORT, seed=3, number=number) for number in range(count)]
 
 
-def until(is_true: Callable[[], bool]) -> None:
-    """Wait until something is true; fail after half a minute."""
-    end_s = time.monotonic() + 30.0
-    while not is_true():
-        assert time.monotonic() < end_s
-        time.sleep(0.02)
-
-
-def below(process: int) -> list[int]:
-    """Return the processes that a process has started, but for Python's tracker."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
-            words = (entry / "cmdline").read_text()
-            if int(parent) == process and "resource_tracker" not in words:
-                found.append(int(entry.name))
-    return found
-
-
 def workers_of(fleet: rv.Fleet) -> list[int]:
     """Return the processes that do the jobs of a fleet's own workers."""
     (command,) = (each._process.pid for each in fleet._workers)
-    return below(command)
+    return agent_processes(command)
 
 
 @pytest.fixture(scope="module")
@@ -75,12 +54,8 @@ def test_results_are_in_order_and_equal_those_of_one_process(fleet: rv.Fleet) ->
     # Their own experiment is the same one.
     assert list(fleet.evaluate(many)) == results
     assert list(fleet.evaluate(iter(()))) == []
-
-
-def test_submit_returns_a_future(fleet: rv.Fleet) -> None:
-    robot = robots(1)[0]
-    future = fleet.submit(robot, SHORT)
-    assert future.result(30) == rv.evaluate(robot)
+    future = fleet.submit(many[0], SHORT)
+    assert future.result(30) == results[0]
     assert future.done()
 
 
@@ -90,24 +65,12 @@ def test_rest_is_dropped_when_the_iterator_is_closed(
 ) -> None:
     found = fleet.evaluate(robots(40), SHORT)
     assert len(list(islice(found, taken))) == taken
-    assert fleet._engine is not None
-    until(lambda: len(fleet._engine._open) > 10)  # type: ignore[union-attr]
+    engine = fleet._engine
+    assert engine is not None
+    wait_until(lambda: len(engine._open) > 10, "jobs ahead")
     found.close()  # type: ignore[attr-defined]
-    until(lambda: not fleet._engine._open)  # type: ignore[union-attr]
+    wait_until(lambda: not engine._open, "no job")
     assert next(fleet.evaluate(robots(1))).failure == ""
-
-
-def test_own_brains_are_evaluated(fleet: rv.Fleet, tmp_path: Path) -> None:
-    write_module(tmp_path)
-    file = tmp_path / "own.toml"
-    file.write_text(
-        'name = "own"\n[brain]\ntype = "my_brains:Wave"\n'
-        "[simulation]\nwindow_steps = 80\n"
-    )
-    many = [rv.Robot.random(file, seed=3, number=number) for number in range(3)]
-    results = list(fleet.evaluate(many, file))
-    assert results == [rv.evaluate(robot) for robot in many]
-    assert {result.failure for result in results} == {""}
 
 
 def test_invalid_robot_raises_at_once(fleet: rv.Fleet) -> None:
@@ -123,7 +86,7 @@ def test_killed_worker_costs_no_result() -> None:
     with rv.Fleet(workers=2) as fleet:
         results = fleet.evaluate(many, SHORT)
         found = [next(results)]
-        until(lambda: len(workers_of(fleet)) == 2)
+        wait_until(lambda: len(workers_of(fleet)) == 2, "two workers")
         os.kill(workers_of(fleet)[0], signal.SIGKILL)
         found += results
     assert found == [rv.evaluate(robot) for robot in many]
@@ -203,12 +166,12 @@ def test_map_runs_only_what_the_owner_of_a_worker_allows(
         stranger = Workers(hub.own_address, 1, ())
         try:
             with rv.Fleet(connect=hub.own_address, give_up_after_s=2.0) as fleet:
-                until(lambda: fleet.workers == 1)
+                wait_until(lambda: fleet.workers == 1, "the worker")
                 future = fleet.submit(robots(1)[0], SHORT)
                 assert future.result(60).failure == ""
                 permission.allow_references(["lab_of_others:f"], tmp_path)
                 call = fleet._call(call_settings("lab_of_others:f"), 1, 0)
-                until(lambda: fleet.workers == 0)
+                wait_until(lambda: fleet.workers == 0, "no worker")
                 (told,) = fleet._network.faults.counts
                 assert (told.kind, told.count > 0) == ("refused", True)
                 why = (
@@ -337,9 +300,11 @@ def test_no_worker_outlives_its_loop(number: signal.Signals) -> None:
     ) as process:
         assert process.stdout is not None
         command = int(process.stdout.readline())
-        started = [command, *below(command)]
+        started = [command, *agent_processes(command)]
         assert len(started) == 3
         process.send_signal(number)
         process.communicate()
     assert process.returncode == -number
-    until(lambda: not any(Path(f"/proc/{each}").exists() for each in started))
+    left = (Path(f"/proc/{each}") for each in started)
+    for path in left:
+        wait_until(lambda path=path: not path.exists(), "all have ended")  # type: ignore[misc]

@@ -15,16 +15,6 @@ from schema.parts import BUILT_IN
 RECORDED = Path(__file__).parents[1] / "data" / "runs-3063df1"
 
 
-def test_random_robots_differ_and_repeat_with_the_seed(tmp_path: Path) -> None:
-    words = ["robot random", str(tmp_path / "r.yaml"), "--seed", "7", "--count", "2"]
-    assert main(words) == 0
-    robots = [read_robot(tmp_path / f"r-{number}.yaml") for number in range(2)]
-    assert robots[0] != robots[1]
-    assert all(len(robot.parts) >= 3 for robot in robots)
-    assert main(["robot random", str(tmp_path / "one.pb"), "--seed", "7"]) == 0
-    assert read_robot(tmp_path / "one.pb") == robots[0]
-
-
 def robots_of(tmp_path: Path, count: int, *words: str) -> list[rv.Robot]:
     """Return the robots that the command writes with seed 7."""
     file = tmp_path / "r.yaml"

@@ -121,11 +121,3 @@ def test_an_mjcf_file_has_the_settings_in_it(tmp_path: Path) -> None:
     assert rv.Robot.read(tmp_path / "some.xml", "scenario2").experiment is not None
     plainly = rv.Robot.read(tmp_path / "some.xml", "scenario2")
     assert settings_for(plainly, None) == settings_for(robot, "scenario2")
-
-
-def test_a_file_elsewhere_has_no_experiment(tmp_path: Path) -> None:
-    robot = rv.Robot.random("scenario1", seed=1)
-    robot.write(tmp_path / "some.yaml")
-    read = rv.Robot.read(tmp_path / "some.yaml")
-    assert read.experiment is None
-    assert settings_for(read, None) == settings_for(robot, "scenario1")

@@ -4,6 +4,7 @@ import json
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -86,12 +87,7 @@ class Attacker:
         self.overhear(act)
 
     def replace_by_deadly(self, first: int, times: int) -> None:
-        """Send endless requests in the name of one evaluation to its workers.
-
-        Args:
-            first: the first evaluation with at least this number is chosen.
-            times: how often, each time that the job is given to a worker.
-        """
+        """Send endless requests in the name of one evaluation to its workers."""
         chosen: list[int] = []
 
         def act(key: str, data: bytes) -> None:
@@ -108,13 +104,15 @@ class Attacker:
 
         self.overhear(act)
 
-    def answer_for(self, key: str, answer: bytes, error: str) -> None:
-        """Reply to all jobs of a key expression in the agents' names."""
+    def answer_for(self, key: str, *replies: bytes | str) -> None:
+        """Reply in the agents' names to all jobs of a key expression, in turns."""
+        turns = cycle(replies)
 
         def reply(query: zenoh.Query) -> None:
+            answer = next(turns)
             with query:
-                if error:
-                    query.reply_err(error)
+                if isinstance(answer, str):
+                    query.reply_err(answer)
                 else:
                     query.reply(query.key_expr, answer)
 
@@ -155,10 +153,10 @@ def attacker_at(folder: Path) -> Iterator[Attacker]:
         yield Attacker(folder, address, stack)
 
 
-FORGED_ANSWER = encode(Answer(1, 1, 0.0, Evaluation(99.0, 0.0, 0.0, 1.0)))
-REASONS = {
-    "fenced": f"{FENCED}epoch 1 is over: epoch 9 has begun",
-    "unfit": f"{UNFIT}has no plug-in 'x'",
-    "cancelled": CANCELLED,
-    "error": "\x1b[2J cannot",
-}
+FALSE_REPLIES = (
+    encode(Answer(1, 1, 0.0, Evaluation(99.0, 0.0, 0.0, 1.0))),
+    f"{FENCED}epoch 1 is over: epoch 9 has begun",
+    f"{UNFIT}has no plug-in 'x'",
+    CANCELLED,
+    "\x1b[2J cannot",
+)

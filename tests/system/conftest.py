@@ -9,12 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from schema.agent.network import Tls
-from tests.system.documents import SMALL_ARENA
-from tests.system.fleet import Fleet, make_certificate
-from tests.system.workspace import Workspace, wait_until
-
-BIRTHS = 60
+from tests.system.documents import (
+    CROWD,
+    CROWDED_ARENA,
+    HAMLET,
+    SCENARIO1,
+    SMALL_ARENA,
+)
+from tests.system.workspace import Workspace
 
 
 @pytest.fixture
@@ -23,16 +25,6 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
         made = Workspace(tmp_path)
         stack.callback(made.clear)
         yield made
-
-
-@pytest.fixture
-def until() -> Callable[[Callable[[], bool], str], None]:
-    return wait_until
-
-
-@pytest.fixture(scope="session")
-def births() -> int:
-    return BIRTHS
 
 
 Once = Callable[[str, Callable[[Workspace], object]], Path]
@@ -66,40 +58,8 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 @pytest.fixture(scope="session")
 def undisturbed(once: Once) -> Path:
     """Return the folder of the reference run: undisturbed, in one process."""
-    words = ("scenario1", "--seed", "5", "--births", str(BIRTHS), "--quiet")
-    flags = ("--in-process", "--out", "run")
-    return (
-        once("single", lambda workspace: workspace.run("run", *words, *flags)) / "run"
-    )
-
-
-@pytest.fixture
-def certify() -> Callable[[Path, str, str, str], Tls]:
-    return make_certificate
-
-
-@pytest.fixture
-def fleet_of() -> type[Fleet]:
-    return Fleet
-
-
-CROWDED_ARENA = """
-name = "crowd"
-births = 25
-[selection]
-population = 8
-[simulation]
-warmup_steps = 600
-window_steps = 1200
-[arena]
-birth_interval_s = 4.0
-cull_interval_s = 8.0
-sample_interval_s = 2.0
-snapshot_interval_s = 10.0
-birth_radius_m = 0.5
-record_touches = true
-"""
-"""Small arena in which robots collide and half of them die."""
+    words = (*SCENARIO1, "--in-process", "--out", "run")
+    return once("single", lambda workspace: workspace.run("run", *words)) / "run"
 
 
 @pytest.fixture
@@ -109,27 +69,6 @@ def crowded_arena_workspace(workspace: Workspace) -> Workspace:
     return workspace
 
 
-def _arena(workspace: Workspace, file: str, document: str) -> None:
-    """Run an arena undisturbed in one process."""
-    (workspace.folder / file).write_text(document)
-    flags = ("--seed", "4", "--quiet", "--in-process", "--threads", "1")
-    workspace.run("run", file, *flags, "--out", "run")
-
-
-@pytest.fixture(scope="session")
-def crowded_arena_run(once: Once) -> Path:
-    """Return the folder of the undisturbed crowded arena, run in one process."""
-    return (
-        once("crowd", lambda workspace: _arena(workspace, "crowd.toml", CROWDED_ARENA))
-        / "run"
-    )
-
-
-@pytest.fixture(scope="session")
-def small_arena_document() -> str:
-    return SMALL_ARENA
-
-
 @pytest.fixture
 def small_arena_workspace(workspace: Workspace) -> Workspace:
     """Return a workspace whose folder contains ``hamlet.toml``, the small arena."""
@@ -137,10 +76,22 @@ def small_arena_workspace(workspace: Workspace) -> Workspace:
     return workspace
 
 
+def _arena(once: Once, words: tuple[str, ...], document: str) -> Path:
+    """Return the folder of an undisturbed arena, run in one process."""
+
+    def make(workspace: Workspace) -> None:
+        (workspace.folder / words[0]).write_text(document)
+        flags = ("--in-process", "--threads", "1", "--out", "run")
+        workspace.run("run", *words, *flags)
+
+    return once(words[0], make) / "run"
+
+
+@pytest.fixture(scope="session")
+def crowded_arena_run(once: Once) -> Path:
+    return _arena(once, CROWD, CROWDED_ARENA)
+
+
 @pytest.fixture(scope="session")
 def small_arena_run(once: Once) -> Path:
-    """Return the folder of the undisturbed small arena, run in one process."""
-    return (
-        once("hamlet", lambda workspace: _arena(workspace, "hamlet.toml", SMALL_ARENA))
-        / "run"
-    )
+    return _arena(once, HAMLET, SMALL_ARENA)

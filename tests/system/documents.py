@@ -1,4 +1,9 @@
-"""Experiments of a few seconds that several tests run."""
+"""Experiments of a few seconds that several tests run, and the words of their runs."""
+
+SCENARIO1 = ("scenario1", "--seed", "5", "--births", "60", "--quiet")
+HAMLET = ("hamlet.toml", "--seed", "4", "--quiet")
+CROWD = ("crowd.toml", "--seed", "4", "--quiet")
+"""Runs of the fixtures ``undisturbed``, ``small_arena_run``, ``crowded_arena_run``."""
 
 OFF_LINE = """
 name = "singles"
@@ -49,6 +54,24 @@ birth_radius_m = 0.4
 record_touches = true
 """
 """Arena of little more than half a minute that covers all kinds of events."""
+
+CROWDED_ARENA = """
+name = "crowd"
+births = 25
+[selection]
+population = 8
+[simulation]
+warmup_steps = 600
+window_steps = 1200
+[arena]
+birth_interval_s = 4.0
+cull_interval_s = 8.0
+sample_interval_s = 2.0
+snapshot_interval_s = 10.0
+birth_radius_m = 0.5
+record_touches = true
+"""
+"""Small arena in which robots collide and half of them die."""
 
 SHORT_ARENA = """
 [islands.arena]
@@ -108,3 +131,30 @@ topology = "ring"
 epoch = 6
 """
 """An off-line island and an arena whose newborns learn, with migration."""
+
+RING = """
+name = "ring"
+births = 45
+[simulation]
+window_steps = 80
+[[islands]]
+count = 8
+[migration]
+topology = "ring"
+epoch = 15
+judge_anew = true
+"""
+
+ARENAS = f"""
+name = "arenas"
+births = 10
+{SHORT_EVALUATIONS}
+[[islands]]
+count = 2
+{SHORT_ARENA}
+[migration]
+topology = "ring"
+epoch = 7
+epoch_s = 10.0
+handling = "evict"
+"""

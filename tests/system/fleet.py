@@ -1,26 +1,51 @@
 """A coordinator and agents that a test starts, stops and kills."""
 
 import os
+import shutil
 import signal
 import subprocess
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import zenoh
 
+from coordinator.islands.events import Advanced
+from coordinator.storage.journal import NAME, Journal
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import agents_alive
-from tests.system.workspace import Workspace, wait_until
-
-Fleets = Callable[..., Any]
-"""Type of the fixture that starts fleets."""
+from tests.system.workspace import Process, Workspace, wait_until
 
 
 def size(folder: Path) -> int:
     """Return the size of a run's journal [bytes]; it may be growing."""
     journal = folder / "journal.bin"
     return journal.stat().st_size if journal.exists() else 0
+
+
+def kill_beyond(process: Process, folder: Path, position: float) -> None:
+    """Kill a process when the journal of its run exceeds a size [bytes]."""
+    wait_until(
+        lambda: size(folder) > position or process.poll() is not None,
+        "the run is on its way",
+    )
+    process.kill()
+    process.communicate()
+
+
+def advances(folder: Path) -> list[Advanced]:
+    """Return the advances of a run's journal, which may be growing."""
+    with TemporaryDirectory() as copied:
+        shutil.copy(folder / NAME, copied)
+        with Journal.open(Path(copied)) as journal:
+            return [event for event in journal.replay() if isinstance(event, Advanced)]
+
+
+def holders(folder: Path) -> list[str]:
+    """Return the name of the worker of each advance, without what a restart changes."""
+    return [one.provenance.agent.partition("-")[0] for one in advances(folder)]
 
 
 def agent_processes(pid: int) -> list[int]:
@@ -41,20 +66,24 @@ class Fleet:
     """A coordinator and agents that can be stopped, killed and disconnected."""
 
     def __init__(
-        self, workspace: Workspace, *words: str, listen: str = "", inside: str = ""
+        self,
+        workspace: Workspace,
+        *words: str,
+        listen: str = "",
+        **where: Any,  # noqa: ANN401 - as of Workspace.start
     ) -> None:
         self.workspace = workspace
         self.folder = workspace.folder / "run"
         self.address = listen or "tcp/127.0.0.1:0"
         all_words = (*words, "--out", "run", "--listen", self.address)
-        self.coordinator = workspace.start("coordinator", *all_words, inside=inside)
+        self.coordinator = workspace.start("coordinator", *all_words, **where)
         wait_until(
             lambda: (self.folder / "address").exists() or self.is_over,
             "the coordinator listens",
         )
         if not listen:
             self.address = (self.folder / "address").read_text().split()[0]
-        self.agents: dict[str, subprocess.Popen[str]] = {}
+        self.agents: dict[str, Process] = {}
 
     @property
     def is_over(self) -> bool:
@@ -69,12 +98,7 @@ class Fleet:
         return agent_processes(process.pid)[0]
 
     def begin(self, workers: int, *, has_analyzer: bool = True) -> None:
-        """Start an analyzer once this many workers are connected; births begin.
-
-        Args:
-            workers: to wait for.
-            has_analyzer: start it; otherwise only wait.
-        """
+        """Wait for this many workers; start an analyzer, so that births begin."""
         config = zenoh.Config.from_json5(client_config(self.address))
         with zenoh.open(config) as session:
             key = agents_alive("default", "worker")
@@ -84,6 +108,20 @@ class Fleet:
             )
         if has_analyzer:
             self.join("judge", "analyzer")
+
+    @contextmanager
+    def misbehaving(self, behaviour: str) -> Iterator[list[str]]:
+        """Join with ``misbehaving_agent.py``; its report is in the list at the end."""
+        report: list[str] = []
+        agent = self.workspace.start(
+            self.address, behaviour, module="tests.system.misbehaving_agent"
+        )
+        try:
+            yield report
+        finally:
+            agent.terminate()
+            said, _ = agent.communicate()
+        report += said.split()[1:]
 
     def kill(self, name: str) -> None:
         """Kill an agent and the parent process that would restart it."""
@@ -122,3 +160,15 @@ def make_certificate(folder: Path, name: str, authority: str, host: str) -> Tls:
     subprocess.run(["sh", "-c", script], check=True, capture_output=True)
     files = (f"{authority}.pem", f"{name}.pem", f"{name}.key")
     return Tls(*(str(folder / file) for file in files))
+
+
+def kit_files(kit: Path, name: str) -> Tls:
+    """Return the certificate files of a member of a kit."""
+    own = kit / "members" / name
+    return Tls(*(str(own / file) for file in ("ca.pem", "certificate.pem", "key.pem")))
+
+
+def tls_flags(tls: Tls) -> tuple[str, ...]:
+    """Return the flags that name certificate files."""
+    own = ("--tls-certificate", tls.certificate, "--tls-key", tls.key)
+    return ("--tls-ca", tls.ca, *own)

@@ -13,11 +13,6 @@ from schema.wire.messages import AgentInfo, Crash
 def introduce(session: zenoh.Session, member: Member, *deaths: Crash) -> Any:  # noqa: ANN401 - of Zenoh
     """Declare a queryable that says what a good agent of this machine says.
 
-    Args:
-        session: of the agent.
-        member: the agent.
-        deaths: of its predecessors.
-
     Returns:
         The queryable, which ends with its session or with the last reference to it.
     """

@@ -42,15 +42,7 @@ def config_of(address: str, ca: str, certificate: str, key: str) -> zenoh.Config
 def intrude(
     session: zenoh.Session, ears: zenoh.Session, chief: Member, other: Member
 ) -> Counter[str]:
-    """Use the keys of a coordinator and a worker until SIGTERM.
-
-    Args:
-        session: gives orders and declares tokens.
-        ears: declares queryables and subscribers; a session of its own, since each
-            session gets what it sends itself.
-        chief: the coordinator.
-        other: the worker.
-    """
+    """Use the keys of a coordinator and a worker until SIGTERM."""
     got: Counter[str] = Counter()
 
     def count(kind: str) -> "zenoh.handlers.Callback[zenoh.Sample]":

@@ -167,13 +167,7 @@ class FleetKills:
         self._stack.close()
 
     def run(self, reference: Reference, folder: Path, left: Counter[str]) -> None:
-        """Execute a run with kills, and compare it.
-
-        Args:
-            reference: the first run of the document.
-            folder: of the run.
-            left: kills that are to be made, by role; decreases.
-        """
+        """Execute a run with kills, and compare it."""
         kills = 0
         child = self._resume(reference, folder)
         while (code := self._wait(child, reference, folder, left)) is None:

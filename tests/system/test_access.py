@@ -1,7 +1,6 @@
 """Roles of certificates at a real hub, and processes of one user without flags."""
 
 import json
-import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime, timedelta
@@ -14,9 +13,10 @@ from coordinator.cluster.kit import ClusterKit, Kit
 from coordinator.storage.compare import compare
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import Member, agents_alive, member_of
-from tests.system.fleet import make_certificate
+from tests.system.documents import SCENARIO1
+from tests.system.fleet import kit_files, make_certificate, tls_flags
 from tests.system.test_agents import free_address
-from tests.system.workspace import Workspace, runtime_directory, said, wait_until
+from tests.system.workspace import Process, Workspace, runtime_directory, wait_until
 
 pytestmark = pytest.mark.system
 
@@ -28,7 +28,7 @@ ROLES = {
     "looker": "viewer",
     "boss": "operator",
 }
-RUN = ("scenario1", "--seed", "5", "--births", "60", "--quiet", "--out", "run")
+RUN = (*SCENARIO1, "--out", "run")
 
 
 class Lab:
@@ -43,19 +43,15 @@ class Lab:
         members = [{"name": name, "role": role} for name, role in ROLES.items()]
         (workspace.folder / "access.json").write_text(json.dumps(members))
         self.hub = self.start("hub", "hub", "--access", "access.json")
-        assert self.hub.stderr is not None
         assert "listening on tls/" in self.hub.stderr.readline()
 
     def certified(self, name: str, authority: str) -> Tls:
         return make_certificate(self.workspace.folder, name, authority, "127.0.0.1")
 
-    def start(self, name: str, *words: str) -> subprocess.Popen[str]:
+    def start(self, name: str, *words: str) -> Process:
         where = "--listen" if words[0] == "hub" else "--connect"
-        tls = self.tls[name]
-        files = ("--tls-ca", tls.ca, "--tls-certificate", tls.certificate)
-        return self.workspace.start(
-            *words, where, self.address, *files, "--tls-key", tls.key
-        )
+        files = tls_flags(self.tls[name])
+        return self.workspace.start(*words, where, self.address, *files)
 
     @contextmanager
     def session(self, tls: Tls) -> Iterator[zenoh.Session]:
@@ -182,21 +178,7 @@ def test_three_commands_of_one_user_need_no_address(
 def test_name_of_an_agent_is_that_of_its_certificate(lab: Lab) -> None:
     process = lab.start("good", "worker", "--name", "other")
     assert process.wait(60) == 2
-    assert process.stderr is not None
     assert "--name: must be 'good', the name of " in process.stderr.read()
-
-
-def test_a_worker_and_the_hub_say_that_a_certificate_is_not_listed(lab: Lab) -> None:
-    lab.tls["unlisted"] = lab.certified("unlisted", "ca")
-    worker = lab.start("unlisted", "worker", "--processes", "2")
-    assert worker.stderr is not None
-    assert lab.hub.stderr is not None
-    first, second = worker.stderr.readline(), worker.stderr.readline()
-    assert said(first) == [f"connected to {lab.address}"]
-    assert "drops all that this worker sends: its certificate was revoked" in second
-    assert f"; revolve doctor --connect {lab.address} --fleet default" in second
-    told = said(lab.hub.stderr.readline())
-    assert told[0].startswith("certificate 'unlisted' is not in --access (revoked?)")
 
 
 def test_hub_closes_links_when_their_certificate_expires(workspace: Workspace) -> None:
@@ -209,27 +191,13 @@ def test_hub_closes_links_when_their_certificate_expires(workspace: Workspace) -
     for name, left_s in (("late", -5.0), ("brief", 20.0)):
         clock[0] = start - timedelta(days=1) + timedelta(seconds=left_s)
         kit.add(name, "worker")
-    files = {
-        name: Tls(
-            *(
-                str(folder / "members" / name / file)
-                for file in ("ca.pem", "certificate.pem", "key.pem")
-            )
-        )
-        for name in ("hub", "good", "late", "brief")
-    }
     address = free_address().replace("tcp/", "tls/")
-    tls = files["hub"]
-    hub = workspace.start(
-        *("hub", "--listen", address, "--access", str(folder / "access.json")),
-        *("--tls-ca", tls.ca, "--tls-certificate", tls.certificate),
-        *("--tls-key", tls.key),
-    )
-    assert hub.stderr is not None
+    words = ("hub", "--listen", address, "--access", str(folder / "access.json"))
+    hub = workspace.start(*words, *tls_flags(kit_files(folder, "hub")))
     assert "listening on tls/" in hub.stderr.readline()
 
     def opened(name: str) -> zenoh.Session:
-        config = client_config(address, files[name])
+        config = client_config(address, kit_files(folder, name))
         return zenoh.open(zenoh.Config.from_json5(config))
 
     with pytest.raises(zenoh.ZError):

@@ -1,13 +1,12 @@
 """Tests of ``revolve worker`` and ``revolve analyzer`` as started by a user."""
 
 import os
-import shutil
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,7 +14,6 @@ import pytest
 
 from coordinator.dispatch.events import DispatchEvent, Joined, Left, Returned
 from coordinator.network.service import Network
-from schema.agent.network import Tls
 
 pytestmark = pytest.mark.system
 
@@ -125,27 +123,3 @@ def test_agents_do_not_outlive_their_command() -> None:
             until(network, 2)
             process.kill()
             assert all(isinstance(event, Left) for event in until(network, 2))
-
-
-@pytest.mark.skipif(not shutil.which("openssl"), reason="makes certificates")
-def test_only_agents_with_a_certificate_connect(
-    tmp_path: Path, certify: Callable[[Path, str, str, str], Tls]
-) -> None:
-    hub = certify(tmp_path, "hub", "ca", "127.0.0.1")
-    friend = certify(tmp_path, "friend", "ca", "127.0.0.1")
-    stranger = certify(tmp_path, "stranger", "another", "127.0.0.1")
-    address = free_address().replace("tcp/", "tls/")
-
-    def flags(tls: Tls) -> list[str]:
-        files = ["--tls-certificate", tls.certificate, "--tls-key", tls.key]
-        return ["--connect", address, "--processes", "1", "--tls-ca", hub.ca, *files]
-
-    with (
-        Network(name="c", listen=(address,), tls=hub) as network,
-        command("worker", *flags(stranger), "--name", "stranger") as outside,
-    ):
-        assert outside.stderr is not None
-        assert "unknown ca" in outside.stderr.readline()
-        with command("worker", *flags(friend), "--name", "friend"):
-            (name,) = agents(until(network, 1))
-            assert name.startswith("friend-0.")

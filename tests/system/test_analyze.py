@@ -141,20 +141,6 @@ def test_three_libraries_read_the_same_tables(
         assert rows == [tuple(row.values()) for row in arrow.to_pylist()]
 
 
-def test_a_missing_folder_is_reported_in_one_line(workspace: Workspace) -> None:
-    output = workspace.run("analyze", "nowhere", code=2)
-    assert output == "revolve: nowhere: no such folder\n"
-
-
-def test_a_file_as_output_folder_is_refused(
-    workspace: Workspace, undisturbed: Path
-) -> None:
-    (workspace.folder / "file").write_text("mine")
-    output = workspace.run("analyze", str(undisturbed), "--out", "file", code=2)
-    assert output == "revolve: file: must be a folder, got a file\n"
-    assert (workspace.folder / "file").read_text() == "mine"
-
-
 def test_a_damaged_run_is_measured_in_part(
     workspace: Workspace, undisturbed: Path
 ) -> None:

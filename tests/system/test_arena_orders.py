@@ -2,7 +2,6 @@
 
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 import zenoh
@@ -16,7 +15,7 @@ from schema.tables.files import read_table
 from schema.wire.arena import Live
 from schema.wire.codec import decode
 from schema.wire.poses import PoseArrays
-from tests.system.workspace import Until
+from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -36,17 +35,16 @@ birth_interval_s = 4.0
 sample_interval_s = 2.0
 """
 
-Workspace = Any
-
 
 def test_pause_list_insert_remove_snapshot_resume(
-    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until
+    crowded_arena_workspace: Workspace,
+    crowded_arena_run: Path,
 ) -> None:
     folder = crowded_arena_workspace.folder / "run"
     words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
     flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
     coordinator = crowded_arena_workspace.start("run", *words, *flags)
-    until((folder / "address").exists, "the coordinator listens")
+    wait_until((folder / "address").exists, "the coordinator listens")
     address = (folder / "address").read_text().split()[0]
 
     def arena(*more: str, code: int = 0) -> str:
@@ -64,9 +62,9 @@ def test_pause_list_insert_remove_snapshot_resume(
     with zenoh.open(config) as session:
         key = "revolve/default/w/*/arena/0/pose"
         _subscriber = session.declare_subscriber(key, watch)
-        until(lambda: len(received) > 10, "live poses of the arena arrive")
+        wait_until(lambda: len(received) > 10, "live poses of the arena arrive")
         assert "takes effect at" in arena("pause")
-        until(lambda: arena("list").startswith("paused"), "the arena pauses")
+        wait_until(lambda: arena("list").startswith("paused"), "the arena pauses")
         before = arena("list")
         first = before.splitlines()[2].split()[0]
         refused = arena("remove", "999", code=1)
@@ -80,7 +78,7 @@ def test_pause_list_insert_remove_snapshot_resume(
         arena("snapshot")
         assert first not in [line.split()[0] for line in arena("list").splitlines()[2:]]
         arena("resume")
-        until(lambda: coordinator.poll() is not None, "the run ends")
+        wait_until(lambda: coordinator.poll() is not None, "the run ends")
     assert coordinator.returncode == 0, coordinator.communicate()
     assert compare(crowded_arena_run, folder) != []
     assert "removed" in read_table(folder, "deaths")["reason"].to_pylist()
@@ -97,14 +95,14 @@ def test_pause_list_insert_remove_snapshot_resume(
 
 
 def test_robot_with_its_own_part_types_is_inserted(
-    workspace: Workspace, until: Until
+    workspace: Workspace,
 ) -> None:
     shutil.copy(CRITTERS / "bodies.py", workspace.folder)
     (workspace.folder / "mine.toml").write_text(PISTONS)
     folder = workspace.folder / "run"
     flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
     coordinator = workspace.start("run", "mine.toml", "--quiet", "--out", "run", *flags)
-    until((folder / "address").exists, "the coordinator listens")
+    wait_until((folder / "address").exists, "the coordinator listens")
     words = ("robot", "random", "guest.yaml", "--experiment", "mine.toml")
     workspace.run(*words, "--seed", "3")
     assert "Piston" in (workspace.folder / "guest.yaml").read_text()
@@ -112,13 +110,6 @@ def test_robot_with_its_own_part_types_is_inserted(
     assert "--experiment FILE.toml" in workspace.run(*insert, code=2)
     answer = workspace.run(*insert, "--experiment", "mine.toml")
     assert "takes effect at" in answer
-    until(lambda: coordinator.poll() is not None, "the run ends")
+    wait_until(lambda: coordinator.poll() is not None, "the run ends")
     assert coordinator.returncode == 0, coordinator.communicate()
     assert [] in read_table(folder, "births")["parents"].to_pylist()[8:]
-
-
-def test_orders_without_a_coordinator_are_refused_in_one_line(
-    workspace: Workspace,
-) -> None:
-    output = workspace.run("arena", "list", "--connect", "tcp/127.0.0.1:9", code=2)
-    assert output.strip() == "revolve: no hub at tcp/127.0.0.1:9"

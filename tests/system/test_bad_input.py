@@ -2,17 +2,16 @@
 
 import os
 import shutil
-import signal
-import socket
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-pytestmark = pytest.mark.system
+from coordinator.storage.compare import compare
+from tests.system.documents import HAMLET, SCENARIO1
+from tests.system.workspace import Workspace
 
-Workspace = Any
+pytestmark = pytest.mark.system
 
 
 def _refused(workspace: Workspace, *words: str) -> str:
@@ -30,26 +29,6 @@ def test_certificates_of_the_environment_are_not_those_of_a_run_in_one_process(
     assert process.wait(60) == 0
 
 
-def test_port_in_use_is_refused(workspace: Workspace) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        address = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
-        words = ("coordinator", "scenario1", "--out", "x", "--listen", address)
-        assert "in use" in _refused(workspace, *words)
-
-
-def test_worker_without_a_coordinator_reports_it_and_retries(
-    workspace: Workspace,
-) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-    worker = workspace.start("worker", "--connect", f"tcp/127.0.0.1:{port}")
-    line = worker.stderr.readline()
-    assert f"127.0.0.1:{port}" in line
-    assert worker.poll() is None
-    worker.send_signal(signal.SIGINT)
-    assert worker.wait(30) == 0
-
-
 def _fill_the_disk(workspace: Workspace, *words: str, kilobytes: int) -> None:
     """Run on a small disk until it is full; copy the run folder to ``moved``."""
     disk = workspace.folder / "disk"
@@ -58,7 +37,7 @@ def _fill_the_disk(workspace: Workspace, *words: str, kilobytes: int) -> None:
     if subprocess.run(mount, check=False).returncode:
         pytest.skip("a small disk cannot be mounted here")
     try:
-        output = workspace.run("run", *words, "--quiet", "--out", "disk/run", code=2)
+        output = workspace.run("run", *words, "--out", "disk/run", code=2)
         assert "full" in output
         assert "Traceback" not in output
         shutil.copytree(disk / "run", workspace.folder / "moved")
@@ -69,13 +48,12 @@ def _fill_the_disk(workspace: Workspace, *words: str, kilobytes: int) -> None:
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
 @pytest.mark.parametrize("flags", [("--in-process",), ("--workers", "2")])
 def test_run_resumes_after_a_full_disk(
-    workspace: Workspace, undisturbed: Path, births: int, flags: tuple[str, ...]
+    workspace: Workspace, undisturbed: Path, flags: tuple[str, ...]
 ) -> None:
-    words = ("scenario1", "--seed", "5", "--births", str(births), *flags)
+    words = (*SCENARIO1, *flags)
     _fill_the_disk(workspace, *words, kilobytes=64)
     workspace.run("resume", "moved", "--quiet", *flags)
-    output = workspace.run("compare", "moved", str(undisturbed))
-    assert "equal" in output
+    assert compare(workspace.folder / "moved", undisturbed) == []
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
@@ -83,11 +61,9 @@ def test_arena_resumes_after_a_full_disk(
     small_arena_workspace: Workspace, small_arena_run: Path
 ) -> None:
     flags = ("--in-process", "--threads", "1")
-    words = ("hamlet.toml", "--seed", "4", *flags)
-    _fill_the_disk(small_arena_workspace, *words, kilobytes=120)
+    _fill_the_disk(small_arena_workspace, *HAMLET, *flags, kilobytes=120)
     small_arena_workspace.run("resume", "moved", "--quiet", *flags)
-    output = small_arena_workspace.run("compare", "moved", str(small_arena_run))
-    assert "equal" in output
+    assert compare(small_arena_workspace.folder / "moved", small_arena_run) == []
 
 
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}

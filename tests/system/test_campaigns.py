@@ -1,10 +1,8 @@
-"""Tests of campaigns: interruption, kills, existing runs, a shared hub."""
+"""Tests of campaigns: interruption, kills, existing runs, a sweep, a shared hub."""
 
-import json
 import signal
 import socket
 from pathlib import Path
-from typing import Any
 
 import pytest
 import zenoh
@@ -14,14 +12,14 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.description import read_state
-from tests.system.workspace import Until, Workspace
+from tests.system.conftest import Once
+from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-
 SHORT = """
 name = "{name}"
-births = 20
+births = 16
 [selection]
 population = 8
 children = {children}
@@ -29,89 +27,74 @@ children = {children}
 window_steps = 400
 """
 """Evaluations of two seconds, as these tests do not depend on the physics."""
+EXPERIMENTS = {
+    "steady": SHORT.format(name="steady", children=1),
+    "broods": (
+        SHORT.format(name="broods", children=8)
+        + '[sweep]\nsettings."selection.population" = [5, 8]\n'
+    ),
+}
+WORDS = ("run", "steady.toml", "broods.toml", "--seed", "7", "--repeats", "2", "--out")
+RUNS = 6
+"""Each experiment is repeated, and one has two points of a sweep."""
 
-HUB = "tcp/127.0.0.1:0"
-REPEATS = 2
-NAMES = ("steady", "broods")
 
-
-def _write(folder: Path) -> None:
-    for name, children in zip(NAMES, (1, 8), strict=True):
-        text = SHORT.format(name=name, children=children)
-        (folder / f"{name}.toml").write_text(text)
-
-
-def _words(out: str, *more: str) -> tuple[str, ...]:
-    sources = tuple(f"{name}.toml" for name in NAMES)
-    return ("run", *sources, "--seed", "7", "--repeats", str(REPEATS), "--out", out,
-            *more)  # fmt: skip
+@pytest.fixture
+def lab(workspace: Workspace) -> Workspace:
+    """Return a workspace with the files of the experiments."""
+    for name, text in EXPERIMENTS.items():
+        (workspace.folder / f"{name}.toml").write_text(text)
+    return workspace
 
 
 @pytest.fixture(scope="session")
-def whole(once: Any) -> Path:  # noqa: ANN401 - the fixture
+def whole(once: Once) -> Path:
     """Return the folder of an undisturbed campaign, run in one process."""
 
     def make(workspace: Workspace) -> None:
-        _write(workspace.folder)
-        workspace.run(*_words("all", "--in-process", "--quiet"))
+        for name, text in EXPERIMENTS.items():
+            (workspace.folder / f"{name}.toml").write_text(text)
+        workspace.run(*WORDS, "all", "--in-process", "--quiet")
 
-    folder: Path = once("campaign", make)
-    return folder / "all"
-
-
-def _check_equal(whole: Path, other: Path) -> None:
-    for name in NAMES:
-        for repeat in range(REPEATS):
-            folder = f"{name}-{repeat}"
-            assert compare(whole / folder, other / folder) == [], folder
+    return once("campaign", make) / "all"
 
 
 def _sizes(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.glob("*/journal.bin"))
 
 
-def _make_single_run(workspace: Workspace, path: Path, name: str, run: int) -> None:
-    """Write a single run in the format of versions without environments."""
-    text = experiment_text(read_experiment(str(workspace.folder / f"{name}.toml")))
-    document = json.loads(text)
-    del document["environment"]
-    with RunFolder(path, RunDetails(name, run, 7, json.dumps(document))):
-        pass
-    workspace.run("resume", str(path), "--in-process", "--quiet")
-
-
 def test_killed_campaign_resumes_and_includes_existing_runs(
-    workspace: Workspace, whole: Path, until: Until
+    lab: Workspace, whole: Path
 ) -> None:
-    _write(workspace.folder)
-    campaign = workspace.folder / "campaign"
-    _make_single_run(workspace, campaign / "steady-1", "steady", 1)
+    campaign = lab.folder / "campaign"
+    text = experiment_text(read_experiment(str(lab.folder / "steady.toml")))
+    with RunFolder(campaign / "steady-1", RunDetails("steady", 1, 7, text)):
+        pass
+    lab.run("resume", "campaign/steady-1", "--in-process", "--quiet")
     existing = campaign / "steady-1" / "journal.bin"
-    before = existing.stat().st_mtime_ns
-    first = workspace.start(*_words("campaign", "--workers", "2"))
-    share = existing.stat().st_size + 0.4 * (_sizes(whole) - existing.stat().st_size)
-    until(lambda: _sizes(campaign) > share, "the campaign is on its way")
+    before = existing.stat()
+    first = lab.start(*WORDS, "campaign", "--workers", "2")
+    share = before.st_size + 0.4 * (_sizes(whole) - before.st_size)
+    wait_until(lambda: _sizes(campaign) > share, "the campaign is on its way")
     first.send_signal(signal.SIGKILL)
     first.communicate()
-    assert "stopped" in workspace.run("status", "campaign")
-    output = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 runs finished" in output
-    assert (
-        "keeps its own number of births" not in output
-    )  # it has as many births as the others
-    _check_equal(whole, campaign)
-    assert existing.stat().st_mtime_ns == before
-    again = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 of 4 runs already finished" in again
+    assert "stopped" in lab.run("status", "campaign")
+    output = lab.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert f"{RUNS} runs finished" in output
+    # It has as many births as the others.
+    assert "keeps its own number of births" not in output
+    assert compare(whole, campaign) == []
+    assert existing.stat().st_mtime_ns == before.st_mtime_ns
+    again = lab.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert f"{RUNS} of {RUNS} runs already finished" in again
 
 
 def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
-    workspace: Workspace, whole: Path, until: Until
+    lab: Workspace, whole: Path
 ) -> None:
-    _write(workspace.folder)
-    campaign = workspace.folder / "campaign"
-    first = workspace.start(*_words("campaign", "--workers", "2"))
-    until(lambda: _sizes(campaign) > 0.3 * _sizes(whole), "the campaign is on its way")
+    campaign = lab.folder / "campaign"
+    first = lab.start(*WORDS, "campaign", "--workers", "2")
+    wait_until(lambda: _sizes(campaign) > 0.3 * _sizes(whole), "it is on its way")
     first.send_signal(signal.SIGINT)
     out, err = first.communicate(timeout=60)
     assert first.returncode == 130, out + err
@@ -119,93 +102,56 @@ def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
     assert "Traceback" not in err
     begun = [path.parent for path in campaign.glob("*/run.json")]
     assert {read_state(path) for path in begun} <= {"stopped", "finished"}
-    assert (
-        workspace.run(*_words("campaign"), code=2).count("revolve resume campaign") == 1
-    )
-    workspace.run("resume", "campaign", "--in-process", "--quiet")
-    _check_equal(whole, campaign)
-
-
-def test_later_repeats_are_those_of_a_longer_campaign(
-    workspace: Workspace, whole: Path
-) -> None:
-    _write(workspace.folder)
-    sources = tuple(f"{name}.toml" for name in NAMES)
-    words = ("--seed", "7", "--first-repeat", "1", "--out", "later")
-    workspace.run("run", *sources, *words, "--in-process", "--quiet")
-    later = workspace.folder / "later"
-    names = [f"{name}-1" for name in NAMES]
-    assert sorted(path.parent.name for path in later.glob("*/run.json")) == sorted(
-        names
-    )
-    for name in names:
-        assert compare(whole / name, later / name) == []
+    again = lab.run(*WORDS, "campaign", code=2)
+    assert again.count("revolve resume campaign") == 1
+    lab.run("resume", "campaign", "--in-process", "--quiet")
+    assert compare(whole, campaign) == []
 
 
 def test_two_coordinators_share_the_workers_of_a_hub(
-    workspace: Workspace, whole: Path
+    lab: Workspace, whole: Path
 ) -> None:
-    _write(workspace.folder)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    flags = ("--seed", "7", "--repeats", "2", "--connect", address)
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
         commands = [
-            workspace.start(
-                "run", f"{name}.toml", "--seed", "7", "--repeats", str(REPEATS),
-                "--connect", address, "--out", name,
-            )
-            for name in NAMES
-        ]  # fmt: skip
-        workspace.start("analyzer", "--connect", address)
-        workspace.start("worker", "--connect", address, "--processes", "2")
+            lab.start("run", f"{name}.toml", *flags, "--out", name)
+            for name in EXPERIMENTS
+        ]
+        lab.start("analyzer", "--connect", address)
+        lab.start("worker", "--connect", address, "--processes", "2")
         for command in commands:
             out, err = command.communicate(timeout=200)
             assert command.returncode == 0, out + err
-    for name in NAMES:
-        for repeat in range(REPEATS):
-            run = f"{name}-{repeat}"
-            assert compare(whole / run, workspace.folder / name / run) == []
+    runs = [path.parent for path in whole.glob("*/run.json")]
+    assert len(runs) == RUNS
+    for run in runs:
+        name = run.name.partition("-")[0]
+        assert compare(run, lab.folder / name / run.name) == []
 
 
-def test_status_of_all_coordinators_of_a_hub(
-    workspace: Workspace, until: Until
-) -> None:
-    _write(workspace.folder)
-    first = workspace.start("coordinator", *_words("one")[1:], "--listen", HUB)
-    until((workspace.folder / "one" / "address").exists, "the first one listens")
-    address = (workspace.folder / "one" / "address").read_text().split()[0]
-    workspace.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
-    until((workspace.folder / "two" / "address").exists, "the second one is connected")
+def test_status_of_all_coordinators_of_a_hub(lab: Workspace) -> None:
+    words = ("coordinator", *WORDS[1:], "one", "--listen", "tcp/127.0.0.1:0")
+    first = lab.start(*words)
+    place = lab.folder / "one" / "address"
+    wait_until(place.exists, "the first one listens")
+    address = place.read_text().split()[0]
+    lab.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
+    wait_until((lab.folder / "two" / "address").exists, "the second one is connected")
 
     def status() -> str:
-        text = workspace.run("status", "--connect", address)
-        return str(text)
+        return lab.run("status", "--connect", address)
 
-    until(
-        lambda: "two" in status() and "broods-1" in status(), "both coordinators answer"
+    wait_until(
+        lambda: "two" in status() and "steady-1" in status(), "both coordinators answer"
     )
     assert "0 workers" not in status()
-    assert "0 of 4 runs finished, 0 of 80 births" in status()
+    assert f"0 of {RUNS} runs finished, 0 of {16 * RUNS} births" in status()
     # The folder's own coordinator answers; a folder alone has no estimate of time left.
-    assert "left" not in workspace.run("status", "one")
-    workspace.start("worker", "--connect", address, "--processes", "1")
-    until(
-        lambda: "1 worker, 0 analyzers" in workspace.run("status", "one"), "it answers"
+    assert "left" not in lab.run("status", "one")
+    lab.start("worker", "--connect", address, "--processes", "1")
+    wait_until(
+        lambda: "1 worker, 0 analyzers" in lab.run("status", "one"), "it answers"
     )
     assert first.poll() is None
-
-
-def test_killed_sweep_resumes(workspace: Workspace, until: Until) -> None:
-    text = SHORT.format(name="sizes", children=1)
-    settings = 'settings."selection.population" = [5, 8]'
-    (workspace.folder / "sizes.toml").write_text(f"{text}[sweep]\n{settings}\n")
-    words = ("run", "sizes.toml", "--seed", "7", "--in-process", "--quiet", "--out")
-    assert "2 runs finished" in workspace.run(*words, "all")
-    whole, killed = workspace.folder / "all", workspace.folder / "killed"
-    first = workspace.start(*words, "killed")
-    until(lambda: _sizes(killed) > 0.4 * _sizes(whole), "the sweep is on its way")
-    first.send_signal(signal.SIGKILL)
-    first.communicate()
-    workspace.run("resume", "killed", "--in-process", "--quiet")
-    for name in ("sizes-0-0", "sizes-1-0"):
-        assert compare(whole / name, killed / name) == []

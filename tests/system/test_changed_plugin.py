@@ -27,7 +27,6 @@ def far(track, fitness):
     return float(track.core_position[-1, 0])
 """
 FAULTY = "\ndef far(track):\n    return 0.0\n"
-HOW = ("--in-process", "--quiet")
 
 
 def test_an_edited_module_does_not_stop_its_run(workspace: Workspace) -> None:
@@ -72,31 +71,3 @@ def spawned(process: int) -> list[int]:
             if int(parent) == process and "spawn_main" in words:
                 found.append(int(entry.name))
     return found
-
-
-def test_another_file_that_is_named_is_refused(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # As an installed command: the folder is not searched for modules.
-    monkeypatch.setenv("PYTHONSAFEPATH", "1")
-    run, module = workspace.folder / "a", workspace.folder / "lab.py"
-    (workspace.folder / "mine.toml").write_text(DOCUMENT)
-    module.write_text(MODULE)
-    workspace.run("run", "mine.toml", "--out", "a", *HOW)
-    assert "lab.py:2: in order" in workspace.run("check", "a")
-    (run / "state").write_text("stopped")
-    before = (run / "journal.bin").read_bytes()
-
-    module.write_text(FAULTY)
-    named = ("--plugins", "lab.py")
-    for words, code in ((("resume", "a", *HOW), 2), (("check", "a"), 1)):
-        (line,) = workspace.run(*words, *named, code=code).splitlines()[-1:]
-        assert "plug-in lab: has source digest" in line
-        assert "--plugins lab=a/plugins/lab.py (in Python: " in line
-    assert (run / "journal.bin").read_bytes() == before
-
-    named = ("--plugins", "lab=a/plugins/lab.py")
-    assert "in order" in workspace.run("check", "a", *named)
-    workspace.run("resume", "a", *HOW, *named)
-    assert (run / "state").read_text().strip() == "finished"
-    assert "a: already finished" in workspace.run("resume", "a", *HOW)

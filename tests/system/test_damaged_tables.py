@@ -13,6 +13,7 @@ import pytest
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
 from schema.tables.segments import segment_path
+from tests.system.documents import SMALL_ARENA
 from tests.system.flipping import flip, flips
 from tests.system.workspace import Workspace, wait_until
 
@@ -54,11 +55,11 @@ def offline(once: Once) -> Path:
 
 
 @pytest.fixture(scope="module")
-def arena(once: Once, small_arena_document: str) -> Path:
+def arena(once: Once) -> Path:
     """Return such a folder for an arena."""
 
     def make(workspace: Workspace) -> None:
-        (workspace.folder / "mine.toml").write_text(small_arena_document)
+        (workspace.folder / "mine.toml").write_text(SMALL_ARENA)
         _make(workspace, ARENA, "poses")
 
     return once("flip-arena", make)
@@ -94,29 +95,6 @@ def test_a_flipped_bit_in_a_segment_is_named_and_computed_again(
         table == "poses"
     )
     assert compare(kinds[kind] / "finished", folder) == []
-
-
-@pytest.mark.parametrize(
-    ("kind", "table"),
-    [
-        ("offline", "births"),
-        pytest.param("arena", "poses", marks=pytest.mark.long),
-    ],
-)
-def test_a_flipped_bit_in_a_finished_table_is_named_and_computed_again(
-    workspace: Workspace, kinds: dict[str, Path], kind: str, table: str
-) -> None:
-    folder = workspace.folder / "run"
-    shutil.copytree(kinds[kind] / "finished", folder)
-    (path,) = folder.rglob(f"{table}.parquet")
-    flip(path, 4 * path.stat().st_size)
-    output = workspace.run("analyze", "run", "--out", "report")
-    is_measured = table == "births"
-    assert ("births.parquet: damaged" in output) == is_measured
-    output = workspace.run("resume", "run", *FLAGS)
-    assert f"{table}.parquet: damaged (its SHA-256 is not the one" in output
-    assert compare(kinds[kind] / "finished", folder) == []
-    assert "already finished" in workspace.run("resume", "run", *FLAGS)
 
 
 def test_lost_poses_are_simulated_again_by_worker_processes(

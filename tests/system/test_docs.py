@@ -1,21 +1,20 @@
 """Runs the code of README and docs unchanged."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import msgspec
 import pytest
 
+from coordinator.storage.compare import compare
 from revolve.cli.commands import COMMANDS
 from schema.experiment.document import ArenaSection
 from schema.parts import ACTIVE_HINGE, PartType
 from tests.documents import parse_experiment
 from tests.own_brains import write_module
+from tests.system.workspace import Workspace
 from worker.kinds import check_fitness
 from worker.measures import BUILT_IN, measures_of
 
@@ -31,179 +30,137 @@ def _blocks(page: Path, language: str) -> list[str]:
     )
 
 
-def _environment(*paths: Path) -> dict[str, str]:
-    found = os.pathsep.join(map(str, (*paths, TOP)))
-    return {**os.environ, "PYTHONPATH": found}
+def _write(workspace: Workspace, files: Mapping[str, str]) -> Path:
+    """Write files, by their names; return their folder."""
+    for name, text in files.items():
+        (workspace.folder / name).write_text(text)
+    return workspace.folder
 
 
-def _python(
-    words: Sequence[str], folder: Path, *paths: Path
-) -> subprocess.CompletedProcess[str]:
-    """Run Python with arguments in a folder, as a reader would."""
-    return subprocess.run(
-        [sys.executable, *words],
-        cwd=folder,
-        env=_environment(*paths),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def _follow(workspace: Workspace, lines: Iterable[str]) -> list[str]:
+    """Run ``revolve`` as the lines say, one after the other; return what it writes."""
+    return [workspace.run(*line.partition("#")[0].split()[1:]) for line in lines]
 
 
-def _follow(
-    lines: Iterable[str], folder: Path, *paths: Path
-) -> list[subprocess.CompletedProcess[str]]:
-    """Run commands one after the other; each has to succeed."""
-    done = [_python(("-m", *line.partition("#")[0].split()), folder, *paths)
-            for line in lines]  # fmt: skip
-    for each in done:
-        assert each.returncode == 0, f"{each.args}\n{each.stdout}{each.stderr}"
-    return done
+def _quoted(page: Path, start: str) -> str:
+    """Return the message that a page quotes."""
+    pattern = rf"^    ({re.escape(start)} .*)$"
+    (message,) = re.findall(pattern, page.read_text(), re.MULTILINE)
+    return str(message)
 
 
 @pytest.mark.parametrize(
     ("page", "least"), [("tables.md", 5), ("analysis.md", 3), ("viewing.md", 0)]
 )
 def test_code_of_pages_about_tables_runs(
-    page: str, least: int, undisturbed: Path, tmp_path: Path
+    workspace: Workspace, page: str, least: int, undisturbed: Path
 ) -> None:
-    shutil.copytree(undisturbed, tmp_path / "runs" / "a")
-    commands = [["-m", *block.split()]
-                for block in _blocks(TOP / "docs" / page, "bash")]  # fmt: skip
+    shutil.copytree(undisturbed, workspace.folder / "runs" / "a")
     blocks = _blocks(TOP / "docs" / page, "python")
     assert len(blocks) >= least
-    for words in [
-        *commands,
-        *(["-W", "error", "-c", block] for block in blocks),
-    ]:
-        done = _python(words, tmp_path)
-        assert done.returncode == 0, f"{words[-1]}\n{done.stderr}"
+    _follow(workspace, _blocks(TOP / "docs" / page, "bash"))
+    for block in blocks:
+        workspace.python("-W", "error", "-c", block)
 
 
-def test_selection_of_the_selection_page_runs(tmp_path: Path) -> None:
+def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
     """Two workers give the births of one process; the run needs its folder alone."""
     page = TOP / "docs" / "selection.md"
     (module,) = _blocks(page, "python")
     (document,) = _blocks(page, "toml")
-    plugin = tmp_path / "crowding.py"
-    plugin.write_text(module)
-    (tmp_path / "crowding.toml").write_text(document)
+    folder = _write(workspace, {"crowding.py": module, "crowding.toml": document})
     (block,) = _blocks(page, "sh")
     check, run = (line.split()[1:] for line in block.strip().splitlines())
-    environment = {
-        **_environment(),
-        "XDG_STATE_HOME": str(tmp_path / "state"),
+    workspace.environment |= {
+        "XDG_STATE_HOME": str(folder / "state"),
         # As an installed command: the folder is not searched for modules.
         "PYTHONSAFEPATH": "1",
     }
-
-    def revolve(*words: str) -> str:
-        done = subprocess.run(
-            [sys.executable, "-m", "revolve", *words],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    assert revolve(*check).count("in order") == 2
-    revolve(*run, "--in-process", "--quiet", "--out", "calm")
-    revolve(*run, "--workers", "2", "--quiet", "--out", "two")
-    assert "equal" in revolve("compare", "calm", "two")
+    assert workspace.run(*check).count("in order") == 2
+    workspace.run(*run, "--in-process", "--quiet", "--out", "calm")
+    workspace.run(*run, "--workers", "2", "--quiet", "--out", "two")
+    assert compare(folder / "calm", folder / "two") == []
     # As a kill leaves it: without the end of its journal.
-    journal = tmp_path / "two" / "journal.bin"
+    journal = folder / "two" / "journal.bin"
     journal.write_bytes(journal.read_bytes()[: journal.stat().st_size // 2])
-    (tmp_path / "two" / "state").write_text("running")
-    shutil.rmtree(tmp_path / "two" / "tables")
-    plugin.unlink()
-    revolve("resume", "two", "--in-process", "--quiet")
-    assert "equal" in revolve("compare", "calm", "two")
+    (folder / "two" / "state").write_text("running")
+    shutil.rmtree(folder / "two" / "tables")
+    (folder / "crowding.py").unlink()
+    workspace.run("resume", "two", "--in-process", "--quiet")
+    assert compare(folder / "calm", folder / "two") == []
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_measures_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
+def test_measures_page_runs_from_top_to_bottom(workspace: Workspace) -> None:
     page = TOP / "docs" / "measures.md"
     module, *readers = _blocks(page, "python")
     built_in, own = _blocks(page, "toml")
     assert len(readers) >= 2
-    (tmp_path / "gaits.py").write_text(module)
-    (tmp_path / "gaits.toml").write_text(own)
+    _write(workspace, {"gaits.py": module, "gaits.toml": own})
     (block,) = _blocks(page, "sh")
-    _follow(block.splitlines(), tmp_path)
+    _follow(workspace, block.splitlines())
     for reader in readers:
-        done = _python(("-W", "error", "-c", reader), tmp_path)
-        assert done.returncode == 0, f"{reader}\n{done.stderr}"
+        workspace.python("-W", "error", "-c", reader)
     listed = re.findall(r"^\| `(\w+)` \| \S.*\| ", page.read_text(), re.MULTILINE)
     # The channel of the same name as a measure comes later.
     assert [name for name in dict.fromkeys(listed) if name in BUILT_IN] == [*BUILT_IN]
     measures = parse_experiment(built_in, str(page)).measures
     assert len(measures_of(measures)) == 5
-    # The message that the page quotes.
-    (tmp_path / "gaits.py").write_text(module.replace('@rv.needs("contact")\n', "\n"))
-    done = _python(("-m", "revolve", "check", "gaits.toml"), tmp_path)
-    (quoted,) = re.findall(
-        r"^    (measures\.names: .*)$", page.read_text(), re.MULTILINE
-    )
-    assert done.returncode != 0
-    assert quoted in done.stdout + done.stderr
+    wrong = module.replace('@rv.needs("contact")\n', "\n")
+    _write(workspace, {"gaits.py": wrong})
+    quoted = _quoted(page, "measures.names:")
+    assert quoted in workspace.run("check", "gaits.toml", code=1)
 
 
 @pytest.mark.slow
-def test_code_of_the_python_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
+def test_code_of_the_python_page_runs_from_top_to_bottom(workspace: Workspace) -> None:
     blocks = _blocks(TOP / "docs" / "python.md", "python")
     assert len(blocks) >= 8
-    done = _python(("-W", "error", "-c", "\n".join(blocks)), tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "no such experiment; did you mean 'scenario1'" in done.stdout
-    assert "\n20 of 20\n" in done.stdout
+    told = workspace.python("-W", "error", "-c", "\n".join(blocks))
+    assert "no such experiment; did you mean 'scenario1'" in told
+    assert "\n20 of 20\n" in told
 
 
-def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
+def test_experiments_of_the_experiments_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "experiments.md"
     (module,) = _blocks(page, "python")
-    (tmp_path / "my_parts.py").write_text(module)
     (yard,) = _blocks(page, "xml")
-    (tmp_path / "yard.xml").write_text(yard)
+    folder = _write(workspace, {"my_parts.py": module, "yard.xml": yard})
     documents = _blocks(page, "toml")
     assert len(documents) >= 3
     for document in documents:
-        (tmp_path / "mine.toml").write_text(document)
+        _write(workspace, {"mine.toml": document})
         words = f"--births 20 --in-process --quiet --out out-{len(document)}"
-        _follow([f"revolve run mine.toml {words}"], tmp_path, tmp_path)
+        _follow(workspace, [f"revolve run mine.toml {words}"])
         if "my_parts" not in document:
-            parse_experiment(document, str(tmp_path / page.name))
+            parse_experiment(document, str(folder / page.name))
 
 
-def test_experiments_of_the_brains_page_run(tmp_path: Path) -> None:
+def test_experiments_of_the_brains_page_run(workspace: Workspace) -> None:
     """Each runs equally in one process and with two workers."""
-    write_module(tmp_path)
+    write_module(workspace.folder)
     for document in _blocks(TOP / "docs" / "brains.md", "toml"):
-        (tmp_path / "mine.toml").write_text(document)
+        _write(workspace, {"mine.toml": document})
         runs = [f"out-{len(document)}-{number}" for number in range(2)]
-        hows = ("--in-process", "--workers 2")
-        words = "revolve run mine.toml --births 17 --quiet"
-        commands = [
-            f"{words} {how} --out {run}" for how, run in zip(hows, runs, strict=True)
-        ]
-        _follow([*commands, f"revolve compare {' '.join(runs)}"], tmp_path)
+        words = "revolve run mine.toml --births 17 --quiet --out"
+        hows = (f"{runs[0]} --in-process", f"{runs[1]} --workers 2")
+        _follow(workspace, [f"{words} {how}" for how in hows])
+        workspace.run("compare", *runs)
 
 
-def test_parts_page_runs(tmp_path: Path) -> None:
+def test_parts_page_runs(workspace: Workspace) -> None:
     page = TOP / "docs" / "parts.md"
     module, knees = _blocks(page, "python")
     document, with_knees = _blocks(page, "toml")
     (robot,) = _blocks(page, "yaml")
-    for name, text in (
-        ("my_parts.py", module),
-        ("mine.toml", document),
-        ("knees.py", knees),
-        ("knees.toml", with_knees),
-        ("kneed.yaml", robot),
-    ):
-        (tmp_path / name).write_text(text)
+    _write(
+        workspace, {"my_parts.py": module, "mine.toml": document, "kneed.yaml": robot}
+    )
+    _write(workspace, {"knees.py": knees, "knees.toml": with_knees})
     (block,) = _blocks(page, "sh")
-    for done in _follow(block.splitlines(), tmp_path):
-        printed = re.search(r"^fitness: +(\S+)", done.stdout, re.MULTILINE)
+    for told in _follow(workspace, block.splitlines()):
+        printed = re.search(r"^fitness: +(\S+)", told, re.MULTILINE)
         assert not printed or 0.025 < float(printed[1]) < 0.035
     # The page gives the numbers of the built-in hinge.
     session: dict[str, PartType] = {}
@@ -211,19 +168,13 @@ def test_parts_page_runs(tmp_path: Path) -> None:
     knee = session["KNEE"]
     assert knee.shape(()) == ACTIVE_HINGE.shape(())
     assert knee.motor == ACTIVE_HINGE.motor
-    words = "run mine.toml --births 20 --in-process --quiet --out out"
-    _follow([f"revolve {words}"], tmp_path)
-    # The message that the page quotes.
-    wrong = module.replace(
-        "length, 0.0, 0.0), (1.0, 0.0, 0.0), (", "length, 0.0, 0.0), (2.0, 0.0, 0.0), ("
-    )
-    (tmp_path / "my_parts.py").write_text(wrong)
-    done = _python(("-m", "revolve", *words.split()), tmp_path)
-    (quoted,) = re.findall(
-        r"^    (space\.part_types: .*)$", page.read_text(), re.MULTILINE
-    )
-    assert done.returncode != 0
-    assert quoted in done.stderr
+    words = ("run", "mine.toml", "--births", "20", "--in-process", "--quiet")
+    workspace.run(*words, "--out", "out")
+    axis = "length, 0.0, 0.0), ({}.0, 0.0, 0.0), ("
+    wrong = module.replace(axis.format(1), axis.format(2))
+    _write(workspace, {"my_parts.py": wrong})
+    told = workspace.run(*words, "--out", "wrong", code=2)
+    assert _quoted(page, "space.part_types:") in told
 
 
 def test_experiments_of_the_tasks_page_are_accepted(tmp_path: Path) -> None:
@@ -243,33 +194,35 @@ def test_arenas_page_lists_all_keys_with_their_defaults() -> None:
     ]
 
 
-def test_commands_of_the_robots_page_run(tmp_path: Path) -> None:
+def test_commands_of_the_robots_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "robots.md"
     (document,) = _blocks(page, "toml")
-    (tmp_path / "robogen.toml").write_text(document)
+    folder = _write(workspace, {"robogen.toml": document})
     (block,) = _blocks(page, "sh")
     own = "revolve robot simulate some.yaml --experiment robogen.toml"
-    done = _follow([*block.splitlines(), own], tmp_path)
-    printed = [each.stdout for each in done if "simulate" in each.args]
+    lines = [*block.splitlines(), own]
+    told = _follow(workspace, lines)
+    printed = [
+        text for line, text in zip(lines, told, strict=True) if "simulate" in line
+    ]
     assert printed[0] == printed[1]
     assert printed[2] != printed[0]
-    some, again = (tmp_path / name for name in ("some.yaml", "again.yaml"))
-    assert some.read_text() == again.read_text()
+    assert (folder / "some.yaml").read_text() == (folder / "again.yaml").read_text()
 
 
-def test_archipelagos_of_the_islands_page_run(tmp_path: Path) -> None:
+def test_archipelagos_of_the_islands_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "islands.md"
     (document,) = _blocks(page, "toml")
-    (tmp_path / "mine.toml").write_text(document)
+    _write(workspace, {"mine.toml": document})
     (block,) = _blocks(page, "sh")
     own = "revolve run mine.toml --births 24 --out mine"
-    _follow([own, *block.splitlines()], tmp_path)
+    _follow(workspace, [own, *block.splitlines()])
 
 
-def test_campaign_of_the_campaigns_page_runs(tmp_path: Path) -> None:
+def test_campaign_of_the_campaigns_page_runs(workspace: Workspace) -> None:
     (block,) = _blocks(TOP / "docs" / "campaigns.md", "sh")
-    *_, last = _follow(block.splitlines(), tmp_path)
-    assert "4 of 4 runs already finished" in last.stderr
+    *_, last = _follow(workspace, block.splitlines())
+    assert "4 of 4 runs already finished" in last
 
 
 def test_every_command_on_the_pages_exists() -> None:

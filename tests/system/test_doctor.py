@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from coordinator.cluster.kit import ClusterKit, Kit
+from tests.system.fleet import kit_files, tls_flags
 from tests.system.test_agents import free_address
 from tests.system.workspace import (
     PATIENCE_S,
@@ -30,15 +31,6 @@ def lines_of(
     out, err = process.communicate(timeout=PATIENCE_S)
     assert err == ""
     return process.returncode, {line[6:19].strip(): line for line in out.splitlines()}
-
-
-def files_of(kit: Kit, name: str) -> tuple[str, ...]:
-    folder = kit.folder / "members" / name
-    return (
-        *("--tls-ca", str(folder / "ca.pem")),
-        *("--tls-certificate", str(folder / "certificate.pem")),
-        *("--tls-key", str(folder / "key.pem")),
-    )
 
 
 def test_a_machine_without_a_hub(workspace: Workspace, tmp_path: Path) -> None:
@@ -87,30 +79,45 @@ def test_rights_of_certificates(workspace: Workspace) -> None:
     kit.add("gone", "worker")
     kit.revoke("gone")
     access = ("--access", str(kit.folder / "access.json"))
-    hub = workspace.start("hub", "--listen", address, *files_of(kit, "hub"), *access)
-    assert hub.stderr is not None
+    hub = workspace.start(
+        "hub", "--listen", address, *tls_flags(kit_files(kit.folder, "hub")), *access
+    )
     assert "listening" in hub.stderr.readline()
     code, lines = lines_of(
-        workspace, "--connect", address, *files_of(kit, "a"), *access
+        workspace, "--connect", address, *tls_flags(kit_files(kit.folder, "a")), *access
     )
     assert code == 0, lines
     assert "'a', worker, 89 days left" in lines["certificate"]
     assert lines["rights"].endswith("those of worker")
     code, lines = lines_of(
-        workspace, "--connect", address, *files_of(kit, "gone"), *access
+        workspace,
+        "--connect",
+        address,
+        *tls_flags(kit_files(kit.folder, "gone")),
+        *access,
     )
     assert code == 1
     assert "not in --access" in lines["certificate"]
     assert "revoked" in lines["rights"]
-    chief = ("--connect", address, *files_of(kit, "chief"), "--out", "run")
+    chief = (
+        "--connect",
+        address,
+        *tls_flags(kit_files(kit.folder, "chief")),
+        "--out",
+        "run",
+    )
     run = workspace.start("coordinator", "scenario1", "--quiet", *chief)
     wait_until((workspace.folder / "run" / "address").exists, "the run has an address")
-    code, lines = lines_of(workspace, "--connect", address, *files_of(kit, "boss"))
+    code, lines = lines_of(
+        workspace, "--connect", address, *tls_flags(kit_files(kit.folder, "boss"))
+    )
     assert code == 0, lines
     assert lines["rights"].endswith("those of operator")
     assert lines["coordinators"].split()[2].startswith("chief.")
     run.kill()
     (kit.folder / "members" / "a" / "key.pem").chmod(0o644)
-    code, lines = lines_of(workspace, "--connect", address, *files_of(kit, "a"))
+    code, lines = lines_of(
+        workspace, "--connect", address, *tls_flags(kit_files(kit.folder, "a"))
+    )
     assert code == 1
     assert "644" in lines["key"]

@@ -2,19 +2,16 @@
 
 import json
 import socket
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import zenoh
 
 from schema.agent.network import Tls, client_config
-from tests.system.workspace import PATIENCE_S, wait_until
+from tests.system.fleet import make_certificate, tls_flags
+from tests.system.workspace import PATIENCE_S, Workspace, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
-
-Workspace = Any
 
 
 def provoke_warning(address: str, tls: Tls) -> None:
@@ -30,14 +27,12 @@ def provoke_warning(address: str, tls: Tls) -> None:
 
 @pytest.mark.slow
 def test_engine_warns_on_standard_error_and_shows_no_secret(
-    workspace: Workspace, certify: Callable[[Path, str, str, str], Tls]
+    workspace: Workspace,
 ) -> None:
-    tls = certify(workspace.folder, "node", "authority", "127.0.0.1")
+    tls = make_certificate(workspace.folder, "node", "authority", "127.0.0.1")
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tls/127.0.0.1:{server.getsockname()[1]}"
-    files = (
-        "--tls-ca", tls.ca, "--tls-certificate", tls.certificate, "--tls-key", tls.key,
-    )  # fmt: skip
+    files = tls_flags(tls)
     words = ("run", "scenario1", "--births", "90", "--workers", "1", "--out", "run")
     process = workspace.start(
         *words, "--quiet", "--listen", address, *files,

@@ -3,8 +3,8 @@
 import json
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,16 +13,17 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import check_rewritable, folder_status
 from coordinator.storage.journal import Journal
+from revolve import command as revolve
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.columns import TABLES
 from schema.tables.description import read_state
 from schema.tables.last_populations import last_populations
-from tests.system.workspace import Until
+from tests.system.conftest import Once
+from tests.system.flipping import flip
+from tests.system.workspace import Workspace, wait_until
 
 pytestmark = pytest.mark.system
-
-Workspace = Any
 
 SHORT = """
 name = "{name}"
@@ -48,7 +49,7 @@ window_steps = 400
 population_limit = 12
 population_floor = 5
 [fitness]
-function = "{fitness}"
+function = "judge:none"
 """
 
 FITNESS = """
@@ -66,6 +67,7 @@ def none(track, settings):
         return 0.0
     raise ValueError("nobody looked")
 """
+QUIET = ("--in-process", "--quiet")
 
 
 def _write(workspace: Workspace, name: str, fitness: str) -> str:
@@ -75,14 +77,9 @@ def _write(workspace: Workspace, name: str, fitness: str) -> str:
     return f"{name}.toml"
 
 
-def _run(workspace: Workspace, *words: str, code: int = 0) -> str:
-    output: str = workspace.run("run", *words, "--in-process", "--quiet", code=code)
-    return output
-
-
 def test_run_without_any_fitness_has_no_best_robot(workspace: Workspace) -> None:
     source = _write(workspace, "blind", "judge:none")
-    output = _run(workspace, source, "--out", "a b", code=1)
+    output = workspace.run("run", source, *QUIET, "--out", "a b", code=1)
     assert "12 births; no robot of the last population has a fitness" in output
     assert "12 of 12 evaluations failed, all: " in output
     assert "nobody looked" in output
@@ -93,11 +90,11 @@ def test_run_without_any_fitness_has_no_best_robot(workspace: Workspace) -> None
 
 
 def test_run_reports_failed_evaluations_and_the_reason(workspace: Workspace) -> None:
-    output = _run(workspace, _write(workspace, "dim", "judge:few"), "--out", "a")
-    failed = [line for line in output.splitlines() if "evaluations failed" in line]
-    assert len(failed) == 1
-    assert "too fast to see" in failed[0]
-    assert "of 12 evaluations failed, all: " in failed[0]
+    source = _write(workspace, "dim", "judge:few")
+    output = workspace.run("run", source, *QUIET, "--out", "a")
+    (failed,) = [line for line in output.splitlines() if "evaluations failed" in line]
+    assert "too fast to see" in failed
+    assert "of 12 evaluations failed, all: " in failed
     # No failed robot outlives one with a negative fitness.
     last = last_populations(workspace.folder / "a")
     assert [row["fitness"] < 0.0 for row in last] == [True] * 6
@@ -110,50 +107,83 @@ def test_campaign_reports_runs_without_any_fitness(workspace: Workspace) -> None
         _write(workspace, "blind", "judge:none"),
         _write(workspace, "seeing", "worker.fitness:thesis"),
     ]
-    output = _run(workspace, *sources, "--out", "both", code=1)
+    output = workspace.run("run", *sources, *QUIET, "--out", "both", code=1)
     assert "both/blind-0: 12 of 12 evaluations failed, all: " in output
     assert "seeing-0" not in output
     assert "2 runs finished" in output
-    again = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
+    again = workspace.run("resume", "both", *QUIET, code=1)
     assert "2 of 2 runs already finished" in again
     # A campaign of one run reports the reason, too.
     (workspace.folder / "both" / "blind-0" / "state").write_text("tired")
     shutil.rmtree(workspace.folder / "both" / "seeing-0")
-    text = (workspace.folder / "both" / "campaign.toml").read_text()
+    file = workspace.folder / "both" / "campaign.toml"
+    text = file.read_text()
     text = text[: text.rindex("[[experiments]]")]
-    text = re.sub("digest = .*", "", text, count=1)  # as one of an earlier version
-    (workspace.folder / "both" / "campaign.toml").write_text(text)
-    alone = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
+    # As one of an earlier version.
+    file.write_text(re.sub("digest = .*", "", text, count=1))
+    alone = workspace.run("resume", "both", *QUIET, code=1)
     assert "both/blind-0/state: damaged: must be one of running" in alone
     assert "both/blind-0: 12 of 12 evaluations failed, all: " in alone
 
 
+def test_arena_without_any_fitness_reports_the_reason(workspace: Workspace) -> None:
+    (workspace.folder / "judge.py").write_text(FITNESS)
+    (workspace.folder / "arena.toml").write_text(ARENA)
+    output = workspace.run("run", "arena.toml", *QUIET, "--out", "a", code=1)
+    assert "too few robots are left to mate" in output
+    assert "deaths were failures, all: " in output
+    assert "nobody looked" in output
+    assert "already finished" in workspace.run("resume", "a", "--in-process", code=1)
+
+
 @pytest.fixture(scope="module")
-def campaign_folder(once: Any) -> Path:  # noqa: ANN401 - the fixture
-    """Return a folder with a campaign of two finished runs."""
+def campaign_folder(once: Once) -> Path:
+    """Return a folder with a campaign of two finished runs, ``twice``."""
 
     def make(workspace: Workspace) -> None:
-        words = ("--repeats", "2", "--out", "all/twice")
-        _run(workspace, _write(workspace, "seeing", "worker.fitness:thesis"), *words)
+        source = _write(workspace, "seeing", "worker.fitness:thesis")
+        workspace.run("run", source, *QUIET, "--repeats", "2", "--out", "all/twice")
 
-    folder: Path = once("failures-told", make)
-    return folder / "all"
+    return once("failures-told", make) / "all"
+
+
+@pytest.fixture
+def twice(
+    campaign_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Path:
+    """Return a copy of the campaign below the current folder."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(campaign_folder, tmp_path / "all")
+    return Path("all/twice")
+
+
+Told = Callable[..., str]
+
+
+@pytest.fixture
+def told(capsys: pytest.CaptureFixture[str]) -> Told:
+    """Return a function that runs a command here, and returns what it writes."""
+
+    def run(*words: str | Path, code: int = 0) -> str:
+        assert revolve.main([*map(str, words)]) == code
+        written = capsys.readouterr()
+        return written.out + written.err
+
+    return run
 
 
 def test_damaged_run_does_not_hide_other_runs(
-    workspace: Workspace, campaign_folder: Path
+    told: Told, twice: Path, campaign_folder: Path
 ) -> None:
-    shutil.copytree(campaign_folder, workspace.folder / "all")
-    twice = workspace.folder / "all" / "twice"
     damage = "seeing-0/run.json: damaged: must have a key 'name'"
     (twice / "seeing-0" / "run.json").write_text("{}")
-    output = workspace.run("status", "all", code=1)
+    output = told("status", "all", code=1)
     assert f"damaged: all/twice/{damage}" in output
     assert "1 of 2 runs finished" in output
     assert "twice/seeing-0  damaged" in output
     # A damaged run does not prevent the other run from starting again.
     shutil.rmtree(twice / "seeing-1")
-    output = workspace.run("resume", "all/twice", "--in-process", "--quiet", code=1)
+    output = told("resume", twice, *QUIET, code=1)
     assert f"seeing-0 failed: all/twice/{damage}" in output
     assert read_state(twice / "seeing-1") == "finished"
     assert compare(twice / "seeing-1", campaign_folder / "twice" / "seeing-1") == []
@@ -169,10 +199,9 @@ def test_damaged_run_does_not_hide_other_runs(
     ids=["state", "births.parquet", "no tables"],
 )
 def test_damaged_and_missing_files_are_reported(
-    tmp_path: Path, campaign_folder: Path, file: str, content: str | None, message: str
+    twice: Path, file: str, content: str | None, message: str
 ) -> None:
-    run = tmp_path / "run"
-    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
+    run = twice / "seeing-0"
     assert folder_status(run).births == 12
     (path,) = run.glob(f"**/{file}")
     if content is None:
@@ -184,13 +213,10 @@ def test_damaged_and_missing_files_are_reported(
 
 
 def test_narrow_terminal_does_not_truncate_the_status(
-    campaign_folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    told: Told, campaign_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "40")
-    assert status(["status", str(campaign_folder)]) == 0
-    output = capsys.readouterr().out
+    output = told("status", campaign_folder)
     assert "2 of 2 runs finished, 24 of 24 births" in output
     assert "no coordinator is running" not in output
     for name in ("twice/seeing-0", "twice/seeing-1"):
@@ -198,97 +224,52 @@ def test_narrow_terminal_does_not_truncate_the_status(
         assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
 
 
-def test_missing_tables_are_written_again(
-    workspace: Workspace, campaign_folder: Path
-) -> None:
-    run = workspace.folder / "run"
-    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
-    words = ("resume", "run", "--in-process", "--quiet")
-    assert "already finished" in workspace.run(*words)
-    shutil.rmtree(run / "tables")
-    output = workspace.run(*words)
-    assert "tables are missing" in output
-    assert "writing such tables again from the journal" in output
-    assert "12 births" in output
-    assert compare(run, campaign_folder / "twice" / "seeing-0") == []
-
-
 def test_missing_file_of_the_best_robot_is_written_again(
-    workspace: Workspace, campaign_folder: Path
+    told: Told, twice: Path
 ) -> None:
     """A process may have been killed after its run, before it wrote the file."""
-    shutil.copytree(campaign_folder / "twice", workspace.folder / "twice")
-    file = workspace.folder / "twice" / "seeing-1" / "best.yaml"
+    file = twice / "seeing-1" / "best.yaml"
     sound = file.read_bytes()
     said = "best.yaml was missing; best robot of the last population: its file: "
-    for folder in ("twice/seeing-1", "twice"):
+    for folder in (twice / "seeing-1", twice):
         file.unlink()
-        output = workspace.run("resume", folder, "--in-process", "--quiet")
+        output = told("resume", folder, *QUIET)
         assert "already finished" in output
-        assert f"{said}twice/seeing-1" in output
+        assert f"{said}{twice}/seeing-1" in output
         assert file.read_bytes() == sound
-    output = workspace.run("resume", "twice", "--in-process", "--quiet")
-    assert "was missing" not in output
+    assert "was missing" not in told("resume", twice, *QUIET)
 
 
-def test_damaged_tables_of_a_campaign_are_written_again(
-    workspace: Workspace, campaign_folder: Path
+def test_missing_and_damaged_tables_of_a_campaign_are_written_again(
+    told: Told, twice: Path, campaign_folder: Path
 ) -> None:
-    shutil.copytree(campaign_folder / "twice", workspace.folder / "twice")
-    (path,) = (workspace.folder / "twice" / "seeing-1").rglob("evaluations.parquet")
-    data = path.read_bytes()
-    path.write_bytes(data[:100] + bytes([data[100] ^ 1]) + data[101:])
-    output = workspace.run("resume", "twice", "--in-process", "--quiet")
-    assert "1 of 2 runs already finished" in output
+    shutil.rmtree(twice / "seeing-0" / "tables")
+    (path,) = (twice / "seeing-1").rglob("evaluations.parquet")
+    flip(path, 800)
+    output = told("resume", twice, *QUIET)
+    assert "tables are missing" in output
+    assert "writing such tables again from the journal" in output
     assert f"{path.name}: damaged (its SHA-256" in output
-    for name in ("seeing-0", "seeing-1"):
-        assert (
-            compare(workspace.folder / "twice" / name, campaign_folder / "twice" / name)
-            == []
-        )
-    output = workspace.run("resume", "twice", "--in-process", "--quiet")
+    assert compare(twice, campaign_folder / "twice") == []
+    output = told("resume", twice, *QUIET)
     assert "2 of 2 runs already finished" in output
     assert "damaged" not in output
 
 
-@pytest.mark.parametrize("tables", ["tables", "no tables"])
-def test_run_without_its_journal_does_not_restart(
-    workspace: Workspace, campaign_folder: Path, tables: str
-) -> None:
-    run = workspace.folder / "run"
-    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
-    (run / "journal.bin").unlink()
-    words = ("resume", "run", "--in-process", "--quiet")
-    if tables == "tables":
-        (run / "state").unlink()
-        message = "journal.bin: is lost"
-    else:
-        shutil.rmtree(run / "tables")
-        message = "put a copy of the tables in their place"
-    assert message in workspace.run(*words, code=2)
-    (run / "journal.bin").touch()
-    assert message in workspace.run(*words, code=2)
-
-
-def test_refused_resume_does_not_change_the_folder(
-    workspace: Workspace, campaign_folder: Path
-) -> None:
+def test_refused_resume_does_not_change_the_folder(told: Told, twice: Path) -> None:
     """Lost rows are rewritten only from an intact journal."""
-    run = workspace.folder / "run"
-    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
+    run = twice / "seeing-0"
     shutil.rmtree(run / "tables")
     (run / "state").unlink()
     (run / "segments").mkdir()
     schema = TABLES["births"].serialize().to_pybytes()
     (run / "segments" / "births-001.arrows").write_bytes(schema)
-    journal = bytearray((run / "journal.bin").read_bytes())
-    journal[40] ^= 1
-    (run / "journal.bin").write_bytes(journal)
-    output = workspace.run("resume", "run", "--in-process", "--quiet", code=2)
-    assert "journal.bin: damaged at byte" in output
-    (run / "journal.bin").unlink()
-    output = workspace.run("resume", "run", "--in-process", "--quiet", code=2)
-    assert "journal.bin: is lost" in output
+    journal = run / "journal.bin"
+    flip(journal, 320)
+    assert "journal.bin: damaged at byte" in told("resume", run, *QUIET, code=2)
+    for spoil in (journal.unlink, journal.touch):
+        spoil()
+        assert "journal.bin: is lost" in told("resume", run, *QUIET, code=2)
     assert [path.name for path in (run / "segments").iterdir()] == ["births-001.arrows"]
 
 
@@ -300,10 +281,9 @@ def test_tables_are_rewritable_only_with_the_journal(tmp_path: Path) -> None:
         with pytest.raises(RunFolderError, match="state: damaged: is 'finished'"):
             folder_status(tmp_path)
         folder.seal({"births": "0" * 64})
-    with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):
-        check_rewritable(tmp_path)
-    with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):
-        folder_status(tmp_path)
+    for read in (check_rewritable, folder_status):
+        with pytest.raises(RunFolderError, match="put a copy of the tables in their"):
+            read(tmp_path)
     with Journal.open(tmp_path):
         pass
     check_rewritable(tmp_path)
@@ -323,33 +303,27 @@ def test_status_follows_a_link_to_a_run(
     assert "1 of 1 run finished, 12 of 12 births" in output
 
 
-def test_arena_without_any_fitness_reports_the_reason(workspace: Workspace) -> None:
-    (workspace.folder / "judge.py").write_text(FITNESS)
-    text = ARENA.format(fitness="judge:none")
-    (workspace.folder / "arena.toml").write_text(text)
-    output = _run(workspace, "arena.toml", "--out", "a", code=1)
-    assert "too few robots are left to mate" in output
-    assert "deaths were failures, all: " in output
-    assert "nobody looked" in output
-    assert "already finished" in workspace.run("resume", "a", "--in-process", code=1)
-
-
 @pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
 def test_wrong_address_leaves_the_folder_usable(
-    workspace: Workspace, repeats: tuple[str, ...]
+    told: Told,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    repeats: tuple[str, ...],
 ) -> None:
-    source = _write(workspace, "seeing", "worker.fitness:thesis")
-    words = ("run", source, *repeats, "--out", "new", "--quiet")
-    output = workspace.run(*words, "--connect", "tcp/127.0.0.1:1", code=2)
+    monkeypatch.chdir(tmp_path)
+    text = SHORT.format(name="seeing", fitness="worker.fitness:thesis")
+    Path("seeing.toml").write_text(text)
+    words = ("run", "seeing.toml", *repeats, "--out", "new", "--quiet")
+    output = told(*words, "--connect", "tcp/127.0.0.1:1", code=2)
     assert "no hub at tcp/127.0.0.1:1" in output
-    workspace.run(*words, "--in-process")
+    told(*words, "--in-process")
 
 
-def test_moved_folder_is_reported(workspace: Workspace, until: Until) -> None:
+def test_moved_folder_is_reported(workspace: Workspace) -> None:
     words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
     process = workspace.start("run", *words, "--quiet")
     journal = workspace.folder / "gone" / "journal.bin"
-    until(
+    wait_until(
         lambda: journal.exists() and journal.stat().st_size > 2000,
         "the run is on its way",
     )

@@ -7,15 +7,15 @@ kills many.
 import signal
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from coordinator.storage.compare import compare
-from coordinator.storage.journal import NAME
 from coordinator.storage.lock import LOCK
-from tests.system.fleet import Fleets
+from tests.system.documents import SCENARIO1
+from tests.system.fleet import Fleet, size
+from tests.system.workspace import Workspace
 
 pytestmark = [
     pytest.mark.system,
@@ -23,28 +23,28 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Workspace = Any
 PATIENCE_S = 120
 
 
 def stopped_coordinator(
-    workspace: Workspace, fleet_of: Fleets, undisturbed: Path, births: int
-) -> Any:  # noqa: ANN401 - a fleet
+    workspace: Workspace,
+    undisturbed: Path,
+) -> Fleet:
     """Return a fleet whose coordinator is stopped by SIGSTOP during its run."""
-    words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    fleet = fleet_of(workspace, *words)
+    fleet = Fleet(workspace, *SCENARIO1)
     fleet.join("judge", "analyzer")
     fleet.join("one")
     share = np.random.default_rng(43).uniform(0.2, 0.5)
-    fleet.wait_for(share * (undisturbed / NAME).stat().st_size)
+    fleet.wait_for(share * size(undisturbed))
     fleet.coordinator.send_signal(signal.SIGSTOP)
     return fleet
 
 
 def test_stopped_coordinator_keeps_the_lock_of_its_run(
-    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
+    workspace: Workspace,
+    undisturbed: Path,
 ) -> None:
-    fleet = stopped_coordinator(workspace, fleet_of, undisturbed, births)
+    fleet = stopped_coordinator(workspace, undisturbed)
     output = workspace.run("resume", "run", "--quiet", code=2)
     assert f"in use by process {fleet.coordinator.pid} on " in output
     assert len(output.strip().splitlines()) == 1
@@ -55,15 +55,15 @@ def test_stopped_coordinator_keeps_the_lock_of_its_run(
 
 @pytest.mark.parametrize("when", ["meanwhile", "afterwards"])
 def test_continued_coordinator_exits_and_writes_nothing_after_a_takeover(
-    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets, when: str
+    workspace: Workspace, undisturbed: Path, when: str
 ) -> None:
     """The epoch detects a takeover on file systems without locks."""
-    fleet = stopped_coordinator(workspace, fleet_of, undisturbed, births)
+    fleet = stopped_coordinator(workspace, undisturbed)
     (fleet.folder / LOCK).unlink()
     second = workspace.start("resume", "run", "--workers", "1", "--quiet")
-    whole = (undisturbed / NAME).stat().st_size
+    whole = size(undisturbed)
     if when == "meanwhile":
-        position = (fleet.folder / NAME).stat().st_size + 0.1 * whole
+        position = size(fleet.folder) + 0.1 * whole
         fleet.wait_for(position)
     else:
         second.wait(PATIENCE_S)

@@ -5,39 +5,30 @@ test_bad_input.py tests full disks.
 
 import re
 import shlex
-import signal
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME
-from tests.system.workspace import Until
+from tests.system.documents import SCENARIO1
+from tests.system.fleet import kill_beyond, size
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
-
-Workspace = Any
 
 
 @pytest.fixture
 def partial_journal(
-    workspace: Workspace, undisturbed: Path, births: int, until: Until
+    workspace: Workspace,
+    undisturbed: Path,
 ) -> Path:
     """Return the journal of a run that was killed after a third of it."""
-    words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    run = workspace.start("run", *words, "--in-process", "--out", "run")
-    journal: Path = workspace.folder / "run" / NAME
-    whole = (undisturbed / NAME).stat().st_size
-    until(
-        lambda: journal.exists() and journal.stat().st_size > whole // 3,
-        "a third of the run",
-    )
-    run.send_signal(signal.SIGKILL)
-    run.wait()
-    return journal
+    run = workspace.start("run", *SCENARIO1, "--in-process", "--out", "run")
+    kill_beyond(run, workspace.folder / "run", size(undisturbed) // 3)
+    return workspace.folder / "run" / NAME
 
 
 def test_truncated_journal_is_repaired_by_resume(

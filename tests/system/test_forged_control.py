@@ -5,14 +5,14 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from coordinator.storage.compare import compare
 from schema.limits import MOST_EPOCH
-from tests.system.attacker import FORGED_ANSWER, REASONS, Attacker, attacker_at
-from tests.system.workspace import PATIENCE_S, wait_until
+from tests.system.attacker import FALSE_REPLIES, Attacker, attacker_at
+from tests.system.documents import HAMLET, SCENARIO1
+from tests.system.workspace import PATIENCE_S, Workspace, wait_until
 
 pytestmark = [
     pytest.mark.system,
@@ -20,65 +20,60 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Workspace = Any
 Forge = Callable[[Attacker], None]
-ALL_JOBS = "revolve/**/jobs"
 
 
-def role_tokens(attacker: Attacker) -> None:
-    """Declare and remove tokens of the workers' names under the other prefix."""
-    for role, other in (("worker", "/an/"), ("analyzer", "/w/")):
-        assert role in ("worker", "analyzer")
-        for member in attacker.agents("worker" if role == "worker" else "analyzer"):
-            chunk = "/w/" if role == "worker" else "/an/"
+def false_tokens(attacker: Attacker) -> None:
+    """Declare tokens of thousands of agents that do not exist, describe all falsely."""
+    attacker.answer_for("revolve/**/info", b"\xff")
+    # Remove and declare tokens of the workers' names under the other prefix.
+    for chunk, other in (("/w/", "/an/"), ("/an/", "/w/")):
+        for member in attacker.agents("worker" if chunk == "/w/" else "analyzer"):
             key = member.alive.replace(chunk, other)
             attacker.session.liveliness().declare_token(key).undeclare()  # type: ignore[no-untyped-call]
             attacker.declare(key)
             attacker.declare(member.alive)
-
-
-def tokens(attacker: Attacker) -> None:
-    """Declare tokens of thousands of agents that do not exist."""
+    # Last: a query of so many tokens by this session would not return.
     for number in range(2000):
         attacker.declare(f"revolve/default/w/fake-{number}/alive")
 
 
+def epochs(attacker: Attacker) -> None:
+    """Claim epochs of a coordinator that has taken over the run."""
+    for epoch in (MOST_EPOCH, 2**64 - 1):
+        attacker.claim(epoch)
+
+
 FORGERIES: dict[str, tuple[Forge, str]] = {
-    "epoch-2^64-1": (lambda a: a.claim(2**64 - 1), ""),
-    "epoch-2^32": (lambda a: a.claim(MOST_EPOCH), "fenced"),
-    "fenced": (lambda a: a.answer_for(ALL_JOBS, b"", REASONS["fenced"]), "foreign"),
-    "unfit": (lambda a: a.answer_for(ALL_JOBS, b"", REASONS["unfit"]), "foreign"),
-    "error": (lambda a: a.answer_for(ALL_JOBS, b"", REASONS["error"]), "foreign"),
-    "answers": (lambda a: a.answer_for(ALL_JOBS, FORGED_ANSWER, ""), "foreign"),
-    "infos": (lambda a: a.answer_for("revolve/**/info", b"\xff", ""), ""),
+    "epochs": (epochs, "fenced"),
+    "answers": (lambda a: a.answer_for("revolve/**/jobs", *FALSE_REPLIES), "foreign"),
     "silence": (lambda a: a.keep_silent_for("revolve/**"), ""),
     "cancelled": (lambda a: a.cancel(), "cancelled"),
-    "role": (role_tokens, ""),
-    "tokens": (tokens, ""),
+    "tokens": (false_tokens, ""),
     "deadly": (lambda a: a.replace_by_deadly(20, times=4), "death"),
     "deaths": (lambda a: a.report_deaths(range(1, 4)), "death"),
 }
+"""What each attacker does, and the kind of fault that the coordinator tells."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORGERIES)
 def test_a_run_beside_a_forger_equals_an_undisturbed_one(
-    workspace: Workspace, undisturbed: Path, births: int, name: str
+    workspace: Workspace, undisturbed: Path, name: str
 ) -> None:
     forge, kind = FORGERIES[name]
     folder = workspace.folder / "run"
-    words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
     # A single worker: no other one gets a copy of the job that takes long.
     workers = 1 if name == "deadly" else 2
     flags = ("--workers", str(workers), "--out", "run", "--cpu-limit", "1")
-    process = workspace.start("run", *words, *flags)
+    process = workspace.start("run", *SCENARIO1, *flags)
     wait_until((folder / "address").exists, "the coordinator listens")
     with attacker_at(folder) as attacker:
         wait_until(
             lambda: len(attacker.agents("worker")) == workers, "the workers are there"
         )
         forge(attacker)
-        while name.startswith("epoch") and process.poll() is None:
+        while name == "epochs" and process.poll() is None:
             forge(attacker)
             with suppress(subprocess.TimeoutExpired):
                 process.wait(0.1)
@@ -97,7 +92,7 @@ def test_an_arena_beside_a_forger_equals_an_undisturbed_one(
     small_arena_workspace: Workspace, small_arena_run: Path, name: str
 ) -> None:
     folder = small_arena_workspace.folder / "run"
-    words = ("hamlet.toml", "--seed", "4", "--quiet", "--workers", "2", "--out", "run")
+    words = (*HAMLET, "--workers", "2", "--out", "run")
     process = small_arena_workspace.start("run", *words)
     wait_until((folder / "address").exists, "the coordinator listens")
     with attacker_at(folder) as attacker:

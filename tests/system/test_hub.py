@@ -6,8 +6,9 @@ import pytest
 import zenoh
 
 from coordinator.storage.compare import compare
-from schema.agent.network import Tls, client_config
-from tests.system.fleet import size
+from schema.agent.network import client_config
+from tests.system.documents import HAMLET, SCENARIO1, SMALL_ARENA
+from tests.system.fleet import kit_files, size, tls_flags
 from tests.system.machines import Running
 from tests.system.test_agents import free_address
 from tests.system.test_view import check_curves
@@ -15,16 +16,16 @@ from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(300)]
 
-PLAIN = ("coordinator", "scenario1", "--seed", "5", "--births", "60", "--quiet")
-ARENA = ("coordinator", "hamlet.toml", "--seed", "4", "--quiet")
+PLAIN = ("coordinator", *SCENARIO1)
+ARENA = ("coordinator", *HAMLET)
 
 
 class Site:
     """A machine with a hub, two kinds of runs, and processes that connect to it."""
 
-    def __init__(self, workspace: Workspace, arena: str) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         self.folder = workspace.folder
-        (self.folder / "hamlet.toml").write_text(arena)
+        (self.folder / "hamlet.toml").write_text(SMALL_ARENA)
         self._workspace = workspace
         self._started = 0
         self.hub = self.start("hub")
@@ -49,31 +50,13 @@ class Site:
 
 
 @pytest.fixture
-def site(workspace: Workspace, small_arena_document: str) -> Site:
-    return Site(workspace, small_arena_document)
+def site(workspace: Workspace) -> Site:
+    return Site(workspace)
 
 
 def told_of_hub(process: Running) -> tuple[int, int]:
     """Return how many times a process told that the hub was gone, and back."""
     return process.text.count("; retrying"), process.text.count("reconnected to")
-
-
-@pytest.mark.long
-def test_viewer_and_run_go_on_after_the_hub_is_killed(
-    site: Site, undisturbed: Path
-) -> None:
-    site.start("analyzer")
-    worker = site.start("worker", "--processes", "1")
-    coordinator = site.start(*PLAIN, "--out", "first", "--connect", "hub")
-    viewer = site.start("view", "--save", "first.rrd")
-    viewer.wait_for("recording ")
-    site.wait_for("first", 0.3, undisturbed)
-    site.restart_hub()
-    coordinator.end()
-    assert "the run has ended" in viewer.end()
-    assert compare(site.folder / "first", undisturbed) == []
-    check_curves(site.folder / "first.rrd", undisturbed)
-    assert told_of_hub(viewer) == told_of_hub(worker) == (1, 1)
 
 
 @pytest.mark.long
@@ -106,15 +89,10 @@ def test_printed_configuration_opens_a_hub(workspace: Workspace) -> None:
     kit = workspace.folder / "lab"
     workspace.run("cluster", "init", str(kit), "--hub", "127.0.0.1", "--workers", "a")
     address = free_address().replace("tcp/", "tls/")
-    member = kit / "members" / "hub"
-    config = workspace.run(
-        *("hub", "--listen", address, "--access", str(member / "access.json")),
-        *("--tls-ca", str(member / "ca.pem"), "--tls-key", str(member / "key.pem")),
-        *("--tls-certificate", str(member / "certificate.pem"), "--print-config"),
-    )
-    own = kit / "members" / "a"
-    files = (str(own / name) for name in ("ca.pem", "certificate.pem", "key.pem"))
-    client = zenoh.Config.from_json5(client_config(address, Tls(*files)))
+    access = str(kit / "members" / "hub" / "access.json")
+    words = ("hub", "--listen", address, "--access", access, "--print-config")
+    config = workspace.run(*words, *tls_flags(kit_files(kit, "hub")))
+    client = zenoh.Config.from_json5(client_config(address, kit_files(kit, "a")))
     with (
         zenoh.open(zenoh.Config.from_json5(config)) as hub,
         zenoh.open(client) as session,

@@ -19,9 +19,7 @@ from hatchling.builders.wheel import WheelBuilder
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
-from tests.system.documents import OFF_LINE, SMALL_ARENA
-from tests.system.test_strangers import PACKAGE, TOGETHER, document
-from tests.system.workspace import Until
+from tests.system.workspace import wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.long, pytest.mark.timeout(3600)]
 
@@ -159,7 +157,6 @@ def constraints(folder: Path, libraries: str, wheel: Path) -> list[str]:
 def test_wheel_works_outside_the_tree(
     made: Callable[[str], Environment],
     wheel: Path,
-    until: Until,
     version: str,
     libraries: str,
 ) -> None:
@@ -169,7 +166,7 @@ def test_wheel_works_outside_the_tree(
     assert wheel.name.split("-")[1] in its.run("revolve", "--version")
     words = ("scenario1", "--births", "15", "--seed", "3", "--quiet", "--out")
     its.run("revolve", "run", *words, "one", "--workers", "1")
-    _runs_in_processes(its, words, until)
+    _runs_in_processes(its, words)
     assert "equal" in its.run("revolve", "compare", "one", "two")
     births, again, recorded = its.run("python", "-c", EXAMPLE).split()
     assert (births, again) == ("15", recorded)
@@ -184,14 +181,17 @@ def test_wheel_works_outside_the_tree(
     its.install(*limits, f"{wheel}[all]")
 
 
-def _runs_in_processes(its: Environment, words: tuple[str, ...], until: Until) -> None:
+def _runs_in_processes(
+    its: Environment,
+    words: tuple[str, ...],
+) -> None:
     """Run a coordinator with a worker and an analyzer in other processes."""
     words = (*words, "two", "--listen", "tcp/127.0.0.1:0")
     run = its.start("revolve", "coordinator", *words)
     place = its.folder / "two" / "address"
     others: list[subprocess.Popen[str]] = []
     try:
-        until(
+        wait_until(
             lambda: place.exists() or run.poll() is not None,
             "the coordinator listens",
         )
@@ -222,22 +222,3 @@ def _follow_advice(
     assert Path(python).is_relative_to(its.folder.parent)
     its.run("python", *install, "-q", *limits)
     its.run("revolve", *command)
-
-
-def test_a_strangers_package_evolves_from_its_own_environment(
-    made: Callable[[str], Environment], wheel: Path
-) -> None:
-    its = made("{}.{}".format(*sys.version_info[:2]))
-    its.install(str(wheel))
-    its.install(str(PACKAGE))
-    for name, added in TOGETHER.items():
-        is_arena = name == "brain"
-        text = document(SMALL_ARENA if is_arena else OFF_LINE, added, 20)
-        (its.folder / f"{name}.toml").write_text(text)
-        words = (f"{name}.toml", "--seed", "5", "--quiet", "--out")
-        its.run("revolve", "run", *words, name, "--workers", "2")
-        its.run("revolve", "run", *words, f"{name}-2", "--in-process")
-        assert "equal" in its.run("revolve", "compare", name, f"{name}-2")
-    checked = its.run("python", "-c", "import revolve as rv; print("
-                      "rv.read('bodies').births.num_rows)")  # fmt: skip
-    assert checked.split() == ["20"]

@@ -142,10 +142,8 @@ def test_threads_that_the_user_sets_have_no_effect(
     assert "listening on" in listening
 
 
-def test_an_arena_runs_with_a_separate_hub(
-    workspace: Workspace, small_arena_document: str
-) -> None:
-    site = Site(workspace, small_arena_document)
+def test_an_arena_runs_with_a_separate_hub(workspace: Workspace) -> None:
+    site = Site(workspace)
     (site.folder / "crowd.toml").write_text(CROWD)
     site.start("analyzer")
     worker = site.start("worker", "--processes", "1")

@@ -32,15 +32,3 @@ def test_an_error_at_the_end_is_a_line_of_the_log(workspace: Workspace) -> None:
     entry = json.loads(line)
     assert entry["level"] == "error"
     assert "192.0.2.1" in entry["message"]
-
-
-def test_a_worker_without_a_hub_warns_with_its_name(workspace: Workspace) -> None:
-    words = ("worker", "--connect", "tcp/127.0.0.1:1", "--processes", "1")
-    worker = workspace.start(
-        *words, "--name", "w7", environment={"REVOLVE_LOG": "json"}
-    )
-    assert worker.stderr is not None
-    entry = json.loads(worker.stderr.readline())
-    assert entry["level"] == "warning"
-    assert entry["process"].startswith("w7-0")
-    assert entry["message"].startswith("no hub at tcp/127.0.0.1:1")

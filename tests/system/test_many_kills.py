@@ -13,7 +13,17 @@ from typing import Any
 
 import pytest
 
-from tests.system.documents import BRIDGE, LEARNING, MIXED, OFF_LINE, SMALL_ARENA
+from schema.tables.files import read_table
+from tests.system.documents import (
+    ARENAS,
+    BRIDGE,
+    CROWDED_ARENA,
+    LEARNING,
+    MIXED,
+    OFF_LINE,
+    RING,
+    SMALL_ARENA,
+)
 
 pytestmark = [
     pytest.mark.system,
@@ -28,6 +38,9 @@ DOCUMENTS = {
     "arena": SMALL_ARENA,
     "mixed": MIXED,
     "learning": LEARNING,
+    "crowd": CROWDED_ARENA,
+    "ring": RING,
+    "arenas": ARENAS,
 }
 KILLS = int(os.environ.get("REVOLVE_KILLS", "1000"))
 OF_COORDINATORS = {"instants": 0.7, "fleet": 0.3}
@@ -75,8 +88,8 @@ def killed(folder: Path, mode: str, kills: tuple[int, int], seed: int) -> Any:  
 @pytest.mark.parametrize(
     ("mode", "kinds", "kills"),
     [
-        ("instants", ("bridge", "arena"), (15, 0)),
-        ("fleet", ("learning", "mixed"), (5, 20)),
+        ("instants", ("bridge", "arena", "crowd"), (24, 0)),
+        ("fleet", ("off", "bridge", "learning", "mixed"), (8, 24)),
     ],
 )
 def test_kills_in_runs_of_all_kinds_give_equal_runs(
@@ -101,5 +114,9 @@ def test_many_kills_give_equal_runs(tmp_path: Path, mode: str) -> None:
     results = killed(tmp_path, mode, (of_coordinators, of_workers), seed=60)
     assert results["differences"] == []
     assert sum(results["kills"].values()) == of_coordinators + of_workers
+    migrants = read_table(tmp_path / "arenas", "migrations").num_rows
+    reasons = read_table(tmp_path / "arenas", "deaths")["reason"].to_pylist()
+    assert reasons.count("migrated") == migrants > 2
+    assert read_table(tmp_path / "ring", "migrations").num_rows == 8 * 2 * 2
     if mode == "instants" and KILLS >= ENOUGH:
         assert set(results["kills"]) >= OFTEN_HIT

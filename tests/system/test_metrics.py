@@ -14,7 +14,6 @@ pytestmark = pytest.mark.system
 def test_metrics_and_json_status_of_a_run_that_waits(workspace: Workspace) -> None:
     words = ("--listen", "tcp/127.0.0.1:0", "--metrics", "127.0.0.1:0")
     run = workspace.start("coordinator", "scenario1", "--out", "run", *words)
-    assert run.stderr is not None
     lines = iter(run.stderr.readline, "")
     url = next(
         match[0] for line in lines if (match := re.search(r"http://\S+/metrics", line))

@@ -102,6 +102,7 @@ MISTAKES = [
     ("compare later later", "was written by another version of Revolve"),
     ("analyze empty", "empty: no run in or below"),
     ("analyze nowhere", "nowhere: no such folder"),
+    ("analyze run --out file", "file: must be a folder, got a file"),
     # Views
     ("view nowhere --save a.rrd", "nowhere: no such folder"),
     ("view run --robot 0:9999 --save a.rrd", "0:9999: no robot of that name was born"),
@@ -112,6 +113,13 @@ MISTAKES = [
         "view run --save a.gif --from 1e5 --until 1.1e5",
         "run: no poses of an arena between 100000 and 110000 s; the run ends at ",
     ),
+    ("view x --connect hub", "give either a run folder or --connect"),
+    ("view --connect tcp/127.0.0.1:1 --save a.rrd", "no hub at"),
+    ("view nowhere --serve 9876", "must be HOST:PORT"),
+    ("view nowhere --follow x", "must be BIRTH or ISLAND:BIRTH"),
+    ("view nowhere --ancestry", "needs --robot best"),
+    ("view --connect tcp/127.0.0.1:1 --robot best", "a run folder only"),
+    ("arena list --connect tcp/127.0.0.1:1", "no hub at tcp/127.0.0.1:1"),
     # Robots
     ("robot check nowhere.yaml", "nowhere.yaml: cannot be read"),
     ("robot check exp.yaml", "exp.yaml"),

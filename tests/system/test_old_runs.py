@@ -125,23 +125,8 @@ def test_a_new_run_has_the_rows_of_the_old_one(workspace: Workspace, name: str) 
     }
 
 
-def test_comparison_detects_differences(tmp_path: Path) -> None:
-    births = tables(unpacked("off-line", tmp_path))["births"]
-    assert len(repeatable(births.schema)) > 10
-    last = births.num_rows - 1
-    shorter = births.slice(0, last)
-    repeated = pa.concat_tables([shorter, births.slice(last - 1, 1)])
-    assert differences(births, births) == []
-    assert differences(births, shorter) == repeatable(births.schema)
-    assert "birth" in differences(births, repeated)
-    assert differences(births, births.drop_columns(["rank"])) == ["rank"]
-
-
-@each_run
-def test_an_unfinished_run_is_refused_in_one_line(
-    workspace: Workspace, name: str
-) -> None:
-    folder = unpacked(name, workspace.folder)
+def test_an_unfinished_run_is_refused_in_one_line(workspace: Workspace) -> None:
+    folder = unpacked("off-line", workspace.folder)
     (folder / "state").write_text("stopped")
     (line,) = workspace.run("resume", "run", code=2).splitlines()
     assert "Revolve Islands 0.2 began this run" in line

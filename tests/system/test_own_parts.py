@@ -2,16 +2,15 @@
 
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Workspace = Any
 CRAWLERS = Path(__file__).parents[1] / "plugins" / "crawlers.py"
 SPACE = """
 [space]
@@ -22,20 +21,12 @@ part_types = [
 ]
 max_inputs = 16
 """
-ARENA = """
-births = 8
-[arena]
-birth_interval_s = 5.0
-snapshot_interval_s = 5.0
-[selection]
-population = 6
-"""
 
 
-def prepared(workspace: Workspace, piston: str, more: str = "") -> None:
+def prepared(workspace: Workspace, piston: str) -> None:
     """Write the user's file and an experiment with one of its part types."""
     shutil.copy(CRAWLERS, workspace.folder)
-    text = f'name = "crawlers"\n{more}{SPACE.format(piston)}'
+    text = f'name = "crawlers"\n{SPACE.format(piston)}'
     (workspace.folder / "mine.toml").write_text(text)
 
 
@@ -60,12 +51,3 @@ def test_a_failing_sensor_is_a_failed_evaluation(workspace: Workspace) -> None:
     failed = [row for row in rows if row["status"] == "failed"]
     assert failed
     assert all(row["reason"].startswith("sensor Fragile of part ") for row in failed)
-
-
-def test_an_arena_of_own_parts_repeats(workspace: Workspace) -> None:
-    prepared(workspace, "PISTON", ARENA)
-    words = ("mine.toml", "--seed", "3", "--quiet")
-    workspace.run("run", *words, "--out", "one", "--in-process")
-    workspace.run("run", *words, "--out", "two", "--workers", "2")
-    assert compare(workspace.folder / "one", workspace.folder / "two") == []
-    assert read_table(workspace.folder / "one", "births").num_rows == 8

@@ -1,7 +1,5 @@
 """Workers that never answer, and arenas that share workers."""
 
-import os
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -15,20 +13,20 @@ import analyzer.service
 import worker.serve.service
 from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import JobRouter
-from coordinator.islands.events import Advanced
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
-from coordinator.storage.journal import Journal
 from schema.experiment.file import experiment_text, read_experiment
 from schema.limits import ADVANCE_REQUEST_BYTES
 from schema.wire.arena import AdvanceShard
 from schema.wire.codec import decode
 from schema.wire.messages import Request
 from tests.benchmarks.dispatch_bench import Body, real_fleet
-from tests.system.fleet import Fleets
+from tests.system.documents import HAMLET
+from tests.system.fleet import Fleet, advances
 from tests.system.silent_agents import silent_agents
+from tests.system.workspace import Workspace
 
 pytestmark = [
     pytest.mark.system,
@@ -36,35 +34,18 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Workspace = Any
-ROOT = Path(__file__).parents[2]
-MISBEHAVING_AGENT = Path(__file__).with_name("misbehaving_agent.py")
-
-
-def advances(folder: Path) -> list[Advanced]:
-    with Journal.open(folder) as journal:
-        return [each for each in journal.replay() if isinstance(each, Advanced)]
-
 
 def test_arena_of_a_silent_worker_continues_on_an_idle_one(
-    small_arena_workspace: Workspace, small_arena_run: Path, fleet_of: Fleets
+    small_arena_workspace: Workspace,
+    small_arena_run: Path,
 ) -> None:
-    fleet = fleet_of(small_arena_workspace, "hamlet.toml", "--seed", "4", "--quiet")
-    command = [sys.executable, str(MISBEHAVING_AGENT), fleet.address, "silent"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, text=True
-    ) as silent:
-        try:
-            fleet.join("one")
-            fleet.begin(workers=2)
-            fleet.finish()
-        finally:
-            silent.terminate()
-        assert silent.stdout is not None
-        report = silent.stdout.read().split()
+    fleet = Fleet(small_arena_workspace, *HAMLET)
+    with fleet.misbehaving("silent") as report:
+        fleet.join("one")
+        fleet.begin(workers=2)
+        fleet.finish()
     # It sent its late answer when the job was cancelled.
-    assert report == ["silent", "1"]
+    assert report == ["1"]
     assert compare(small_arena_run, fleet.folder) == []
     agents = [each.provenance.agent[:3] for each in advances(fleet.folder)]
     first = agents.index("one")
@@ -104,8 +85,20 @@ window = 1
 """
 
 
-def longest_stall_s(run: RunSession, fleet: JobRouter) -> float:
-    """Finish a run; return the longest time without a birth [s]."""
+def bodies(workers: int) -> dict[AgentKind, tuple[Body, int]]:
+    """Return what the processes of a fleet with one analyzer run."""
+    return {
+        "worker": (worker.serve.service.process, workers),
+        "analyzer": (analyzer.service.process, 1),
+    }
+
+
+def longest_stall_s(folder: Path, document: str, fleet: JobRouter) -> float:
+    """Run an experiment to its end; return the longest time without a birth [s]."""
+    (folder / "mine.toml").write_text(document)
+    experiment = read_experiment(str(folder / "mine.toml"))
+    details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
+    run = RunSession(RunFolder(folder / "run", details), fleet)
     longest_s, births = 0.0, -1
     run.start()
     changed_s = began_s = time.monotonic()
@@ -128,16 +121,9 @@ def longest_stall_s(run: RunSession, fleet: JobRouter) -> float:
 def test_each_silent_agent_costs_an_offline_run_a_small_delay(
     workers: int, analyzers: int, most_s: float, tmp_path: Path
 ) -> None:
-    (tmp_path / "lively.toml").write_text(LIVELY)
-    experiment = read_experiment(str(tmp_path / "lively.toml"))
-    details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
-    bodies: dict[AgentKind, tuple[Body, int]] = {
-        "worker": (worker.serve.service.process, 1),
-        "analyzer": (analyzer.service.process, 1),
-    }
     lines: list[str] = []
     with ExitStack() as stack:
-        fleet = stack.enter_context(real_fleet(bodies))
+        fleet = stack.enter_context(real_fleet(bodies(workers=1)))
         fleet._warn = lines.append
         address = cast("Network", fleet._agents).own_address
         taken = stack.enter_context(silent_agents(address, workers))
@@ -146,8 +132,7 @@ def test_each_silent_agent_costs_an_offline_run_a_small_delay(
             fleet.dispatch.agents("analyzer") < 1 + analyzers
         ):
             fleet.listen(0.1, time.monotonic())
-        run = RunSession(RunFolder(tmp_path / "run", details), fleet)
-        stall_s = longest_stall_s(run, fleet)
+        stall_s = longest_stall_s(tmp_path, LIVELY, fleet)
     # The first job went to each of them in turn.
     assert (len(taken) >= workers, len(vets) >= analyzers) == (True, True)
     assert 1.0 < stall_s <= most_s
@@ -175,22 +160,9 @@ class Counting:
 
 
 def test_forty_arenas_on_two_workers_are_never_rebuilt(tmp_path: Path) -> None:
-    (tmp_path / "forty.toml").write_text(FORTY)
-    experiment = read_experiment(str(tmp_path / "forty.toml"))
-    details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
-    bodies: dict[AgentKind, tuple[Body, int]] = {
-        "worker": (worker.serve.service.process, 2),
-        "analyzer": (analyzer.service.process, 1),
-    }
-    with real_fleet(bodies) as fleet:
+    with real_fleet(bodies(workers=2)) as fleet:
         agents = Counting(fleet)
-        run = RunSession(RunFolder(tmp_path / "run", details), fleet)
-        run.start()
-        while not run.loop.is_finished:
-            now_s = time.monotonic()
-            ends = fleet.listen(0.1, now_s)
-            run.loop.act(now_s, ends.get(run.loop.client, ()))
-        run.close()
+        longest_stall_s(tmp_path, FORTY, fleet)
     made = advances(tmp_path / "run")
     assert len(made) >= 3 * 40
     assert agents.rebuilt == 0

@@ -6,23 +6,21 @@ on two workers, of which one is killed, equals that in one process.
 
 import os
 import re
-import signal
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
 from tests.system.documents import OFF_LINE, SMALL_ARENA
-from tests.system.workspace import Until
+from tests.system.fleet import Fleet, size
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
-Workspace = Any
 
 TOP = Path(__file__).parents[2]
 PACKAGE = TOP / "tests" / "plugins" / "critters_lab"
@@ -58,17 +56,6 @@ _SURVIVORS = (
     'survivors = "critters.choices:elite_and_young"\n'
     "survivors_parameters = {share = 0.7}\n"
 )
-PLUGINS = {
-    "part type and sensor": _BODIES,
-    "neuron type": f"[space]\n{_NEURONS}",
-    "brain": _BRAIN,
-    "encoding": _ENCODING,
-    "fitness": _FITNESS,
-    "measure": _MEASURES,
-    "parents": f"[selection]\n{_PARENTS}",
-    "survivors": f"[selection]\n{_SURVIVORS}",
-}
-"""What each plug-in adds to an experiment."""
 TOGETHER = {
     "bodies": (
         f"{_BODIES}{_NEURONS}{_FITNESS}{_MEASURES}[selection]\n{_PARENTS}{_SURVIVORS}"
@@ -106,63 +93,26 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return site
 
 
-class Commands:
-    """Commands of an environment that has the package, in a test's folder."""
-
-    def __init__(self, workspace: Workspace, site: Path) -> None:
-        self.folder: Path = workspace.folder
-        self._start = workspace.start
-        self._environment = {"PYTHONPATH": f"{TOP}{os.pathsep}{site}"}
-
-    def start(self, *words: str) -> "subprocess.Popen[str]":
-        started: subprocess.Popen[str] = self._start(
-            *words, environment=self._environment
-        )
-        return started
-
-    def run(self, *words: str) -> str:
-        process = self.start(*words)
-        out, err = process.communicate(timeout=300)
-        assert process.returncode == 0, f"{words}: {out}{err}"
-        return out + err
-
-
 @pytest.fixture
-def commands(workspace: Workspace, installed: Path) -> Commands:
-    return Commands(workspace, installed)
+def lab(workspace: Workspace, installed: Path) -> Workspace:
+    """Return a workspace with the environment that has the package."""
+    workspace.environment["PYTHONPATH"] = f"{TOP}{os.pathsep}{installed}"
+    return workspace
 
 
-def _is_equal_after_a_kill(commands: Commands, own: str, until: Until) -> None:
+def _is_equal_after_a_kill(lab: Workspace, own: str) -> None:
     """Run in one process, and on two workers of which one is killed; compare."""
-    folder = commands.folder
-    (folder / "mine.toml").write_text(own)
-    words = ("mine.toml", "--seed", "5", "--quiet", "--out")
-    commands.run("run", *words, "one", "--in-process")
-    whole = (folder / "one" / "journal.bin").stat().st_size
-    journal = folder / "two" / "journal.bin"
-    run = commands.start("coordinator", *words, "two", "--listen", "tcp/127.0.0.1:0")
-    until(
-        lambda: (folder / "two" / "address").exists() or run.poll() is not None,
-        "the coordinator listens",
-    )
-    address = (folder / "two" / "address").read_text().split()[0]
-    commands.start("analyzer", "--connect", address)
-    workers = [
-        commands.start("worker", "--connect", address, "--processes", "1")
-        for _ in range(2)
-    ]
-    until(
-        lambda: (
-            run.poll() is not None
-            or (journal.exists() and journal.stat().st_size > 0.4 * whole)
-        ),
-        "the run is on its way",
-    )
-    assert run.poll() is None
-    workers[0].send_signal(signal.SIGKILL)
-    out, err = run.communicate(timeout=300)
-    assert run.returncode == 0, out + err
-    assert compare(folder / "one", folder / "two") == []
+    (lab.folder / "mine.toml").write_text(own)
+    words = ("mine.toml", "--seed", "5", "--quiet")
+    lab.run("run", *words, "--out", "one", "--in-process")
+    fleet = Fleet(lab, *words)
+    for name in ("doomed", "spare"):
+        fleet.join(name)
+    fleet.join("judge", "analyzer")
+    fleet.wait_for(0.4 * size(lab.folder / "one"))
+    fleet.kill("doomed")
+    fleet.finish()
+    assert compare(lab.folder / "one", fleet.folder) == []
 
 
 def _check_births(folder: Path, count: int) -> None:
@@ -176,38 +126,23 @@ def _check_births(folder: Path, count: int) -> None:
     [("bodies", OFF_LINE), ("brain", SMALL_ARENA), ("encoding", OFF_LINE)],
 )
 def test_a_strangers_plug_ins_evolve_on_two_workers_of_which_one_is_killed(
-    commands: Commands, until: Until, name: str, text: str
+    lab: Workspace, name: str, text: str
 ) -> None:
     births = 12 if text is SMALL_ARENA else 30
-    _is_equal_after_a_kill(commands, document(text, TOGETHER[name], births), until)
-    _check_births(commands.folder / "one", births)
+    _is_equal_after_a_kill(lab, document(text, TOGETHER[name], births))
+    _check_births(lab.folder / "one", births)
     if name == "bodies":
-        rows = read_table(commands.folder / "one", "births").to_pylist()
+        rows = read_table(lab.folder / "one", "births").to_pylist()
         kinds = {part["kind"] for row in rows for part in row["body"]}
         assert "Piston" in kinds
-        rows = read_table(commands.folder / "one", "evaluations").to_pylist()
+        rows = read_table(lab.folder / "one", "evaluations").to_pylist()
         assert all(dict(row["measures"])["sway"] > 0.0 for row in rows)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("text", [OFF_LINE, SMALL_ARENA], ids=["off-line", "arena"])
-@pytest.mark.parametrize("name", PLUGINS)
-def test_each_plug_in_alone_evolves_60_births(
-    commands: Commands, until: Until, name: str, text: str
-) -> None:
-    if name == "survivors" and text is SMALL_ARENA:
-        pytest.skip("the removal of robots from an arena depends on their fitness")
-    _is_equal_after_a_kill(commands, document(text, PLUGINS[name], 60), until)
-    _check_births(commands.folder / "one", 60)
-    commands.run("run", "mine.toml", "--seed", "5", "--quiet", "--workers", "2",
-                 "--out", "three")  # fmt: skip
-    assert compare(commands.folder / "one", commands.folder / "three") == []
-
-
 def test_all_plug_ins_of_the_package_are_found_and_in_order(
-    commands: Commands,
+    lab: Workspace,
 ) -> None:
-    listed = commands.run("plugins").splitlines()
+    listed = lab.run("plugins").splitlines()
     found = [row.split()[:2] for row in listed if " critters." in row]
     assert sorted(found) == [
         ["brain", "critters.brains:Beat"],
@@ -219,7 +154,7 @@ def test_all_plug_ins_of_the_package_are_found_and_in_order(
         ["part-type", "critters.bodies:PISTON"],
         ["survivors", "critters.choices:elite_and_young"],
     ]
-    checked = commands.run("check", *(path for _, path in found))
+    checked = lab.run("check", *(path for _, path in found))
     assert checked.count(": in order\n") == len(found)
 
 

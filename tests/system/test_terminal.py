@@ -5,20 +5,18 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from revolve import command as revolve
 from revolve.cli.commands import COMMANDS
+from tests.system.workspace import Workspace, wait_until
 
 pytestmark = pytest.mark.system
 
 ROOT = Path(__file__).parents[2]
-Workspace = Any
 
 
 def _start(*words: str) -> subprocess.Popen[str]:
@@ -34,12 +32,12 @@ def _start(*words: str) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize("awaited", ["run.json", "address"])
 def test_ctrl_c_pressed_twice_while_processes_start(
-    workspace: Workspace, until: Callable[[Callable[[], bool], str], None], awaited: str
+    workspace: Workspace, awaited: str
 ) -> None:
     """Interrupt the process group twice while its processes import modules."""
     run = workspace.folder / "run"
     process = _start("run", "scenario1", "--out", str(run))
-    until((run / awaited).exists, awaited)
+    wait_until((run / awaited).exists, awaited)
     os.killpg(process.pid, signal.SIGINT)
     time.sleep(0.1)  # interval between two key presses
     os.killpg(process.pid, signal.SIGINT)
@@ -78,22 +76,20 @@ def _run_in_shell(
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("words", ["--help", "run --help", "run scenario1 --out x"])
+@pytest.mark.parametrize("words", ["--help", "run scenario1 --out x"])
 def test_closed_output_is_refused_before_the_command_starts(words: str) -> None:
     expected = (2, "revolve: standard output is closed\n")
     assert _run_in_shell(f"{words} >&-") == expected
     assert not (ROOT / "x").exists()
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("words", ["--help", "run --help"])
+@pytest.mark.parametrize(("words", "unbuffered"), [("--help", "1"), ("run --help", "")])
 def test_output_to_a_full_device_is_reported(words: str, unbuffered: str) -> None:
     expected = (2, "revolve: standard output: no space left on device\n")
     assert _run_in_shell(f"{words} > /dev/full", unbuffered) == expected
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("words", ["--help", "run --help"])
+@pytest.mark.parametrize(("words", "unbuffered"), [("--help", "1"), ("run --help", "")])
 def test_closed_pipe_ends_the_command_without_a_message(
     words: str, unbuffered: str
 ) -> None:

@@ -3,7 +3,7 @@
 import signal
 import subprocess
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +22,38 @@ from schema.errors import rounded
 from schema.tables.checksums import digest_of
 from schema.tables.description import description_text, read_description
 from schema.tables.files import read_table
-from tests.system.workspace import Until
+from tests.system.fleet import Fleet
+from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Workspace = Any
-Fleet = Callable[..., Any]
 
 WORDS = ("hamlet.toml", "--seed", "4", "--quiet")
 CENTRES = "Boxes3D:centers"
 
 
-def batches(file: Path, path: str) -> Iterator[tuple[pa.RecordBatch, bool]]:
-    """Yield the record batches of an entity, and whether each is static."""
-    for chunk in RrdReader(file).stream().filter(content=path):
-        yield chunk.to_record_batch(), chunk.is_static
+def chunks(file: Path, path: str) -> Iterator[Any]:
+    """Return the chunks of an entity."""
+    yield from RrdReader(file).stream().filter(content=path)
+
+
+def rows(file: Path, path: str, component: str) -> Iterator[tuple[int, int, Any]]:
+    """Yield time [ns], births and value of each row of an entity with a component."""
+    for chunk in chunks(file, path):
+        batch = chunk.to_record_batch()
+        if chunk.is_static or component not in batch.schema.names:
+            continue
+        columns = [
+            batch[name].cast(pa.int64()).to_pylist()
+            if name in batch.schema.names
+            else [0] * batch.num_rows
+            for name in ("sim_time", "births")
+        ]
+        for time, births, value in zip(
+            *columns, batch[component].to_pylist(), strict=True
+        ):
+            if value is not None:
+                yield time, births, value
 
 
 def paths(file: Path) -> set[str]:
@@ -45,50 +62,13 @@ def paths(file: Path) -> set[str]:
 
 def poses(file: Path, path: str) -> dict[int, Any]:
     """Return the centres (B, 3) of a robot's boxes by time [ns]."""
-    found = {}
-    for batch, _ in batches(file, path):
-        if CENTRES not in batch.schema.names:
-            continue
-        for time, row in zip(batch["sim_time"], batch[CENTRES], strict=True):
-            if row.is_valid:
-                found[time.value] = np.array(row.as_py())
-    return found
-
-
-def clears(file: Path, path: str) -> dict[int, int]:
-    """Return the number of births at each removal of a robot, by time [ns]."""
-    return {
-        time.value: births.as_py()
-        for batch, _ in batches(file, path)
-        if "Clear:is_recursive" in batch.schema.names
-        for time, births, row in zip(
-            batch["sim_time"],
-            batch["births"],
-            batch["Clear:is_recursive"],
-            strict=True,
-        )
-        if row.is_valid
-    }
-
-
-def last_births(file: Path, path: str) -> int:
-    """Return the number of births at the last pose of a robot."""
-    columns = [
-        pa.chunked_array([batch["births"]])
-        for batch, _ in batches(file, path)
-        if CENTRES in batch.schema.names
-    ]
-    return max(int(pc.max(column).as_py()) for column in columns)
+    return {time: np.array(centres) for time, _, centres in rows(file, path, CENTRES)}
 
 
 def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
     """Return a curve of island 0 by number of births."""
-    return {
-        births.as_py(): tuple(row.as_py())
-        for batch, is_static in batches(file, f"/islands/0/{name}")
-        if not is_static
-        for births, row in zip(batch["births"], batch["Scalars:scalars"], strict=True)
-    }
+    found = rows(file, f"/islands/0/{name}", "Scalars:scalars")
+    return {births: tuple(values) for _, births, values in found}
 
 
 def expected_curve(folder: Path) -> dict[int, tuple[float, ...]]:
@@ -101,10 +81,6 @@ def expected_curve(folder: Path) -> dict[int, tuple[float, ...]]:
         row["births"]: (row["fitness_mean"], row["fitness_max"])
         for row in grouped.to_pylist()
     }
-
-
-def nanoseconds(time_s: float) -> int:
-    return round(time_s * 1e9)
 
 
 def check_curves(file: Path, folder: Path) -> None:
@@ -131,51 +107,41 @@ def test_replay_contains_each_pose_of_each_robot(
 ) -> None:
     table = read_table(small_arena_run, "poses")
     for number in sorted(set(table["birth"].to_pylist())):
-        rows = table.filter(pc.field("birth") == number)
-        shown = poses(replayed, f"/islands/0/robots/0-{number}")
-        recorded = {
-            nanoseconds(row["sim_time_s"]): (row["x"], row["y"], row["z"])
-            for row in rows.select(["sim_time_s", "x", "y", "z"]).to_pylist()
-        }
-        assert shown.keys() == recorded.keys()
-        for time, position in recorded.items():
+        own = table.filter(pc.field("birth") == number)
+        path = f"/islands/0/robots/0-{number}"
+        shown = poses(replayed, path)
+        times = [round(time_s * 1e9) for time_s in own["sim_time_s"].to_pylist()]
+        assert [*shown] == times
+        for time, *position in zip(times, *(own[axis].to_pylist() for axis in "xyz"),
+                                   strict=True):  # fmt: skip
             # One of the boxes is the core, whose centre is in the table.
             distances = np.linalg.norm(shown[time] - np.array(position), axis=1)
             assert distances.min() < 1e-3
+        sizes = rows(replayed, path, "Boxes3D:half_sizes")
+        assert min(time for time, _, _ in sizes) == times[0]
 
 
 def test_dead_robots_are_cleared_at_their_death(
     replayed: Path, small_arena_run: Path
 ) -> None:
     deaths = {
-        row["birth"]: nanoseconds(row["sim_time_s"])
+        row["birth"]: round(row["sim_time_s"] * 1e9)
         for row in read_table(small_arena_run, "deaths").to_pylist()
     }
     assert deaths
     robots = [path for path in paths(replayed) if "/robots/" in path]
     assert len(robots) == read_table(small_arena_run, "births").num_rows
     for path in robots:
+        assert not any(chunk.is_static for chunk in chunks(replayed, path))
         number = int(path.rpartition("-")[2])
         if number in deaths:
-            cleared = clears(replayed, path)
-            assert deaths[number] in cleared
+            cleared = {
+                time: births
+                for time, births, _ in rows(replayed, path, "Clear:is_recursive")
+            }
             # On the timeline of births, too, no pose follows the removal.
-            assert cleared[deaths[number]] >= last_births(replayed, path)
-        assert not any(is_static for _, is_static in batches(replayed, path))
-
-
-def test_boxes_are_logged_with_the_first_pose(replayed: Path) -> None:
-    for path in sorted(each for each in paths(replayed) if "/robots/" in each):
-        times = [
-            time.value
-            for batch, _ in batches(replayed, path)
-            if "Boxes3D:half_sizes" in batch.schema.names
-            for time, row in zip(
-                batch["sim_time"], batch["Boxes3D:half_sizes"], strict=True
-            )
-            if row.is_valid
-        ]
-        assert min(times) == min(poses(replayed, path))
+            last = max(births for _, births, _ in rows(replayed, path, CENTRES))
+            assert cleared[deaths[number]] >= last
 
 
 def test_curves_of_a_replay_equal_the_tables(
@@ -187,32 +153,25 @@ def test_curves_of_a_replay_equal_the_tables(
 def test_log_contains_each_birth_and_death(
     replayed: Path, small_arena_run: Path
 ) -> None:
-    lines = [
-        line.as_py()[0]
-        for batch, _ in batches(replayed, "/log")
-        for line in batch["TextLog:text"]
-    ]
-    births = read_table(small_arena_run, "births").num_rows
-    deaths = read_table(small_arena_run, "deaths").num_rows
-    assert sum("is born" in line for line in lines) == births
-    assert sum("is gone" in line for line in lines) == deaths
+    lines = [text for _, _, (text,) in rows(replayed, "/log", "TextLog:text")]
+    for table, word in (("births", "is born"), ("deaths", "is gone")):
+        count = read_table(small_arena_run, table).num_rows
+        assert sum(word in line for line in lines) == count
 
 
 def test_viewers_receive_everything_and_do_not_change_the_run(
     small_arena_workspace: Workspace,
     small_arena_run: Path,
-    fleet_of: Fleet,
-    until: Until,
 ) -> None:
     """Start three viewers; kill one and stop another during the run."""
     workspace = small_arena_workspace
-    fleet = fleet_of(workspace, *WORDS, "--speed", "10")
+    fleet = Fleet(workspace, *WORDS, "--speed", "10")
     viewers = {}
     for name in ("whole", "killed", "frozen"):
         words = ("view", "--connect", fleet.address, "--save", f"{name}.rrd")
         viewers[name] = workspace.start(*words)
         file = workspace.folder / f"{name}.rrd"
-        until(file.exists, f"the viewer {name} has received the run")
+        wait_until(file.exists, f"the viewer {name} has received the run")
     fleet.join("w", "worker")
     fleet.begin(1)
     fleet.wait_for(0.4 * (small_arena_run / NAME).stat().st_size)
@@ -246,12 +205,6 @@ def test_a_film_of_an_arena_has_a_picture_for_each_recorded_time(
     step_ms = 1000 * (times[1] - times[0]) / 2
     assert sum(durations) == pytest.approx(step_ms * len(times))
     assert len(durations) > len(times) // 2
-
-
-def test_an_off_line_run_has_no_film(workspace: Workspace, undisturbed: Path) -> None:
-    words = ("view", str(undisturbed), "--save", "robots.gif")
-    done = workspace.run(*words, code=2)
-    assert f"{undisturbed}: the run has no arena; for the film of a robot use: " in done
 
 
 def test_resimulated_robot_of_an_arena_moves_as_recorded(
@@ -296,34 +249,3 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
     (folder / "run.json").write_text(text)
     out = workspace.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
     assert "0:4: DIFFERS from the record: fitness" in out
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("view", "x", "--connect", "hub"), "give either a run folder or --connect"),
-        (
-            ("view", "nowhere", "--save", "a.rrd"),
-            "nowhere: no such folder",
-        ),
-        (
-            ("view", "--connect", "tcp/127.0.0.1:1", "--save", "a.rrd"),
-            "no hub at",
-        ),
-        (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
-        (("view", "nowhere", "--follow", "x"), "must be BIRTH or ISLAND:BIRTH"),
-        (("view", "nowhere", "--save", "no/such/a.rrd"), "no such folder: no/such"),
-        (("view", "nowhere", "--save", "a.txt"), "must end in .rrd"),
-        (("view", "nowhere", "--ancestry"), "needs --robot best"),
-        (
-            ("view", "--connect", "tcp/127.0.0.1:1", "--robot", "best"),
-            "a run folder only",
-        ),
-    ],
-)
-def test_invalid_flags_are_reported_in_one_line(
-    workspace: Workspace, words: tuple[str, ...], message: str
-) -> None:
-    out = workspace.run(*words, code=2)
-    assert message in out
-    assert out.count("\n") == 1

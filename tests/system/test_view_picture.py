@@ -8,9 +8,8 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,12 +19,10 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from schema.tables.files import read_table
-from tests.system.workspace import Until
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Workspace = Any
-Fleet = Callable[..., Any]
 Floats = npt.NDArray[np.float64]
 
 PICTURE_TIME_S = 12.0
@@ -135,27 +132,6 @@ def test_replay_shows_robots_at_their_recorded_positions(
     shown = Image.open(own).convert("RGB")
     colours = shown.getcolors(maxcolors=shown.width * shown.height)
     assert len(colours or []) > 100
-
-
-def test_live_view_shows_robots_at_their_recorded_positions(
-    viewer: ViewerClient,
-    small_arena_workspace: Workspace,
-    fleet_of: Fleet,
-    until: Until,
-) -> None:
-    fleet = fleet_of(small_arena_workspace, "hamlet.toml", "--seed", "4", "--quiet")
-    served = f"127.0.0.1:{free_port()}"
-    words = ("--serve", served, "--save", "live.rrd")
-    small_arena_workspace.start("view", "--connect", fleet.address, *words)
-    until(
-        (small_arena_workspace.folder / "live.rrd").exists,
-        "the viewer has received the run",
-    )
-    fleet.join("w", "worker")
-    fleet.begin(1)
-    fleet.finish()
-    picture = screenshot(viewer, f"rerun+http://{served}/proxy")
-    check_robots(picture, fleet.folder)
 
 
 def test_blank_picture_fails_the_check(small_arena_run: Path) -> None:

@@ -44,14 +44,7 @@ def start(
     before: Callable[[], object] = lambda: None,
     after: Callable[[], object] = lambda: None,
 ) -> int:
-    """Start a command as a fork of this process; return its process id.
-
-    Args:
-        words: of the command, without ``revolve``.
-        log: file to which its output is appended.
-        before: called in the new process, before the command.
-        after: called in the new process when the command is done.
-    """
+    """Start a command as a fork of this process; return its process id."""
     sys.stdout.flush()
     child = os.fork()
     if child:
@@ -102,11 +95,7 @@ def ended(process: int) -> int | None:
 
 
 def wait(process: int, log: Path) -> int:
-    """Wait for the end of a command; return its exit code.
-
-    Raises:
-        TimeoutError: it does not end.
-    """
+    """Wait for the end of a command; return its exit code."""
     deadline = time.monotonic() + PATIENCE_S
     while (code := ended(process)) is None:
         if time.monotonic() > deadline:
@@ -117,11 +106,7 @@ def wait(process: int, log: Path) -> int:
 
 
 def wait_for(text: str, log: Path) -> None:
-    """Wait until a log contains a text.
-
-    Raises:
-        TimeoutError: it does not come.
-    """
+    """Wait until a log contains a text."""
     deadline = time.monotonic() + PATIENCE_S
     while not (log.exists() and text in log.read_text("utf-8", errors="replace")):
         if time.monotonic() > deadline:

@@ -12,19 +12,15 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO
+from typing import Any
 
 PATIENCE_S = 240.0
-Until = Callable[[Callable[[], bool], str], None]
-"""Type of the fixture that waits for a condition."""
+Process = Any
+"""A ``subprocess.Popen[str]``; mypy does not know that its pipes are there."""
 
 
 def runtime_directory(folder: Path) -> str:
-    """Return a directory for the sockets of a test, by a path that is short enough.
-
-    Args:
-        folder: of the test; the sockets are removed with it.
-    """
+    """Return a directory for the sockets of a test, by a path that is short enough."""
     (folder / "runtime").mkdir(exist_ok=True)
     link = Path(tempfile.gettempdir()) / f"rt-{secrets.token_hex(6)}"
     link.symlink_to(folder / "runtime")
@@ -39,11 +35,15 @@ def said(text: str) -> list[str]:
 
 
 class Workspace:
-    """Starts the commands of a test in a folder and kills remaining processes."""
+    """Starts the commands of a test in a folder and kills remaining processes.
+
+    All of them get the variables in ``environment``.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._started: list[tuple[subprocess.Popen[str], Path | None]] = []
+        self.environment: dict[str, str] = {}
+        self._started: list[tuple[Process, Path | None]] = []
 
     def start(
         self,
@@ -53,17 +53,8 @@ class Workspace:
         inside: str = "",
         module: str = "revolve",
         log: Path | None = None,
-    ) -> subprocess.Popen[str]:
-        """Start ``revolve`` with arguments and return immediately.
-
-        Args:
-            words: command-line arguments.
-            folder: working directory; default: the workspace's folder.
-            environment: additional environment variables.
-            inside: network namespace; default: that of the test.
-            module: program to start in place of ``revolve``.
-            log: file that gets all output; default: pipes.
-        """
+    ) -> Process:
+        """Start ``revolve``, or another module, and return immediately."""
         prefix = ("ip", "netns", "exec", inside) if inside else ()
         command = (*prefix, sys.executable, "-m", module, *words)
         return self.start_command(
@@ -76,47 +67,33 @@ class Workspace:
         folder: Path | None = None,
         environment: dict[str, str] | None = None,
         log: Path | None = None,
-    ) -> subprocess.Popen[str]:
-        """Start any command, otherwise like ``start``.
-
-        Args:
-            words: command and arguments.
-            folder: as for ``start``.
-            environment: as for ``start``.
-            log: file that gets all output; default: pipes.
-        """
+    ) -> Process:
+        """Start any command, otherwise like ``start``."""
+        root = {"PYTHONPATH": str(Path(__file__).parents[2])}
         with ExitStack() as opened:
             file = opened.enter_context(log.open("w")) if log else subprocess.PIPE
-            process = self._popen(words, file, folder, environment)
+            process = subprocess.Popen(
+                words,
+                stdout=file,
+                stderr=file,
+                text=True,
+                cwd=folder or self.folder,
+                env={**os.environ, **root, **self.environment, **(environment or {})},
+            )
         self._started.append((process, log))
         return process
 
-    def _popen(
-        self,
-        words: tuple[str, ...],
-        output: IO[str] | int,
-        folder: Path | None,
-        environment: dict[str, str] | None,
-    ) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            words,
-            stdout=output,
-            stderr=output,
-            text=True,
-            cwd=folder or self.folder,
-            env={
-                **os.environ,
-                "PYTHONPATH": str(Path(__file__).parents[2]),
-                **(environment or {}),
-            },
-        )
-
     def run(self, *words: str, code: int = 0) -> str:
         """Run ``revolve`` to its end; return standard output and standard error."""
-        process = self.start(*words)
+        return self.python("-m", "revolve", *words, code=code)
+
+    def python(self, *words: str, code: int = 0) -> str:
+        """Run Python with arguments to its end; return all that it writes."""
+        process = self.start_command(sys.executable, *words)
         out, err = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == code, f"{words}: {process.returncode}\n{out}{err}"
-        return out + err
+        told: str = out + err
+        return told
 
     def clear(self) -> None:
         """Kill remaining processes and write all output to the test report."""

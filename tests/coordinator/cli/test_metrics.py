@@ -73,10 +73,3 @@ def test_a_port_in_use_is_one_line() -> None:
         port = used.getsockname()[1]
         with pytest.raises(NetworkError, match=rf"--metrics: .*127.0.0.1:{port}"):
             MetricsServer("127.0.0.1", port)
-
-
-def test_the_port_is_free_after_the_end() -> None:
-    with MetricsServer("127.0.0.1", 0) as server:
-        port = int(server.url.rsplit(":", 1)[1].removesuffix("/metrics"))
-    with MetricsServer("127.0.0.1", port):
-        pass

@@ -9,14 +9,7 @@ from coordinator.cli.status import Source, main, show_source, status_json
 from coordinator.cli.status_text import fault_lines, state_of
 from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.folder import RunDetails, RunFolder
-from schema.errors import MalformedMessage
 from schema.experiment.file import experiment_text, read_experiment
-from schema.limits import MOST_SHOWN
-from schema.wire.codec import encode
-from schema.wire.operator import (
-    OperatorReply,
-    decode_operator_reply,
-)
 from schema.wire.status import IslandStatus, PeerFault, Queue, RunStatus, Status
 
 EXPERIMENT = read_experiment("scenario1")
@@ -209,10 +202,3 @@ def test_a_run_without_agents_waits_for_them_if_its_coordinator_says_so() -> Non
         assert state_of(running, status, is_live=True) == state
         assert state_of(stopped, status, is_live=True) == "stopped"
         assert state_of(running, status, is_live=False) == "running"
-
-
-def test_a_status_with_a_long_name_is_malformed() -> None:
-    status = Status((), 1, 1, 0.0, (PeerFault("late", "x" * (MOST_SHOWN + 1), 1),))
-    data = encode(OperatorReply("", status=status))
-    with pytest.raises(MalformedMessage):
-        decode_operator_reply(data)

@@ -55,11 +55,13 @@ def test_hub_for_other_machines_needs_tls(address: str, tls: Tls | None) -> None
         hub_config((THIS_MACHINE, address), tls)
 
 
-def test_tls_needs_its_files() -> None:
+def test_tls_needs_its_files_and_explicit_ports() -> None:
     with pytest.raises(NetworkError, match=r"tls/h:1 needs --tls-ca"):
         hub_config(("tls/h:1",))
     with pytest.raises(NetworkError, match=r"tls/h:1 needs --tls-ca"):
         client_config("tls/h:1")
+    with pytest.raises(NetworkError, match="each address needs a port"):
+        hub_config((THIS_MACHINE, "tls/h:1"), TLS)
 
 
 def test_tls_hub_requires_certificates_and_has_no_admin_space() -> None:
@@ -68,16 +70,6 @@ def test_tls_hub_requires_certificates_and_has_no_admin_space() -> None:
     assert link["protocols"] == ["tcp", "tls"]
     assert link["tls"]["enable_mtls"] is True
     assert config["adminspace"]["enabled"] is False
-
-
-def test_tls_hub_needs_explicit_ports() -> None:
-    with pytest.raises(NetworkError, match="each address needs a port"):
-        hub_config((THIS_MACHINE, "tls/h:1"), TLS)
-
-
-def test_hub_needs_an_address() -> None:
-    with pytest.raises(NetworkError, match="got none"):
-        hub_config(())
 
 
 @pytest.mark.parametrize(
@@ -95,10 +87,3 @@ def test_engine_accepts_the_configurations_without_scouting(text: str) -> None:
     assert config["scouting"]["multicast"]["enabled"] is False
     assert config["scouting"]["gossip"]["enabled"] is False
     assert config["transport"]["shared_memory"]["enabled"] is False
-
-
-def test_client_does_not_listen() -> None:
-    config = json.loads(client_config("tcp/far.example:7447"))
-    assert config["mode"] == "client"
-    assert config["listen"]["endpoints"] == []
-    assert config["connect"]["endpoints"] == ["tcp/far.example:7447"]

@@ -25,15 +25,6 @@ TASK = RunningJob("worker-0.ab", "host:some/folder", 3, 2**40, b"12345678")
 PATIENCE_S = 30.0
 
 
-def test_note_is_readable_from_begin_to_end() -> None:
-    note = CurrentJob()
-    assert note.read() is None
-    note.begin(TASK)
-    assert note.read() == TASK
-    note.end()
-    assert note.read() is None
-
-
 def test_note_of_a_long_name_is_cut() -> None:
     note = CurrentJob()
     note.begin(RunningJob("a" * 999, "r" * 9999, 1, 2))
@@ -201,17 +192,6 @@ def passed(clocks: Clocks, watch: JobWatch, seconds: int, used_s: float) -> None
         watch.measure()
 
 
-def test_nothing_is_quiet_between_jobs(clocks: Clocks, watch: JobWatch) -> None:
-    passed(clocks, watch, 10, 0.0)
-    assert watch.quiet_s is None
-    watch.begin(TASK)
-    assert watch.task == TASK
-    assert watch.quiet_s == pytest.approx(0.0)
-    watch.end()
-    passed(clocks, watch, 10, 5.0)
-    assert [watch.task, watch.quiet_s] == [None, None]
-
-
 @pytest.mark.parametrize(
     ("used_s", "quiet_s"),
     # A loop that polls needs some thousandth of a core; a process on a machine with
@@ -226,10 +206,16 @@ def test_job_is_quiet_while_it_uses_no_cpu(
     assert watch.quiet_s == quiet_s
 
 
-def test_each_job_starts_anew(clocks: Clocks, watch: JobWatch) -> None:
+def test_each_job_starts_anew_and_nothing_is_quiet_between_jobs(
+    clocks: Clocks, watch: JobWatch
+) -> None:
+    passed(clocks, watch, 10, 0.0)
+    assert [watch.task, watch.quiet_s] == [None, None]
     watch.begin(TASK)
+    assert watch.task == TASK
     passed(clocks, watch, 60, 0.0)
     watch.end()
+    assert [watch.task, watch.quiet_s] == [None, None]
     watch.begin(TASK)
     passed(clocks, watch, 3, 0.0)
     assert watch.quiet_s == 3.0
