@@ -1,6 +1,7 @@
 """Migration of an arena: its emigrants, and immigrants until there is room for them."""
 
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from coordinator.arena.living import LivingRobots, Moment, death_record
 from coordinator.evolution.breeding import Individual

@@ -7,9 +7,9 @@ window that begins there. Time stands still while a learner is asked.
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from msgspec import structs
+from msgspec.structs import replace
 
 from coordinator.arena.living import LivingRobot, LivingRobots, Moment
 from coordinator.evolution.breeding import Candidate
@@ -233,7 +233,7 @@ def _rows(infant: _Infant, adult: Robot | None = None) -> list[Record]:
     records = infant.learning.records()
     best = None if adult is None else encode_robot(adult)
     return [
-        structs.replace(
+        replace(
             record,
             row={
                 **record.row,

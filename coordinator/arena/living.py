@@ -4,13 +4,13 @@ Their table rows are made here, too, besides those of migrations.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import cos, dist, isfinite, sin, tau
 from types import MappingProxyType
 from typing import NamedTuple
 
-from msgspec import structs
+from msgspec.structs import replace
 
 from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import IslandEncoding
@@ -187,10 +187,10 @@ class LivingRobots:
         robot.robot, birth = changed, robot.birth
         inserted = self._insertions.get(birth)
         if inserted is not None:
-            self._insertions[birth] = structs.replace(inserted, robot=changed)
+            self._insertions[birth] = replace(inserted, robot=changed)
             return
         if restarts_window and robot.judgement is not None:
-            robot.judgement = structs.replace(robot.judgement, is_mature=False)
+            robot.judgement = replace(robot.judgement, is_mature=False)
         if (before := self._brains.get(birth)) is not None:
             restarts_window = restarts_window or before.restarts_window
         self._brains[birth] = BrainChange(birth, changed.brain, restarts_window)

@@ -6,10 +6,12 @@ Attempts are numbered through all couples of a birth, so that each has its own s
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 from types import MappingProxyType
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose, stream
@@ -30,8 +32,7 @@ _COUPLES = 100
 """Number of couples that may fail at one birth before `Breeder` gives up."""
 
 
-@dataclass(frozen=True, slots=True)
-class Individual:
+class Individual(Struct, frozen=True):
     """Member of a population.
 
     Attributes:
@@ -57,10 +58,12 @@ class Individual:
     has_failed: bool = False
     parents: tuple[BirthId, ...] = ()
     size: int = 0
-    measures: Mapping[str, float] = field(
-        default_factory=lambda: NO_MEASURES, hash=False
-    )
+    measures: Mapping[str, float] = NO_MEASURES
     learnt: Robot | None = None
+
+    def __hash__(self) -> int:
+        """Return the hash of the birth id, as measures have none."""
+        return hash(self.birth)
 
     def evaluated(
         self, evaluation: Evaluation | None, labels: Sequence[str]
@@ -111,8 +114,7 @@ Couple = tuple[Individual, Individual]
 """Two parents; the first gives the root of the child."""
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
+class Candidate(Struct, frozen=True):
     """Robot that may be born under a birth id.
 
     Attributes:

@@ -5,6 +5,7 @@ function call, and convert it into a new genome.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from itertools import count
 from operator import add, sub
 from typing import NamedTuple, TypeVar
@@ -63,12 +64,8 @@ class MutableGenome(Struct, eq=False):
 
     def neurons(self, *layers: Layer) -> list[tuple[Layer, int]]:
         """Return (layer, offset) of its own neurons, in the order of the layers."""
-        found: list[tuple[Layer, int]] = []
-        for layer in layers:
-            genes = self.outputs if layer == "output" else self.hidden
-            if count := self.kind.inputs if layer == "input" else len(genes):
-                found += [(layer, k) for k in range(count)]
-        return found
+        counts = self.kind.inputs, len(self.outputs), len(self.hidden)
+        return [*_neurons(layers, *counts)]
 
     def path_to(self, other: "MutableGenome") -> tuple[int, ...]:
         """Return the path of a connection to another branch of its tree."""
@@ -77,6 +74,14 @@ class MutableGenome(Struct, eq=False):
     def along(self, path: tuple[int, ...]) -> "MutableGenome | None":
         """Return the branch at the end of a path; None if the path does not exist."""
         return follow(self, path)
+
+
+@lru_cache(maxsize=1024)
+def _neurons(
+    layers: tuple[Layer, ...], inputs: int, outputs: int, hidden: int
+) -> tuple[tuple[Layer, int], ...]:
+    counts: dict[Layer, int] = {"input": inputs, "output": outputs, "hidden": hidden}
+    return tuple((layer, k) for layer in layers for k in range(counts[layer]))
 
 
 def gene_ids(birth: BirthId) -> Iterator[int]:
@@ -120,29 +125,31 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
     """Return the genome of a tree whose branches are given depth first."""
     nodes: dict[MutableGenome, Node] = {}
     for branch in reversed(branches):
+        genes = branch.outputs, branch.hidden, branch.connections
+        if not type(genes[0]) is type(genes[1]) is type(genes[2]) is tuple:
+            genes = tuple(map(_as_tuple, genes))
+        children = branch.children
         nodes[branch] = Node(
             branch.kind.name,
             branch.slot,
             branch.orientation,
             branch.parameters,
             branch.gene,
-            _genes(branch.outputs),
-            _genes(branch.hidden),
-            _genes(branch.connections),
-            tuple([(slot, nodes[child]) for slot, child in branch.children.items()]),
+            *genes,
+            tuple([(slot, nodes[child]) for slot, child in children.items()])
+            if children
+            else (),
         )
     return nodes[branches[0]]
 
 
-def _genes(genes: tuple[Gene, ...]) -> tuple[Gene, ...]:
+def _as_tuple(genes: tuple[Gene, ...]) -> tuple[Gene, ...]:
     """Return genes as a tuple, as genomes share them; a brain type may return a list.
 
     Raises:
         TypeError: neither a tuple nor a list.
     """
-    if type(genes) is tuple:
-        return genes
-    if not isinstance(genes, list):
+    if not isinstance(genes, tuple | list):
         raise TypeError(f"genes must be a tuple, got a {type(genes).__name__}")
     return tuple(genes)
 
@@ -154,8 +161,8 @@ def preorder(root: MutableGenome) -> list[MutableGenome]:
     while stack:
         branch = stack.pop()
         order.append(branch)
-        if branch.children:
-            stack.extend(reversed(branch.children.values()))
+        if children := branch.children:
+            stack += reversed(children.values())
     return order
 
 
@@ -269,13 +276,17 @@ def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Coun
     Args:
         branches: those of a whole tree, depth first.
     """
-    sums = {b: (1, b.kind.inputs, len(b.outputs), len(b.hidden)) for b in branches}
+    sums: dict[MutableGenome, Counts] = {}
     for branch in reversed(branches):
-        if branch.parent is not None:
-            p, i, o, h = sums[branch]
-            parts, inputs, outputs, hidden = sums[branch.parent]
-            sums[branch.parent] = parts + p, inputs + i, outputs + o, hidden + h
-    return sums
+        parts, inputs = 1, branch.kind.inputs
+        outputs, hidden = len(branch.outputs), len(branch.hidden)
+        if branch.children:
+            for child in branch.children.values():
+                p, i, o, h = sums[child]
+                parts, inputs = parts + p, inputs + i
+                outputs, hidden = outputs + o, hidden + h
+        sums[branch] = parts, inputs, outputs, hidden
+    return {branch: sums[branch] for branch in branches}
 
 
 def fitting_subtrees(

@@ -8,6 +8,7 @@ connection.
 
 from collections.abc import Iterable, Sequence
 from decimal import Decimal
+from functools import lru_cache
 from typing import TypeVar
 
 from msgspec.structs import replace
@@ -75,8 +76,8 @@ class NetworkGenes:
         self, draws: Draws, branches: Sequence[Branch], rules: BrainRules
     ) -> tuple[int, int]:
         """Delete hidden neurons and connections; return how many of each there were."""
-        hidden = sum(len(branch.hidden) for branch in branches)
-        connections = sum(len(branch.connections) for branch in branches)
+        hidden = sum([len(branch.hidden) for branch in branches])
+        connections = sum([len(branch.connections) for branch in branches])
         delete_hidden_neurons(draws, branches, rules.p_delete_hidden_neuron)
         delete_connections(draws, branches, rules.p_remove_brain_connection)
         return hidden, connections
@@ -105,7 +106,13 @@ def endpoints(
     branches: Iterable[B], *layers: Layer
 ) -> list[tuple[B, tuple[Layer, int]]]:
     """Return all neurons of some layers as ends of connections."""
-    return [(branch, end) for branch in branches for end in branch.neurons(*layers)]
+    return [
+        (branch, end)
+        for branch in branches
+        # Most parts have no neurons.
+        if branch.outputs or branch.hidden or branch.kind.inputs
+        for end in branch.neurons(*layers)
+    ]
 
 
 def connect(
@@ -141,9 +148,9 @@ def delete_hidden_neurons(
 
     Connections of the remaining neurons keep their source and target.
     """
-    new_offsets: dict[Branch, list[int | None]] = {}
+    number, new_offsets = draws.number, dict[Branch, list[int | None]]()
     for branch in [one for one in branches if one.hidden]:
-        stays = [not draws.chance(probability) for _ in branch.hidden]
+        stays = [number() >= probability for _ in branch.hidden]
         if not all(stays):
             offsets = iter(range(len(stays)))
             new_offsets[branch] = [next(offsets) if stay else None for stay in stays]
@@ -195,10 +202,11 @@ def delete_connections(
     draws: Draws, branches: Sequence[Branch], probability: float
 ) -> None:
     """Delete each connection with a probability."""
+    number = draws.number
     for branch in branches:
         if branch.connections:
             branch.connections = tuple(
-                [gene for gene in branch.connections if draws.number() >= probability]
+                [gene for gene in branch.connections if number() >= probability]
             )
 
 
@@ -220,11 +228,11 @@ def _varied(
     epsilon: float,
     kinds: NeuronKinds,
 ) -> tuple[NeuronGene, ...]:
+    nearby = draws.nearby
     return tuple(
         [
             NeuronGene(
-                neuron.kind,
-                draws.nearby(kinds[neuron.kind], neuron.parameters, epsilon),
+                neuron.kind, nearby(kinds[neuron.kind], neuron.parameters, epsilon)
             )
             for neuron in neurons
         ]
@@ -248,6 +256,8 @@ def add_hidden_neurons(
         kinds: neuron types.
     """
     wanted = draws.rounded(before * rules.p_delete_hidden_neuron)
+    if not wanted:
+        return
     types = tuple(kinds.items())
     room = rules.max_hidden - sum(len(b.hidden) for b in branches)
     for _ in range(min(wanted, room)):
@@ -285,4 +295,9 @@ def _share(count: int, probability: float) -> int:
 
     The probability counts as the decimal number of the document: halves are exact.
     """
-    return int(count * Decimal(repr(probability)) + _HALF)
+    return int(count * _as_written(probability) + _HALF)
+
+
+@lru_cache(maxsize=64)
+def _as_written(number: float) -> Decimal:
+    return Decimal(repr(number))

@@ -121,9 +121,10 @@ class BufferedRng:
             if not p.is_mutable:
                 moved.append(v)
                 continue
-            near = rest * v + epsilon * (p.low + (p.high - p.low) * number())
+            low, high = p.low, p.high
+            near = rest * v + epsilon * (low + (high - low) * number())
             # Rounding must not carry a value out of its range.
-            moved.append(p.low if near < p.low else min(near, p.high))
+            moved.append(low if near < low else high if near > high else near)
         return tuple(moved)
 
     def normal(self, mean: float, sd: float) -> float:

@@ -156,8 +156,7 @@ class RevolveAngle:
         pruned = self._brain.prune(draws, branches, self._rules)
         vary_parts(draws, branches, experiment.variation.body_epsilon)
         self._brain.vary(draws, branches, self._rules, pruned)
-        add_parts(draws, branches, gene_ids(birth), experiment)
-        branches = preorder(root)
+        branches = add_parts(draws, branches, gene_ids(birth), experiment)
         has_motor = any(branch.outputs for branch in branches)
         genome = self._genome(branches) if has_motor else None
         _unlink(branches)
@@ -203,8 +202,10 @@ def crossover(
     if len(branches) == 1:
         return False
     donated_sizes = subtree_sizes(donors)
-    replaced = draws.pick(branches[1:])
-    rest = size_of(branches).minus(size_of(preorder(replaced)))
+    place = 1 + draws.below(len(branches) - 1)
+    replaced = branches[place]
+    end = place + len(preorder(replaced))
+    rest = size_of([*branches[:place], *branches[end:]])
     room = size_limits(space).minus(rest)
     candidates = fitting_subtrees(donated_sizes, room)
     if not candidates:
@@ -282,7 +283,7 @@ def add_parts(
     branches: Sequence[MutableGenome],
     genes: Iterator[int],
     experiment: Experiment,
-) -> None:
+) -> Sequence[MutableGenome]:
     """Add random parts, `expected_parts` on average, with neurons and connections.
 
     Args:
@@ -290,34 +291,39 @@ def add_parts(
         branches: those of the tree, depth first.
         genes: identities of the parts.
         experiment: restrictions and probabilities.
+
+    Returns:
+        The branches of the tree then, depth first.
     """
     expected = expected_parts(branches, experiment)
-    if expected <= 0.0:
-        return
-    trials = ceil(2.0 * expected)
-    for _ in range(trials):
-        if draws.chance(expected / trials):
-            _add_part(draws, branches[0], genes, experiment)
+    if expected > 0.0:
+        trials = ceil(2.0 * expected)
+        for _ in range(trials):
+            if draws.chance(expected / trials):
+                branches = _add_part(draws, branches, genes, experiment)
+    return branches
 
 
 def _add_part(
     draws: BufferedRng,
-    root: MutableGenome,
+    branches: Sequence[MutableGenome],
     genes: Iterator[int],
     experiment: Experiment,
-) -> None:
+) -> Sequence[MutableGenome]:
+    """Add one part, if one fits; return the branches as `add_parts` does."""
     space = experiment.space
-    branches = preorder(root)
     size = size_of(branches)
     usable = usable_types(body_space(space), size, space)
     growth = pick_growth(draws, free_places(branches), usable)
     if growth is None:
-        return
+        return branches
     (parent, slot), kind = growth
     brain = brain_genes(experiment)
     part = random_part(draws, kind, genes, brain)
     parent.graft(part, slot)
-    brain.grow(draws, [part], preorder(root), brain_rules(experiment))
+    branches = preorder(branches[0])
+    brain.grow(draws, [part], branches, brain_rules(experiment))
+    return branches
 
 
 def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) -> float:

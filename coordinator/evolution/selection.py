@@ -42,11 +42,13 @@ class Rule:
         key: of the experiment, for messages.
         function: the rule.
         parameters: its last argument.
+        is_own: of a user, so that its answers are checked.
     """
 
     key: str
     function: Callable[..., Any]
     parameters: object
+    is_own: bool = True
 
     def places(
         self,
@@ -68,6 +70,8 @@ class Rule:
             ExperimentError: it raises, returns anything else, or puts individuals into
                 its list.
         """
+        if not self.is_own:
+            return list(self.function(population, *rest, self.parameters))
         given = list(population)
         with naming_plugin(self.key, self.function):
             answer = self.function(given, *rest, self.parameters)
@@ -111,9 +115,9 @@ def rule_of(selection: SelectionSection, name: str) -> Rule:
     if own := own_rule(selection, name):
         return Rule(key, *own)
     if name == "survivors":
-        return Rule(key, SURVIVORS[path], None)
+        return Rule(key, SURVIVORS[path], None, is_own=False)
     size = Tournament(selection.tournament_size) if path == "tournament" else None
-    return Rule(key, PARENTS.get(path, random_parents), size)
+    return Rule(key, PARENTS.get(path, random_parents), size, is_own=False)
 
 
 def select_parents(
@@ -182,11 +186,14 @@ def tournament(
     rest of the population. Of equals the elder wins.
     """
     draws = BufferedRng(rng)
-    order = list(map(_order, population))
     places = list(range(len(population)))
-    first = min(draws.sample(places, parameters.size), key=order.__getitem__)
+
+    def order(place: int) -> tuple[float, object]:
+        return _order(population[place])
+
+    first = min(draws.sample(places, parameters.size), key=order)
     places.remove(first)
-    return first, min(draws.sample(places, parameters.size), key=order.__getitem__)
+    return first, min(draws.sample(places, parameters.size), key=order)
 
 
 def random_parents(

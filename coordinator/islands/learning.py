@@ -6,10 +6,9 @@ one. Answers of learners are events, as evaluations are: a replay does not need 
 learners.
 """
 
-from dataclasses import replace
 from math import inf, sqrt
 
-from msgspec import structs
+from msgspec.structs import replace
 
 from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.encodings import IslandEncoding
@@ -184,7 +183,7 @@ class NewbornLearning:
         outcome = self._outcomes[best]
         assert outcome is not None
         grown = self._island.grown(self._candidate, self._robot(best))
-        return grown, structs.replace(outcome, trial=0)
+        return grown, replace(outcome, trial=0)
 
     def records(self) -> list[Record]:
         """Return the rows of the trials that have an outcome."""

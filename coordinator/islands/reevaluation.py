@@ -7,10 +7,9 @@ Source: Hupkes 2016, section 8.2, on scenarios between his 2 and 3.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from math import fsum
 
-from msgspec import structs
+from msgspec.structs import replace
 
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
@@ -35,7 +34,7 @@ def with_durations(
         if isinstance(each, Evaluate):
             rng = stream(seed, run, each.birth, each.trial, Purpose.DURATION)
             steps = shortest + BufferedRng(rng).below(longest - shortest + 1)
-            timed.append(structs.replace(each, steps=steps))
+            timed.append(replace(each, steps=steps))
         else:
             timed.append(each)
     return timed

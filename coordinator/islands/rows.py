@@ -9,7 +9,7 @@ from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.parts import BodySpace
 from schema.robot.genome import Node, walk
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot, motor_count
+from schema.robot.robot import Robot
 from schema.tables.columns import Row
 from schema.wire.protobuf import encode_robot
 
@@ -99,22 +99,28 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
 
     Source: thesis section 6.3; the code of the original.
     """
-    connections = len(robot.brain.connections)
+    brain = robot.brain
+    connections = len(brain.connections)
     if isinstance(genome, Node):
-        connections = sum(len(node.connections) for node, _, _ in walk(genome))
+        connections = sum([len(node.connections) for node, _, _ in walk(genome)])
+    motors = passive = 0
+    for part in robot.parts:
+        kind = space[part.kind]
+        if kind.motor is not None:
+            motors += 1
+        elif kind.shape(part.parameters).joint is not None:
+            passive += 1
+    layers = [neuron.layer for neuron in brain.neurons]
     # Includes -1, the parent of the core.
     parents = {part.parent for part in robot.parts}
     return {
         "parts": len(robot.parts),
-        "joints": sum(
-            space[part.kind].shape(part.parameters).joint is not None
-            for part in robot.parts
-        ),
-        "motors": motor_count(robot, space),
+        "joints": motors + passive,
+        "motors": motors,
         "extremities": len(robot.parts) + 1 - len(parents),
-        "inputs": robot.brain.count("input"),
-        "outputs": robot.brain.count("output"),
-        "hidden": robot.brain.count("hidden"),
+        "inputs": layers.count("input"),
+        "outputs": layers.count("output"),
+        "hidden": layers.count("hidden"),
         "connections": connections,
     }
 

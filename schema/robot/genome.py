@@ -123,23 +123,11 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
         The robot: parts in depth-first order, neurons by layer and then by part.
     """
     entries = walk(genome)
-    parts: list[Part] = []
     inputs: list[Neuron] = []
     outputs: list[Neuron] = []
     hidden: list[Neuron] = []
     starts: list[tuple[int, int, int]] = []
-    for index, (node, parent, slot) in enumerate(entries):
-        parts.append(
-            Part(
-                node.kind,
-                parent,
-                slot,
-                node.slot,
-                node.orientation,
-                node.parameters,
-                node.gene,
-            )
-        )
+    for index, (node, _, _) in enumerate(entries):
         starts.append((len(inputs), len(outputs), len(hidden)))
         if count := space[node.kind].inputs:
             inputs += [Neuron("input", INPUT, index)] * count
@@ -148,6 +136,18 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
         if genes := node.hidden:
             hidden += [Neuron("hidden", g.kind, index, g.parameters) for g in genes]
     starts.append((len(inputs), len(outputs), len(hidden)))
+    parts = [
+        Part(
+            node.kind,
+            parent,
+            slot,
+            node.slot,
+            node.orientation,
+            node.parameters,
+            node.gene,
+        )
+        for node, parent, slot in entries
+    ]
     edges = _edges(entries, starts)
     return Robot(tuple(parts), Brain((*inputs, *outputs, *hidden), edges))
 

@@ -1,10 +1,10 @@
 """Candidates of a birth, attempt by attempt, and survivors."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from coordinator.evolution.breeding import Breeder, Individual, failed_last
 from schema.errors import ExperimentError

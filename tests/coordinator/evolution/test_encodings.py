@@ -1,6 +1,5 @@
 """Encodings as islands use them: built-in and own ones, and what is refused."""
 
-import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -246,7 +245,7 @@ def test_candidates_of_an_own_encoding_depend_on_their_name_alone(
         candidate = first.candidate(BirthId(0, number), 0, ())
         assert candidate is not None
         one = candidate.individual(generation=0)
-        population.append(dataclasses.replace(one, fitness=number / 8))
+        population.append(replace(one, fitness=number / 8))
     child = first.candidate(BIRTH, 0, population)
     again = second.candidate(BIRTH, 0, population)
     other = second.candidate(BirthId(2, 41), 0, population)

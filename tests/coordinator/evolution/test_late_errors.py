@@ -1,11 +1,11 @@
 """Errors of plug-ins late in a run: each names its birth and its island."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from coordinator.evolution.breeding import Breeder, Candidate, Individual
 from coordinator.evolution.encodings import encoding_of
