@@ -123,24 +123,24 @@ def to_branches(genome: Genome, space: BodySpace) -> list[MutableGenome]:
 
 def to_genome(branches: Sequence[MutableGenome]) -> Genome:
     """Return the genome of a tree whose branches are given depth first."""
-    nodes: dict[MutableGenome, Node] = {}
+    nodes: list[Node] = []
     for branch in reversed(branches):
         genes = branch.outputs, branch.hidden, branch.connections
         if not type(genes[0]) is type(genes[1]) is type(genes[2]) is tuple:
             genes = tuple(map(_as_tuple, genes))
-        children = branch.children
-        nodes[branch] = Node(
+        # Backwards: children are made before their parent, the last one first.
+        children = [(slot, nodes.pop()) for slot in branch.children]
+        node = Node(
             branch.kind.name,
             branch.slot,
             branch.orientation,
             branch.parameters,
             branch.gene,
             *genes,
-            tuple([(slot, nodes[child]) for slot, child in children.items()])
-            if children
-            else (),
+            tuple(children),
         )
-    return nodes[branches[0]]
+        nodes.append(node)
+    return nodes[0]
 
 
 def _as_tuple(genes: tuple[Gene, ...]) -> tuple[Gene, ...]:
@@ -270,32 +270,38 @@ def size_of(branches: Iterable[MutableGenome]) -> SizeCounts:
     return SizeCounts(parts, inputs, outputs, hidden)
 
 
-def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Counts]:
+def subtree_sizes(branches: Sequence[MutableGenome]) -> list[Counts]:
     """Return the counts of every subtree, in the order of the branches.
 
     Args:
         branches: those of a whole tree, depth first.
     """
-    sums: dict[MutableGenome, Counts] = {}
+    sums: list[Counts] = []
+    of_children: list[Counts] = []
     for branch in reversed(branches):
         parts, inputs = 1, branch.kind.inputs
         outputs, hidden = len(branch.outputs), len(branch.hidden)
-        if branch.children:
-            for child in branch.children.values():
-                p, i, o, h = sums[child]
-                parts, inputs = parts + p, inputs + i
-                outputs, hidden = outputs + o, hidden + h
-        sums[branch] = parts, inputs, outputs, hidden
-    return {branch: sums[branch] for branch in branches}
+        for _ in branch.children:
+            p, i, o, h = of_children.pop()
+            parts, inputs = parts + p, inputs + i
+            outputs, hidden = outputs + o, hidden + h
+        counts = parts, inputs, outputs, hidden
+        of_children.append(counts)
+        sums.append(counts)
+    sums.reverse()
+    return sums
 
 
-def fitting_subtrees(
-    sizes: dict[MutableGenome, Counts], room: SizeCounts
-) -> list[MutableGenome]:
-    """Return the subtrees, except the whole tree, that exceed no count of ``room``."""
+def fitting_subtrees(sizes: Sequence[Counts], room: SizeCounts) -> list[int]:
+    """Return the places of the subtrees that exceed no count of ``room``.
+
+    Args:
+        sizes: of all subtrees of a tree, which itself does not count.
+        room: greatest counts.
+    """
     parts, inputs, outputs, hidden = room
     return [
-        branch
-        for branch, (p, i, o, h) in sizes.items()
-        if p <= parts and i <= inputs and o <= outputs and h <= hidden and branch.parent
+        place
+        for place, (p, i, o, h) in enumerate(sizes)
+        if p <= parts and i <= inputs and o <= outputs and h <= hidden and place
     ]

@@ -9,6 +9,7 @@ subtrees that can be duplicated is a mean.
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,11 +41,27 @@ from coordinator.evolution.random_streams import BufferedRng
 from schema.errors import InvalidRobot
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import BodySpace
-from schema.robot.genome import Genome, develop, walk
+from schema.robot.genome import Genome, Node, develop, walk
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Robot
 from schema.wire.protobuf import decode_genome, encode_genome
+
+_MOST_DONORS = 1024
+
+
+class Donor(NamedTuple):
+    """Parent that gives a subtree.
+
+    Attributes:
+        nodes: of its genome, depth first.
+        sizes: of the subtree of each node.
+        types: part types.
+    """
+
+    nodes: Sequence[Node]
+    sizes: Sequence[Counts]
+    types: BodySpace
 
 
 class RevolveAngle:
@@ -59,6 +76,7 @@ class RevolveAngle:
         self._experiment = experiment
         self._types = types
         self._brain, self._rules = brain_genes(experiment), brain_rules(experiment)
+        self._donors: dict[int, Donor] = {}
 
     def random(self, rng: np.random.Generator, birth: BirthId) -> Genome:
         """Return the genome of a random robot with at least one motor.
@@ -88,20 +106,20 @@ class RevolveAngle:
             at least one motor; None if crossover finds no fitting subtree or no motor
             is left.
         """
-        draws, types = BufferedRng(rng), self._types
-        branches, donors = to_branches(first, types), to_branches(second, types)
+        draws = BufferedRng(rng)
+        branches, donor = to_branches(first, self._types), self._donor(second)
         child: Genome | None = None
-        if crossover(draws, branches, donors, self._experiment):
+        if crossover(draws, branches, donor, self._experiment):
             child = self._mutated(draws, branches[0], birth)
-        _unlink([*branches, *donors])
+        _unlink(branches)
         return child
 
     def crossover(
         self, first: Genome, second: Genome, rng: np.random.Generator
     ) -> Genome | None:
         """Return the first genome with a subtree of the second, or None."""
-        branches, donors = (to_branches(each, self._types) for each in (first, second))
-        is_done = crossover(BufferedRng(rng), branches, donors, self._experiment)
+        branches, donor = to_branches(first, self._types), self._donor(second)
+        is_done = crossover(BufferedRng(rng), branches, donor, self._experiment)
         return self._genome(preorder(branches[0])) if is_done else None
 
     def mutate(
@@ -134,6 +152,16 @@ class RevolveAngle:
     def from_robot(self, robot: Robot) -> Genome:
         """Return the genome that develops into a robot."""
         return genome_of(robot)
+
+    def _donor(self, genome: Genome) -> Donor:
+        """Return the subtrees of a genome; those of recent parents are kept."""
+        known = self._donors.get(id(genome))
+        if known is None:
+            if len(self._donors) >= _MOST_DONORS:
+                self._donors.clear()
+            # It holds the genome, whose id is thus no other's.
+            known = self._donors[id(genome)] = donor_of(genome, self._types)
+        return known
 
     def _mutated(
         self, draws: BufferedRng, root: MutableGenome, birth: BirthId
@@ -178,10 +206,16 @@ def _unlink(branches: Iterable[MutableGenome]) -> None:
         branch.parent = None
 
 
+def donor_of(genome: Genome, types: BodySpace) -> Donor:
+    """Return the subtrees of a genome."""
+    nodes = [node for node, _, _ in walk(genome)]
+    return Donor(nodes, subtree_sizes(to_branches(genome, types)), types)
+
+
 def crossover(
     draws: BufferedRng,
     branches: Sequence[MutableGenome],
-    donors: Sequence[MutableGenome],
+    donor: Donor,
     experiment: Experiment,
 ) -> bool:
     """Replace a subtree by one of a donor; neither is a root.
@@ -192,31 +226,30 @@ def crossover(
     Args:
         draws: source of all choices.
         branches: those of the tree that changes, depth first.
-        donors: those of the other tree, which loses the donated subtree.
+        donor: the other tree.
         experiment: restrictions.
 
     Returns:
-        Whether a subtree was replaced; if not, the trees are unchanged.
+        Whether a subtree was replaced; if not, the tree is unchanged.
     """
     space = experiment.space
     if len(branches) == 1:
         return False
-    donated_sizes = subtree_sizes(donors)
     place = 1 + draws.below(len(branches) - 1)
     replaced = branches[place]
     end = place + len(preorder(replaced))
     rest = size_of([*branches[:place], *branches[end:]])
     room = size_limits(space).minus(rest)
-    candidates = fitting_subtrees(donated_sizes, room)
+    candidates = fitting_subtrees(donor.sizes, room)
     if not candidates:
         return False
     donated = draws.pick(candidates)
-    parts = rest.parts + donated_sizes[donated][0]
+    parts = rest.parts + donor.sizes[donated][0]
     if parts < space.min_parts:
         return False
     assert replaced.parent is not None
-    donated.cut()
-    replaced.parent.graft(donated, replaced.parent_slot)
+    subtree = to_mutable(donor.nodes[donated], donor.types)
+    replaced.parent.graft(subtree, replaced.parent_slot)
     return True
 
 
@@ -226,8 +259,9 @@ def delete_subtree(
     """Delete a random subtree, with the probability of the experiment."""
     if not draws.chance(experiment.variation.p_delete_subtree):
         return
-    if candidates := deletable(subtree_sizes(preorder(root)), experiment.space):
-        draws.pick(candidates).cut()
+    branches = preorder(root)
+    if candidates := deletable(subtree_sizes(branches), experiment.space):
+        branches[draws.pick(candidates)].cut()
 
 
 def duplicate_subtree(
@@ -240,7 +274,7 @@ def duplicate_subtree(
     candidates = duplicable(subtree_sizes(branches), experiment.space)
     places = free_places(branches)
     if candidates and places:
-        copy = copied(draws.pick(candidates))
+        copy = copied(branches[draws.pick(candidates)])
         parent, slot = draws.pick(places)
         parent.graft(copy, slot)
 
@@ -338,8 +372,8 @@ def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) ->
     """
     variation, space = experiment.variation, experiment.space
     sizes = subtree_sizes(branches)
-    deleted = [sizes[branch][0] for branch in deletable(sizes, space)]
-    duplicated = [sizes[branch][0] for branch in duplicable(sizes, space)]
+    deleted = [sizes[place][0] for place in deletable(sizes, space)]
+    duplicated = [sizes[place][0] for place in duplicable(sizes, space)]
     more = sum(duplicated) / len(duplicated) if duplicated else 0.0
     less = sum(deleted) / len(deleted) if deleted else 0.0
     return min(
@@ -348,17 +382,12 @@ def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) ->
     )
 
 
-def deletable(sizes: dict[MutableGenome, Counts], space: Space) -> list[MutableGenome]:
-    """Return the subtrees that can be deleted without falling below the least size."""
-    most = next(iter(sizes.values()))[0] - space.min_parts
-    return [
-        branch
-        for branch, (parts, *_) in sizes.items()
-        if branch.parent and parts <= most
-    ]
+def deletable(sizes: Sequence[Counts], space: Space) -> list[int]:
+    """Return the places of the subtrees without which the tree is large enough."""
+    most = sizes[0][0] - space.min_parts
+    return [place for place, size in enumerate(sizes) if place and size[0] <= most]
 
 
-def duplicable(sizes: dict[MutableGenome, Counts], space: Space) -> list[MutableGenome]:
-    """Return the subtrees of which a second copy stays within all limits."""
-    total = next(iter(sizes.values()))
-    return fitting_subtrees(sizes, size_limits(space).minus(total))
+def duplicable(sizes: Sequence[Counts], space: Space) -> list[int]:
+    """Return the places of the subtrees whose second copy stays within all limits."""
+    return fitting_subtrees(sizes, size_limits(space).minus(sizes[0]))

@@ -131,8 +131,8 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             nonce = read_description(path).nonce
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
             self.epoch = _next_epoch(path)
-            self._mark = str(self.epoch).encode()
-            replace_bytes(path / EPOCH, self._mark)
+            self._epoch_file, self._mark = path / EPOCH, str(self.epoch).encode()
+            replace_bytes(self._epoch_file, self._mark)
         except BaseException:
             self.close()
             raise
@@ -176,11 +176,13 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             RunFolderError: one has opened the folder, the folder is gone, or the
                 file with the epoch is damaged.
         """
-        with contextlib.suppress(OSError):
-            if (self.path / EPOCH).read_bytes() == self._mark:
-                return
         try:
+            # For each answer of an agent: a plain comparison suffices nearly always.
+            if read_small(self._epoch_file, MOST_MARK) == self._mark:
+                return
             epoch = _read_epoch(self.path)
+        except FileNotFoundError:
+            epoch = 0
         except RunFolderError as error:
             raise RunFolderError(
                 f"{error}; to write it again: {command('resume', self.path)}"

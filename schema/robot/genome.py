@@ -169,7 +169,12 @@ def _edges(
         "output": (1, inputs),
         "hidden": (2, inputs + outputs),
     }
-    neighbours = _neighbours(entries)
+    # Of each node: the index of the neighbour at each used slot.
+    neighbours: list[dict[int, int]] = []
+    for index, (node, parent, parent_slot) in enumerate(entries):
+        neighbours.append({node.slot: parent})
+        if index:
+            neighbours[parent][parent_slot] = index
     edges: dict[tuple[int, int], Connection] = {}
     for index, (node, _, _) in enumerate(entries):
         for gene in node.connections:
@@ -185,22 +190,13 @@ def _edges(
             target = starts[end][layer] + offset
             if target >= starts[end + 1][layer]:
                 continue
-            target_index = begin + target
+            target += begin
             kind, offset = gene.source
             layer, begin = layers[kind]
             source = starts[index][layer] + offset
             if source < starts[index + 1][layer]:
-                key = (begin + source, target_index)
-                if key not in edges:
-                    edges[key] = Connection(*key, gene.weight)
+                source += begin
+                if (source, target) not in edges:
+                    edge = Connection(source, target, gene.weight)
+                    edges[source, target] = edge
     return tuple(edges.values())
-
-
-def _neighbours(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:
-    """Return, for each node, the index of the neighbour at each used slot."""
-    neighbours: list[dict[int, int]] = [{} for _ in entries]
-    for index, (node, parent, parent_slot) in enumerate(entries):
-        if parent >= 0:
-            neighbours[index][node.slot] = parent
-            neighbours[parent][parent_slot] = index
-    return neighbours

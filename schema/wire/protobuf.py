@@ -108,7 +108,9 @@ def encode_genome(genome: Genome) -> bytes:
                 values = neuron.parameters
                 head = _neuron_head(neuron.kind, len(values))
                 fields += tag, head, _DOUBLES[len(values)].pack(*values)
-        fields += map(_connection_field, node.connections)
+        for gene in node.connections:
+            known = _KNOWN_CONNECTIONS.get(id(gene))
+            fields.append(known[1] if known else _connection_field(gene))
         data = b"".join(fields)
         nodes += _NODES, _varint(len(data)), data
     return b"".join(nodes)
@@ -197,10 +199,7 @@ def _neuron_head(kind: str, count: int) -> bytes:
 
 
 def _connection_field(gene: ConnectionGene) -> bytes:
-    """Return a connection as a field of its node."""
-    known = _KNOWN_CONNECTIONS.get(id(gene))
-    if known is not None:
-        return known[1]
+    """Return a connection as a field of its node, and keep it."""
     node = pb.Node()
     entry = node.connections.add()
     layer, offset = gene.source

@@ -101,7 +101,7 @@ def test_a_path_goes_up_by_own_slots_and_down_by_the_parents() -> None:
 
 def test_sizes_of_all_subtrees() -> None:
     sizes = subtree_sizes(preorder(to_mutable(TREE, TYPES)))
-    assert list(sizes.values()) == [
+    assert sizes == [
         (6, 10, 1, 2),
         (2, 2, 1, 2),
         (1, 2, 0, 0),

@@ -19,7 +19,7 @@ from coordinator.evolution.mutable_genome import (
     to_mutable,
 )
 from coordinator.evolution.random_streams import BufferedRng
-from coordinator.evolution.revolve_angle import RevolveAngle, crossover
+from coordinator.evolution.revolve_angle import RevolveAngle, crossover, donor_of
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.parts import BUILT_IN
 from schema.robot.frames import place_parts, shapes_of
@@ -79,10 +79,10 @@ def kinds(genome: Genome) -> list[str]:
 def crossed(
     seed: int, first: Genome, second: Genome, setting: Experiment = DEFAULT
 ) -> Genome | None:
-    branches, donors = to_branches(first, TYPES), to_branches(second, TYPES)
+    branches = to_branches(first, TYPES)
     root = branches[0]
     draws = BufferedRng(np.random.default_rng(seed))
-    done = crossover(draws, branches, donors, setting)
+    done = crossover(draws, branches, donor_of(second, TYPES), setting)
     if not done:
         assert to_genome(preorder(root)) == first, "a failure changes nothing"
         return None
