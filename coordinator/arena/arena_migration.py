@@ -1,6 +1,5 @@
 """Migration of an arena: its emigrants, and immigrants until there is room for them."""
 
-
 from msgspec.structs import replace
 
 from coordinator.arena.living import LivingRobots, Moment, death_record

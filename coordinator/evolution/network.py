@@ -76,8 +76,10 @@ class NetworkGenes:
         self, draws: Draws, branches: Sequence[Branch], rules: BrainRules
     ) -> tuple[int, int]:
         """Delete hidden neurons and connections; return how many of each there were."""
-        hidden = sum([len(branch.hidden) for branch in branches])
-        connections = sum([len(branch.connections) for branch in branches])
+        hidden = connections = 0
+        for branch in branches:
+            hidden += len(branch.hidden)
+            connections += len(branch.connections)
         delete_hidden_neurons(draws, branches, rules.p_delete_hidden_neuron)
         delete_connections(draws, branches, rules.p_remove_brain_connection)
         return hidden, connections

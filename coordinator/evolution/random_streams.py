@@ -124,7 +124,7 @@ class BufferedRng:
             low, high = p.low, p.high
             near = rest * v + epsilon * (low + (high - low) * number())
             # Rounding must not carry a value out of its range.
-            moved.append(low if near < low else high if near > high else near)
+            moved.append(low if near < low else min(near, high))
         return tuple(moved)
 
     def normal(self, mean: float, sd: float) -> float:

@@ -45,7 +45,8 @@ from schema.robot.genome import Genome, Node, develop, walk
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Robot
-from schema.wire.protobuf import decode_genome, encode_genome
+from schema.wire.genome_bytes import encode_genome
+from schema.wire.protobuf import decode_genome
 
 _MOST_DONORS = 1024
 

@@ -102,7 +102,7 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     brain = robot.brain
     connections = len(brain.connections)
     if isinstance(genome, Node):
-        connections = sum([len(node.connections) for node, _, _ in walk(genome)])
+        connections = sum(len(node.connections) for node, _, _ in walk(genome))
     motors = passive = 0
     for part in robot.parts:
         kind = space[part.kind]

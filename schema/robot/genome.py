@@ -169,12 +169,7 @@ def _edges(
         "output": (1, inputs),
         "hidden": (2, inputs + outputs),
     }
-    # Of each node: the index of the neighbour at each used slot.
-    neighbours: list[dict[int, int]] = []
-    for index, (node, parent, parent_slot) in enumerate(entries):
-        neighbours.append({node.slot: parent})
-        if index:
-            neighbours[parent][parent_slot] = index
+    neighbours = _neighbours(entries)
     edges: dict[tuple[int, int], Connection] = {}
     for index, (node, _, _) in enumerate(entries):
         for gene in node.connections:
@@ -200,3 +195,13 @@ def _edges(
                     edge = Connection(source, target, gene.weight)
                     edges[source, target] = edge
     return tuple(edges.values())
+
+
+def _neighbours(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:
+    """Return, for each node, the index of the neighbour at each used slot."""
+    neighbours: list[dict[int, int]] = []
+    for index, (node, parent, parent_slot) in enumerate(entries):
+        neighbours.append({node.slot: parent})
+        if index:
+            neighbours[parent][parent_slot] = index
+    return neighbours

@@ -5,8 +5,6 @@ Rules that need the part types or neuron types are checked by
 """
 
 import math
-from functools import lru_cache
-from struct import Struct
 from typing import TypeVar
 
 from google.protobuf.message import DecodeError
@@ -20,19 +18,18 @@ from schema.robot.genome import (
     Genome,
     NeuronGene,
     assemble,
-    walk,
 )
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
 
 M = TypeVar("M", pb.Robot, pb.Genome)
 
-_LAYER_CODES: dict[Layer, pb.Layer] = {
+LAYER_CODES: dict[Layer, pb.Layer] = {
     "input": pb.LAYER_INPUT,
     "output": pb.LAYER_OUTPUT,
     "hidden": pb.LAYER_HIDDEN,
 }
-_LAYERS: dict[int, Layer] = {int(code): name for name, code in _LAYER_CODES.items()}
+_LAYERS: dict[int, Layer] = {int(code): name for name, code in LAYER_CODES.items()}
 
 
 def encode_robot(robot: Robot) -> bytes:
@@ -44,7 +41,7 @@ def encode_robot(robot: Robot) -> bytes:
     add_neuron = message.neurons.add
     for neuron in robot.brain.neurons:
         item = add_neuron()
-        item.layer = _LAYER_CODES[neuron.layer]
+        item.layer = LAYER_CODES[neuron.layer]
         item.kind, item.part = neuron.kind, neuron.part
         if neuron.parameters:
             item.parameters.extend(neuron.parameters)
@@ -86,36 +83,6 @@ def decode_robot(data: bytes) -> Robot:
     return robot
 
 
-def encode_genome(genome: Genome) -> bytes:
-    """Return the bytes of a genome; equal genomes give equal bytes.
-
-    Protobuf's messages would take three times as long, a tenth of a birth's cost:
-    fields that recur are encoded by them once, and the numbers are packed here.
-    """
-    nodes: list[bytes] = []
-    for node, parent, parent_slot in walk(genome):
-        values = node.parameters
-        part = (
-            _place_fields(
-                node.kind, parent, parent_slot, node.slot, node.orientation, len(values)
-            )
-            + _DOUBLES[len(values)].pack(*values)
-            + _gene_field(node.gene)
-        )
-        fields = [_PART, _varint(len(part)), part]
-        for tag, neurons in ((_OUTPUTS, node.outputs), (_HIDDEN, node.hidden)):
-            for neuron in neurons:
-                values = neuron.parameters
-                head = _neuron_head(neuron.kind, len(values))
-                fields += tag, head, _DOUBLES[len(values)].pack(*values)
-        for gene in node.connections:
-            known = _KNOWN_CONNECTIONS.get(id(gene))
-            fields.append(known[1] if known else _connection_field(gene))
-        data = b"".join(fields)
-        nodes += _NODES, _varint(len(data)), data
-    return b"".join(nodes)
-
-
 def decode_genome(data: bytes) -> Genome:
     """Return the genome of some bytes.
 
@@ -136,84 +103,6 @@ def decode_genome(data: bytes) -> Genome:
     except InvalidRobot as error:
         raise MalformedMessage(f"Genome: {error}") from None
     return assemble(parts, lambda index: _genes(nodes[index]))
-
-
-_PART, _OUTPUTS, _HIDDEN, _NODES = b"\x0a", b"\x12", b"\x1a", b"\x0a"
-"""Keys of fields that have a length: the number of the field times 8, plus 2."""
-_KNOWN_CONNECTIONS: dict[int, tuple[ConnectionGene, bytes]] = {}
-"""Genes that were encoded, by their id; children share most of their parents'."""
-_MOST_KNOWN = 2**14
-
-
-class _Doubles(dict[int, Struct]):
-    """Packers of so many numbers."""
-
-    def __missing__(self, count: int) -> Struct:
-        self[count] = packer = Struct(f"<{count}d")
-        return packer
-
-
-_DOUBLES = _Doubles()
-
-
-@lru_cache(maxsize=2**12)
-def _varint(number: int) -> bytes:
-    """Return a length as Protobuf writes it: 7 bits a byte, the lowest first."""
-    data = bytearray()
-    while number > 0x7F:  # noqa: PLR2004
-        data.append(number & 0x7F | 0x80)
-        number >>= 7
-    return bytes((*data, number))
-
-
-def _packed_head(key: bytes, count: int) -> bytes:
-    """Return what precedes so many numbers of a repeated field."""
-    return key + _varint(8 * count) if count else b""
-
-
-@lru_cache(maxsize=_MOST_KNOWN)
-def _place_fields(
-    kind: str, parent: int, parent_slot: int, slot: int, orientation: int, count: int
-) -> bytes:
-    """Return the fields of a part before its parameters, and the head of these."""
-    part = pb.Part(
-        kind=kind,
-        parent=parent,
-        parent_slot=parent_slot,
-        slot=slot,
-        orientation=orientation,
-    )
-    return part.SerializeToString() + _packed_head(b"\x32", count)
-
-
-@lru_cache(maxsize=_MOST_KNOWN)
-def _gene_field(gene: int) -> bytes:
-    return pb.Part(gene=gene).SerializeToString()
-
-
-@lru_cache(maxsize=_MOST_KNOWN)
-def _neuron_head(kind: str, count: int) -> bytes:
-    """Return the length of a neuron's message, and the message before the numbers."""
-    head = pb.NeuronGene(kind=kind).SerializeToString() + _packed_head(b"\x12", count)
-    return _varint(len(head) + 8 * count) + head
-
-
-def _connection_field(gene: ConnectionGene) -> bytes:
-    """Return a connection as a field of its node, and keep it."""
-    node = pb.Node()
-    entry = node.connections.add()
-    layer, offset = gene.source
-    entry.source_layer, entry.source_offset = _LAYER_CODES[layer], offset
-    entry.path.extend(gene.path)
-    layer, offset = gene.target
-    entry.target_layer, entry.target_offset = _LAYER_CODES[layer], offset
-    entry.weight = gene.weight
-    if len(_KNOWN_CONNECTIONS) >= _MOST_KNOWN:
-        _KNOWN_CONNECTIONS.clear()
-    data = node.SerializeToString()
-    # With the gene, whose id would be another's otherwise once it is gone.
-    _KNOWN_CONNECTIONS[id(gene)] = gene, data
-    return data
 
 
 def _genes(message: pb.Node) -> Genes:

@@ -90,6 +90,7 @@ from schema.wire.arena import (
 )
 from schema.wire.calls import call_settings, pack_value, unpack_value
 from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.genome_bytes import encode_genome
 from schema.wire.messages import (
     AgentInfo,
     Answer,
@@ -118,7 +119,6 @@ from schema.wire.operator import (
 from schema.wire.protobuf import (
     decode_genome,
     decode_robot,
-    encode_genome,
     encode_robot,
 )
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status

@@ -15,7 +15,7 @@ from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Islands
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.robot.ids import BirthId
-from schema.wire.protobuf import encode_genome
+from schema.wire.genome_bytes import encode_genome
 from tests.analysis.bodies import part
 from tests.analysis.tables import births
 

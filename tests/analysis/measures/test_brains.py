@@ -18,7 +18,8 @@ from schema.experiment.document import Space, body_space
 from schema.robot.brain import INPUT, Brain, Connection, Layer, Neuron
 from schema.robot.genome import ConnectionGene, NeuronGene, Node, develop
 from schema.robot.robot import Part, Robot
-from schema.wire.protobuf import encode_genome, encode_robot
+from schema.wire.genome_bytes import encode_genome
+from schema.wire.protobuf import encode_robot
 from tests.analysis.drawn import layers
 from tests.analysis.tables import births, population, run
 

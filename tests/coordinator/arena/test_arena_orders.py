@@ -19,7 +19,7 @@ from schema.robot.brain import Brain
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.wire.arena import AdvanceShard
-from schema.wire.protobuf import encode_genome
+from schema.wire.genome_bytes import encode_genome
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,

@@ -19,7 +19,8 @@ from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Part, Robot, check_robot
-from schema.wire.protobuf import decode_robot, encode_genome
+from schema.wire.genome_bytes import encode_genome
+from schema.wire.protobuf import decode_robot
 
 Own = Callable[..., Experiment]
 THESIS = Experiment(name="test")

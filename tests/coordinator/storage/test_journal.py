@@ -45,7 +45,7 @@ from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.arena import NO_POSES, Advance, Casualty, Judgement, Poses, Touch
-from schema.wire.protobuf import encode_genome
+from schema.wire.genome_bytes import encode_genome
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 REFUSED = Report(

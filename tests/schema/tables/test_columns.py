@@ -19,7 +19,8 @@ from schema.tables.columns import (
     TABLES,
     repeatable,
 )
-from schema.wire.protobuf import decode_genome, encode_genome, encode_robot
+from schema.wire.genome_bytes import encode_genome
+from schema.wire.protobuf import decode_genome, encode_robot
 
 NodeMaker = Callable[..., Node]
 HIDDEN = NeuronGene("Simple", (0.0, 0.5))

@@ -17,10 +17,10 @@ from schema.robot.genome import Genome, Node, develop
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Part, Robot, check_robot
 from schema.wire import revolve_pb2 as pb
+from schema.wire.genome_bytes import encode_genome
 from schema.wire.protobuf import (
     decode_genome,
     decode_robot,
-    encode_genome,
     encode_robot,
 )
 
@@ -72,6 +72,8 @@ def test_genome_round_trip(genomes: SearchStrategy[Genome], data: DataObject) ->
     encoded = encode_genome(genome)
     assert repr(decode_genome(encoded)) == repr(genome)
     assert encode_genome(decode_genome(encoded)) == encoded
+    message = pb.Genome.FromString(encoded)
+    assert message.SerializeToString(deterministic=True) == encoded
 
 
 def test_bytes_are_those_of_earlier_versions() -> None:
