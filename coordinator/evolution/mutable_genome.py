@@ -22,6 +22,9 @@ from schema.robot.ids import BirthId
 Gene = TypeVar("Gene", NeuronGene, ConnectionGene)
 
 
+_TUPLES = (tuple, tuple, tuple)
+
+
 class MutableGenome(Struct, eq=False):
     """Mutable node of a genome; its first fields are those of `Node`.
 
@@ -125,9 +128,10 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
     """Return the genome of a tree whose branches are given depth first."""
     nodes: list[Node] = []
     for branch in reversed(branches):
-        genes = branch.outputs, branch.hidden, branch.connections
-        if not type(genes[0]) is type(genes[1]) is type(genes[2]) is tuple:
-            genes = tuple(map(_as_tuple, genes))
+        outputs, hidden, connections = branch.outputs, branch.hidden, branch.connections
+        if (type(outputs), type(hidden), type(connections)) != _TUPLES:
+            outputs, hidden = _as_tuple(outputs), _as_tuple(hidden)
+            connections = _as_tuple(connections)
         # Backwards: children are made before their parent, the last one first.
         children = [(slot, nodes.pop()) for slot in branch.children]
         node = Node(
@@ -136,7 +140,9 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
             branch.orientation,
             branch.parameters,
             branch.gene,
-            *genes,
+            outputs,
+            hidden,
+            connections,
             tuple(children),
         )
         nodes.append(node)

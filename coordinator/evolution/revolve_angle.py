@@ -315,10 +315,10 @@ def vary_parts(
 
 def add_parts(
     draws: BufferedRng,
-    branches: Sequence[MutableGenome],
+    branches: list[MutableGenome],
     genes: Iterator[int],
     experiment: Experiment,
-) -> Sequence[MutableGenome]:
+) -> list[MutableGenome]:
     """Add random parts, `expected_parts` on average, with neurons and connections.
 
     Args:
@@ -341,10 +341,10 @@ def add_parts(
 
 def _add_part(
     draws: BufferedRng,
-    branches: Sequence[MutableGenome],
+    branches: list[MutableGenome],
     genes: Iterator[int],
     experiment: Experiment,
-) -> Sequence[MutableGenome]:
+) -> list[MutableGenome]:
     """Add one part, if one fits; return the branches as `add_parts` does."""
     space = experiment.space
     size = size_of(branches)
