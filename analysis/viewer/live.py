@@ -138,7 +138,7 @@ class LiveSource:
                 self._session = opened.enter_context(open_session(config))
             except zenoh.ZError:
                 raise NetworkError(why_no_hub(self._connect, self._hub.tls)) from None
-            put = zenoh.handlers.Callback(
+            put: zenoh.handlers.Callback[zenoh.Sample] = zenoh.handlers.Callback(
                 lambda sample: self._put(str(sample.key_expr), sample.payload),
                 indirect=False,
             )
