@@ -1,6 +1,6 @@
-"""Hand-made rows, for tests of storage."""
+"""Invariants of the state machines after each test; hand-made rows of tables."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,29 @@ from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.tables.columns import TABLES
 from schema.tables.files import read_table
+from tests.coordinator.invariants import CHECKS
+
+
+@pytest.fixture(autouse=True)
+def _invariants(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Check each state machine that a test made, once it is over."""
+    made: list[Any] = []
+
+    def noting(kind: type[Any]) -> Callable[..., None]:
+        begin = kind.__init__
+
+        def begin_noted(machine: Any, *args: Any, **options: Any) -> None:  # noqa: ANN401
+            begin(machine, *args, **options)
+            made.append(machine)
+
+        return begin_noted
+
+    for kind in CHECKS:
+        monkeypatch.setattr(kind, "__init__", noting(kind))
+    yield
+    for machine in made:
+        CHECKS[type(machine)](machine)
+
 
 DETAILS = RunDetails("a/b c", 2, 1, "{}")
 Make = Callable[..., list[Record]]
