@@ -240,9 +240,10 @@ def _event(end: Deliver) -> Answered:
     why = failure_of(result) if isinstance(result, Failure) else reason
     if isinstance(request, Vet):
         if isinstance(result, Report):
-            words = printable(result.reason, LONGEST_REASON)
-            report = structs.replace(result, reason=words)
-            return Vetted(birth, request.attempt, report)
+            if result.reason:
+                words = printable(result.reason, LONGEST_REASON)
+                result = structs.replace(result, reason=words)
+            return Vetted(birth, request.attempt, result)
         why = f"the analyzer {reason}" if reason else why
         return VettingFailed(birth, request.attempt, why)
     wall_s = answer.wall_s if answer else 0.0

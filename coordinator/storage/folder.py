@@ -176,13 +176,15 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             RunFolderError: one has opened the folder, the folder is gone, or the
                 file with the epoch is damaged.
         """
-        try:
-            # For each answer of an agent: a plain comparison suffices nearly always.
-            if read_small(self._epoch_file, MOST_MARK) == self._mark:
+        # For each answer of an agent: a plain comparison suffices nearly always.
+        with (
+            contextlib.suppress(OSError),
+            open(self._epoch_file, "rb", 0, opener=_now) as file,
+        ):
+            if file.read(MOST_MARK) == self._mark:
                 return
+        try:
             epoch = _read_epoch(self.path)
-        except FileNotFoundError:
-            epoch = 0
         except RunFolderError as error:
             raise RunFolderError(
                 f"{error}; to write it again: {command('resume', self.path)}"
@@ -346,6 +348,11 @@ def _next_epoch(path: Path) -> int:
             "number: copy its experiment and start another run"
         )
     return epoch
+
+
+def _now(path: str, flags: int) -> int:
+    """Open a file; a named pipe must not block."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _read_epoch(path: Path) -> int:
