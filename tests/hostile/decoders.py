@@ -202,12 +202,12 @@ def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     prints = tuple(map(fingerprint, requests))
     yield Target("Server.cancel", Server(_read_job, _agent()).cancel, prints, ())
     yield Target("unpack_value", unpack_value, (argument.argument,))
-    for read, sample in (
-        (read_vetting_settings, vetting_settings(rules)),
-        (read_evaluation_settings, evaluation_settings(rules)),
-        (read_arena_settings, settings),
+    for name, read, sample in (
+        ("vetting", read_vetting_settings, vetting_settings(rules)),
+        ("evaluation", read_evaluation_settings, evaluation_settings(rules)),
+        ("arena", read_arena_settings, settings),
     ):
-        yield Target(read.__name__, read, (sample,), (RevolveError,), share=3)
+        yield Target(f"settings of {name}", read, (sample,), (RevolveError,), share=3)
     own = read_arena_settings(settings)
 
     def restore(data: bytes) -> None:
