@@ -202,8 +202,11 @@ def test_commands_of_the_robots_page_run(workspace: Workspace) -> None:
     own = "revolve robot simulate some.yaml --experiment robogen.toml"
     lines = [*block.splitlines(), own]
     told = _follow(workspace, lines)
+    # Without the line that says where the settings come from.
     printed = [
-        text for line, text in zip(lines, told, strict=True) if "simulate" in line
+        text.partition("revolve: ")[0]
+        for line, text in zip(lines, told, strict=True)
+        if "simulate" in line
     ]
     assert printed[0] == printed[1]
     assert printed[2] != printed[0]

@@ -83,7 +83,7 @@ MISTAKES = [
     ("run type.toml", "type.toml: births: must be a whole number, got 'many'"),
     ("run range.toml", "range.toml: variation.body_epsilon: must be a number <= 1.0"),
     ("run section.toml", "section.toml: selection.populaton: no such key"),
-    ("run parts.toml", "parts.toml: space.min_parts: "),
+    ("run parts.toml", "parts.toml: space.max_parts: must be >= space.min_parts"),
     ("run part.toml", "did you mean 'schema.parts:CORE'"),
     ("run function.toml", "function.toml: fitness.function: "),
     ("run toml.toml", "toml.toml: not valid TOML"),
