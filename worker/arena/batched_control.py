@@ -61,11 +61,7 @@ class BatchedControllers:
         return outputs
 
     def first_tick(self, step: int, robot: ArenaRobot) -> str:
-        """Update a newborn's brain alone and command its motors.
-
-        Returns:
-            Why its brain broke; empty if it did not.
-        """
+        """Update a newborn's brain alone, command its motors; return why it broke."""
         bank, filters = self._rows_of([robot])
         readings = robot.view.sensors.readings
         outputs = self._outputs(bank, filters, step, readings, 0.0)

@@ -26,16 +26,8 @@ FASTEST_CORE = 20.0
 def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> None:
     """Raise unless changes can be made to a population.
 
-    Args:
-        changes: removals first, then insertions, then brains.
-        population: the living robots.
-        step: of the arena.
-
     Raises:
-        UnexpectedEvent: a robot that does not live here, lives here already, is named
-            twice, is born between two ticks of the controllers, or has its window
-            restarted between two samples.
-        InvalidRobot: a robot that breaks the rules, or a brain that does not fit.
+        UnexpectedEvent, InvalidRobot: as of ``World.apply``.
     """
     gone = _distinct(changes.removals)
     new = _distinct(tuple(insertion.birth for insertion in changes.insertions))

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from schema.errors import SensorFailed
-from schema.experiment.settings import ArenaSettings
 from schema.wire.arena import Casualty
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
@@ -13,20 +12,14 @@ from worker.robot.own_sensors import Surroundings
 
 
 def look(
-    population: ArenaPopulation,
-    robots: Sequence[ArenaRobot],
-    step: int,
-    settings: ArenaSettings,
+    population: ArenaPopulation, robots: Sequence[ArenaRobot], step: int
 ) -> list[Casualty]:
-    """Write the readings of some robots' light sensors and own sensors.
-
-    Returns:
-        The robots with a sensor that failed.
-    """
+    """Write readings of light sensors and own ones; return robots of failed sensors."""
     looking = [robot for robot in robots if robot.view.sensors.looks]
     if not looking:
         return []
     population.kinematics()
+    settings = population.model_cache.settings
     places = np.array([robot.view.qpos[:3] for robot in population.robots])
     rows = population.robot_rows.rows
     failed = []

@@ -50,11 +50,7 @@ def alone(
 ) -> tuple[Evaluation, pa.Table]:
     """Return a robot's evaluation, and its poses at every tick of its controller.
 
-    Returns:
-        The evaluation; rows of the poses table, without ``record``.
-
-    Raises:
-        RevolveError: as ``evaluate`` raises.
+    The poses are rows of their table, without ``record``.
     """
     positions: list[Floats] = []
     times: list[float] = []

@@ -15,7 +15,6 @@ from typing import Self
 from schema.errors import SimulationDiverged, UnexpectedEvent
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
-from schema.robot.trace import Floats
 from schema.wire.arena import (
     Advance,
     BrainChange,
@@ -189,7 +188,8 @@ class World:
         if is_tick:
             self._tick()
         if is_sample:
-            self._sample(rollout.state)
+            self._samples.add(step, rollout.state)
+            self._poses.add(step, self.population.layout, rollout.state)
         if is_merge:
             if self._contacts is not None:
                 self._contacts.count(self.population.clusters, rollout.moment)
@@ -201,27 +201,17 @@ class World:
         A tick is the last moment of its interval, so the engine's states are those of
         the moment.
         """
-        tick_s, cluster_of = (
-            self._settings.simulation.tick_s,
-            self.population.cluster_of,
-        )
+        tick_s = self._settings.simulation.tick_s
+        cluster_of = self.population.cluster_of
         for robot in self.population.robots:
             robot.view.sensors.read(tick_s, cluster_of[robot.birth].touched)
-        self._remove(self._look(self.population.robots))
+        self._remove(look(self.population, self.population.robots, self.step))
         robots = self.population.robots
         outputs = self._controllers.tick(self.step, robots)
         for robot, row in zip(robots, outputs, strict=True):
             robot.view.servos.drive(row)
         broken = self._controllers.broken.items()
         self._remove_broken([(robots[row], reason) for row, reason in broken])
-
-    def _look(self, robots: Sequence[ArenaRobot]) -> list[Casualty]:
-        return look(self.population, robots, self.step, self._settings)
-
-    def _sample(self, state: Floats) -> None:
-        layout = self.population.layout
-        self._samples.add(self.step, state)
-        self._poses.add(self.step, layout, state)
 
     # --- births and deaths ------------------------------------------------------
 
@@ -234,7 +224,7 @@ class World:
             else:
                 robots.append(robot)
         self.population.add(robots)
-        failed = self._look(robots)
+        failed = look(self.population, robots, self.step)
         self._casualties += failed
         self.population.remove([casualty.birth for casualty in failed])
         robots = [robot for robot in robots if robot.birth in self.population]

@@ -131,9 +131,6 @@ def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
 def run(options: argparse.Namespace, robots: RobotSource) -> int:
     """Run one of the two benchmarks and print the results.
 
-    Returns:
-        0.
-
     Raises:
         ExperimentError: an invalid or off-line experiment.
         RevolveError: the file for the results cannot be written.

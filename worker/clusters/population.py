@@ -236,11 +236,7 @@ class ArenaPopulation:
 def _touching(
     members: Group, cluster_of: Mapping[BirthId, Cluster], moment: int
 ) -> list[tuple[int, int]]:
-    """Return which members of a new cluster were in contact in their former ones.
-
-    Returns:
-        Pairs of indices of members, ascending.
-    """
+    """Return pairs of members of a new cluster that touched in their former ones."""
     index_of = {birth: index for index, birth in enumerate(members)}
     pairs: list[tuple[int, int]] = []
     for former in dict.fromkeys(cluster_of[birth] for birth in members):

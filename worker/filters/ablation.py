@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -85,19 +84,18 @@ HELD, MEAN, DEAD = "input at 0", "input at its mean", "motor dead"
 def all_ablations(robot: Robot, space: BodySpace) -> tuple[AblationCase, ...]:
     """Return the ablations of a robot: one by one, by kind, and all together."""
     inputs, motors = _inputs(robot, space), _motors(robot, space)
+
+    def held(value: float | None) -> Callable[[Sequence[int]], Ablation]:
+        return lambda numbers: Ablation(inputs=tuple((n, value) for n in numbers))
+
+    def dead(numbers: Sequence[int]) -> Ablation:
+        return Ablation(motors=tuple(numbers))
+
     return (
-        *_changes(HELD, "sensors", inputs, partial(_held, value=0.0)),
-        *_changes(MEAN, "sensors", inputs, partial(_held, value=None)),
-        *_changes(DEAD, "motors", motors, _dead),
+        *_changes(HELD, "sensors", inputs, held(0.0)),
+        *_changes(MEAN, "sensors", inputs, held(None)),
+        *_changes(DEAD, "motors", motors, dead),
     )
-
-
-def _held(numbers: Sequence[int], value: float | None) -> Ablation:
-    return Ablation(inputs=tuple((number, value) for number in numbers))
-
-
-def _dead(numbers: Sequence[int]) -> Ablation:
-    return Ablation(motors=tuple(numbers))
 
 
 _Channel = tuple[str, int, str]

@@ -52,24 +52,14 @@ class Noise:
         self._drawn: list[tuple[Floats, Floats]] = []
 
     def readings(self, tick: int, values: Floats) -> Floats:
-        """Return readings with sensor noise.
-
-        ``values`` are (R, N), the first N <= I.
-
-        Returns:
-            (R, N); the readings themselves if sensors have no noise.
-        """
+        """Return readings (R, N), the first N <= I, with the sensor noise, if any."""
         if not np.any(self._on_readings):
             return values
         added, _ = self._added(tick)
         return values + added[:, : values.shape[1]]
 
     def outputs(self, tick: int, values: Floats) -> Floats:
-        """Return network outputs with actuator noise.
-
-        Returns:
-            (R, O), unclipped; the outputs themselves if motors have no noise.
-        """
+        """Return outputs (R, O), unclipped, with the actuator noise, if any."""
         if not np.any(self._on_outputs):
             return values
         _, added = self._added(tick)

@@ -241,11 +241,7 @@ class SoloNetwork:
         self._offsets = list(offsets)
 
     def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
-        """Update the network once; see ``NetworkBank.step``.
-
-        Returns:
-            (1, O) output states, a view that the next tick overwrites.
-        """
+        """Update the network once; see ``NetworkBank.step``."""
         if readings is not self.readings:
             self.readings[:] = readings
         offset = self._offsets[int(age_ticks)]
@@ -278,10 +274,7 @@ class SoloNetwork:
 def solo_brain(controls: Controls, brain: Brain, ticks: int) -> Bank:
     """Return the checked brain of a robot that lives alone, as a bank of one.
 
-    There are at most ``ticks`` ticks.
-
-    Raises:
-        InvalidRobot, SimulationDiverged: as of ``Controls.pack``.
+    There are at most ``ticks`` ticks; it raises as ``Controls.pack`` does.
     """
     packed = controls.pack(brain)
     if isinstance(packed, PackedNetwork) and not packed.own:

@@ -119,14 +119,11 @@ class Sensors:
         return self.read(1.0)
 
     def read(self, interval_s: float, touched: Container[int] | None = None) -> Floats:
-        """Read all sensors but those that ``look`` reads.
+        """Read all sensors but those that ``look`` reads; return ``readings``.
 
         Args:
             interval_s: since the last reading [s].
             touched: geoms in contact in the last step, if they are known.
-
-        Returns:
-            ``readings``, new values.
         """
         if self.core_imu >= 0:
             self._read_core(interval_s)
@@ -148,9 +145,6 @@ class Sensors:
         """Read light sensors and own ones.
 
         Frames of all bodies must be those of the state.
-
-        Raises:
-            SensorFailed: as of ``OwnSensors.read``.
         """
         for geom, place in self.lights:
             assert around.light is not None

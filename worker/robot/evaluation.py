@@ -61,8 +61,7 @@ def simulate(
 
     ``watch`` is called with the state at each tick, after the commands.
 
-    Raises:
-        RevolveError: as of ``ControlLoop`` and its ``step``.
+    It raises as ``ControlLoop`` and its ``step`` do.
     """
     means: tuple[float, ...] = ()
     if settings.ablation is not None and settings.ablation.has_means:
@@ -81,9 +80,6 @@ def mean_inputs(
     """Return the mean of each input of a brain over all ticks of an evaluation, (I,).
 
     Inputs are what the brain receives: readings after calibration and noise.
-
-    Raises:
-        RevolveError: as for ``simulate``.
     """
     loop = ControlLoop(robot, settings, identity)
     rows: list[list[float]] = []
