@@ -44,20 +44,24 @@ def test_velocities_of_legs_of_3_and_4_metres() -> None:
     assert value("straight_velocity", found) == 2.5
 
 
-def test_turning_adds_turns_to_both_sides() -> None:
-    """30 degrees left and 60 right in 2 s."""
-    found = standing(3, core_attitude=about_z(0, 30, -30))
-    assert value("turning", found) == pytest.approx(np.radians(45))
+ROLL = np.array([(1.0, 0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0)])
 
 
-def test_turning_takes_the_shorter_way_across_180_degrees() -> None:
-    found = standing(2, core_attitude=about_z(170, -170))
-    assert value("turning", found) == pytest.approx(np.radians(20))
-
-
-def test_turning_ignores_roll() -> None:
-    roll = np.array([(1.0, 0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0)])
-    assert value("turning", standing(2, core_attitude=roll)) == pytest.approx(0.0)
+@pytest.mark.parametrize(
+    ("attitudes", "degrees"),
+    [
+        # 30 degrees left and 60 right in 2 s.
+        (about_z(0, 30, -30), 45),
+        # The shorter way across 180 degrees.
+        (about_z(170, -170), 20),
+        (ROLL, 0),
+    ],
+)
+def test_turning_adds_turns_to_both_sides(
+    attitudes: np.ndarray[Any, Any], degrees: float
+) -> None:
+    found = standing(len(attitudes), core_attitude=attitudes)
+    assert value("turning", found) == pytest.approx(np.radians(degrees))
 
 
 def test_energy_is_that_at_the_end() -> None:

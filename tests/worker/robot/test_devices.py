@@ -65,15 +65,6 @@ def ticks(
         yield tick
 
 
-def test_accelerometer_at_rest_reads_gravity_upward(turtle: Robot) -> None:
-    model, data = alone(turtle)
-    sensors = Sensors(PlacedRobot(turtle, BUILT_IN, model, data), width=10)
-    assert sensors.start()[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0])
-    for _ in ticks(model, data, [sensors], 16):
-        pass
-    assert sensors.readings[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0], abs=1e-3)
-
-
 def test_two_robots_of_one_model_read_gravity_upward(turtle: Robot) -> None:
     model, data = two((turtle, HINGED))
     sensors = [
