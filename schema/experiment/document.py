@@ -261,7 +261,7 @@ class Vetting(Section, frozen=True):
     tolerance_m: Length = 1e-6
 
 
-class Simulation(Section, frozen=True):
+class Simulation(Section, frozen=True, dict=True):
     """Physics, noise, and clocks in physics steps.
 
     MuJoCo needs ``armature``, ``damping``, ``servo_armature``, ``servo_stiffness``
@@ -315,12 +315,12 @@ class Simulation(Section, frozen=True):
     mass_factor: Positive = 1.0
     torque_factor: Positive = 1.0
 
-    @property
+    @cached_property
     def tick_s(self) -> float:
         """Time between two brain ticks [s]."""
         return self.brain_steps * self.timestep_s
 
-    @property
+    @cached_property
     def evaluation_steps(self) -> int:
         """Physics steps of an evaluation, warm-up and window."""
         return self.warmup_steps + self.window_steps
