@@ -283,19 +283,6 @@ def _zero_one() -> tuple[np.ndarray, np.ndarray]:
     return np.array([0]), np.array([1])
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_the_order_of_two_boxes_does_not_matter(seed: int) -> None:
-    rng = np.random.default_rng(2000 + seed)
-    boxes = boxes_of(
-        np.stack([turned(rng), turned(rng)]),
-        rng.uniform(-0.6, 0.6, (2, 3)),
-        rng.uniform(0.1, 1.0, (2, 3)),
-    )
-    there, back = np.array([0, 1]), np.array([1, 0])
-    one, other = separation(boxes, there, back)
-    assert one == pytest.approx(other, abs=1e-12)
-
-
 @pytest.mark.parametrize("mode", ["overlap", "contact"])
 def test_intersections_equal_those_of_all_pairs_one_by_one(
     mode: str, body_of: Callable[[int, int], Robot]

@@ -105,21 +105,6 @@ def test_outputs_are_independent_of_the_batch(
             assert alone[row].states.tobytes() == batch.states[row].tobytes()
 
 
-def test_states_can_be_moved_to_another_batch(networks: list[PackedNetwork]) -> None:
-    rng = np.random.default_rng(1)
-    readings = rng.normal(0.0, 5.0, (20, 3, WIDTH.inputs))
-    whole = NetworkBank(networks[:3], WIDTH, TICK_S)
-    expected = [whole.step(readings[t], float(t)).copy() for t in range(20)]
-    first = NetworkBank(networks[:3], WIDTH, TICK_S)
-    for t in range(10):
-        first.step(readings[t], float(t))
-    second = NetworkBank(networks[:3][::-1], WIDTH, TICK_S)
-    second.states[...] = first.states[::-1]
-    for t in range(10, 20):
-        found = second.step(readings[t, ::-1], float(t))
-        assert found[::-1].tobytes() == expected[t].tobytes()
-
-
 def test_complex_outputs_of_a_brain_type_are_a_failed_result() -> None:
     class Complex:
         states = np.zeros((1, 0))
