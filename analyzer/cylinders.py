@@ -26,7 +26,7 @@ _TURN = 2.4
 """Rotation of these neighbours from step to step, so that none is missed [rad]."""
 
 
-class Solid(NamedTuple):
+class PlacedSolid(NamedTuple):
     """Box or cylinder in the core's frame.
 
     Attributes:
@@ -42,7 +42,9 @@ class Solid(NamedTuple):
     is_round: bool
 
 
-def least_separation(first: Solid, second: Solid, enough: float = math.inf) -> float:
+def least_separation(
+    first: PlacedSolid, second: PlacedSolid, enough: float = math.inf
+) -> float:
     """Return a lower bound on the separation of two bodies.
 
     Args:

@@ -15,7 +15,7 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
-from analyzer.cylinders import Solid, least_separation
+from analyzer.cylinders import PlacedSolid, least_separation
 from schema.errors import MalformedMessage
 from schema.experiment.document import Vetting, body_space
 from schema.experiment.settings import VettingSettings, read_vetting_settings
@@ -123,11 +123,11 @@ class Boxes:
     mass: float
     round: tuple[int, ...] = ()
 
-    def solid(self, index: int) -> Solid:
+    def solid(self, index: int) -> PlacedSolid:
         """Return one of them alone."""
         is_round = index in self.round
         rotation, centre = self.rotation[index], self.centre[index]
-        return Solid(rotation, centre, self.half[index], is_round)
+        return PlacedSolid(rotation, centre, self.half[index], is_round)
 
 
 def place_boxes(robot: Robot, space: BodySpace) -> Boxes:

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from analyzer.cylinders import Solid, least_separation
+from analyzer.cylinders import PlacedSolid, least_separation
 from analyzer.report import Boxes, bounding_box, intersecting_parts, place_boxes
 from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, IDENTITY, Matrix, PartType, Shape, Slot, cylinder
@@ -24,12 +24,12 @@ ON_SIDE: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
 
 def bodies(
     rotation: list[Floats], centre: list[tuple[float, ...]], half: Floats, *, both: bool
-) -> tuple[Solid, Solid]:
+) -> tuple[PlacedSolid, PlacedSolid]:
     """Return two bodies, a cylinder and a box or another cylinder."""
     places = [np.array(place, dtype=float) for place in centre]
     return (
-        Solid(rotation[0], places[0], half[0], is_round=True),
-        Solid(rotation[1], places[1], half[1], is_round=both),
+        PlacedSolid(rotation[0], places[0], half[0], is_round=True),
+        PlacedSolid(rotation[1], places[1], half[1], is_round=both),
     )
 
 
@@ -130,7 +130,9 @@ def test_discs_beside_the_core_meet_later_than_their_boxes(
 # --- oracle ------------------------------------------------------------------
 
 
-def pairs(count: int, *, both: bool) -> Iterator[tuple[tuple[Solid, Solid], float]]:
+def pairs(
+    count: int, *, both: bool
+) -> Iterator[tuple[tuple[PlacedSolid, PlacedSolid], float]]:
     """Yield random pairs of bodies and their distances as MuJoCo finds them."""
     spec = mujoco.MjSpec()
     kinds = ("CYLINDER", "CYLINDER" if both else "BOX")
