@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from analysis.comparison.verdicts import LARGE, NEGLIGIBLE
+from analysis.comparison.findings import LARGE, NEGLIGIBLE
 from analysis.figures.forms import NothingToDraw, Row, Tables
 from analysis.figures.style import INK, pair_name
 

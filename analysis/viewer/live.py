@@ -138,10 +138,7 @@ class LiveSource:
                 self._session = opened.enter_context(open_session(config))
             except zenoh.ZError:
                 raise NetworkError(why_no_hub(self._connect, self._hub.tls)) from None
-            put: zenoh.handlers.Callback[zenoh.Sample] = zenoh.handlers.Callback(
-                lambda sample: self._put(str(sample.key_expr), sample.payload),
-                indirect=False,
-            )
+            put = zenoh.handlers.Callback(self._take, indirect=False)
             token = zenoh.handlers.Callback(self._take_token, indirect=False)
             tokens = agents_alive(self._fleet, "coordinator")
             self._declared = [
@@ -156,6 +153,9 @@ class LiveSource:
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
+
+    def _take(self, sample: zenoh.Sample) -> None:
+        self._put(str(sample.key_expr), sample.payload)
 
     def _take_token(self, sample: zenoh.Sample) -> None:
         self._tokens.append(sample)

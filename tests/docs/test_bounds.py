@@ -10,7 +10,6 @@ import pytest
 
 from docs.settings_reference import page
 from schema.errors import ExperimentError
-from schema.experiment.bounded import parse_toml
 from schema.experiment.file import experiment_from_text, read_experiment
 
 _ROW = re.compile(r"^\| `(\w+)` \| ([^|]*number[^|]*) \|", re.MULTILINE)
@@ -55,38 +54,6 @@ def test_absurd_settings_are_refused_in_one_line(
     assert line.startswith(f"a.toml: {where}")
     assert "<=" in line or ">=" in line
     assert "\n" not in line
-
-
-def test_settings_of_users_who_want_no_limit_are_not_refused() -> None:
-    text = """name = "a"
-births = 100_000_000
-[space]
-max_parts = 1000
-max_hidden = 10_000
-[selection]
-population = 20_000
-children = 20_000
-[simulation]
-window_steps = 100_000_000
-servo_stiffness = 1e9
-torque_factor = 1e9
-[fitness]
-limit = 1e99
-[environment]
-light = [100_000.0, 0, 100_000.0]
-[[islands]]
-count = 2
-[migration]
-topology = "ring"
-epoch = 1_000_000_000
-epoch_s = 1e9
-[arena]
-population_limit = 1_000_000
-cull_interval_s = 1e9
-snapshot_interval_s = 1e9
-"""
-    found = read_experiment(parse_toml(text, "a.toml"), "a.toml")
-    assert found.fitness.limit == 1e99
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from docs import messages_reference, settings_reference
+import revolve
+from docs import messages_reference, python_reference, settings_reference
 from docs.reference_pages import PAGES
 from docs.struct_tables import attributes, rows
 from revolve.cli.commands import COMMANDS, parser_of
@@ -29,9 +30,12 @@ def _page(name: str) -> str:
     return (TOP / "docs" / "reference" / name).read_text("utf-8")
 
 
-@pytest.mark.parametrize("file", PAGES, ids=lambda file: file.name)
+EVERY = PAGES | {python_reference.PAGE: python_reference.reference}
+
+
+@pytest.mark.parametrize("file", EVERY, ids=lambda file: file.name)
 def test_page_is_up_to_date(file: Path) -> None:
-    assert file.read_text("utf-8") == PAGES[file](), (
+    assert file.read_text("utf-8") == EVERY[file](), (
         "run python -m docs.reference_pages"
     )
 
@@ -150,3 +154,9 @@ def test_a_field_without_a_description_is_an_error() -> None:
     )
     with pytest.raises(ValueError, match=r"^Bare\.third: has no description$"):
         list(rows(Bare, lambda kind: kind.__name__))
+
+
+def test_every_public_name_has_an_entry() -> None:
+    lines = python_reference.reference().splitlines()
+    titles = [line for line in lines if line.startswith("## ")]
+    assert sorted(titles) == sorted(f"## `{name}`" for name in revolve.__all__)

@@ -279,30 +279,6 @@ def test_ablation(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert len(winners) == 3
 
 
-def test_summary_of_ablations_by_hand() -> None:
-    names = ("group", "scope", "share", "kind")
-    winners = {
-        run: [dict(zip(names, row, strict=True)) for row in own]
-        for run, own in (
-            ("a", [("input at 0", "all", 0.5, ""), ("input at 0", "kind", 0.5, "imu"),
-                   ("motor dead", "one", 0.2, ""), ("motor dead", "one", 0.95, ""),
-                   ("random brain", "one", 0.1, ""), ("random brain", "one", 0.3, ""),
-                   ("random brain", "one", 0.9, "")]),
-            ("b", [("input at 0", "all", 0.95, ""), ("motor dead", "one", 0.9, ""),
-                   ("random brain", "one", 0.2, "")]),
-        )
-    }  # fmt: skip
-    lines = ablation.summary_lines({"x": winners})
-    found = dict(line.strip("| ").split(" | ") for line in lines if "---" not in line)
-    assert found["without its imu"] == "50 % (50 to 50 %; 1)"
-    assert found["without its touch sensors"] == "–"
-    assert found["without sensors"] == "72 % (50 to 95 %; 2)"
-    assert found["without its most important motor"] == "55 % (20 to 90 %; 2)"
-    assert found["with a random brain, median of draws"] == "25 % (20 to 30 %; 2)"
-    assert found["winners that keep < 95 % without sensors"] == "1 of 2"
-    assert found["motors that carry >= 10 % of the fitness"] == "2 of 3"
-
-
 def test_equal_evaluations(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -318,26 +294,6 @@ def test_equal_evaluations(
         assert float(row["best"]) == pytest.approx(float(row["without changes"]))
 
 
-def test_tables_of_equal_evaluations_by_hand() -> None:
-    rows = [
-        {"experiment": name, "births": "150", "mean": str(mean), "best": str(alone),
-         "without changes": str(alone),
-         **dict.fromkeys(equal_evaluations.CHANGES, str(under))}
-        for name, mean, alone, under in (
-            ("robust", 0.1, 0.2, 0.19), ("robust", 0.3, 0.4, 0.40),
-            ("robust", 0.2, 0.3, 0.15), ("scenario1", 0.4, 0.6, 0.30),
-            ("scenario1", 0.5, 0.6, 0.30), ("scenario1", 0.6, 0.6, 0.30),
-        )
-    ]  # fmt: skip
-    # Student's t with 4 degrees of freedom: 2.776 * 0.1 * sqrt(2 / 3) = 0.2267.
-    # Rank sums: one of 20 ways is as extreme, on each side; ties change nothing.
-    *_, difference = equal_evaluations.compared("robust", rows)
-    assert "-0.3000 (-0.5267 to -0.0733), p = 0.1" in difference
-    *_, robust, base = equal_evaluations.winners("robust", rows)
-    assert robust == "| `robust` | 3 | 0.3000 | 0.1900 | 95 % (50 to 100 %) |"
-    assert base == "| `scenario1` | 3 | 0.6000 | 0.3000 | 50 % (50 to 50 %) |"
-
-
 def test_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.nice", lambda _: None)
     robots, searched = tmp_path / "robots", {"locomotion": ("scenario1", "m/s")}
@@ -350,22 +306,6 @@ def test_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     patched(monkeypatch, tasks_pictures, PICTURES=tmp_path / "pictures")
     assert tasks_pictures.main() == 0
     assert (tmp_path / "pictures" / "locomotion.png").stat().st_size > 1000
-
-
-def test_table_of_tasks_by_hand() -> None:
-    # A resample's median is below 5 in 7 of 27 cases, and above in as many.
-    assert tasks.difference([3.0, 5.0, 9.0], [1.0, 1.0, 1.0]) == (4.0, 2.0, 8.0)
-    best = {"evolution": (0.5, 0.7, 100.0), "random": (0.1, 0.3, 0.3)}
-    rows = [
-        {"task": "turning", "search": search, "seed": str(seed), "best": repr(value)}
-        for search, values in best.items()
-        for seed, value in enumerate(values, 1)
-    ]
-    assert tasks.table(rows[:-1])[2] == (
-        "| turning | 2 | 0.600 rad/s | 0.200 rad/s | +0.400 rad/s | too few seeds |"
-    )
-    start = "| turning | 3 | 0.700 rad/s | 0.300 rad/s | +0.400 rad/s | +0.200 to "
-    assert tasks.table(rows)[2].startswith(start)
 
 
 def test_learners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -414,28 +354,6 @@ def test_arena_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     assert found["size_least"].tolist() == [7, 7]
     *_, line = arena_settings.setting_lines(found, arena_settings.INTERVAL)
     assert line.startswith("| 20 | 1 | 2.0000 (nan to nan) | ")
-
-
-def test_settings_between_those_of_a_grid_by_hand() -> None:
-    names = (arena_settings.INTERVAL, arena_settings.SHARE, "fitness")
-    same = {"fitness_best": 0.5, "late_gain": 0.25, "diversity": 8.0, "birth_s": 12.0,
-            "size_mean": 9.0, "size_least": 5, "births": 50}  # fmt: skip
-
-    def frame(*points: tuple[float, ...]) -> arena_settings.Frame:
-        columns = zip(*points, strict=True)
-        made = pa.table(dict(zip(names, map(list, columns), strict=True)))
-        return made.to_pandas().assign(**same)
-
-    grid = frame((10.0, 0.2, 1.0), (10.0, 0.6, 2.0), (20.0, 0.2, 3.0), (20.0, 0.6, 8.0))
-    # 1.5 and 5.5 at the middle share; a quarter of the way between them.
-    found = arena_settings.interpolated(grid, "fitness", 12.5, 0.4)
-    assert found == pytest.approx(2.5)
-    # Student's t with 1 degree of freedom: 12.706 * 0.5 = 6.353.
-    _, _, line, _ = arena_settings.setting_lines(grid, names[0])
-    assert line.startswith("| 10 | 2 | 1.5000 (-4.8531 to 7.8531) | ")
-    others = frame((15.0, 0.4, 2.0), (15.0, 0.4, 3.0), (15.0, 0.4, 5.5))
-    *_, line = arena_settings.check_lines(grid, others)
-    assert line.startswith("| 15 | 0.4 | 3 | 3.5000 | 3.5000 (2.0000 to 5.5000) | ")
 
 
 def test_code_of_the_readme_runs() -> None:

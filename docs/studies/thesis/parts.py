@@ -8,8 +8,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.comparison.claims import TOUCHES
-from analysis.comparison.equivalence import ALPHA, alike_power
-from analysis.comparison.verdicts import LARGE, SURE
+from analysis.comparison.findings import LARGE, SURE
+from analysis.comparison.statistics import ALPHA, alike_power
 from analysis.figures.style import in_order, label, pair_name
 from docs.studies.pages import Parts, markdown
 from docs.studies.thesis.data import PARTS

@@ -11,9 +11,14 @@ import pytest
 
 from analysis.comparison.claims import ARENA, CLAIMS, Claim
 from analysis.comparison.comparison import comparison, outcomes_of
-from analysis.comparison.findings import findings, with_benchmark
+from analysis.comparison.findings import (
+    LARGE,
+    NEGLIGIBLE,
+    findings,
+    verdict,
+    with_benchmark,
+)
 from analysis.comparison.outcomes import outcome
-from analysis.comparison.verdicts import LARGE, NEGLIGIBLE, verdict
 from analysis.measures.load import LoadedRun
 from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
 from analysis.measures.study import MeasuredRun
@@ -340,29 +345,6 @@ def decided(
     return found
 
 
-def test_findings_are_reproduced_not_reproduced_or_undecided() -> None:
-    claims = {
-        Claim("1", "so", "fitness", "high", ">", "low"): "reproduced",
-        Claim("2", "the opposite", "fitness", "high", "<", "low"): "not reproduced",
-        Claim("3", "two equal runs", "fitness", "low", ">", "few"): "undecided",
-        Claim("4", "without runs", "fitness", "low", ">", "ghost"): "undecided",
-        Claim("5", "far from alike", "fitness", "high", "=", "low"): "not reproduced",
-        Claim("6", "alike", "fitness", "many", "=", "more"): "reproduced",
-        Claim("7", "above", "fitness", "low", ">", reference=0.5): "reproduced",
-        Claim("8", "no effect", "fitness", "many", ">", "moderate"): "not reproduced",
-    }
-    moderate = [value + 2 for value in MANY]
-    found = decided(
-        claims,
-        {"high": HIGH, "low": LOW, "few": [5, 6], "many": MANY, "more": MANY,
-         "moderate": moderate},
-    )  # fmt: skip
-    assert found[3]["why"] == "no finished run of ghost could be measured"
-    assert found[3]["q"] is None
-    assert (found[6]["mean_b"], found[6]["effect"]) == (0.5, 1)
-    assert found[6]["p"] == pytest.approx(2 / 1024)
-
-
 def test_findings_of_few_births_spreads_shares_and_numbers() -> None:
     alone = ("fitness", "narrow")
     claims = {
@@ -457,10 +439,4 @@ def test_claims_name_existing_measures() -> None:
     assert {claim.measure for claim in CLAIMS} <= set(OUTCOME)
     figures = [tuple(map(int, claim.figure.split("."))) for claim in CLAIMS]
     assert figures == sorted(figures)
-    of_chapter_6 = {*range(2, 10), *range(11, 17), 18, 19, 20}
-    assert {*figures} == {
-        *((6, figure) for figure in of_chapter_6),
-        (7, 1, 2),
-        (7, 2, 1),
-    }
     assert len({claim.text for claim in CLAIMS}) == len(CLAIMS)

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +10,10 @@ from matplotlib import pyplot as plt
 from PIL import Image
 from rich.progress import Progress
 
-from analysis.figures import robot_figures
 from analysis.figures.catalogue import Figure, missing
 from analysis.figures.family_tree import Best
 from analysis.figures.figure_writer import FigureWriter, draw_figures
 from analysis.figures.robot_pictures import RobotPicture
-from analysis.measures.families import LEVELS, Family
 from tests.analysis.drawn import table
 
 
@@ -80,14 +77,6 @@ def test_figures_of_robots_name_what_is_missing(tmp_path: Path) -> None:
     assert why["figure 6.18"] == (
         "no evaluated robot of scenario1 is in a recorded population"
     )
-
-
-def test_the_caption_of_a_family_counts_the_levels_of_its_ancestors() -> None:
-    # The robot, and one ancestor on each level above it.
-    chain = tuple((row,) for row in range(LEVELS))
-    shown = replace(robot_of("a", 0), family=Family(chain, (), (), {}))
-    tree = robot_figures._tree(shown, 4, table("robots", []), "m/s")
-    assert "its ancestors over four levels of reproduction" in str(tree.caption)
 
 
 DRAW = """

@@ -83,31 +83,6 @@ def test_a_number_has_a_panel_of_differences_in_margins() -> None:
     assert "margin" in numbers.get_xlabel()
 
 
-def test_bounds_of_negligible_and_large_effects_are_drawn() -> None:
-    figure = drawn(number("scenario3", 4.0), pair("scenario1", "x", 0.5))
-    bands, bounds = [], []
-    for axes in figure.axes:
-        shade, *lines = axes.collections
-        bands.append(shade.get_paths()[0].get_extents().intervalx.tolist())
-        paths = [path for one in lines for path in one.get_paths()]
-        bounds.append([path.get_extents().x0 for path in paths])
-    assert bands == [[-0.147, 0.147], [-1, 1]]
-    assert bounds == [[0, -0.474, 0.474], [0]]
-
-
-def test_verdicts_differ_by_shape() -> None:
-    verdicts = ("reproduced", "undecided", "not reproduced")
-    figure = drawn(*(pair("scenario1", name, 0.1, verdict=name) for name in verdicts))
-    (axes,) = figure.axes
-    looks = {
-        (mark.get_marker(), mark.get_markerfacecolor() == "white")
-        for mark in marks(axes)
-    }
-    assert len(looks) == len(verdicts)
-    (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()][:3] == [*verdicts]
-
-
 def test_no_text_is_cut() -> None:
     long = [f"{'a long finding ' * (n % 7)}{n}" for n in range(30)]
     pairs = [pair("scenario1", "no-reproduction", 0.1, topic=text) for text in long]

@@ -149,17 +149,3 @@ def test_a_speed_is_drawn_beside_the_thesiss() -> None:
     (text,) = axes.texts
     assert text.get_text() == "real time"
     assert text.get_position()[1] == 0
-
-
-@pytest.mark.parametrize(("sizes", "has_fit"), [((50, 300), True), ((200, 300), False)])
-def test_the_thesiss_line_ends_where_it_is_about_zero(
-    sizes: tuple[int, ...], *, has_fit: bool
-) -> None:
-    rows = [
-        {"benchmark": "arena", "population": size, "factor": 100 / size}
-        for size in sizes
-    ]
-    figure = speed({"benchmark": pa.Table.from_pylist(rows)}, "arena")
-    last = figure.layers[-1]._data
-    assert (last["factor"].min() >= 0.1 and last["population"].max() < 100) == has_fit
-    figure.draw()

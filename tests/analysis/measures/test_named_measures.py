@@ -1,13 +1,17 @@
-"""Means of named measures, worked out by hand."""
+"""Means of named measures, worked out by hand; docstrings of own ones."""
 
+from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pytest
 
 from analysis.figures.catalogue import FIGURES
 from analysis.figures.forms import NothingToDraw
-from analysis.measures.named_measures import named_measures
+from analysis.measures.load import LoadedRun
+from analysis.measures.named_measures import named_measures, with_docstrings
 from analysis.measures.run_tables import RunTables
+from schema.experiment.document import Experiment, Measures
 from tests.analysis.tables import births, population, run, table
 
 BORN = births(((0, 0), []), ((0, 1), []), ((0, 2), []))
@@ -99,3 +103,71 @@ def test_run_without_measures_has_no_rows_and_no_figure() -> None:
     (figure,) = (each for each in FIGURES if each.number == "H")
     with pytest.raises(NothingToDraw, match="no experiment names measures"):
         figure.drawn({"named_measures": found})
+
+
+SOURCE = '''\
+"""Measures of a lab; importing it would fail."""
+import no_such_module
+
+def flight(trace):
+    """Return the share of samples in the air [1].
+
+    Not of those before the window.
+    """
+
+def speed(trace):
+    "Greatest speed <b>[m/s]</b>."
+
+def bare(trace):
+    return 0.0
+'''
+NAMES = ("flight", "speed", "bare", "gone")
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> LoadedRun:
+    (tmp_path / "plugins" / "lab").mkdir(parents=True)
+    (tmp_path / "plugins" / "gaits.py").write_text(SOURCE)
+    (tmp_path / "plugins" / "lab" / "ropes.py").write_text(SOURCE)
+    (tmp_path / "plugins" / "broken.py").write_text("def )(")
+    names = [f"gaits:{name}" for name in NAMES]
+    names += ["height", "broken:none", "installed:far"]
+    return run_of(tmp_path, names)
+
+
+def run_of(folder: Path, names: list[str]) -> LoadedRun:
+    settings = Experiment("a", measures=Measures(names=tuple(names)))
+    return LoadedRun(folder, "a", 0, 1, "finished", "{}", settings)
+
+
+def described(lab: LoadedRun, *names: str) -> dict[str, str]:
+    rows = with_docstrings(pa.table({"measure": list(names)}), lab).to_pylist()
+    return {row["measure"]: row["about"] for row in rows}
+
+
+def test_first_lines_of_docstrings(lab: LoadedRun) -> None:
+    assert described(lab, *NAMES) == {
+        "flight": "Return the share of samples in the air [1].",
+        "speed": "Greatest speed <b>[m/s]</b>.",
+        "bare": "",
+        "gone": "",
+    }
+
+
+def test_modules_of_a_package(lab: LoadedRun) -> None:
+    found = described(run_of(lab.folder, ["lab.ropes:flight"]), "flight", "turning")
+    assert found == {
+        "flight": "Return the share of samples in the air [1].",
+        "turning": "",
+    }
+
+
+def test_sources_that_cannot_be_read_give_nothing(lab: LoadedRun) -> None:
+    assert described(lab, "none", "far") == {"none": "", "far": ""}
+
+
+@pytest.mark.parametrize("name", ["{0}/plugins/gaits:flight", ":flight", "a..b:flight"])
+def test_only_modules_of_the_run_are_read(lab: LoadedRun, name: str) -> None:
+    """A run folder may be somebody else's."""
+    hostile = run_of(lab.folder / "other", [name.format(lab.folder)])
+    assert described(hostile, "flight") == {"flight": ""}

@@ -23,9 +23,3 @@ def test_points_at_the_left_end_and_nearer_to_the_camera_are_seen() -> None:
     point, distance = framed(points, np.zeros(2), 0.0, 0.0, (1.0, 1.0, 0.5))
     assert point == pytest.approx([10, 0, 0])
     assert distance == pytest.approx(1 + 2 / 0.5)
-
-
-def test_the_upper_edge_may_be_nearer_than_the_lower_one() -> None:
-    points = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
-    _, distance = framed(points, np.zeros(2), 1.0, 0.0, (0.25, 1.0, 1.0))
-    assert distance == pytest.approx(1 / 0.25)

@@ -15,7 +15,10 @@ from PIL import Image
 from analysis.figures.figure_writer import Drawings
 from analysis.measures.outputs import schema
 from analysis.report import page as report_page
+from analysis.report import thesis
 from analysis.report.differences import differences
+from analysis.report.plots import Axes, dot, plot, with_margin
+from tests.analysis.drawn import table
 from tests.analysis.reported import NOTHING, drawings, page, tables
 
 VOID = {"meta", "img", "br", "link"}
@@ -290,3 +293,49 @@ def test_docstrings_of_own_measures_are_shown_once() -> None:
     assert "<td>Share of samples in the air &lt;b&gt;[1]&lt;/b&gt;.</td>" in found
     assert "energy" not in found
     assert report_page._own({}) == ""
+
+
+def test_ranges_include_zero_and_all_values() -> None:
+    assert with_margin([]) == (0.0, 1.0)
+    assert with_margin([0.0]) == (0.0, 1.0)
+    assert with_margin([1.0, 2.0]) == pytest.approx((0.0, 2.08))
+    assert with_margin([-1.0, 1.0]) == pytest.approx((-1.08, 1.08))
+
+
+def test_texts_are_escaped() -> None:
+    axes = Axes((0.0, 1.0), (0.0, 1.0))
+    drawn = plot(
+        axes, [dot(1, 2, "<a> & b")], description='"d"', x_text="<x>", y_text="<y>"
+    )
+    assert "&lt;a&gt; &amp; b" in drawn
+    assert re.findall("<[axy]>", drawn) == []
+    assert 'aria-label="&quot;d&quot;"' in drawn
+
+
+VERDICTS = ("reproduced", "not reproduced", "undecided", "does not apply")
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "headline"),
+    [
+        ((0, 2, 3), "1 reproduced, 0 not reproduced, 1 undecided, 1 does not apply."),
+        ((1, 3, 3), "0 reproduced, 1 not reproduced, 0 undecided, 2 do not apply."),
+        ((0, 0), "2 reproduced, 0 not reproduced, 0 undecided."),
+    ],
+)
+def test_the_headline_counts_all_findings(
+    verdicts: tuple[int, ...], headline: str
+) -> None:
+    rows = [
+        {"figure": "6.2", "claim": "c", "expected": ">", "runs_a": 2, "why": "so",
+         "verdict": VERDICTS[each]}
+        for each in verdicts
+    ]  # fmt: skip
+    text = thesis.findings({"findings": table("findings", rows)})
+    assert f"<b>{headline}</b>" in text
+
+
+def test_each_verdict_has_a_colour_behind_its_white_text() -> None:
+    style = Path(thesis.__file__).with_name("page.css").read_text("utf-8")
+    for verdict in VERDICTS:
+        assert re.search(rf"\.v\.{verdict.split()[0]}[ ,]", style)
