@@ -13,7 +13,6 @@ from analysis.figures.style import label
 from analysis.measures.families import Family
 from schema.robot.ids import BirthId
 
-_NO_UNITS: Mapping[str, str] = {}
 _INK, _GREY, _FAINT = "#333333", "#666666", "#9A9A9A"
 _SMALL = 8.0
 """Size of the texts that explain lines and numbers."""
@@ -31,9 +30,7 @@ _RIM, _BELOW = 0.35, 0.25
 """Distance of the line below founders from pictures; space below the lowest robot."""
 
 
-def gaits(
-    robot_pictures: Sequence[RobotPicture], units: Mapping[str, str] = _NO_UNITS
-) -> Figure:
+def gaits(robot_pictures: Sequence[RobotPicture], units: Mapping[str, str]) -> Figure:
     """Return one row of consecutive pictures per robot; units are by experiment.
 
     Source: Hupkes 2016, figure 6.10.

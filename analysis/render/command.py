@@ -15,7 +15,6 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
-from schema.experiment.document import Simulation
 from schema.formats.run_settings import read_with_settings
 from schema.plugins.permission import allow
 from schema.robot.trace import Floats
@@ -47,7 +46,13 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
         options.file, named, island, tells_default=True
     )
     world = settings.simulation
-    _check_gait(options.gait, world)
+    ticks = -(-world.evaluation_steps // world.brain_steps)
+    most = ticks - ticks // 2
+    if options.gait is not None and options.gait > most:
+        raise NoPictures(
+            f"--gait {options.gait}: must be <= {most}, the number of ticks in the "
+            "second half of the evaluation"
+        )
     size = (options.width, options.width * 3 // 4)
     with RobotRenderer(robot, settings, size=size) as renderer:
         if not is_film and not options.gait:
@@ -57,16 +62,6 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
             _draw_motion(renderer, live, options.gait, out, world.tick_s)
     print(f"{out}: written")
     return 0
-
-
-def _check_gait(gait: int | None, world: Simulation) -> None:
-    ticks = -(-world.evaluation_steps // world.brain_steps)
-    most = ticks - ticks // 2
-    if gait is not None and gait > most:
-        raise NoPictures(
-            f"--gait {gait}: must be <= {most}, the number of ticks in the second half "
-            "of the evaluation"
-        )
 
 
 def _draw_motion(

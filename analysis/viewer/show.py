@@ -15,8 +15,7 @@ import pyarrow as pa
 
 from analysis.viewer.body import BoxModel, Float32s, box_model, place_rows
 from analysis.viewer.entities import TimePoint, robot_path
-from analysis.viewer.gallery import Gallery
-from analysis.viewer.lineage import Lineage
+from analysis.viewer.populations import Gallery, Lineage
 from analysis.viewer.recording import Recording
 from analysis.viewer.replay import rows_by_robot
 from schema.parts import BodySpace
@@ -61,14 +60,7 @@ class _Clock:
 
 @dataclass(slots=True)
 class _ShownRobot:
-    """A robot that is shown in an arena.
-
-    Attributes:
-        path: its entity.
-        drawn_s: time at which its boxes were logged last [s].
-        seen_s: time of its last pose [s].
-        is_gone: its boxes were removed.
-    """
+    """A robot in an arena: its entity, times of its last boxes and pose [s]."""
 
     path: str
     drawn_s: float

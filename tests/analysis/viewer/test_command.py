@@ -20,9 +20,8 @@ from analysis.viewer.body import box_model
 from analysis.viewer.command import view
 from analysis.viewer.entities import TimePoint
 from analysis.viewer.flags import parser
-from analysis.viewer.gallery import Gallery, spot_place
-from analysis.viewer.lineage import Lineage
 from analysis.viewer.output import Output, Window, keep_serving, ways_to_view
+from analysis.viewer.populations import Gallery, Lineage, spot_place
 from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.resimulate import Simulators
 from analysis.viewer.scene import scene_of
