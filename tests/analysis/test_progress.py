@@ -7,14 +7,6 @@ import pytest
 from analysis.progress import bars
 
 
-def test_a_log_shows_the_title_once(capsys: pytest.CaptureFixture[str]) -> None:
-    with bars("things [bold] to do: 3") as bar:
-        assert list(bar.track(range(3))) == [0, 1, 2]
-    output = capsys.readouterr()
-    assert output.err == "things [bold] to do: 3\n"
-    assert not output.out
-
-
 @pytest.fixture
 def lines(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Return the list that gets the lines of a log, which come quickly."""

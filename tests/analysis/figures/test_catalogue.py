@@ -221,18 +221,6 @@ def test_file_names_are_safe_and_cut_between_characters(text: str, name: str) ->
     assert file_name(text) == name
 
 
-def test_missing_data_is_named() -> None:
-    names = ("outcomes", "progression", "populations")
-    empty = {name: table(name, []) for name in names}
-    with pytest.raises(NothingToDraw, match="no finished run could be measured"):
-        over_runs(empty, FITNESS)
-    with pytest.raises(NothingToDraw, match="fitness at two numbers of births"):
-        over_births(empty, "fitness", "f")
-    none = {"outcomes": table("outcomes", [{"experiment": "a", "rank": 1.0}])}
-    with pytest.raises(NothingToDraw, match="has a value of fitness"):
-        over_runs(none, FITNESS)
-
-
 def test_catalogue_has_all_figures_of_the_thesis_and_each_names_missing_data() -> None:
     # Figures of the thesis except rendered ones, then further ones.
     numbers = [one.number for one in FIGURES]

@@ -161,12 +161,6 @@ def test_an_invalid_tree_is_reported_with_its_row(body: Body) -> None:
         encode(column([CHAIN, body]))
 
 
-def test_no_bodies_give_no_trees() -> None:
-    trees = encode(column([]))
-    empty = np.zeros(0, np.int64)
-    assert tree_distances(trees, empty, empty).tolist() == []
-
-
 def test_without_a_folder_for_its_cache_the_distance_is_compiled(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

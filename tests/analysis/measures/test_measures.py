@@ -472,15 +472,6 @@ def test_progression_of_islands_has_births_at_which_all_are_recorded() -> None:
     assert [row["mean"] for row in found] == pytest.approx([0.3, 0.6])
 
 
-def test_a_population_with_an_unknown_member_is_left_out() -> None:
-    born = births((A, []), (B, []))
-    recorded_populations = population_table(
-        population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born
-    )
-    assert recorded_populations.births.tolist() == [1]
-    assert recorded_populations.incomplete == 1
-
-
 def test_a_run_without_births_has_no_measures() -> None:
     tables = run(births=births(), population=population())
     island = Experiment("e", arena=ArenaSection(record_touches=True))
