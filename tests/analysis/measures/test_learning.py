@@ -1,5 +1,6 @@
 """Measures of lifetime learning, by hand."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import pyarrow as pa
@@ -13,11 +14,11 @@ from analysis.measures.run_tables import RunTables
 from tests.analysis.tables import births, population, run, table
 
 
-def trials(fitness: dict[int, list[float | None]]) -> pa.Table:
-    """Return the fitness of each trial by number of birth, on island 1."""
+def trials(*fitness: Sequence[float | None]) -> pa.Table:
+    """Return the fitness of each trial of births 0, 1, 2 and so on, on island 1."""
     rows: list[dict[str, Any]] = [
         {"island": 1, "birth": birth, "trial": trial, "fitness": value}
-        for birth, values in fitness.items()
+        for birth, values in enumerate(fitness)
         for trial, value in enumerate(values)
     ]
     return table("learning", rows)
@@ -31,13 +32,11 @@ TABLES = RunTables(
             (1, 5, {(1, 1): 2.0, (1, 2): 5.0, (1, 4): 3.0}),
         ),
         learning=trials(
-            {
-                0: [0.5, 1.0, 0.2],
-                1: [2.0, None, 1.5],
-                2: [1.5, 4.0, 5.0],
-                3: [None, None, -1.0],
-                4: [2.5, 3.0, None],
-            }
+            [0.5, 1.0, 0.2],
+            [2.0, None, 1.5],
+            [1.5, 4.0, 5.0],
+            [None, None, -1.0],
+            [2.5, 3.0, None],
         ),
     )
 )
@@ -73,38 +72,26 @@ def test_bodies_saved_in_an_arena_by_hand() -> None:
 
     1 was culled, 3 moved away, and 4 is still an infant.
     """
-    found = learning(
-        RunTables(
-            run(
-                births=births(
-                    *(((1, number), []) for number in range(5)),
-                    sim_time_s=[float(number) for number in range(5)],
-                ),
-                population=population(
-                    (1, 2, {(1, 0): None, (1, 1): None}),
-                    (1, 3, {(1, 0): 3.0, (1, 1): 1.0, (1, 2): None, (1, 3): 9.0}),
-                    (1, 4, {(1, 0): 2.0, (1, 2): 4.0}),
-                    (1, 5, {(1, 0): 2.0, (1, 2): 4.0, (1, 4): None}),
-                    is_online=True,
-                ),
-                deaths=table(
-                    "deaths",
-                    [
-                        {"island": 1, "birth": 1, "reason": "selection"},
-                        {"island": 1, "birth": 3, "reason": "migrated"},
-                    ],
-                ),
-                learning=trials({number: [1.0 + number, 3.0] for number in range(5)}),
-            )
-        )
+    born = births(*(((1, n), []) for n in range(5)), sim_time_s=[0.0, 1.0, 2.0, 3, 4])
+    living = population(
+        (1, 2, {(1, 0): None, (1, 1): None}),
+        (1, 3, {(1, 0): 3.0, (1, 1): 1.0, (1, 2): None, (1, 3): 9.0}),
+        (1, 4, {(1, 0): 2.0, (1, 2): 4.0}),
+        (1, 5, {(1, 0): 2.0, (1, 2): 4.0, (1, 4): None}),
+        is_online=True,
     )
+    went = ((1, "selection"), (3, "migrated"))
+    deaths = [{"island": 1, "birth": birth, "reason": why} for birth, why in went]
+    tables = run(births=born, population=living, deaths=table("deaths", deaths))
+    tables["learning"] = trials(*([1.0 + number, 3.0] for number in range(5)))
+    found = learning(RunTables(tables))
     assert found["kept"].to_pylist() == [True, False, True, None, None]
     assert found["saved"].to_pylist() == [True, False, False, None, None]
 
 
 def test_a_run_without_trials_has_empty_tables() -> None:
     empty = RunTables(
-        run(births=births(((1, 0), [])), population=population(), learning=trials({}))
+        run(births=births(((1, 0), [])), population=population(), learning=trials())
     )
     assert learning(empty).num_rows == learning_curves(empty).num_rows == 0
 

@@ -129,39 +129,32 @@ def test_diversity_is_the_mean_over_pairs() -> None:
     # Core to brick 1, core to hinge 1, brick to hinge 1, core to far 2, brick to far
     # 1 + 2 (type and slot differ, one more part), hinge to far the same.
     bodies = births((A, []), (B, []), (C, []), (D, []), body=[CORE, BRICK, HINGE, FAR])
-    recorded_populations = population_table(
-        population(
-            (0, 2, {A: 0.1}),
-            (0, 3, {A: 0.1, B: None, C: 0.1}),
-            (0, 4, {A: 0.1, B: 0.1, C: 0.1, D: None}),
-            is_online=True,
-        ),
-        bodies,
+    living = population(
+        (0, 2, {A: 0.1}),
+        (0, 3, {A: 0.1, B: None, C: 0.1}),
+        (0, 4, {A: 0.1, B: 0.1, C: 0.1, D: None}),
+        is_online=True,
     )
-    found = diversity(recorded_populations, encode(bodies["body"]))
+    found = diversity(population_table(living, bodies), encode(bodies["body"]))
     assert math.isnan(found[0])
     assert found[1:].tolist() == pytest.approx([1.0, (1 + 1 + 1 + 2 + 3 + 3) / 6])
 
 
 def test_retention_is_the_share_that_is_still_alive() -> None:
     born = births(*((name, []) for name in (A, B, C, D, E)))
-    recorded_populations = population_table(
-        population(
-            (0, 10, {A: 1, B: 1, C: 1, D: 1}),
-            # Nothing was recorded at 130 + 5: skipped, and so are the last.
-            (0, 15, {A: 1, E: 1}),
-            (0, 130, {B: 1, D: 1, E: None}),
-            (0, 250, {B: 1}),
-            # Another island's do not count, though they bear the same names.
-            (1, 130, {A: 1}),
-        ),
-        born,
+    living = population(
+        (0, 10, {A: 1, B: 1, C: 1, D: 1}),
+        # Nothing was recorded at 130 + 5: skipped, and so are the last.
+        (0, 15, {A: 1, E: 1}),
+        (0, 130, {B: 1, D: 1, E: None}),
+        (0, 250, {B: 1}),
+        # Another island's do not count, though they bear the same names.
+        (1, 130, {A: 1}),
     )
-    found = retention(recorded_populations)
-    assert found.tolist() == pytest.approx(
-        [0.5, math.nan, 1 / 3, math.nan, math.nan], nan_ok=True
-    )
-    assert retention(recorded_populations, step=5)[0] == 0.25
+    found = retention(population_table(living, born)).tolist()
+    nan = math.nan
+    assert found == pytest.approx([0.5, nan, 1 / 3, nan, nan], nan_ok=True)
+    assert retention(population_table(living, born), step=5)[0] == 0.25
 
 
 def test_variability_by_hand() -> None:
@@ -202,21 +195,15 @@ def test_sizes_by_hand() -> None:
         motors=[1, 0], extremities=[2, 1], hidden=[3, 0], connections=[10, 1],
     )  # fmt: skip
     found = {name: values.tolist() for name, values in body_sizes(born).items()}
-    assert found == {
-        "parts": [5, 1],
-        "active_joints": [1, 0],
-        "passive_joints": [1, 0],
-        "joints": [2, 0],
-        "extremities": [2, 1],
-        "touch_sensors": [2, 0],
-        "hidden": [3, 0],
-        "connections": [10, 1],
-        "active_joints_per_part": [0.2, 0],
-        "passive_joints_per_part": [0.2, 0],
-        "joints_per_part": [0.4, 0],
-        "extremities_per_part": [0.4, 1],
-        "hidden_per_part": [0.6, 0],
-        "connections_per_part": [2, 1],
+    counts = {
+        "parts": [5, 1], "active_joints": [1, 0], "passive_joints": [1, 0],
+        "joints": [2, 0], "extremities": [2, 1], "touch_sensors": [2, 0],
+        "hidden": [3, 0], "connections": [10, 1],
+    }  # fmt: skip
+    assert found == counts | {
+        f"{name}_per_part": [first / 5, last]
+        for name, (first, last) in counts.items()
+        if name not in {"parts", "touch_sensors"}
     }
     tables = run(births=born, population=population((0, 2, {A: 0.1, B: 0.3})))
     assert column(tables, "parts") == [3]
@@ -375,17 +362,15 @@ def test_interactions_by_hand() -> None:
         (A, []), (B, []), (C, []), (D, []), sim_time_s=[0.0, 10.0, 20.0, None]
     )
     deaths = table("deaths", [{"birth": 0, "sim_time_s": 40.0}])
-    touch = {"birth": 0, "other_island": 0, "other_birth": 1, "over_s": 1.0}
-    touches = table(
-        "touches",
-        [
-            {**touch, "sim_time_s": 30.0, "duration_s": 0.5},
-            {**touch, "sim_time_s": 31.0, "duration_s": 1.0},
-        ],
-    )
+    touches = [
+        {"birth": 0, "other_island": 0, "other_birth": 1, "over_s": 1.0,
+         "sim_time_s": time_s, "duration_s": duration_s}
+        for time_s, duration_s in ((30.0, 0.5), (31.0, 1.0))
+    ]  # fmt: skip
     samples = table("fitness", [{"birth": 1, "sim_time_s": 60.0}])
     tables = run(births=born, population=population((0, 3, {B: None}), is_online=True))
-    tables |= {"deaths": deaths, "touches": touches, "fitness": samples}
+    tables |= {"deaths": deaths, "fitness": samples}
+    tables["touches"] = table("touches", touches)
     (row,) = interactions(RunTables(tables)).to_pylist()
     # A lived 40 s, B 50 s and C 40 s, to the last sample; D off-line.
     assert row == {

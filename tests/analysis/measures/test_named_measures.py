@@ -17,9 +17,19 @@ from tests.analysis.tables import births, population, run, table
 BORN = births(((0, 0), []), ((0, 1), []), ((0, 2), []))
 
 
-def evaluation(birth: int, *measures: tuple[str, float], trial: int = 0) -> Any:  # noqa: ANN401
-    values = list(measures) or None
-    return {"birth": birth, "trial": trial, "measures": values}
+def evaluations(*rows: tuple[int, int, int, dict[str, float]]) -> pa.Table:
+    """Return rows of island, birth on island 0, trial, and measures."""
+    names = ("island", "birth", "trial", "birth_island", "measures")
+    values = [(*place, 0, [*measures.items()] or None) for *place, measures in rows]
+    made = [dict(zip(names, row, strict=True)) for row in values]
+    return table("evaluations", made)
+
+
+def named(tables: dict[str, pa.Table]) -> list[tuple[Any, ...]]:
+    """Return island, births, measure, mean and robots of each row."""
+    return [
+        tuple(row.values()) for row in named_measures(RunTables(tables)).to_pylist()
+    ]
 
 
 def test_off_line_each_robot_counts_with_its_last_evaluation() -> None:
@@ -28,72 +38,51 @@ def test_off_line_each_robot_counts_with_its_last_evaluation() -> None:
         population=population(
             (0, 2, {(0, 0): 0.5, (0, 1): 0.25}), (0, 3, {(0, 1): 0.25, (0, 2): None})
         ),
-        evaluations=table(
-            "evaluations",
-            [
-                evaluation(0, ("height", 1.0), ("turning", 4.0)),
-                evaluation(1, ("height", 3.0), ("turning", 5.0)),
-                evaluation(2),
-                evaluation(1, ("height", 5.0), ("turning", 7.0), trial=1),
-            ],
+        evaluations=evaluations(
+            (0, 0, 0, {"height": 1.0, "turning": 4.0}),
+            (0, 1, 0, {"height": 3.0, "turning": 5.0}),
+            (0, 2, 0, {}),
+            (0, 1, 1, {"height": 5.0, "turning": 7.0}),
         ),
     )
-    assert named_measures(RunTables(tables)).to_pylist() == [
-        {"island": 0, "births": 2, "measure": "height", "mean": 3.0, "robots": 2},
-        {"island": 0, "births": 2, "measure": "turning", "mean": 5.5, "robots": 2},
-        {"island": 0, "births": 3, "measure": "height", "mean": 5.0, "robots": 1},
-        {"island": 0, "births": 3, "measure": "turning", "mean": 7.0, "robots": 1},
+    assert named(tables) == [
+        (0, 2, "height", 3.0, 2),
+        (0, 2, "turning", 5.5, 2),
+        (0, 3, "height", 5.0, 1),
+        (0, 3, "turning", 7.0, 1),
     ]
 
 
 def test_each_island_judges_a_migrant_by_its_own_evaluation() -> None:
-    migrant = {"island": 1, "birth_island": 0, "birth": 0, "trial": 0}
+    """Robots 0 and 1 of island 0; robot 1 went to island 1."""
+    one, migrant = (0, 0), (0, 1)
     tables = run(
-        births=births(((0, 0), []), ((1, 0), [])),
-        population=population(
-            (0, 1, {(0, 0): 0.5}), (1, 1, {(0, 0): 0.25, (1, 0): 0.5})
-        ),
-        evaluations=table(
-            "evaluations",
-            [
-                evaluation(0, ("height", 1.0)),
-                {**migrant, "measures": [("height", 3.0)]},
-                {**evaluation(0, ("height", 5.0)), "island": 1},
-            ],
+        births=births((one, []), (migrant, [])),
+        population=population((0, 1, {one: 0.5, migrant: 0.5}), (1, 1, {migrant: 0.2})),
+        evaluations=evaluations(
+            (0, 0, 0, {"height": 1.0}),
+            (0, 1, 0, {"height": 5.0}),
+            (1, 1, 0, {"height": 4.0}),
         ),
     )
-    found = {
-        row["island"]: row["mean"]
-        for row in named_measures(RunTables(tables)).to_pylist()
-    }
-    assert found == {0: 1.0, 1: 4.0}
+    assert named(tables) == [(0, 1, "height", 3.0, 2), (1, 1, "height", 4.0, 1)]
 
 
 def test_on_line_the_samples_of_mature_robots_count() -> None:
-    def sample(birth: int, count: int, height: float | None, **more: bool) -> Any:  # noqa: ANN401
-        values = None if height is None else [("height", height)]
-        row = {"birth": birth, "births": count, "is_mature": True, "measures": values}
-        return row | more
-
+    samples = [
+        {"birth": birth, "births": count, "is_mature": height != 9.0,
+         "measures": height and [("height", height)]}
+        for birth, count, height in (
+            (0, 2, 1.0), (1, 2, 9.0), (0, 2, 2.0), (1, 2, 6.0), (2, 3, None),
+            (1, 3, 4.0),
+        )
+    ]  # fmt: skip
     tables = run(
         births=BORN,
         population=population((0, 2, {(0, 0): 0.5, (0, 1): 0.25}), is_online=True),
-        fitness=table(
-            "fitness",
-            [
-                sample(0, 2, 1.0),
-                sample(1, 2, 9.0, is_mature=False),
-                sample(0, 2, 2.0),
-                sample(1, 2, 6.0),
-                sample(2, 3, None),
-                sample(1, 3, 4.0),
-            ],
-        ),
+        fitness=table("fitness", samples),
     )
-    assert named_measures(RunTables(tables)).to_pylist() == [
-        {"island": 0, "births": 2, "measure": "height", "mean": 3.0, "robots": 2},
-        {"island": 0, "births": 3, "measure": "height", "mean": 4.0, "robots": 1},
-    ]
+    assert named(tables) == [(0, 2, "height", 3.0, 2), (0, 3, "height", 4.0, 1)]
 
 
 def test_run_without_measures_has_no_rows_and_no_figure() -> None:
