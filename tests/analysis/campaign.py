@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 from schema.tables.columns import TABLES
 from schema.tables.files import parquet_path
 from tests.analysis.bodies import Body, random_body
+from tests.analysis.tables import blank
 
 FOUNDERS = 15
 ONLINE = "scenario3"
@@ -163,16 +164,6 @@ def _filled(name: str, columns: Columns) -> pa.Table:
     """Return a table with these columns; all others are 0, empty or null."""
     schema = TABLES[name]
     rows = len(columns["birth"])  # type: ignore[arg-type]
-    arrays = []
-    for field in schema:
-        values = columns.get(field.name)
-        if values is not None:
-            arrays.append(pa.array(values, field.type))
-        elif field.name == "record":
-            arrays.append(pa.array(np.arange(rows), field.type))
-        elif field.nullable:
-            arrays.append(pa.nulls(rows, field.type))
-        else:
-            blank = "" if pa.types.is_string(field.type) else 0
-            arrays.append(pa.array([blank] * rows, field.type))
-    return pa.Table.from_arrays(arrays, schema=schema)
+    blanks = {field.name: [blank(field)] * rows for field in schema}
+    known = {key: values for key, values in columns.items() if values is not None}
+    return pa.table({**blanks, "record": range(rows), **known}, schema)

@@ -15,13 +15,14 @@ def table(name: str, rows: list[dict[str, Any]]) -> pa.Table:
     made = TABLES[name]
     filled = []
     for record, row in enumerate(rows):
-        blank = {field.name: _blank(field) for field in made}
+        blanks = {field.name: blank(field) for field in made}
         home = {"birth_island": row.get("island", 0)}
-        filled.append({**blank, "record": record, **home, **row})
+        filled.append({**blanks, "record": record, **home, **row})
     return pa.Table.from_pylist(filled, made)
 
 
-def _blank(field: pa.Field) -> object:
+def blank(field: pa.Field) -> object:
+    """Return 0, empty or null."""
     if field.nullable:
         return None
     if pa.types.is_list(field.type):
@@ -41,15 +42,9 @@ def births(*rows: tuple[Name, list[Name]], **columns: list[Any]) -> pa.Table:
     made = []
     for index, ((island, birth), parents) in enumerate(rows):
         named = [{"island": home, "birth": number} for home, number in parents]
-        row = {
-            "island": island,
-            "birth": birth,
-            "parents": named,
-            "body": CORE,
-            "parts": 1,
-        }
-        row |= {name: values[index] for name, values in columns.items()}
-        made.append(row)
+        row = {"island": island, "birth": birth, "parents": named, "body": CORE}
+        more = {name: values[index] for name, values in columns.items()}
+        made.append({**row, "parts": 1, **more})
     return table("births", made)
 
 
@@ -57,21 +52,14 @@ def population(
     *levels: tuple[int, int, dict[Name, float | None]], is_online: bool = False
 ) -> pa.Table:
     """Return recorded populations: (island, births, fitness by birth id)."""
+    names = ("island", "births", "birth_island", "birth", "fitness")
     rows = [
-        {
-            "island": island,
-            "births": count,
-            "birth_island": home,
-            "birth": birth,
-            "fitness": fitness,
-        }
+        dict(zip(names, (island, count, home, birth, fitness), strict=True))
         for island, count, living in levels
         for (home, birth), fitness in living.items()
     ]
     made = table("population", rows)
-    return made.append_column(
-        "is_online", pa.array([is_online] * len(rows), pa.bool_())
-    )
+    return made.append_column("is_online", pa.repeat(is_online, len(rows)))
 
 
 def run(**tables: pa.Table) -> dict[str, pa.Table]:
