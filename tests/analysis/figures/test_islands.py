@@ -1,4 +1,4 @@
-"""Tests of the figures of islands, extremities and speed."""
+"""Tests of the figures of islands, robots, named measures and speed."""
 
 import numpy as np
 import pyarrow as pa
@@ -6,10 +6,12 @@ import pytest
 from matplotlib.text import Text
 
 from analysis.figures.bench import speed
-from analysis.figures.forms import NothingToDraw
+from analysis.figures.courses import UNITS, measures_over_births
+from analysis.figures.forms import NothingToDraw, Tables
 from analysis.figures.islands import between, fitness_by_island, migration_graph
-from analysis.figures.robots import extremities_and_fitness
+from analysis.figures.robots import extremities_and_fitness, variability
 from tests.analysis.drawn import layers, table
+from worker.measures import BUILT_IN
 
 
 def test_arrows_count_migrants_between_islands() -> None:
@@ -149,3 +151,67 @@ def test_a_speed_is_drawn_beside_the_thesiss() -> None:
     (text,) = axes.texts
     assert text.get_text() == "real time"
     assert text.get_position()[1] == 0
+
+
+def measured(*robots: tuple[str, str, float]) -> Tables:
+    """Return the table of robots: experiment, folder and variability of each."""
+    rows = [
+        {"experiment": experiment, "folder": folder, "variability": value}
+        for experiment, folder, value in robots
+    ]
+    return {"variability": table("variability", rows)}
+
+
+def test_density_and_lines_are_those_of_robots_that_differ() -> None:
+    figure = variability(
+        measured(
+            ("a", "a-0", 0.2), ("a", "a-0", 0.4), ("a", "a-1", 0.5),
+            ("b", "b-0", 0.3), ("b", "b-1", 0.6),
+            ("c", "c-0", 0.7), ("d", "d-0", 1.0), ("d", "d-0", 1.0),
+        )
+    )  # fmt: skip
+    shown = layers(figure)
+    assert shown["geom_density"]["variability"] == [0.2, 0.4, 0.5, 0.3, 0.6]
+    assert shown["geom_line"]["folder"] == ["a-0", "a-0"]
+    figure.draw()
+
+
+@pytest.mark.parametrize("other", [("b", "b-0", 0.4), ("a", "a-1", 0.2)])
+def test_robots_that_do_not_differ_have_no_density(
+    other: tuple[str, str, float],
+) -> None:
+    """One robot of each of two experiments, or two equal ones of one."""
+    with pytest.raises(NothingToDraw, match="no two robots of an experiment differ"):
+        variability(measured(("a", "a-0", 0.2), other))
+
+
+def test_figure_is_drawn_without_a_warning() -> None:
+    rows = [
+        {"experiment": "a", "folder": "a-1", "island": 0, "measure": measure,
+         "births": births, "mean": 0.1 * births, "about": about}
+        for births in (15, 30)
+        for measure, about in (
+            ("height", ""), ("bare", "A number."), ("own", "Pull [N] of a rope [m/s].")
+        )
+    ]  # fmt: skip
+    tables = {"named_measures": pa.Table.from_pylist(rows)}
+    # Warnings are errors: a scale without a layer that uses it is one.
+    drawn = measures_over_births(tables).draw()
+    (line,) = drawn.axes[0].lines or drawn.axes[0].collections
+    assert line is not None
+    texts = {text.get_text() for text in drawn.findobj(Text)}
+    assert {"height [m]", "bare", "own [m/s]"} <= texts
+
+
+def test_a_measure_at_one_number_of_births_is_a_dot() -> None:
+    row = {"experiment": "a", "folder": "a-1", "island": 0, "births": 15, "mean": 0.1}
+    rows = [{**row, "measure": "height", "about": ""}]
+    figure = measures_over_births({"named_measures": pa.Table.from_pylist(rows)})
+    assert layers(figure)["geom_point"]["mean"] == [0.1]
+
+
+def test_units_are_those_of_the_docstrings() -> None:
+    assert UNITS.keys() < BUILT_IN.keys()
+    for name, function in BUILT_IN.items():
+        unit = UNITS.get(name, "1")
+        assert f"[{unit}]" in (function.__doc__ or "").partition("Source")[0], name

@@ -7,6 +7,7 @@ import sys
 import threading
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import mujoco
 import numpy as np
@@ -14,7 +15,6 @@ import pyarrow as pa
 import pytest
 from msgspec.structs import replace
 
-from analysis.measures.load import read_run
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
 from analysis.viewer.command import view
@@ -35,6 +35,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
 from schema.wire.updates import Birth, Death, Level, Update
+from tests.coordinator.arena_world import poses
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 WHOLE = Update("run", 1, 4, is_whole=True, experiment="e")
@@ -209,16 +210,33 @@ def test_a_window_that_fails_late_is_reported(
         keep_serving(output, window, recorded, threading.Event())
 
 
-def test_a_campaign_is_told_to_name_a_run(tmp_path: Path) -> None:
-    for number in (1, 0):
-        (tmp_path / f"a-{number}").mkdir()
-        (tmp_path / f"a-{number}" / "run.json").touch()
-    with pytest.raises(RunFolderError, match=f"several runs; .* as {tmp_path}/a-0$"):
-        read_run(tmp_path)
-
-
 def test_plug_ins_of_a_running_run_are_those_of_its_folder(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text("{}")
     options = parser().parse_args(["--connect", str(tmp_path), "--save", "a.rrd"])
     with pytest.raises(RunFolderError, match=r"run\.json: damaged"):
         view(options, Simulators(*[NotImplemented] * 3))
+
+
+BODY = (Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),)
+
+
+def news(sequence: int, *numbers: int) -> Update:
+    """Return news of births in an arena, of which number N is born at 10 N seconds."""
+    births = tuple(
+        Birth(BirthId(0, each - 1), (), 1, each, 10.0 * each, BODY) for each in numbers
+    )
+    return Update("r", 1, sequence, is_whole=False, experiment="e", births=births)
+
+
+def test_births_so_far_are_right_after_a_lost_message() -> None:
+    """Births 3 and 4 are requested again, and arrive after 5."""
+    recording = MagicMock()
+    show = Show(recording, BUILT_IN)
+    for update in (news(1, 1, 2), news(3, 5), news(4, 1, 2, 3, 4, 5), news(5, 6)):
+        show.tell(update)
+    first = BirthId(0, 0)
+    times_s = (5.0, 10.0, 25.0, 35.0, 45.0, 55.0, 65.0)
+    rows = poses([first], *times_s, joints={first: 0})
+    show.move(0, rows.rows())
+    births = recording.log_poses.call_args.args[2]
+    assert births.tolist() == [0, 1, 2, 3, 4, 5, 6]
