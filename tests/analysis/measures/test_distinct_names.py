@@ -1,4 +1,4 @@
-"""Tests of experiments of the same name with different settings."""
+"""Tests of experiments of one name, and of names and units of fitness functions."""
 
 import json
 from collections.abc import Mapping
@@ -6,9 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pytest
 
 from analysis.measures.distinct_names import with_distinct_names
+from analysis.measures.fitness_functions import (
+    UNITS,
+    axis_text,
+    by_function,
+    functions_of,
+)
 from analysis.measures.load import LoadedRun
 from schema.experiment.document import Experiment, Islands, SelectionSection
 from schema.experiment.file import (
@@ -16,6 +23,7 @@ from schema.experiment.file import (
     experiment_text,
     read_experiment,
 )
+from schema.experiment.settings import FITNESS
 
 Document = Mapping[str, Any]
 
@@ -152,3 +160,24 @@ def test_settings_of_a_sweep_are_swept() -> None:
     differs = "selection.population: swept instead of 15 (compared with scenario1)"
     found = named([*runs(SCENARIO), *runs(*points, name="s")])
     assert found == [("scenario1", ""), ("s", differs), ("s", differs)]
+
+
+def test_digests_of_sources_are_shown_only_where_they_tell_apart() -> None:
+    texts = {
+        "a": "goals:far (source 1a)",
+        "b": "goals:far (source 2b)",
+        "c": "goals:up (limit = 2.0, source 2b)",
+        "d": "goals:up (limit = 2.0, source 2b)",
+        "e": None,
+    }
+    columns = {"experiment": [*texts], "fitness_function": [*texts.values()]}
+    found = functions_of(pa.table(columns))
+    short = "goals:up (limit = 2.0)"
+    assert found == texts | {"c": short, "d": short, "e": ""}
+    assert by_function(found)[short] == ["c", "d"]
+
+
+def test_functions_of_the_toolkit_have_units() -> None:
+    assert UNITS.keys() == FITNESS.keys()
+    assert axis_text("turning (wander_weight = 1.0)") == "fitness [rad/s]"
+    assert axis_text("goals:far") == axis_text("turning and locomotion") == "fitness"
