@@ -41,7 +41,7 @@ def row(
     more = {"is_last": birth != 7, "scope": scope, "kind": kind,
             "part": 4 if is_one else None, "channel": 0 if is_one else None,
             "change": "motor of part 4"}  # fmt: skip
-    return changed(birth, group, fitness, **more) | rest
+    return changed(birth, group, fitness) | more | rest
 
 
 ABLATED = [
