@@ -52,7 +52,6 @@ def ablation(table: pa.Table) -> p9.ggplot:
 
 
 def _label(row: dict[str, object]) -> str:
-    """Return the row of the figure that shows a change; empty for none."""
     group, scope, kind = (str(row[name]) for name in ("group", "scope", "kind"))
     if group == RANDOM:
         return "random brains"

@@ -36,13 +36,9 @@ class Film:
 
 @dataclass(frozen=True, slots=True)
 class Drawings:
-    """Files that an analysis drew.
+    """Files that an analysis drew, figures of the thesis first, and what it did not.
 
-    Attributes:
-        figures: figures, those of the thesis first.
-        films: moving pictures, in the order of experiments.
-        no_films: reasons why experiments have none, by experiment.
-        left_out: figures that cannot be drawn, with the reason.
+    ``no_films`` are reasons by experiment.
     """
 
     figures: list[DrawnFigure]

@@ -146,7 +146,6 @@ def _draw_rows(axes: Axes, rows: Sequence[Row], top: float) -> None:
 
 
 def _set_axis(axes: Axes, *, is_pair: bool) -> None:
-    """Set limits, ticks and label of the axis of effects, which has no frame."""
     if is_pair:
         text, ticks = "Cliff's delta (positive: A above B)", [-1, -0.5, 0, 0.5, 1]
         axes.set_xlim(-1.05, 1.05)

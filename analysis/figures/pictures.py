@@ -111,7 +111,6 @@ def family_tree(
 
 
 def _add_rim(axes: Axes, width: float, height: float) -> None:
-    """Draw the line between founders and a robot's nearest ancestors."""
     axes.plot([0, width], [height] * 2, "--", color=_FAINT, linewidth=0.8)
     axes.annotate(
         "founders whose parts these robots have", (0, height), (3, 2), "data",
@@ -120,7 +119,6 @@ def _add_rim(axes: Axes, width: float, height: float) -> None:
 
 
 def _add_key(axes: Axes, unit: str, *, is_dotted: bool) -> None:
-    """Say beside the lowest robot what numbers and lines are."""
     fitness = f"fitness [{unit}]" if unit else "fitness"
     axes.text(
         0.01, 0.02, f"below each robot: number of\nits birth, {fitness}", va="bottom",
@@ -158,7 +156,6 @@ def _add_picture(
     size: float,
     colour: Colour | None = None,
 ) -> None:
-    """Put a robot's picture into a figure, with a text below."""
     x, y = spot
     edges = (x - _WIDTH / 2, x + _WIDTH / 2, y, y + _HEIGHT)
     axes.imshow(

@@ -32,13 +32,7 @@ _MOST_CELLS = 40
 
 
 class SweepRuns(NamedTuple):
-    """Finished runs of one sweep.
-
-    Attributes:
-        settings: swept settings, in the order of the document.
-        frame: one row per run: a column for each setting and each known measure.
-        measures: the measures that the runs have.
-    """
+    """Finished runs of one sweep, a row each, with settings and known measures."""
 
     settings: list[str]
     frame: Any  # a data frame; pandas has no types

@@ -28,13 +28,7 @@ from schema.tables.description import run_columns
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRun:
-    """The measures of a run.
-
-    Attributes:
-        run: the run.
-        tables: by name, with the columns of ``outputs``.
-        left_out: tables and measures that could not be read or measured.
-    """
+    """Measures of a run, by names of ``outputs``, and what could not be measured."""
 
     run: LoadedRun
     tables: dict[str, pa.Table]

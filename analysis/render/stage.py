@@ -57,7 +57,6 @@ def choose_engine() -> str:
 
 
 def _installed() -> str | None:
-    """Return the first backend whose library is installed."""
     if find_spec("OpenGL") is None:
         return None
     for name, library in _LIBRARIES.items():

@@ -62,7 +62,6 @@ def _apart(tables: Tables) -> str:
 
 
 def _differences_of(comparison: Sequence[Row], measure: str, title: str) -> str:
-    """Return the differences of one measure; empty if nothing is compared."""
     rows = [row for row in comparison if row["measure"] == measure]
     shown = rows[:_MOST_PAIRS]
     if not shown:

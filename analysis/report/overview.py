@@ -140,7 +140,6 @@ def arenas(tables: Tables) -> str:
 
 
 def _last_fitness(populations: pa.Table) -> dict[str, tuple[float, float]]:
-    """Return best and mean fitness of the last populations of each run, by folder."""
     islands: dict[str, list[tuple[float, float]]] = {}
     for row in last_rows(populations):
         if row["fitness"] is not None:

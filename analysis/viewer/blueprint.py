@@ -68,7 +68,6 @@ def _curves(name: str, islands: Sequence[int], what: str) -> rrb.TimeSeriesView:
 def _island_view(
     scene: Scene, island: int, follow: BirthId | None
 ) -> rrb.Spatial3DView:
-    """Return the view of one island, or a close view of one of its robots."""
     path = island_path(island)
     tracked = robot_path(island, follow) if follow and follow.island == island else None
     is_arena = island in scene.arenas
@@ -96,7 +95,6 @@ def _motion(births: Sequence[BirthId], *, is_online: bool) -> rrb.Spatial3DView:
 
 
 def _eye(near: float, tracked: str | None) -> rrb.EyeControls3D:
-    """Return a camera that looks at the origin, or follows an entity."""
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         position=(0.35 * near, -near, 0.8 * near),

@@ -136,7 +136,6 @@ def _in_arena(
     simulators: Simulators,
     report: Callable[[float], None],
 ) -> dict[BirthId, Motion]:
-    """Return the motions of the robots that were born in one arena."""
     here = [birth for birth in births if birth.island == island]
     recorded = {birth: _rows_of(folder, "poses", birth) for birth in here}
     for birth, rows in recorded.items():
@@ -169,7 +168,6 @@ def _in_arena(
 def _differences(
     recorded: pa.Table, replayed: pa.Table, *, is_equal: bool
 ) -> list[str]:
-    """Return the differences between a recorded and a re-simulated track."""
     columns = [name for name in replayed.column_names if name in _TRACK]
     first = recorded.select(columns).combine_chunks()
     second = replayed.select(columns).combine_chunks()

@@ -151,7 +151,6 @@ class Show:
         return path
 
     def _remove_absent(self, arena: int, shown: set[BirthId]) -> None:
-        """Remove the boxes of robots that died or have left the arena."""
         here = [key for key in self._shown if key[0] == arena]
         for key in here:
             if key in self._gone:
