@@ -54,10 +54,8 @@ def _problems(experiment: Experiment) -> Iterator[str]:
     types = body_space(experiment.space)
     core = next(kind for kind in types.values() if kind.is_root)
     if core.inputs > experiment.space.max_inputs:
-        yield (
-            f"space.max_inputs: must be >= {core.inputs}, the inputs of "
-            f"{core.name}, got {experiment.space.max_inputs}"
-        )
+        rule = f"must be >= {core.inputs}, the inputs of {core.name}"
+        yield f"space.max_inputs: {rule}, got {experiment.space.max_inputs}"
     if not any(kind.outputs for kind in types.values()):
         yield "space.part_types: at least one type must have a motor"
     yield from _light_sensor_problems(experiment, types)
@@ -102,10 +100,8 @@ def _measures_problems(measures: Measures) -> Iterator[str]:
             yield f"measures.names: two measures are named {shown(label)}"
     for label in measures.parameters:
         if label not in labels:
-            yield (
-                f"measures.parameters.{shown(label)}: is not in measures.names"
-                f"{nearest(label, labels)}"
-            )
+            near = nearest(label, labels)
+            yield f"measures.parameters.{shown(label)}: not in measures.names{near}"
 
 
 def _name_problems(name: str) -> Iterator[str]:
@@ -116,7 +112,4 @@ def _name_problems(name: str) -> Iterator[str]:
         yield f"name: must be printable, got {name!r}"
     length = len(quote(name, safe=""))
     if length > _LONGEST_NAME:
-        yield (
-            f"name: must be <= {_LONGEST_NAME} bytes long after percent-encoding, "
-            f"got {length}"
-        )
+        yield f"name: must be <= {_LONGEST_NAME} bytes when percent-encoded, got {length}"

@@ -15,7 +15,7 @@ from schema.experiment.document import (
 )
 from schema.experiment.environment import ground_problems
 from schema.experiment.learning import LEARNERS
-from schema.experiment.robust import range_problems
+from schema.experiment.robust import ordered, range_problems
 from schema.experiment.section import multiple_problems
 from schema.experiment.selection_rules import rule_problems
 from schema.experiment.settings import FITNESS, arena_problems
@@ -30,10 +30,9 @@ def island_problems(experiment: Experiment) -> Iterator[str]:
     if culling is not None:
         yield from _death_problems(experiment, "selection.culling", culling, 1)
         if round(culling.full_cull_share * culling.population_limit) < 1:
-            yield (
-                "selection.culling.full_cull_share: must remove at least one robot of "
-                f"{culling.population_limit}, got {culling.full_cull_share:g}"
-            )
+            rule = f"must remove at least one robot of {culling.population_limit}"
+            share = f"selection.culling.full_cull_share: {rule}"
+            yield f"{share}, got {culling.full_cull_share:g}"
     yield from _clock_problems(experiment)
     yield from ground_problems(experiment.environment)
     yield from _scenery_problems(experiment)
@@ -70,10 +69,7 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
     selection = experiment.selection
     yield from rule_problems(selection)
     if selection.population < selection.parents_needed:
-        yield (
-            f"selection.population: must be >= {selection.parents_needed}, to choose "
-            f"two parents{_by(selection)}, got {selection.population}"
-        )
+        yield f"selection.population: {_by(selection)}, got {selection.population}"
     if selection.reevaluation is not None and not selection.keep_parents:
         yield (
             "selection.reevaluation: no individual outlives its brood if "
@@ -82,9 +78,11 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
 
 
 def _by(selection: SelectionSection) -> str:
-    """Return how parents are chosen, where that decides how many are needed."""
-    is_by_size = selection.parents == "tournament"
-    return f" with tournament_size = {selection.tournament_size}" if is_by_size else ""
+    """Return how many robots are needed to choose parents from, and why."""
+    rule = f"must be >= {selection.parents_needed}, to choose two parents"
+    if selection.parents != "tournament":
+        return rule
+    return f"{rule} with tournament_size = {selection.tournament_size}"
 
 
 def _death_problems(
@@ -93,21 +91,15 @@ def _death_problems(
     """Yield what is wrong with the rules by which a population varies in size."""
     selection = experiment.selection
     if selection.survivors != "best" or not selection.keep_parents:
-        yield (
-            f"{where}: survival depends on fitness; selection.survivors must be "
-            '"best" and selection.keep_parents true'
-        )
+        rule = 'selection.survivors must be "best" and keep_parents true'
+        yield f"{where}: survival depends on fitness; {rule}"
     if rules.population_floor < selection.parents_needed:
-        yield (
-            f"{where}.population_floor: must be >= {selection.parents_needed}, to "
-            f"choose two parents{_by(selection)}, got {rules.population_floor}"
-        )
+        got = f"got {rules.population_floor}"
+        yield f"{where}.population_floor: {_by(selection)}, {got}"
     lowest = max(rules.population_floor + spare, selection.population)
     if rules.population_limit < lowest:
-        yield (
-            f"{where}.population_limit: must be >= {lowest}, for population_floor and "
-            f"selection.population, got {rules.population_limit}"
-        )
+        rule = f"must be >= {lowest}, for population_floor and selection.population"
+        yield f"{where}.population_limit: {rule}, got {rules.population_limit}"
 
 
 def _clock_problems(experiment: Experiment) -> Iterator[str]:
@@ -129,16 +121,12 @@ def _clock_problems(experiment: Experiment) -> Iterator[str]:
             )
     if clock.evaluation_s is None:
         return
-    shortest, longest = clock.evaluation_s
+    shortest, _ = clock.evaluation_s
     if steps_of(shortest, clock) < clock.evaluation_steps:
         least = clock.evaluation_steps * clock.timestep_s
-        yield (
-            f"simulation.evaluation_s: must be >= {least:g} s, warmup_steps and "
-            f"window_steps together, got {shortest:g}"
-        )
-    if longest < shortest:
-        ends = f"[{shortest:g}, {longest:g}]"
-        yield f"simulation.evaluation_s: must be [shortest, longest], got {ends}"
+        rule = f"must be >= {least:g} s, warmup_steps and window_steps together"
+        yield f"simulation.evaluation_s: {rule}, got {shortest:g}"
+    yield from ordered("simulation.evaluation_s", clock.evaluation_s)
 
 
 def _arena_problems(experiment: Experiment, arena: ArenaSection) -> Iterator[str]:
@@ -166,9 +154,9 @@ def _learning_problems(experiment: Experiment) -> Iterator[str]:
     if ":" not in learning.learner and learning.learner not in LEARNERS:
         yield str(unknown(learning.learner, "learning.learner", LEARNERS))
     low, high = learning.weight_limits
-    if low >= high:
-        ends = f"[{low:g}, {high:g}]"
-        yield f"learning.weight_limits: must be [least, greatest], got {ends}"
+    if low == high:
+        yield f"learning.weight_limits: must be two numbers, got {low:g} twice"
+    yield from ordered("learning.weight_limits", learning.weight_limits)
     if experiment.selection.reevaluation is not None:
         yield "learning: cannot be combined with selection.reevaluation; remove one"
     if learning.inherit == "lamarckian" and experiment.encoding.type == "cppn":
@@ -206,10 +194,8 @@ def _push_problems(experiment: Experiment) -> Iterator[str]:
     if clock.evaluation_s is not None:
         longest_s = clock.evaluation_s[1]
     if steps_of(interval_s, clock) >= steps_of(longest_s, clock):
-        yield (
-            f"{key}: must be < {longest_s:g} s, the longest evaluation, or there is no "
-            f"push, got {interval_s:g}"
-        )
+        rule = f"must be < {longest_s:g} s, the longest evaluation, for a push"
+        yield f"{key}: {rule}, got {interval_s:g}"
 
 
 def _light_problems(experiment: Experiment) -> Iterator[str]:
@@ -217,13 +203,9 @@ def _light_problems(experiment: Experiment) -> Iterator[str]:
     function = experiment.fitness.function
     needs_light = function in ("light", FITNESS["light"])
     if needs_light and not light_of(experiment.environment, arena):
-        yield (
-            f"fitness.function: {shown(function)} needs environment.light = [x, y, z], "
-            "got none"
-        )
+        needs = "needs environment.light = [x, y, z], got none"
+        yield f"fitness.function: {shown(function)} {needs}"
     here = None if arena is None else arena.light
     if here and there and here != there:
-        yield (
-            f"arena.light: differs from environment.light = {list(there)}, got "
-            f"{list(here)}; remove one of the two"
-        )
+        differs = f"differs from environment.light = {list(there)}, got {list(here)}"
+        yield f"arena.light: {differs}; remove one of the two"

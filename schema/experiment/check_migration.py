@@ -7,10 +7,8 @@ from math import ceil
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.migration import Migration, migrant_count
 
-_UNCONNECTED = (
-    "migration.topology: unconnected islands cannot exchange migrants; choose another "
-    "topology, or remove the other keys of [migration]"
-)
+_UNCONNECTED = """migration.topology: unconnected islands cannot exchange migrants; \
+choose another topology, or remove the other keys of [migration]"""
 
 
 def migration_problems(experiment: Experiment) -> Iterator[str]:
@@ -43,10 +41,7 @@ def _edges_problems(migration: Migration, count: int) -> Iterator[str]:
         yield "migration.edges: must be pairs of islands, got none"
     for edge in edges:
         if max(edge) >= count:
-            yield (
-                f"migration.edges: islands are 0..{count - 1}, got {list(edge)}; "
-                "[[islands]] says how many there are"
-            )
+            yield f"migration.edges: islands are 0..{count - 1}, got {list(edge)}"
         if edge[0] == edge[1]:
             yield f"migration.edges: must be two islands, got {list(edge)}"
         if edges.count(edge) > 1:
@@ -59,15 +54,10 @@ def _degree_problems(migration: Migration, count: int) -> Iterator[str]:
     degree = migration.degree
     lowest = 1 if migration.topology == "random-regular" else 2
     if not lowest <= degree < count:
-        yield (
-            f"migration.degree: must be >= {lowest} and < {count}, the number of "
-            f"islands, got {degree}"
-        )
+        rule = f"must be >= {lowest} and < {count}, the number of islands"
+        yield f"migration.degree: {rule}, got {degree}"
     if migration.topology == "random-regular" and degree * count % 2:
-        yield (
-            f"migration.degree: must be even for an odd number of islands, {count}, "
-            f"got {degree}"
-        )
+        yield f"migration.degree: must be even for {count} islands, got {degree}"
     if migration.topology == "small-world" and degree % 2:
         yield f"migration.degree: must be even in a small world, got {degree}"
 
@@ -95,21 +85,14 @@ def _exchange_problems(own: Experiment, migration: Migration) -> Iterator[str]:
         broods = ceil((first - founders) / selection.children)
         first = founders + broods * selection.children
     if first >= own.births and (arena is None or migration.epoch_s is None):
-        yield (
-            f"migration.epoch: its first epoch of {epoch} births would end with birth "
-            f"{first}, but the island ends with birth {own.births}"
-        )
+        end = f"the first of {epoch} births would end with birth {first}"
+        yield f"migration.epoch: {end}, but the island ends with birth {own.births}"
     living = selection.population if arena is None else arena.population_limit
     if migrant_count(migration, living) == 0:
-        yield (
-            f"migration.migrants: a share of {migration.migrants:g} of {living} rounds "
-            "to 0"
-        )
+        yield f"migration.migrants: {migration.migrants:g} of {living} rounds to 0"
     if isinstance(migration.migrants, int) and migration.migrants > living:
-        yield (
-            f"migration.migrants: must be <= {living}, the population of the "
-            f"island, got {migration.migrants}"
-        )
+        rule = f"must be <= {living}, the population of the island"
+        yield f"migration.migrants: {rule}, got {migration.migrants}"
     stay = selection.parents_needed
     if migration.handling == "evict" and living <= stay:
         yield (
@@ -117,7 +100,5 @@ def _exchange_problems(own: Experiment, migration: Migration) -> Iterator[str]:
             f"and at most {living} live there"
         )
     if migration.replaced == "none" and not (arena or selection.culling):
-        yield (
-            'migration.replaced: "none" needs a population of varying size; '
-            "off-line it varies only with selection.culling"
-        )
+        varies = "off-line it varies only with selection.culling"
+        yield f'migration.replaced: "none" needs a varying population; {varies}'

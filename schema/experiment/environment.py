@@ -120,10 +120,9 @@ def ground_problems(environment: Environment) -> Iterator[str]:
     extent_m, patch_m = environment.extent_m, environment.patch_m
     # First: the ratio may be too large for an integer.
     if 2 * extent_m / patch_m >= MOST_PATCHES + 1:
-        yield (
-            "environment.patch_m: must be >= 2 environment.extent_m / "
-            f"{MOST_PATCHES} = {2 * extent_m / MOST_PATCHES:g}, got {patch_m:g}"
-        )
+        least = 2 * extent_m / MOST_PATCHES
+        rule = f"must be >= 2 environment.extent_m / {MOST_PATCHES} = {least:g}"
+        yield f"environment.patch_m: {rule}, got {patch_m:g}"
         return
     key = "environment.extent_m"
     yield from multiple_problems(key, extent_m, patch_m, "environment.patch_m")

@@ -108,10 +108,8 @@ def read_experiment(source: str | Tables, where: str = "") -> Experiment:
     draft = read_draft(source, where=where)
     first = draft.experiments[0]
     if first.sweep is not None and len(draft.experiments) > 1:
-        raise ExperimentError(
-            f"{draft.where}: sweep: stands for several experiments; only revolve run "
-            "and revolve check take all of them"
-        )
+        why = "stands for several experiments: only revolve run and check take them"
+        raise ExperimentError(f"{draft.where}: sweep: {why}")
     return draft.checked()[0]
 
 
@@ -143,9 +141,8 @@ def check_source(source: str, shipped: Collection[str]) -> None:
         return
     path = Path(source)
     if path.is_dir():
-        raise ExperimentError(
-            f"{source}: is a folder; an experiment is a .toml file or a shipped name"
-        )
+        what = "an experiment is a .toml file or a shipped name"
+        raise ExperimentError(f"{source}: is a folder; {what}")
     beside = f"{source}.toml"
     if path.is_file() or (path.suffix and not Path(beside).is_file()):
         and_missing = "" if path.is_file() else ", and there is no such file"

@@ -78,9 +78,14 @@ class Robust(Section, frozen=True):
 def range_problems(robust: Robust | None) -> Iterator[str]:
     """Yield which range ends before it begins."""
     for name in RANGES if robust is not None else ():
-        low, high = getattr(robust, name)
-        if low > high:
-            yield f"robust.{name}: must be [least, greatest], got [{low:g}, {high:g}]"
+        yield from ordered(f"robust.{name}", getattr(robust, name))
+
+
+def ordered(key: str, ends: tuple[float, float]) -> Iterator[str]:
+    """Yield whether the range of a key ends before it begins."""
+    low, high = ends
+    if low > high:
+        yield f"{key}: must be [least, greatest], got [{low:g}, {high:g}]"
 
 
 class Response(Section, frozen=True):

@@ -184,22 +184,17 @@ def _check_elements(root: ET.Element) -> None:
         raise _invalid(f"must be <mujoco>, got <{root.tag}>")
     for element in root.iter():
         if element.tag not in _ALLOWED:
-            raise _invalid(
-                f"<{cut(element.tag)}> is not allowed in scenery; "
-                f"allowed: {', '.join(_ALLOWED)}"
-            )
+            allowed = ", ".join(_ALLOWED)
+            raise _invalid(f"<{cut(element.tag)}> is not allowed; allowed: {allowed}")
         for key, value in element.items():
             if key == "user":
                 raise _invalid(f"<{element.tag} user=...> is not allowed")
             if key not in _WORDS and not is_finite(value):
-                raise _invalid(
-                    f"<{element.tag} {cut(key)}={shown(value)}> must be finite"
-                )
+                where = f"<{element.tag} {cut(key)}={shown(value)}>"
+                raise _invalid(f"{where} must be finite")
         if element.get("mocap", "false") != "false":
-            name = element.get("name", "")
-            raise _invalid(
-                f"<body name={name!r}> must not be mocap: nothing would move it"
-            )
+            name = shown(element.get("name", ""))
+            raise _invalid(f"<body name={name}> must not be mocap: nothing moves it")
 
 
 def _check_count(root: ET.Element) -> None:
@@ -223,9 +218,8 @@ def _check_count(root: ET.Element) -> None:
 def _replicas(element: ET.Element) -> int:
     count = element.get("count", "")
     if not (count.isascii() and count.isdigit() and len(count) <= len(str(MOST_GEOMS))):
-        raise _invalid(
-            f"<replicate count={shown(count)}> must be a whole number <= {MOST_GEOMS}"
-        )
+        where = f"<replicate count={shown(count)}>"
+        raise _invalid(f"{where} must be a whole number <= {MOST_GEOMS}")
     return int(count)
 
 
@@ -235,9 +229,9 @@ def _check_shapes(model: mujoco.MjModel) -> None:
     for index, kind in enumerate(model.geom_type.tolist()):
         if kind not in _SHAPES:
             shape = mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
+            allowed, name = ", ".join(_SHAPES.values()), model.geom(index).name
             raise _invalid(
-                f"geom {index} {model.geom(index).name!r} must be "
-                f"one of {', '.join(_SHAPES.values())}, got {shape}"
+                f"geom {index} {name!r} must be one of {allowed}, got {shape}"
             )
 
 
@@ -247,7 +241,7 @@ def _check_objects(model: mujoco.MjModel) -> None:
     inside = set(range(1, model.nbody)).difference(_object_bodies(model))
     for body in sorted(inside):
         if model.body_weldid[body]:
+            where = f"<body name={model.body(body).name!r}>"
             raise _invalid(
-                f"<body name={model.body(body).name!r}> must not be inside a body with "
-                "<freejoint>: use <frame>"
+                f"{where} must not be inside one with <freejoint>: use <frame>"
             )

@@ -231,10 +231,8 @@ def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
         return settings
     clock = settings.simulation
     if steps < clock.window_steps:
-        raise ExperimentError(
-            f"an evaluation must take >= simulation.window_steps = "
-            f"{clock.window_steps} steps, got {steps}"
-        )
+        rule = f"must take >= simulation.window_steps = {clock.window_steps} steps"
+        raise ExperimentError(f"an evaluation {rule}, got {steps}")
     warmup = steps - clock.window_steps
     return replace(settings, simulation=replace(clock, warmup_steps=warmup))
 

@@ -69,10 +69,9 @@ def _refuse_equal(experiments: Sequence[Experiment], where: str) -> None:
         plain = [replace(each, name="", sweep=None) for each in islands]
         known = first.setdefault(msgspec.json.encode(plain), experiment.name)
         if known != experiment.name:
-            raise ExperimentError(
-                f"{where}: sweep: {known} and {experiment.name} have equal islands: "
-                "[[islands]] replace the swept settings"
-            )
+            equal = f"{known} and {experiment.name} have equal islands"
+            why = "[[islands]] replace the swept settings"
+            raise ExperimentError(f"{where}: sweep: {equal}: {why}")
 
 
 @contextmanager
@@ -96,10 +95,9 @@ def _read_calibration(tables: Tables, where: str) -> None:
     text = text_of(path, f"{where}: calibration: {named}", near_files(path))
     found = parse_toml(text, str(path))
     if list(found) != ["calibration"]:
-        raise ExperimentError(
-            f"{where}: calibration: {named}: must hold [[calibration]] tables and "
-            f"nothing else, got {', '.join(map(cut, found)) or 'nothing'}"
-        )
+        rule = "must hold [[calibration]] tables and nothing else"
+        got = ", ".join(map(cut, found)) or "nothing"
+        raise ExperimentError(f"{where}: calibration: {named}: {rule}, got {got}")
     tables["calibration"] = found["calibration"]
 
 

@@ -91,9 +91,8 @@ def _parts(body: Table, where: str) -> dict[str, RobogenPart]:
         if entry.has("root") and entry.word("root", _BOOLEANS) == "true":
             roots.append(name)
     if len(roots) != 1:
-        raise InvalidRobot(
-            f"{where}: body.part: exactly one must be the root, got {len(roots)}"
-        )
+        rule = "exactly one must be the root"
+        raise InvalidRobot(f"{where}: body.part: {rule}, got {len(roots)}")
     return {roots[0]: parts.pop(roots[0]), **parts}
 
 
@@ -116,7 +115,6 @@ def _body(body: Table, parts: dict[str, RobogenPart], where: str) -> RobogenPart
     connected = {part.name for part in root.subtree()}
     for name in parts:
         if name not in connected:
-            raise InvalidRobot(
-                f"{where}: body.part: {shown(name)} is not attached to the core"
-            )
+            why = f"{shown(name)} is not attached to the core"
+            raise InvalidRobot(f"{where}: body.part: {why}")
     return root

@@ -141,10 +141,8 @@ def _problem(name: str, note: KeptPlugin, copy: Path) -> str:
     files = _files(name, copy)
     digest = digest_of_sources([copy] if files else [])
     if digest != note.digest:
-        return (
-            f"is damaged (source digest {digest}, expected {note.digest}): give the "
-            f"original with {FLAG} FILE"
-        )
+        why = f"source digest {digest}, expected {note.digest}"
+        return f"is damaged ({why}): give the original with {FLAG} FILE"
     with suppress(OSError, RuntimeError):
         if _mark_of(name, files).exists():
             return ""
@@ -170,10 +168,9 @@ def _files(name: str, source: Path) -> dict[str, bytes]:
             return {}
         return {path.relative_to(root).as_posix(): path.read_bytes() for path in paths}
     except OSError as error:
-        raise ExperimentError(
-            f"plug-in {name}: {error.filename}: {unreadable(error)}; give its source "
-            f"with {FLAG} FILE"
-        ) from None
+        why = f"{error.filename}: {unreadable(error)}"
+        give = f"give its source with {FLAG} FILE"
+        raise ExperimentError(f"plug-in {name}: {why}; {give}") from None
 
 
 def _mark_of(name: str, files: Mapping[str, bytes]) -> Path:

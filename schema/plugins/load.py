@@ -93,10 +93,8 @@ def load_function(
     # A module that imports a function of another one does not offer it.
     home = str(getattr(found, "__module__", None))
     if not is_allowed(home):
-        raise UnknownPlugin(
-            f"{where}: {path!r} is defined in {home}, which is not allowed: "
-            f"{how_to_allow(home)}"
-        )
+        why = f"is defined in {home}, which is not allowed: {how_to_allow(home)}"
+        raise UnknownPlugin(f"{where}: {path!r} {why}")
     try:
         inspect.signature(found).bind(*range(arguments))
     except (TypeError, ValueError) as error:
@@ -126,15 +124,12 @@ def _load(path: str, where: str) -> object:
         raise UnknownPlugin(f"{where}: must be 'module:attribute', got {shown(path)}")
     if module_name.endswith(".py"):
         meant = f"{module_name.removesuffix('.py')}:{attribute}"
-        raise UnknownPlugin(
-            f"{where}: must be 'module:attribute', got {shown(path)}; did you mean "
-            f"{meant!r}?"
-        )
+        got = f"got {shown(path)}; did you mean {meant!r}?"
+        raise UnknownPlugin(f"{where}: must be 'module:attribute', {got}")
     if not is_allowed(module_name):
-        raise UnknownPlugin(
-            f"{where}: {shown(path)}: module {shown(module_name)} is not allowed: "
-            f"{how_to_allow(module_name)}"
-        )
+        why = f"module {shown(module_name)} is not allowed"
+        how = how_to_allow(module_name)
+        raise UnknownPlugin(f"{where}: {shown(path)}: {why}: {how}")
     return _loaded(module_name, attribute, where)
 
 

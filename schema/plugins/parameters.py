@@ -39,9 +39,8 @@ def read_parameters(
             raise ExperimentError(f"{where}{separator}{_no_such_key(key, '', known)}")
     for path, number in _numbers(table):
         if not math.isfinite(number):
-            raise ExperimentError(
-                f"{where}{separator}{path}: must be finite, got {number}"
-            )
+            at = f"{where}{separator}{path}"
+            raise ExperimentError(f"{at}: must be finite, got {number}")
     try:
         return msgspec.convert(dict(table), kind)
     except msgspec.ValidationError as error:

@@ -85,19 +85,16 @@ def check_plugins(wanted: str, run: str = "") -> None:
     for each in wanted.split():
         name, _, digest = each.partition("=")
         if not allows_any_of(name):
-            raise PluginDiffers(
-                f"has no plug-in {shown(name)} among those that it may import: "
-                f"{how_to_allow(name)}"
-            )
+            why = "among those that it may import"
+            how = how_to_allow(name)
+            raise PluginDiffers(f"has no plug-in {shown(name)} {why}: {how}")
         found = _digest(name)
         if not found:
             raise PluginDiffers(f"has no plug-in {shown(name)}: it is not installed")
         if found != digest:
-            raise PluginDiffers(
-                f"its plug-in {shown(name)} differs from the coordinator's: source "
-                f"digest {found}, expected {digest[:_DIGITS]}: "
-                f"{_how_to_give(name, run)}"
-            )
+            differs = f"its plug-in {shown(name)} differs from the coordinator's"
+            why = f"source digest {found}, expected {digest[:_DIGITS]}"
+            raise PluginDiffers(f"{differs}: {why}: {_how_to_give(name, run)}")
 
 
 def _how_to_give(name: str, run: str) -> str:

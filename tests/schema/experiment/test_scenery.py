@@ -156,7 +156,7 @@ def test_a_robot_starts_on_an_object_that_lies_where_it_is_born() -> None:
         (scene("<body><freejoint/></body>" + BOX), "not valid MJCF: "),
         (
             scene(f"<body><freejoint/>{BOX}<body name='a'>{BOX}</body></body>"),
-            "<body name='a'> must not be inside a body with <freejoint>: use <frame>",
+            "<body name='a'> must not be inside one with <freejoint>: use <frame>",
         ),
         (
             scene(f"<replicate count='101'><body><freejoint/>{BOX}</body></replicate>"),
