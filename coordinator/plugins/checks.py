@@ -71,8 +71,7 @@ def refuse_faulty(
     Built-in plug-ins are not checked: the tests of this project do that.
 
     Raises:
-        ExperimentError: one cannot be loaded, breaks its contract, takes too long or
-            ends its process; an experiment that is invalid.
+        ExperimentError: a plug-in that is not in order, or an invalid experiment.
     """
     own = [word for word, draft in drafts if any(map(is_own, draft.references))]
     if own:
@@ -80,14 +79,10 @@ def refuse_faulty(
 
 
 def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
-    """Check the plug-ins of a run or campaign folder that is resumed.
-
-    Returns:
-        Its experiments.
+    """Check the plug-ins of a folder that is resumed; return its experiments.
 
     Raises:
-        ExperimentError: as of ``refuse_faulty``, or a plug-in that is not that of the
-            beginning.
+        ExperimentError: as of ``refuse_faulty``; another plug-in than at the beginning.
     """
     experiments = _experiments_of(folder)
     if any(is_own(path) for each in experiments for path in references(each)):

@@ -76,8 +76,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     """Return the document of a TOML text.
 
     Raises:
-        ExperimentError: not TOML, too long, nested too deeply, or a key of too many
-            parts.
+        ExperimentError: not TOML, or beyond a limit.
     """
     check_most(len(text), MOST_TEXT_BYTES, "characters", where, ExperimentError)
     tables = "lists and tables"
@@ -102,8 +101,7 @@ def parse_xml(
     """Return the root of an XML text that has no document type and so no entities.
 
     Raises:
-        ValueError: not XML; a document type; too long, too deep, too many elements or
-            attributes.
+        ValueError: not XML, a document type, or beyond a limit.
     """
     # Counted before parsing; text that holds these signs counts, too.
     for name, count, limit in (

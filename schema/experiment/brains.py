@@ -53,8 +53,7 @@ def neuron_types(names: tuple[str, ...]) -> tuple[NeuronType, ...]:
     """Return the neuron types of an experiment, in its order.
 
     Raises:
-        ExperimentError: no such type, none, two of one name, or one that breaks its
-            contract.
+        ExperimentError: no such type, none, two of one name, or a broken contract.
     """
     where = "space.neuron_types"
     types: dict[str, NeuronType] = {}
@@ -79,8 +78,7 @@ def types_of(
     """Return the part types and the neuron types that robots may have, by name.
 
     Raises:
-        ExperimentError: no such type, one that breaks its contract, or wrong
-            parameters.
+        ExperimentError: no such type, a broken contract, or wrong parameters.
     """
     return body_space(settings.space), neuron_kinds(settings.brain, settings.space)
 
@@ -89,8 +87,7 @@ def neuron_kinds(brain: BrainSection, space: Space) -> NeuronKinds:
     """Return the types of output and hidden neurons that robots may have, by name.
 
     Raises:
-        ExperimentError: no such type, one that breaks its contract, or wrong
-            parameters.
+        ExperimentError: no such type, a broken contract, or wrong parameters.
     """
     if ":" in brain.type:
         return _own_brain(brain, space.neuron_types).neurons
@@ -109,8 +106,7 @@ def brain_half(
     ``built_in`` has that half of the built-in types, by short name.
 
     Raises:
-        ExperimentError: no such type, one that breaks its contract, or wrong
-            parameters.
+        ExperimentError: no such type, a broken contract, or wrong parameters.
     """
     if ":" in brain.type:
         # An own class has both halves.

@@ -26,8 +26,7 @@ def check_experiment(experiment: Experiment, where: str) -> None:
     """Raise unless the sections of an experiment are consistent.
 
     Raises:
-        ExperimentError: the first thing that is wrong; the message names file and
-            key.
+        ExperimentError: the first thing that is wrong, with file and key.
     """
     with naming(where):
         if problem := next(_problems(experiment), ""):
@@ -112,4 +111,4 @@ def _name_problems(name: str) -> Iterator[str]:
         yield f"name: must be printable, got {name!r}"
     length = len(quote(name, safe=""))
     if length > _LONGEST_NAME:
-        yield f"name: must be <= {_LONGEST_NAME} bytes when percent-encoded, got {length}"
+        yield f"name: must be <= {_LONGEST_NAME} bytes after encoding, got {length}"

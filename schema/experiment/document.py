@@ -571,8 +571,7 @@ def body_space(space: Space) -> BodySpace:
     """Return the part types of a document by name, in its order.
 
     Raises:
-        ExperimentError: no such part type, one that ``check_part_type`` refuses,
-            two of one name, or not exactly one core.
+        ExperimentError: a wrong type, two of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:

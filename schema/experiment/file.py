@@ -134,8 +134,7 @@ def check_source(source: str, shipped: Collection[str]) -> None:
     """Raise unless a source is the path of a TOML file or a shipped name.
 
     Raises:
-        ExperimentError: neither; the message names the nearest, or says what a path
-            of another kind leads to.
+        ExperimentError: neither; the message names the nearest.
     """
     if source.endswith(".toml") or source in shipped:
         return

@@ -25,8 +25,7 @@ def check_fitness_keys(fitness: Fitness) -> None:
     """Raise if a key that was changed has no effect; the function is called.
 
     Raises:
-        ExperimentError: the function has parameters of its own, or does not read the
-            key; errors of ``fitness_argument``.
+        ExperimentError: such a key; errors of ``fitness_argument``.
     """
     changed = [key for key in _KEYS if getattr(fitness, key) != _DEFAULTS[key]]
     if not changed:

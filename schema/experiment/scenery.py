@@ -145,9 +145,7 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
     The simulation has the default friction and contact of its geoms.
 
     Raises:
-        ExperimentError: not XML, not MJCF, no geom or too many, too many objects, an
-            element that moves otherwise or refers to another file, or a shape that is
-            not supported.
+        ExperimentError: no MJCF of scenery: its elements, shapes or their numbers.
     """
     try:
         root = parse_xml(scenery, most_depth=MOST_SCENERY_DEPTH)

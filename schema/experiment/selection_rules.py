@@ -24,8 +24,7 @@ def own_rule(
     None is a built-in rule.
 
     Raises:
-        ExperimentError: no such function of so many arguments, or other parameters
-            than it declares.
+        ExperimentError: no such function, or other parameters than it declares.
     """
     path, key = getattr(selection, name), f"selection.{name}"
     if ":" not in path:

@@ -53,8 +53,7 @@ class _Composer:
         """Return the root node; None if the document is empty.
 
         Raises:
-            yaml.YAMLError: not YAML, several documents, an alias, a key that is no
-                scalar or given twice, too many values or levels.
+            yaml.YAMLError: not YAML, what is not allowed here, or beyond a limit.
         """
         root: DocumentNode | None = None
         documents = 0
@@ -254,8 +253,7 @@ def compose(text: str, file: str, language: str = "YAML") -> Table:
     JSON is read as YAML.
 
     Raises:
-        InvalidRobot: not of the language, not a mapping, or beyond a limit
-            (``schema.limits``).
+        InvalidRobot: not of the language, not a mapping, or beyond a limit.
     """
     check_most(len(text), MOST_TEXT_BYTES, "characters", file, InvalidRobot)
     try:

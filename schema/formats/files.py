@@ -34,8 +34,7 @@ def robot_from_yaml(
     """Return the robot of a YAML text, in the current form or that of Revolve (2016).
 
     Raises:
-        InvalidRobot: no such document, or no well-formed robot; the message names
-            file, line and field.
+        InvalidRobot: no well-formed robot; the message names file, line and field.
     """
     document = compose(text, file)
     if not is_of_revolve(document):
@@ -168,8 +167,7 @@ def write_robot(
             with all built-in types (in MJCF, those of the default brain).
 
     Raises:
-        InvalidRobot: another ending, a robot that is not well formed with these types
-            or that could not be read again, or a file that cannot be written.
+        InvalidRobot: another ending, a robot that could not be read again, or no file.
     """
     ending = _ending(path, _WRITTEN)
     settings = settings or settings_of(None)

@@ -41,9 +41,8 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
     """Return the MJCF text of a robot on its ground, with brain and settings.
 
     Raises:
-        InvalidRobot: the robot is not well formed in the settings' body space, or
-            MuJoCo cannot build it; MJCF beyond the limits of reading, as of about 400
-            bodies, each on the last.
+        InvalidRobot: a robot that is not well formed, or that MuJoCo cannot build; MJCF
+            beyond the limits of reading, as of about 400 bodies, each on the last.
     """
     space, kinds = types_of(settings)
     check_robot(robot, space, kinds)

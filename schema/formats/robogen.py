@@ -107,8 +107,7 @@ def checked_part(
     """Return a part without children, after checking its fields.
 
     Raises:
-        InvalidRobot: an unknown type, turns outside 0..3, or a wrong number of
-            parameters.
+        InvalidRobot: an unknown type, wrong turns, or a wrong number of parameters.
     """
     at = f"{where}: part {shown(name)}"
     if kind not in KINDS:
@@ -144,8 +143,7 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
     """Return the robot of a RoboGen file.
 
     Raises:
-        InvalidRobot: a slot that a part does not have, a parameter out of range, an
-            unknown neuron or part, two neurons of one number.
+        InvalidRobot: a wrong slot, parameter, neuron or part.
     """
     body = _Body()
     try:

@@ -28,8 +28,7 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
     The simulation has the factors of masses and torques, and the damping of the joints.
 
     Raises:
-        InvalidRobot: the body is not well formed in this body space, or MuJoCo cannot
-            build it.
+        InvalidRobot: a body that is not well formed, or that MuJoCo cannot build.
     """
     check_tree(robot.parts)
     check_body(robot.parts, space)

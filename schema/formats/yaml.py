@@ -47,9 +47,8 @@ def robot_to_yaml(
     """Return the YAML text of a robot.
 
     Raises:
-        InvalidRobot: the robot is not well formed in this body space, has neurons of
-            other kinds, is nested too deeply (a chain of about 150 parts), or
-            gives a text beyond the limits of reading.
+        InvalidRobot: a robot that is not well formed, nested too deeply (a chain of
+            about 150 parts), or of a text beyond the limits of reading.
     """
     check_robot(robot, space, kinds)
     entries: list[dict[str, Any]] = []

@@ -52,14 +52,10 @@ class KeptPlugin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
 def keep(
     folder: Path, document: str, write: Callable[[Path, bytes], None]
 ) -> dict[str, KeptPlugin]:
-    """Copy the plug-ins of an experiment's JSON; this process uses the copies.
-
-    Returns:
-        The description of each module.
+    """Copy the plug-ins of JSON, use the copies, and describe each module.
 
     Raises:
-        ExperimentError: a file cannot be read; two plug-ins need different data files
-            of one name; a source has changed since it was imported.
+        ExperimentError: an unreadable or changed source, or two data files of one name.
     """
     kept: dict[str, KeptPlugin] = {}
     written: dict[str, bytes] = {}
@@ -100,8 +96,8 @@ def allow_kept(
     If the run continues, all sources must be those of its beginning.
 
     Raises:
-        ExperimentError: a source that was named or imported differs from that of the
-            run; a copy is missing, damaged or not written by a run of this user.
+        ExperimentError: another source than that of the run, or a copy that is missing,
+            damaged or not written by a run of this user.
     """
     for name, note in kept.items():
         if is_chosen(name) if note.file else is_resumed:

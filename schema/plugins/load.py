@@ -164,8 +164,7 @@ def load_module(name: str, where: str, path: str = "") -> ModuleType:
     ``where`` needs it, or a ``path`` of it; both are for messages.
 
     Raises:
-        UnknownPlugin: it is not there.
-        ExperimentError: its import raises another error.
+        ExperimentError: it is not there, or its import raises another error.
     """
     wanted = path or name
     try:

@@ -28,9 +28,8 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
     than 8 parameters, for each extreme value alone. Own sensors read hand-made views.
 
     Raises:
-        ExperimentError: a number, name, slot, box, joint, motor or sensor that is
-            not what it must be; a shape that raises, differs from call to call, or
-            is not hashable.
+        ExperimentError: a piece that is not what it must be; a shape that raises,
+            differs from call to call, or is not hashable.
     """
     with naming_plugin(where, kind.shape):
         try:

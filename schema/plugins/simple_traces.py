@@ -30,9 +30,8 @@ def check_function(function: Callable[..., Any], *arguments: object) -> None:
     not for all of them.
 
     Raises:
-        Exception: what it raises for each trace, or ``ExperimentError`` for a
-            broken rule: a finite number, always the same, and no change of the
-            trace.
+        Exception: what it raises for each trace, or ``ExperimentError`` for a broken
+            rule.
     """
     raised: list[Exception] = []
     traces = simple_traces(function)

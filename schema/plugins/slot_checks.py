@@ -21,9 +21,8 @@ def check_slots_and_sensors(kind: PartType) -> None:
     It is not part of ``check_part_type``: finished runs may have such parts.
 
     Raises:
-        ExperimentError: a slot that points into its own part; imus on two boxes, as
-            a part has one site for them; a touch sensor of a box whose name MJCF
-            cannot hold.
+        ExperimentError: a slot that points into its own part, imus on two boxes, or a
+            touch sensor of a box whose name MJCF cannot hold.
     """
     for values in extremes(kind):
         shape = kind.shape(values)

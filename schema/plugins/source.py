@@ -77,8 +77,7 @@ def check_plugins(wanted: str, run: str = "") -> None:
     Nothing is imported. The name of the run that wants them ends with its folder.
 
     Raises:
-        PluginDiffers: one is missing or not allowed, or its source differs; a text
-            that is too long.
+        PluginDiffers: one is missing, not allowed or of another source; a long text.
     """
     most, what = MOST_PLUGIN_CHARACTERS, "characters"
     check_most(len(wanted), most, what, "list of plug-ins", PluginDiffers)

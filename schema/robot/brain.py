@@ -102,9 +102,7 @@ def check_brain(brain: Brain, part_count: int) -> None:
     ``check_neurons`` checks the types of its neurons.
 
     Raises:
-        InvalidRobot: neurons out of order or on no part, inputs of a type, numbers
-            that are not finite; connections to inputs or missing neurons, or given
-            twice.
+        InvalidRobot: neurons or connections that break a rule, or are out of order.
     """
     order = [(LAYERS.index(neuron.layer), neuron.part) for neuron in brain.neurons]
     if order != sorted(order):

@@ -21,9 +21,8 @@ from schema.robot.robot import Part, Robot
 def genome_of(robot: Robot) -> Genome:
     """Return a genome that develops into a robot.
 
-    Returns:
-        The genome. It develops into the same parts and neurons; connections are in
-        the order of the parts that they leave.
+    It develops into the same parts and neurons; connections are in the order of the
+    parts that they leave.
     """
     neurons, places = _shares(robot.brain)
     connections: dict[int, list[ConnectionGene]] = {}

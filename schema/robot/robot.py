@@ -60,8 +60,7 @@ def check_tree(parts: Sequence[Part]) -> None:
     """Raise unless parts form a tree; types are not checked.
 
     Raises:
-        InvalidRobot: no tree in depth-first order, a slot that is used twice, or a
-            number that is out of range or not finite.
+        InvalidRobot: another order, a slot used twice, a number out of its range.
     """
     if not parts:
         raise InvalidRobot("body: must have at least the core")
@@ -116,9 +115,8 @@ def check_robot(
     The analyzer checks intersections of parts.
 
     Raises:
-        InvalidRobot: as of ``check_tree``; parts, slots or parameters that their
-            types do not have; a brain that breaks its rules or does not fit the
-            body.
+        InvalidRobot: as of ``check_tree``; what the types of parts do not have; a brain
+            that breaks its rules or does not fit the body.
     """
     check_tree(robot.parts)
     check_brain(robot.brain, len(robot.parts))
