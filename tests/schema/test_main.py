@@ -76,21 +76,6 @@ def test_vetting_is_that_of_the_experiment(
     assert "not viable: parts 1 (ActiveHinge) and 2 " in said(capsys, *words)
 
 
-def test_a_wrong_file_is_refused(path: Path) -> None:
-    path.write_text(TEXT.replace("leg,", "leg, leg: 1,"))
-    with pytest.raises(
-        InvalidRobot, match=r"robot\.yaml:4: part 'leg': leg: no such key"
-    ):
-        main(["robot", "check", str(path)])
-
-
-def test_convert_round_trip(path: Path) -> None:
-    there, back = path.with_suffix(".pb"), path.with_suffix(".yml")
-    assert main(["robot", "convert", str(path), str(there)]) == 0
-    assert main(["robot", "convert", str(there), str(back)]) == 0
-    assert read_robot(path) == read_robot(there) == read_robot(back)
-
-
 def test_mjcf_keeps_its_settings_and_part_types(path: Path, tmp_path: Path) -> None:
     experiment = tmp_path / "mine.toml"
     experiment.write_text(

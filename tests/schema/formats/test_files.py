@@ -199,12 +199,6 @@ def test_names_of_a_file_cannot_break_the_line_of_an_error(
     assert str(caught.value).isprintable()
 
 
-@given(text=st.text(max_size=40))
-def test_any_text_is_a_robot_or_is_refused(text: str) -> None:
-    with pytest.raises(InvalidRobot):
-        read(text)
-
-
 @given(data=st.data())
 def test_any_damage_leaves_a_robot_or_is_refused(data: DataObject) -> None:
     place = data.draw(st.integers(0, len(TEXT) - 1))

@@ -135,15 +135,6 @@ def test_the_angle_is_that_of_segment_1_against_segment_0(
     assert turn == pytest.approx(matrix.reshape(3, 3), abs=1e-12)
 
 
-def test_positions_of_parts_are_those_of_the_original() -> None:
-    """Golden: a hinge on the core's -y face, plate at -45.75 mm, conn_a -56.85."""
-    model = model_of(on_core("Hinge", parent_slot=0))
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    assert data.geom("1/root").xpos[1] == pytest.approx(-0.04575, abs=1e-12)
-    assert data.geom("1/conn_a").xpos[1] == pytest.approx(-0.05685, abs=1e-12)
-
-
 @pytest.mark.parametrize("turn", [0, 90])
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_planar_robots_stand_on_the_core(kind: str, turn: int) -> None:

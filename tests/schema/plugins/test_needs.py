@@ -5,7 +5,7 @@ import pytest
 
 from schema.errors import ExperimentError
 from schema.plugins.needs import channels_of, needs
-from schema.robot.trace import RECORDED, Trace
+from schema.robot.trace import Trace
 
 
 @needs("energy", "core_attitude", "light")
@@ -23,9 +23,6 @@ def test_needs_of_several_functions_are_joined_in_the_order_of_the_channels() ->
     assert (plain, channels_of([])) == ((), ())
     assert channels_of([second, first]) == ("core_attitude", "energy", "contact")
     assert channels_of([first]) == ("core_attitude", "energy")
-    assert list(channels_of([first, second])) == [
-        name for name in RECORDED if name in {"core_attitude", "energy", "contact"}
-    ]
 
 
 def test_unknown_channel_is_refused_with_the_nearest_one() -> None:

@@ -12,7 +12,7 @@ from hypothesis.strategies import DataObject, SearchStrategy
 from schema.parts import BUILT_IN, Slot
 from schema.robot.frames import attach, place_parts, shapes_of
 from schema.robot.genome import Genome, Node, develop
-from schema.robot.robot import ORIENTATIONS, Part, Robot
+from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
 from tests.schema.robots import CORE, GREY
 
@@ -156,18 +156,6 @@ def test_level_bodies_are_flat_and_stand_on_their_core(
             local = (corners * box.size / 2) @ np.array(box.rotation).T + box.position
             lowest = min(lowest, float((local @ rotation.T + position)[:, 2].min()))
     assert lowest == pytest.approx(-0.0225, abs=1e-12)
-
-
-def test_four_quarter_turns_are_the_identity() -> None:
-    slot = BUILT_IN["Core"].shape(()).slots[1]
-    child = BUILT_IN["FixedBrick"].shape(()).slots[3]
-    quarter, _ = attach(slot, child, 90)
-    rotations = {turn: attach(slot, child, turn)[0] for turn in ORIENTATIONS}
-    step = rotations[0].T @ quarter
-    for number, turn in enumerate(ORIENTATIONS):
-        expected = rotations[0] @ np.linalg.matrix_power(step, number)
-        assert rotations[turn] == pytest.approx(expected, abs=1e-12)
-    assert np.linalg.matrix_power(step, 4) == pytest.approx(np.eye(3), abs=1e-12)
 
 
 def test_shared_frames_cannot_be_written_to() -> None:
