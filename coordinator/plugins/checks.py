@@ -249,10 +249,9 @@ def _check_document(
         for kind in types.values():
             for name in kind.not_on:
                 if name not in types and name not in BUILT_IN:
-                    yield (
-                        f"space.part_types: {kind.name}.not_on: no part type is named "
-                        f"{shown(name)}{nearest(name, types)}"
-                    )
+                    unknown = f"no part type is named {shown(name)}"
+                    near = nearest(name, types)
+                    yield f"space.part_types: {kind.name}.not_on: {unknown}{near}"
 
 
 def _is_folder(folder: Path) -> bool:

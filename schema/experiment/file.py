@@ -138,22 +138,17 @@ def check_source(source: str, shipped: Collection[str]) -> None:
     """
     if source.endswith(".toml") or source in shipped:
         return
-    path = Path(source)
+    path, beside = Path(source), Path(f"{source}.toml")
     if path.is_dir():
         what = "an experiment is a .toml file or a shipped name"
         raise ExperimentError(f"{source}: is a folder; {what}")
-    beside = f"{source}.toml"
-    if path.is_file() or (path.suffix and not Path(beside).is_file()):
-        and_missing = "" if path.is_file() else ", and there is no such file"
-        raise ExperimentError(
-            f"{source}: the file of an experiment must end in .toml, got "
-            f"{path.suffix!r}{and_missing}{'' if path.is_file() else near_files(path)}"
-        )
-    near = nearest(source, [*shipped, *([beside] if Path(beside).is_file() else ())])
-    raise ExperimentError(
-        f"{source}: no such experiment{near}; shipped are {', '.join(shipped)}, or "
-        "give a path to a .toml file"
-    )
+    if path.is_file() or (path.suffix and not beside.is_file()):
+        rule = f"the file of an experiment must end in .toml, got {path.suffix!r}"
+        missing = f", and there is no such file{near_files(path)}"
+        raise ExperimentError(f"{source}: {rule}{'' if path.is_file() else missing}")
+    near = nearest(source, [*shipped, *([str(beside)] if beside.is_file() else ())])
+    known = f"shipped are {', '.join(shipped)}, or give a path to a .toml file"
+    raise ExperimentError(f"{source}: no such experiment{near}; {known}")
 
 
 def shipped_experiments() -> list[str]:

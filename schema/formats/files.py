@@ -42,10 +42,9 @@ def robot_from_yaml(
     try:
         return RevolveReader(space, file, kinds).read(document)
     except InvalidRobot as error:
-        raise InvalidRobot(
-            f"{error} (read in the form of the original Revolve; a file that begins "
-            "with 'revolve_robot: 1' has this project's form)"
-        ) from None
+        forms = "read in the form of the original Revolve; a file that begins with"
+        own = "'revolve_robot: 1' has this project's form"
+        raise InvalidRobot(f"{error} ({forms} {own})") from None
 
 
 BEST = "best.yaml"
@@ -55,10 +54,8 @@ _YAML = (".yaml", ".yml")
 _ROBOGEN = (".txt", ".json")
 _READ = (*_YAML, *_ROBOGEN, ".pb", MJCF_ENDING)
 _WRITTEN = (".yaml", ".yml", ".pb", MJCF_ENDING, ".urdf")
-_BINARY_DUMP = (
-    "a binary RoboGen dump (Protobuf) is not supported: only RoboGen's robot text and "
-    "JSON are"
-)
+_BINARY_DUMP = """a binary RoboGen dump (Protobuf) is not supported: \
+only RoboGen's robot text and JSON are"""
 _ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
 
 

@@ -89,10 +89,9 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
     except (MalformedMessage, ExperimentError, InvalidRobot) as error:
         raise InvalidRobot(f"{where}: {one_line(error)}") from None
     if DIGEST in held and held[DIGEST] != _digest(root):
-        raise InvalidRobot(
-            f"{where}: was edited and no longer fits the robot in its text: edit the "
-            "robot's YAML, or the experiment, and convert it again"
-        )
+        edit = "edit the robot's YAML, or the experiment, and convert it again"
+        why = "was edited and no longer fits the robot in its text"
+        raise InvalidRobot(f"{where}: {why}: {edit}")
     return robot, settings
 
 
@@ -123,10 +122,8 @@ def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
 
 def _bytes(held: dict[str, str], name: str) -> bytes:
     if name not in held:
-        raise InvalidRobot(
-            f"has no text {name!r}: only MJCF that `revolve robot convert` wrote is "
-            "read, which contains the brain"
-        )
+        read = "only MJCF that `revolve robot convert` wrote is read, with the brain"
+        raise InvalidRobot(f"has no text {name!r}: {read}")
     try:
         return base64.b64decode(held[name], validate=True)
     except binascii.Error as error:

@@ -134,11 +134,6 @@ def neuron_kind(name: str, where: str) -> str:
     return _NEURONS[name.lower()]
 
 
-def two_neurons(part: str, number: int) -> str:
-    """Return what is wrong with a part that has two neurons of one number."""
-    return f"part {shown(part)} has two neurons {number}"
-
-
 def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
     """Return the robot of a RoboGen file.
 
@@ -154,9 +149,8 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
     ends = (end for *pair, _ in theirs.weights for end in pair)
     for name, number in (*theirs.kinds, *ends):
         if (name, number) not in index:
-            raise InvalidRobot(
-                f"{where}: no neuron {shown(number)} on part {shown(name)}"
-            )
+            what = f"no neuron {shown(number)} on part {shown(name)}"
+            raise InvalidRobot(f"{where}: {what}")
     connections = []
     for source, target, weight in theirs.weights:
         # RoboGen ignores connections to oscillators.
@@ -247,7 +241,8 @@ def _neurons(
             kind, values = INPUT, ()
         if layer != "input" or part or theirs.root.has_imu:
             if end in index:
-                raise InvalidRobot(f"{where}: {two_neurons(*end)}")
+                what = f"part {shown(end[0])} has two neurons {end[1]}"
+                raise InvalidRobot(f"{where}: {what}")
             index[end] = len(neurons)
         neurons.append(Neuron(layer, kind, part, values))
     return neurons, index

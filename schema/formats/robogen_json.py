@@ -12,7 +12,6 @@ from schema.formats.robogen import (
     checked_part,
     neuron_kind,
     our_robot,
-    two_neurons,
 )
 from schema.parts import BodySpace
 from schema.robot.brain import LAYERS
@@ -65,7 +64,7 @@ def _read_brain(brain: Table, theirs: RobogenRobot, where: str) -> None:
             theirs.kinds[end] = (kind, tuple(values))
         ends[name] = end
         if len(set(ends.values())) < len(ends):
-            neuron.refuse("ioId", two_neurons(*end))
+            neuron.refuse("ioId", f"part {shown(end[0])} has two neurons {end[1]}")
     for edge in brain.tables("connection"):
         edge.refuse_others("src", "dest", "weight")
         source, target = (ends[edge.word(key, ends)] for key in ("src", "dest"))

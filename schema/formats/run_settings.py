@@ -49,9 +49,9 @@ def experiment_of(
     experiment = _experiment_of_run(folder)
     if experiment is None:
         if island is not None:
+            name = "name an experiment with islands: --experiment FILE.toml"
             raise ExperimentError(
-                "--island: the robot file is in no run folder; name an experiment with "
-                "islands: --experiment FILE.toml"
+                f"--island: the robot file is in no run folder; {name}"
             )
         if tells_default:
             say("with the settings of scenario1; --experiment names others")

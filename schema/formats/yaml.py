@@ -86,12 +86,9 @@ def robot_to_yaml(
     try:
         text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
         compose(text, "")
-    except RecursionError:
-        raise InvalidRobot(
-            "nested too deeply for YAML: a .pb file holds any robot"
-        ) from None
-    except InvalidRobot:
-        raise InvalidRobot("too large for YAML: a .pb file holds any robot") from None
+    except (RecursionError, InvalidRobot) as error:
+        why = "too large" if isinstance(error, InvalidRobot) else "nested too deeply"
+        raise InvalidRobot(f"{why} for YAML: a .pb file holds any robot") from None
     return text
 
 

@@ -100,12 +100,10 @@ class RevolveReader(Reader):
             elif ends.get(name) == end:
                 own[name] = name
             elif name in ends or not free.get(end):
-                part = list(self.part_index)[end[1]]
-                count = list(ends.values()).count(end)
+                part = shown(list(self.part_index)[end[1]])
+                few = f"has {list(ends.values()).count(end)} {end[0]} neurons"
                 table.refuse(
-                    "layer",
-                    f"part {shown(part)} has {count} {end[0]} neurons, "
-                    f"{shown(name)} is none of them",
+                    "layer", f"part {part} {few}, {shown(name)} is none of them"
                 )
             else:
                 own[free[end].pop(0)] = name
@@ -125,11 +123,8 @@ class RevolveReader(Reader):
 def _check_network(table: Table) -> None:
     """Raise unless a brain is a neural network."""
     if table.has("type") and (kind := table.text("type")) != _NETWORK:
-        table.refuse(
-            "type",
-            f"{shown(kind)} is not supported: must be {_NETWORK!r}; "
-            "without the brain, the body can be read",
-        )
+        rule = f"must be {_NETWORK!r}; without the brain, the body can be read"
+        table.refuse("type", f"{shown(kind)} is not supported: {rule}")
     table.refuse_others("type", "neurons", "params", "connections")
 
 

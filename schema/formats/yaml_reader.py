@@ -15,7 +15,6 @@ from schema.robot.brain import (
     LAYERS,
     Brain,
     Connection,
-    Layer,
     Neuron,
     NeuronKinds,
     neuron_names,
@@ -26,7 +25,6 @@ from schema.robot.robot import Part, Robot, check_number, check_robot
 FULL_TURN = 360
 OTHER_TYPES = " (name the experiment with its part types: --experiment FILE.toml)"
 """End of the message about an unknown part type."""
-_WRITTEN: tuple[Layer, ...] = ("output", "hidden")
 _INDEXED = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.\w+)?")
 
 
@@ -71,9 +69,8 @@ class Reader:
         if document.has("revolve_robot"):
             version = document.integer("revolve_robot")
             if version != VERSION:
-                document.refuse(
-                    "revolve_robot", f"must be {VERSION}, got {shown(version)}"
-                )
+                rule = f"must be {VERSION}, got {shown(version)}"
+                document.refuse("revolve_robot", rule)
         self._read_part(document.table("body"), -1, -1)
         brain = None if document.is_null("brain") else document.table("brain")
         robot = Robot(tuple(self.parts), self.brain(brain))
@@ -81,10 +78,9 @@ class Reader:
             check_number(robot)
             check_robot(robot, self.space, self._kinds)
         except InvalidRobot as error:
-            named = with_ids(
-                str(error), list(self.part_index), self._neurons, self._edges
-            )
-            raise InvalidRobot(f"{self._place(str(error))}: {named}") from None
+            parts, message = list(self.part_index), str(error)
+            named = with_ids(message, parts, self._neurons, self._edges)
+            raise InvalidRobot(f"{self._place(message)}: {named}") from None
         return robot
 
     def _place(self, message: str) -> str:
@@ -110,7 +106,7 @@ class Reader:
             kind=kind.name,
             parent=parent,
             parent_slot=parent_slot,
-            slot=self.own_slot(table) if own else -1,
+            slot=table.integer("slot", 0) if own else -1,
             orientation=self.orientation(table),
             parameters=_values(table, kind.parameters),
             gene=table.integer("gene", 0),
@@ -125,10 +121,6 @@ class Reader:
         """Return the type of a part."""
         return table.word("type", self.space, OTHER_TYPES)
 
-    def own_slot(self, table: Table) -> int:
-        """Return the slot by which a part is attached to its parent; 0 by default."""
-        return table.integer("slot", 0)
-
     def orientation(self, table: Table) -> int:
         """Return the orientation of a part about the axis of its slot [degrees]."""
         return table.integer("orientation", 0) % FULL_TURN
@@ -137,17 +129,13 @@ class Reader:
         """Return the weight of a connection."""
         return table.number("weight")
 
-    def inputs(self) -> dict[str, Neuron]:
-        """Return the input neurons of the sensors by name, in order."""
-        return {
+    def brain(self, table: Table | None) -> Brain:
+        """Return the brain, after the body was read; None is an omitted brain."""
+        names = {
             f"{name}-in-{offset}": Neuron("input", INPUT, index)
             for name, index in self.part_index.items()
             for offset in range(self.space[self.parts[index].kind].inputs)
         }
-
-    def brain(self, table: Table | None) -> Brain:
-        """Return the brain, after the body was read; None is an omitted brain."""
-        names = self.inputs()
         if table is None:
             return Brain(tuple(names.values()))
         table.refuse_others("neurons", "connections")
@@ -170,23 +158,18 @@ class Reader:
         for name, index in self.part_index.items():
             expected = self.space[self.parts[index].kind].outputs
             if (count := owners.count(index)) != expected:
-                table.refuse(
-                    "neurons",
-                    f"part {shown(name)} must have {expected} output neurons, "
-                    f"got {count}",
-                )
+                rule = f"must have {expected} output neurons, got {count}"
+                table.refuse("neurons", f"part {shown(name)} {rule}")
 
     def _read_neuron(self, table: Table) -> tuple[Neuron, Table]:
         if table.has("id"):
             table.rename(f"neuron {shown(table.text('id'))}")
         table.refuse_others("id", "part", "layer", "type", "params")
-        layer: Layer = (
-            "output" if table.word("layer", _WRITTEN) == "output" else "hidden"
-        )
+        is_output = table.word("layer", ("output", "hidden")) == "output"
         kind = table.word("type", self._kinds)
         part = self.part_index[table.word("part", self.part_index)]
         values = _values(table, self._kinds[kind])
-        return Neuron(layer, kind, part, values), table
+        return Neuron("output" if is_output else "hidden", kind, part, values), table
 
     def connections(
         self, tables: list[Table], neurons: dict[str, Neuron]

@@ -22,10 +22,8 @@ def needs(*channels: str) -> Callable[[_Function], _Function]:
     known = (*RECORDED, *COMPUTED, *CONSTANT)
     for name in channels:
         if name not in known:
-            raise ExperimentError(
-                f"needs: {shown(name)} is not a channel{nearest(name, known)}; "
-                f"channels: {', '.join(known)}"
-            )
+            hint = f"{nearest(name, known)}; channels: {', '.join(known)}"
+            raise ExperimentError(f"needs: {shown(name)} is not a channel{hint}")
 
     def declare(function: _Function) -> _Function:
         setattr(function, _ATTRIBUTE, channels)

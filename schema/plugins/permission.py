@@ -62,9 +62,9 @@ def allow(entries: Iterable[str]) -> None:
         else:
             _check_name(entry)
             if _source(_top(entry)) is None and _top(entry) not in _allowed:
+                give = "give an installed module or the path of a .py file"
                 raise UnknownPlugin(
-                    f"{FLAG}: no module {shown(entry)} is installed; give an installed "
-                    "module or the path of a .py file"
+                    f"{FLAG}: no module {shown(entry)} is installed; {give}"
                 )
             _allowed.setdefault(entry, None)
 
@@ -246,19 +246,16 @@ def _allow_file(file: Path, where: str) -> None:
         found = None
     if not is_same and (named or found is not None):
         other = others[0] if others else "a built-in module"
-        raise ExperimentError(
-            f"{where}: {file} has the name of another module, {other}: rename the file"
-        )
+        why = f"has the name of another module, {other}: rename the file"
+        raise ExperimentError(f"{where}: {file} {why}")
     _allowed[top] = file
 
 
 def _check_name(module: str) -> None:
     """Raise unless a name may be that of a plug-in."""
     if not _may_be_plugin(module):
-        raise ExperimentError(
-            f"{FLAG}: must be a module outside the standard library and Revolve, or "
-            f"the path of a .py file, got {shown(module)}"
-        )
+        rule = "a module outside the standard library and Revolve, or a .py file"
+        raise ExperimentError(f"{FLAG}: must be {rule}, got {shown(module)}")
 
 
 def _may_be_plugin(module: str) -> bool:

@@ -166,9 +166,8 @@ def check_widths(brain: Brain, width: Widths) -> None:
     }
     for layer, (key, limit) in limits.items():
         if (count := brain.count(layer)) > limit:
-            raise InvalidRobot(
-                f"brain: {layer} neurons must be <= space.{key} = {limit}, got {count}"
-            )
+            rule = f"must be <= space.{key} = {limit}, got {count}"
+            raise InvalidRobot(f"brain: {layer} neurons {rule}")
 
 
 def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:

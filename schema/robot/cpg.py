@@ -39,10 +39,8 @@ class CpgParameters(Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         """Raise ValueError unless the range is one."""
         if self.lowest_hz > self.highest_hz:
-            raise ValueError(
-                f"lowest_hz must be <= highest_hz = {self.highest_hz:g}, "
-                f"got {self.lowest_hz:g}"
-            )
+            rule = f"must be <= highest_hz = {self.highest_hz:g}"
+            raise ValueError(f"lowest_hz {rule}, got {self.lowest_hz:g}")
 
 
 def cpg_neurons(parameters: CpgParameters) -> NeuronKinds:

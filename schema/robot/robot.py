@@ -84,10 +84,8 @@ def _place_problem(part: Part, index: int) -> str:
     if index == 0:
         if (part.parent, part.parent_slot, part.slot) == (-1, -1, -1):
             return ""
-        return (
-            ": the core's parent, parent_slot and slot must be -1, "
-            f"got {part.parent}, {part.parent_slot}, {part.slot}"
-        )
+        got = f"{part.parent}, {part.parent_slot}, {part.slot}"
+        return f": the core's parent, parent_slot and slot must be -1, got {got}"
     if not 0 <= part.parent < index:
         return f".parent: must be 0..{index - 1}, got {part.parent}"
     if part.parent_slot < 0:
@@ -187,9 +185,8 @@ def part_type(name: str, space: BodySpace, where: str) -> PartType:
         InvalidRobot: the body space has no such type.
     """
     if name not in space:
-        raise InvalidRobot(
-            f"{where}.kind: must be one of {', '.join(space)}, got {name!r}"
-        )
+        rule = f"must be one of {', '.join(space)}, got {name!r}"
+        raise InvalidRobot(f"{where}.kind: {rule}")
     return space[name]
 
 
@@ -218,6 +215,5 @@ def _check_wiring(robot: Robot, space: BodySpace) -> None:
         expected = [part for part, count in enumerate(counts) for _ in range(count)]
         owners = [n.part for n in robot.brain.neurons if n.layer == layer]
         if owners != expected:
-            raise InvalidRobot(
-                f"brain: {layer} neurons must belong to parts {expected}, got {owners}"
-            )
+            rule = f"must belong to parts {expected}, got {owners}"
+            raise InvalidRobot(f"brain: {layer} neurons {rule}")

@@ -146,10 +146,8 @@ class Trace:
         """
         if name in self.channels:
             return self.channels[name]
-        raise ExperimentError(
-            f'trace.{name} is not recorded: declare it with @needs("{name}") above the '
-            "function"
-        )
+        how = f'declare it with @needs("{name}") above the function'
+        raise ExperimentError(f"trace.{name} is not recorded: {how}")
 
 
 def sum_in_order(numbers: Iterable[float]) -> float:

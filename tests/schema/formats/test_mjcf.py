@@ -190,6 +190,7 @@ def test_other_tools_compile_the_same_model_to_the_last_bit() -> None:
     names = [name for name in dir(expected) if name.startswith(("body_", "geom_"))]
     names += ["jnt_range", "jnt_axis", "dof_armature", "dof_damping", "qpos0"]
     names += ["actuator_forcerange", "actuator_gainprm", "actuator_biasprm"]
+    names += ["actuator_biastype", "actuator_dyntype", "actuator_trntype"]
     for name in names:
         one, other = getattr(found, name), getattr(expected, name)
         if isinstance(one, np.ndarray) and "adr" not in name and "num" not in name:
