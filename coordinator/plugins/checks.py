@@ -317,8 +317,7 @@ def _uses(
     found = by_name[kind] if kind else kind_of(plugin, kinds)
     if found is None:
         names = ", ".join(each.name for each in kinds)
-        raise UnknownPlugin(
-            f"{path}: {place_of(path)}: must be of one of the kinds {names}, got a "
-            f"{type(plugin).__name__}; --kind says which"
-        )
+        got = f"got a {type(plugin).__name__}; --kind says which"
+        rule = f"must be of one of the kinds {names}"
+        raise UnknownPlugin(f"{path}: {place_of(path)}: {rule}, {got}")
     return [Use(found, found.section(path))]

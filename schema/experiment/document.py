@@ -577,16 +577,14 @@ def body_space(space: Space) -> BodySpace:
     for path in space.part_types:
         kind = load_object(path, "space.part_types", {}, kind=PartType)
         if kind.name in types:
-            raise ExperimentError(
-                f"space.part_types: two part types are named {kind.name!r}"
-            )
+            what = f"two part types are named {kind.name!r}"
+            raise ExperimentError(f"space.part_types: {what}")
         types[kind.name] = kind if space.planar else _freed(kind)
         check_part_type(types[kind.name], "space.part_types")
     cores = [name for name, kind in types.items() if kind.is_root]
     if len(cores) != 1:
-        raise ExperimentError(
-            f"space.part_types: must contain exactly one core, got {len(cores)} {cores}"
-        )
+        got = f"{len(cores)} {cores}"
+        raise ExperimentError(f"space.part_types: must contain one core, got {got}")
     return types
 
 

@@ -38,10 +38,9 @@ def check_fitness_keys(fitness: Fitness) -> None:
     read = _keys_read(function, fitness)
     for key in changed:
         if key not in read:
-            raise ExperimentError(
-                f"fitness.{key}: has no effect on {name}, which does not read it: "
-                f"remove the key, or let the function use it (parameters.{key})"
-            )
+            why = f"has no effect on {name}, which does not read it"
+            how = f"remove the key, or let the function use it (parameters.{key})"
+            raise ExperimentError(f"fitness.{key}: {why}: {how}")
 
 
 class _Watched:

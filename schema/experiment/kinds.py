@@ -31,24 +31,25 @@ class Kind:
         key: of the experiment that names a plug-in, for messages.
         built_in: objects that ship, by the name that an experiment gives them.
         is_one: whether an object is of this kind.
-        section: returns the section of a path, with default parameters.
         sections: of an experiment, those of its islands included.
-        path: returns the short name or ``module:attribute`` of a section.
         load: returns the plug-in of a section; raises ``ExperimentError`` if it cannot
             be had.
         check: raises any error if the plug-in of a section breaks its contract; may
             return a warning.
+        section: returns the section of a path, with default parameters; by default the
+            path itself.
+        path: returns the short name or ``module:attribute`` of a section.
     """
 
     name: str
     key: str
     built_in: Mapping[str, object]
     is_one: Callable[[object], bool]
-    section: Callable[[str], Any]
     sections: Callable[[Experiment], Iterable[Any]]
-    path: Callable[[Any], str]
     load: Callable[[Any], object]
     check: Callable[[Any], str | None]
+    section: Callable[[str], Any] = str
+    path: Callable[[Any], str] = str
 
 
 class Use(NamedTuple):
@@ -153,9 +154,7 @@ PART_TYPE = Kind(
         if isinstance(value, PartType)
     },
     is_one=lambda plugin: isinstance(plugin, PartType),
-    section=str,
     sections=lambda experiment: experiment.space.part_types,
-    path=str,
     load=_load_part_type,
     check=_check_part_type,
 )
@@ -170,9 +169,7 @@ NEURON_TYPE = Kind(
     "space.neuron_types",
     BUILT_IN_NEURONS,
     is_one=partial(has, ("name", "parameters", "states", "step")),
-    section=str,
     sections=lambda experiment: experiment.space.neuron_types,
-    path=str,
     load=lambda path: load_object(path, "space.neuron_types", BUILT_IN_NEURONS),
     check=_check_neuron_type,
 )
@@ -189,10 +186,8 @@ SENSOR = Kind(
     is_one=lambda plugin: (
         not isinstance(plugin, type) and has(("inputs", "read"), plugin)
     ),
-    section=str,
     # Sensors are checked with the part types that hold them.
     sections=lambda _: (),
-    path=str,
     load=_load_sensor,
     check=lambda path: check_sensor(_load_sensor(path)),
 )

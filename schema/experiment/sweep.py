@@ -75,19 +75,15 @@ def settings_problem(tables: dict[str, Any]) -> str:
         if isinstance(value, dict):
             inner, first = next(iter(value.items()), ("", None))
             if isinstance(first, dict | list):
-                return (
-                    f"{name}: a key with dots must be quoted: "
-                    f'settings."{key}.{cut(inner)}" = ...'
-                )
+                quoted = f'settings."{key}.{cut(inner)}" = ...'
+                return f"{name}: a key with dots must be quoted: {quoted}"
             try:
                 read_parameters(value, Range, name)
             except ExperimentError as error:
                 return str(error)
         elif not isinstance(value, list):
-            return (
-                f"{name}: must be a list, or a range such as {{ low = 1, high = 2, "
-                f"steps = 3 }}, got {shown(value)}"
-            )
+            rule = "must be a list, or a range such as { low = 1, high = 2, steps = 3 }"
+            return f"{name}: {rule}, got {shown(value)}"
     return ""
 
 

@@ -142,10 +142,8 @@ def _problem(name: str, note: KeptPlugin, copy: Path) -> str:
     with suppress(OSError, RuntimeError):
         if _mark_of(name, files).exists():
             return ""
-    return (
-        "was not written by a run of yours on this machine, and importing it runs its "
-        f"code; if you trust it, add {FLAG} {name}={copy}"
-    )
+    why = "was not written by a run of yours on this machine; an import runs its code"
+    return f"{why}: if you trust it, add {FLAG} {name}={copy}"
 
 
 def _files(name: str, source: Path) -> dict[str, bytes]:

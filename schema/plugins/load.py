@@ -58,9 +58,8 @@ def load_object(
             raise unknown(path, where, built_in)
         return built_in[path]
     found = _load(path, where)
-    problem = next(
-        (f"has no {one!r}" for one in members if not hasattr(found, one)), ""
-    )
+    missing = [f"has no {name!r}" for name in members if not hasattr(found, name)]
+    problem = missing[0] if missing else ""
     if kind is not None and not isinstance(found, kind):
         problem = f"is not a {kind.__name__}, but a {type(found).__name__}"
     if problem:
@@ -70,10 +69,9 @@ def load_object(
 
 def unknown(path: str, where: str, built_in: Collection[str]) -> UnknownPlugin:
     """Return the error of a short name that is none of the built-in ones."""
-    return UnknownPlugin(
-        f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
-        f"got {shown(path)}{nearest(path, built_in)}"
-    )
+    rule = f"must be one of {', '.join(built_in)} or 'module:attribute'"
+    got = f"got {shown(path)}{nearest(path, built_in)}"
+    return UnknownPlugin(f"{where}: {rule}, {got}")
 
 
 def load_function(
@@ -145,9 +143,8 @@ def _loaded(module_name: str, attribute: str, where: str) -> object:
         near = get_close_matches(attribute, names, n=1)
         hint = f"; did you mean '{module_name}:{near[0]}'?" if near else ""
         place = where_named(module, attribute)
-        raise UnknownPlugin(
-            f"{where}: {place}: {module_name} has no {attribute!r}{hint}"
-        )
+        why = f"{module_name} has no {attribute!r}{hint}"
+        raise UnknownPlugin(f"{where}: {place}: {why}")
     return getattr(module, attribute)
 
 

@@ -26,9 +26,7 @@ def where_defined(plugin: object) -> str:
     A wrapped or partial function counts as the function inside, an object that is
     neither function nor class as its class.
 
-    Returns:
-        Name of the file and line of the definition; without a line if the source is
-        not there; module and name if there is no file.
+    Without its source there is no line; without a file, module and name.
     """
     code = _code(plugin)
     if not _is_code(code):
@@ -46,9 +44,7 @@ def where_defined(plugin: object) -> str:
 def where_named(module: ModuleType, name: str) -> str:
     """Return file and line of a name in a plug-in's module.
 
-    Returns:
-        As of ``where_defined``; without a line for a name that is not assigned at the
-        top of the module.
+    There is no line of a name that is not assigned at the top of the module.
     """
     value = _code(getattr(module, name, None))
     if _is_code(value):

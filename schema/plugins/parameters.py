@@ -136,8 +136,8 @@ def _explain(message: str, key: str, value: Any, kind: Any) -> str:  # noqa: ANN
 
 
 def _no_such_key(name: str, prefix: str, known: list[str]) -> str:
-    own = f"; those of a plug-in are in [{prefix}parameters]"
-    return (
-        f"{prefix}{cut(name)}: no such key{nearest(name, known)}; allowed: "
-        f"{', '.join(known) or 'none'}{own if 'parameters' in known else ''}"
-    )
+    allowed = ", ".join(known) or "none"
+    if "parameters" in known:
+        allowed += f"; those of a plug-in are in [{prefix}parameters]"
+    near = nearest(name, known)
+    return f"{prefix}{cut(name)}: no such key{near}; allowed: {allowed}"

@@ -367,17 +367,15 @@ class BrainGenes(Protocol):
 
 
 class Bank(Protocol):
-    """Brains of R robots that are updated together; row r belongs to robot r.
-
-    Attributes:
-        states: (R, K) all that a brain keeps between ticks, 0 at birth; K depends
-            on nothing but the experiment. The caller reads and writes rows, to save,
-            move and restore robots.
-    """
+    """Brains of R robots that are updated together; row r belongs to robot r."""
 
     @property
     def states(self) -> Floats:
-        """All states, (R, K)."""
+        """(R, K) all that a brain keeps between ticks, 0 at birth.
+
+        K depends on nothing but the experiment. The caller reads and writes rows, to
+        save, move and restore robots.
+        """
 
     def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
         """Update all brains once.

@@ -48,18 +48,14 @@ def advise_shape(kind: PartType) -> str:
         shape = kind.shape(values)
         joint = shape.joint
         if joint and joint.kind == "revolute" and math.tau < joint.limit < math.inf:
-            return (
-                f"joint.limit is {joint.limit:g} rad, more than a turn: "
-                f"{joint.limit:g} degrees are {math.radians(joint.limit):.3g} rad"
-            )
+            turned = f"{joint.limit:g} degrees are {math.radians(joint.limit):.3g} rad"
+            return f"joint.limit is {joint.limit:g} rad, more than a turn: {turned}"
         for number, slot in enumerate(shape.slots):
             away_m = _distance_from_surface(slot, shape.boxes)
             if away_m > _OFF_SURFACE_M:
-                return (
-                    f"slots[{number}].position is {1000 * away_m:.3g} mm from the "
-                    f"surface of the boxes of segment {slot.segment}: attached parts "
-                    "float or sink by as much"
-                )
+                place = f"slots[{number}].position is {1000 * away_m:.3g} mm"
+                boxes = f"the surface of the boxes of segment {slot.segment}"
+                return f"{place} from {boxes}: attached parts float or sink by as much"
     return ""
 
 
