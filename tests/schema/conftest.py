@@ -1,115 +1,28 @@
-"""Random genomes and robots of the built-in body space, for property tests."""
+"""Random genomes and robots as fixtures."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import pytest
-from hypothesis import strategies as st
-from hypothesis.strategies import DrawFn, SearchStrategy
-from msgspec.structs import replace
+from hypothesis.strategies import SearchStrategy
 
-from schema.parts import BUILT_IN, Parameter
-from schema.robot.brain import NEURON_TYPES, Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop
-from schema.robot.robot import ORIENTATIONS, Robot
-
-CHILD_TYPES = [kind for kind in BUILT_IN.values() if not kind.is_root]
-FINITE = st.floats(allow_nan=False, allow_infinity=False)
-
-
-@dataclass
-class Draft:
-    """Node of a genome under construction."""
-
-    node: Node
-    children: dict[int, "Draft"] = field(default_factory=dict)
-
-    def free(self) -> list[int]:
-        used = {self.node.slot, *self.children}
-        return [s for s in range(BUILT_IN[self.node.kind].arity) if s not in used]
-
-    def finished(self) -> Node:
-        children = tuple(
-            (slot, self.children[slot].finished()) for slot in sorted(self.children)
-        )
-        return replace(self.node, children=children)
-
-
-def drawn(draw: DrawFn, parameters: tuple[Parameter, ...]) -> tuple[float, ...]:
-    return tuple(draw(st.floats(item.low, item.high)) for item in parameters)
-
-
-@st.composite
-def neuron_genes(draw: DrawFn) -> NeuronGene:
-    kind = draw(st.sampled_from(sorted(NEURON_TYPES)))
-    return NeuronGene(kind, drawn(draw, NEURON_TYPES[kind]))
-
-
-@st.composite
-def connection_genes(draw: DrawFn) -> ConnectionGene:
-    layers: tuple[Layer, ...] = ("input", "output", "hidden")
-    ends = st.tuples(st.sampled_from(layers), st.integers(0, 2))
-    path = tuple(draw(st.lists(st.integers(0, 3), max_size=3)))
-    return ConnectionGene(draw(ends), path, draw(ends), draw(FINITE))
-
-
-def brain_of(draw: DrawFn, node: Node) -> Node:
-    outputs = BUILT_IN[node.kind].outputs
-    genes = neuron_genes()
-    return replace(
-        node,
-        outputs=tuple(draw(st.lists(genes, min_size=outputs, max_size=outputs))),
-        hidden=tuple(draw(st.lists(genes, max_size=2))),
-        connections=tuple(draw(st.lists(connection_genes(), max_size=3))),
-    )
-
-
-@st.composite
-def random_genomes(draw: DrawFn) -> Genome:
-    core = Node("Core", -1, 0, drawn(draw, BUILT_IN["Core"].parameters))
-    drafts = [Draft(brain_of(draw, core))]
-    for _ in range(draw(st.integers(0, 8))):
-        places = [(draft, slot) for draft in drafts for slot in draft.free()]
-        if not places:
-            break
-        parent, slot = draw(st.sampled_from(places))
-        kind = draw(st.sampled_from(CHILD_TYPES))
-        node = Node(
-            kind.name,
-            draw(st.integers(0, kind.arity - 1)),
-            draw(st.sampled_from(ORIENTATIONS)),
-            drawn(draw, kind.parameters),
-            gene=draw(st.integers(0, 2**64 - 1)),
-        )
-        drafts.append(Draft(brain_of(draw, node)))
-        parent.children[slot] = drafts[-1]
-    return drafts[0].finished()
+from schema.robot.genome import Genome, Node
+from schema.robot.robot import Robot
+from tests.schema import robots as made
 
 
 @pytest.fixture(scope="session")
 def genomes() -> SearchStrategy[Genome]:
     """Well-formed genomes; some of their paths lead nowhere."""
-    return random_genomes()
+    return made.random_genomes()
 
 
 @pytest.fixture(scope="session")
 def robots() -> SearchStrategy[Robot]:
     """Well-formed robots."""
-    return random_genomes().map(lambda genome: develop(genome, BUILT_IN))
+    return made.random_robots()
 
 
 @pytest.fixture(scope="session")
 def node() -> Callable[..., Node]:
     """A node with default parameters and simple outputs; the rest by keyword."""
-
-    def make(kind: str, slot: int = 0, **rest: object) -> Node:
-        part_type = BUILT_IN[kind]
-        defaults: dict[str, object] = {
-            "orientation": 0,
-            "parameters": tuple(p.default for p in part_type.parameters),
-            "outputs": (NeuronGene("Simple", (0.0, 0.5)),) * part_type.outputs,
-        }
-        values = defaults | rest
-        return Node(kind, -1 if part_type.is_root else slot, **values)  # type: ignore[arg-type]
-
-    return make
+    return made.node

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.strategies import DataObject, SearchStrategy
+from hypothesis.strategies import DataObject
 from msgspec.structs import replace
 
 from schema.errors import InvalidRobot, MalformedMessage, RevolveError
@@ -16,11 +16,10 @@ from schema.formats.files import read_robot, robot_from_yaml, write_robot
 from schema.formats.yaml import robot_to_yaml
 from schema.parts import BUILT_IN
 from schema.robot.brain import INPUT, Brain, Connection, Neuron
-from schema.robot.genome import Node, develop
+from schema.robot.genome import develop
 from schema.robot.robot import Part, Robot, check_robot
 from schema.wire.protobuf import encode_robot
-
-NodeMaker = Callable[..., Node]
+from tests.schema.robots import node, random_robots
 
 TEXT = """\
 body:
@@ -54,9 +53,8 @@ def read(text: str) -> Robot:
     return robot_from_yaml(text, "mine.yaml", BUILT_IN)
 
 
-@given(data=st.data())
-def test_yaml_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> None:
-    robot = data.draw(robots)
+@given(robot=random_robots())
+def test_yaml_round_trip(robot: Robot) -> None:
     text = robot_to_yaml(robot, BUILT_IN)
     again = read(text)
     # A repr tells -0.0 from 0.0 and every bit of a float.
@@ -300,7 +298,7 @@ def test_robot_of_another_body_space_is_refused(tmp_path: Path) -> None:
         read_robot(path, space)
 
 
-def test_malformed_robot_is_not_written(node: NodeMaker, tmp_path: Path) -> None:
+def test_malformed_robot_is_not_written(tmp_path: Path) -> None:
     robot = develop(node("Core"), BUILT_IN)
     broken = replace(robot, brain=replace(robot.brain, neurons=()))
     for ending in (".yaml", ".pb"):
@@ -314,9 +312,7 @@ def test_deeply_nested_robot_is_written_as_protobuf_only(
     tmp_path: Path, chain: Robot
 ) -> None:
     """Writing YAML recurses for each level; reading it allows 400 levels."""
-    with pytest.raises(
-        InvalidRobot, match=r"it\.yaml: nested too deeply for YAML: .*\.pb"
-    ):
+    with pytest.raises(InvalidRobot, match=r"it\.yaml: nested too deeply .*\.pb"):
         write_robot(chain, tmp_path / "it.yaml")
     assert list(tmp_path.iterdir()) == []
     write_robot(chain, tmp_path / "it.pb")
@@ -361,9 +357,7 @@ def test_robot_beyond_the_limits_of_reading_is_not_written(tmp_path: Path) -> No
     with pytest.raises(InvalidRobot, match=r"it\.yaml: too large for YAML: .*\.pb"):
         write_robot(large, tmp_path / "it.yaml")
     for ending in ("pb", "xml"):
-        with pytest.raises(
-            InvalidRobot, match=rf"it\.{ending}: body: .* <= 1000 parts"
-        ):
+        with pytest.raises(InvalidRobot, match=rf"it\.{ending}: body: .* <= 1000"):
             write_robot(row("FixedBrick", 1000), tmp_path / f"it.{ending}")
     assert list(tmp_path.iterdir()) == []
     write_robot(large, tmp_path / "it.pb")

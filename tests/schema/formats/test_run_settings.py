@@ -129,9 +129,7 @@ def test_island_that_is_not_there_is_refused(tmp_path: Path) -> None:
         experiment_of(file, None, 2)
     with pytest.raises(ExperimentError, match=r"^--island must be in 0\.\.0, got 2$"):
         experiment_of(file, "scenario1", 2)
-    with pytest.raises(
-        ExperimentError, match="is in no run folder; name an experiment"
-    ):
+    with pytest.raises(ExperimentError, match="in no run folder; name an exp"):
         experiment_of(tmp_path / "a.yaml", None, 0)
 
 

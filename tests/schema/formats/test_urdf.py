@@ -7,8 +7,6 @@ import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.strategies import DataObject, SearchStrategy
 from msgspec.structs import replace as changed
 
 from schema.errors import InvalidRobot
@@ -21,7 +19,7 @@ from schema.mjcf.model import robot_spec
 from schema.parts import BUILT_IN
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
 from schema.robot.robot import Part, Robot
-from tests.schema.robots import GREY, robot_of
+from tests.schema.robots import GREY, random_robots, robot_of
 
 SIMULATION = Simulation()
 
@@ -67,11 +65,8 @@ def test_a_slider_becomes_a_prismatic_joint() -> None:
 
 
 @settings(max_examples=25, deadline=None)
-@given(data=st.data())
-def test_urdf_moves_like_the_robot(
-    robots: SearchStrategy[Robot], data: DataObject
-) -> None:
-    robot = data.draw(robots)
+@given(robot=random_robots())
+def test_urdf_moves_like_the_robot(robot: Robot) -> None:
     ours = robot_spec(robot, BUILT_IN, SIMULATION).spec.compile()
     spec = mujoco.MjSpec.from_string(robot_to_urdf(robot, BUILT_IN, SIMULATION))
     # The root segment must stay a body of its own to be compared.

@@ -291,9 +291,7 @@ def test_data_files_of_one_name_that_differ_are_refused(tmp_path: Path) -> None:
         write(tmp_path / name / f"kept_{name}.py", b"# goals.csv")
         write(tmp_path / name / "goals.csv", name.encode())
         allow([str(tmp_path / name / f"kept_{name}.py")])
-    with pytest.raises(
-        ExperimentError, match=r"data file goals\.csv differs from that"
-    ):
+    with pytest.raises(ExperimentError, match=r"goals\.csv differs from that"):
         keep(tmp_path / "run", '["kept_a:x","kept_b:x"]', write)
 
 

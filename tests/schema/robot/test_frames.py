@@ -1,22 +1,17 @@
 """Frames of parts: positions and rule of the original code."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.parts import BUILT_IN, Slot
 from schema.robot.frames import attach, place_parts, shapes_of
 from schema.robot.genome import Genome, Node, develop
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
-from tests.schema.robots import CORE, GREY
-
-NodeMaker = Callable[..., Node]
+from tests.schema.robots import CORE, GREY, node, random_genomes, random_robots
 
 
 def turned(vector: Floats, axis: Floats, degrees: float) -> Floats:
@@ -59,7 +54,7 @@ def body(genome: Genome) -> Robot:
     return develop(genome, BUILT_IN)
 
 
-def test_golden_position_of_a_hinge_on_the_front(node: NodeMaker) -> None:
+def test_golden_position_of_a_hinge_on_the_front() -> None:
     core = node("Core", children=((0, node("Hinge")),))
     robot = body(core)
     rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
@@ -100,9 +95,8 @@ def test_quarter_turn_on_the_right_face() -> None:
     assert position == pytest.approx((0.04575, 0.0, 0.0), abs=1e-12)
 
 
-@given(data=st.data())
-def test_rule_of_attachment(robots: SearchStrategy[Robot], data: DataObject) -> None:
-    robot = data.draw(robots)
+@given(robot=random_robots())
+def test_rule_of_attachment(robot: Robot) -> None:
     rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     slots = [BUILT_IN[p.kind].shape(p.parameters).slots for p in robot.parts]
     for index, part in enumerate(robot.parts[1:], start=1):
@@ -120,11 +114,8 @@ def test_rule_of_attachment(robots: SearchStrategy[Robot], data: DataObject) -> 
         assert np.linalg.det(rotations[index]) == pytest.approx(1.0)
 
 
-@given(data=st.data())
-def test_frames_are_products_along_the_tree_to_the_last_bit(
-    robots: SearchStrategy[Robot], data: DataObject
-) -> None:
-    robot = data.draw(robots)
+@given(robot=random_robots())
+def test_frames_are_products_along_the_tree_to_the_last_bit(robot: Robot) -> None:
     shapes = shapes_of(robot, BUILT_IN)
     rotations, positions = place_parts(robot, shapes)
     for index, part in enumerate(robot.parts[1:], start=1):
@@ -140,11 +131,9 @@ def test_frames_are_products_along_the_tree_to_the_last_bit(
         assert positions[index].tobytes() == moved_by.tobytes()
 
 
-@given(data=st.data())
-def test_level_bodies_are_flat_and_stand_on_their_core(
-    genomes: SearchStrategy[Genome], data: DataObject
-) -> None:
-    robot = body(level(data.draw(genomes)))
+@given(genome=random_genomes())
+def test_level_bodies_are_flat_and_stand_on_their_core(genome: Genome) -> None:
+    robot = body(level(genome))
     rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     lowest = math.inf
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])

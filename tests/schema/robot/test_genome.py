@@ -1,19 +1,15 @@
 """Development of a small genome, connection by connection."""
 
-from collections.abc import Callable
-
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.strategies import DataObject, SearchStrategy
 from msgspec.structs import replace
 
 from schema.parts import BUILT_IN
 from schema.robot.brain import Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop, walk
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, develop, walk
 from schema.robot.robot import check_robot
+from tests.schema.robots import node, random_genomes
 
-NodeMaker = Callable[..., Node]
 End = tuple[Layer, int]
 Edge = tuple[End, tuple[int, ...], End, float]
 HIDDEN = NeuronGene("Sigmoid", (0.25, 0.75))
@@ -29,7 +25,7 @@ def gene(
     return ConnectionGene(source, path, target, weight)
 
 
-def limb(node: NodeMaker, **connections: tuple[ConnectionGene, ...]) -> Genome:
+def limb(**connections: tuple[ConnectionGene, ...]) -> Genome:
     """Core: hinge A on slot 0 with a touch sensor; on slot 2 a brick, hinge B on it.
 
     The brick is attached by its slot 3; B is on its slot 1, by its own slot 1.
@@ -55,8 +51,8 @@ def edges(genome: Genome) -> list[tuple[int, int, float]]:
     return [(edge.source, edge.target, edge.weight) for edge in connections]
 
 
-def test_parts_are_in_depth_first_order_by_slot(node: NodeMaker) -> None:
-    robot = develop(limb(node), BUILT_IN)
+def test_parts_are_in_depth_first_order_by_slot() -> None:
+    robot = develop(limb(), BUILT_IN)
     places = [(p.kind, p.parent, p.parent_slot, p.slot, p.gene) for p in robot.parts]
     assert places == [
         ("Core", -1, -1, -1, 0),
@@ -65,12 +61,12 @@ def test_parts_are_in_depth_first_order_by_slot(node: NodeMaker) -> None:
         ("FixedBrick", 0, 2, 3, 0),
         ("ActiveHinge", 3, 1, 1, 7),
     ]
-    visits = [(n.kind, parent, slot) for n, parent, slot in walk(limb(node))]
+    visits = [(n.kind, parent, slot) for n, parent, slot in walk(limb())]
     assert visits == [(kind, parent, slot) for kind, parent, slot, *_ in places]
 
 
-def test_neurons_are_sorted_by_layer_then_part(node: NodeMaker) -> None:
-    neurons = develop(limb(node), BUILT_IN).brain.neurons
+def test_neurons_are_sorted_by_layer_then_part() -> None:
+    neurons = develop(limb(), BUILT_IN).brain.neurons
     layers = [(neuron.layer, neuron.part) for neuron in neurons]
     inputs = [("input", 0)] * 6 + [("input", 2)] * 2
     outputs, hidden = [("output", 1), ("output", 4)], [("hidden", 0), ("hidden", 4)]
@@ -98,9 +94,9 @@ def test_neurons_are_sorted_by_layer_then_part(node: NodeMaker) -> None:
     ],
 )
 def test_connection_with_a_valid_path(
-    node: NodeMaker, owner: str, connection: Edge, expected: tuple[int, int, float]
+    owner: str, connection: Edge, expected: tuple[int, int, float]
 ) -> None:
-    genome = limb(node, **{owner: (gene(*connection),)})
+    genome = limb(**{owner: (gene(*connection),)})
     assert edges(genome) == [expected]
     check_robot(develop(genome, BUILT_IN), BUILT_IN)
 
@@ -124,42 +120,39 @@ def test_connection_with_a_valid_path(
     ],
 )
 def test_connection_with_an_invalid_path_is_left_out(
-    node: NodeMaker, owner: str, connection: Edge
+    owner: str, connection: Edge
 ) -> None:
     kept = gene(("output", 0), (), ("output", 0), 0.5)
-    genome = limb(node, **{owner: (gene(*connection),)})
+    genome = limb(**{owner: (gene(*connection),)})
     assert edges(genome) == []
-    both = limb(node, **{owner: (gene(*connection),), "b": (kept,)})
+    both = limb(**{owner: (gene(*connection),), "b": (kept,)})
     if owner != "b":
         assert edges(both) == [(OUT_B, OUT_B, 0.5)]
 
 
-def test_first_connection_of_a_pair_of_neurons_is_kept(node: NodeMaker) -> None:
+def test_first_connection_of_a_pair_of_neurons_is_kept() -> None:
     first = gene(("input", 0), (0,), ("output", 0), 0.1)
     detour = gene(("input", 0), (0, 0, 0), ("output", 0), 0.9)
-    genome = limb(node, core=(first, detour))
+    genome = limb(core=(first, detour))
     assert edges(genome) == [(IMU_X, OUT_A, 0.1)]
 
 
-def test_reverse_connection_is_another_pair(node: NodeMaker) -> None:
+def test_reverse_connection_is_another_pair() -> None:
     up = gene(("output", 0), (1, 3, 0), ("output", 0), 0.1)
     down = gene(("output", 0), (0, 2, 1), ("output", 0), 0.2)
-    genome = limb(node, a=(down,), b=(up,))
+    genome = limb(a=(down,), b=(up,))
     assert edges(genome) == [(OUT_A, OUT_B, 0.2), (OUT_B, OUT_A, 0.1)]
 
 
-def test_a_long_chain_develops(node: NodeMaker) -> None:
+def test_a_long_chain_develops() -> None:
     chain = node("FixedBrick")
     for _ in range(3000):
         chain = node("FixedBrick", children=((1, chain),))
     assert len(develop(node("Core", children=((0, chain),)), BUILT_IN).parts) == 3002
 
 
-@given(data=st.data())
-def test_what_develops_is_well_formed(
-    genomes: SearchStrategy[Genome], data: DataObject
-) -> None:
-    genome = data.draw(genomes)
+@given(genome=random_genomes())
+def test_what_develops_is_well_formed(genome: Genome) -> None:
     robot = develop(genome, BUILT_IN)
     check_robot(robot, BUILT_IN)
     genes = [node for node, _, _ in walk(genome)]
@@ -168,10 +161,7 @@ def test_what_develops_is_well_formed(
     assert {edge.weight for edge in robot.brain.connections} <= weights
 
 
-@given(data=st.data())
-def test_bodies_do_not_depend_on_brains(
-    genomes: SearchStrategy[Genome], data: DataObject
-) -> None:
-    genome = data.draw(genomes)
+@given(genome=random_genomes())
+def test_bodies_do_not_depend_on_brains(genome: Genome) -> None:
     bare = replace(genome, hidden=(), connections=())
     assert develop(bare, BUILT_IN).parts == develop(genome, BUILT_IN).parts

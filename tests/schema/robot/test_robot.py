@@ -1,7 +1,6 @@
 """Each rule of a well-formed robot, broken once."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -11,14 +10,13 @@ from msgspec.structs import replace
 from schema.errors import InvalidRobot
 from schema.parts import BUILT_IN
 from schema.robot.brain import Brain, Connection, Neuron, check_brain
-from schema.robot.genome import NeuronGene, Node, develop
+from schema.robot.genome import NeuronGene, develop
 from schema.robot.robot import Part, Robot, check_body, check_robot, check_tree
-
-NodeMaker = Callable[..., Node]
+from tests.schema.robots import node
 
 
 @pytest.fixture
-def robot(node: NodeMaker) -> Robot:
+def robot() -> Robot:
     """Core; on slot 0 a hinge with a brick and a bar; on slot 1 a touch sensor."""
     bar = node("ParametricBarJoint")
     brick = node("FixedBrick", children=((1, bar),))
@@ -95,9 +93,7 @@ def test_body_without_parts_is_refused() -> None:
 
 def test_breadth_first_order_is_refused(robot: Robot) -> None:
     core, hinge, brick, _, touch = robot.parts
-    with pytest.raises(
-        InvalidRobot, match=r"parts\[3\]: parts must be in depth-first order"
-    ):
+    with pytest.raises(InvalidRobot, match=r"parts\[3\]: .* depth-first order"):
         check_tree((core, hinge, touch, brick))
 
 
@@ -112,9 +108,7 @@ def test_a_body_is_checked_without_a_brain(robot: Robot) -> None:
     with pytest.raises(InvalidRobot, match="brain: input neurons"):
         check_robot(bare, BUILT_IN)
     core_only = {"Core": BUILT_IN["Core"]}
-    with pytest.raises(
-        InvalidRobot, match=r"body.parts\[1\].kind: must be one of Core"
-    ):
+    with pytest.raises(InvalidRobot, match=r"parts\[1\].kind: must be one of Co"):
         check_body(bare.parts, core_only)
 
 
@@ -172,9 +166,7 @@ def test_broken_connection(robot: Robot, connection: Connection, message: str) -
 def test_one_connection_per_ordered_pair(robot: Robot) -> None:
     there, back = Connection(8, 9, 0.5), Connection(9, 8, 0.5)
     check_robot(wired(robot, there, back), BUILT_IN)
-    with pytest.raises(
-        InvalidRobot, match=r"connections\[2\]: second connection 8 -> 9"
-    ):
+    with pytest.raises(InvalidRobot, match=r"connections\[2\]: second .* 8 -> 9"):
         check_robot(
             wired(robot, there, back, structs.replace(there, weight=0.1)), BUILT_IN
         )
