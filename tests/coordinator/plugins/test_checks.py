@@ -71,9 +71,7 @@ def last(word: object, why: str, kind: str | None = None) -> str:
     return line
 
 
-def test_a_fitness_function_is_recognised_and_in_order(
-    lab: Writer,
-) -> None:
+def test_a_fitness_function_is_recognised_and_in_order(lab: Writer) -> None:
     file = lab(GOOD)
     path = f"{file.stem}:judge"
     assert checked(f"{file}:judge") == [
@@ -150,9 +148,7 @@ def test_a_plug_in_that_is_named_twice_is_told_once(lab: Writer) -> None:
     assert len(warnings) == 1
 
 
-def test_experiment_without_own_plug_ins_is_in_order(
-    experiment: Writer,
-) -> None:
+def test_experiment_without_own_plug_ins_is_in_order(experiment: Writer) -> None:
     words = ["scenario1", str(experiment("births = 20"))]
     lines: list[str] = []
     assert check_apart(words, lines.append) == []
@@ -224,9 +220,7 @@ def test_kind_may_be_said(lab: Writer) -> None:
     last(f"{file}:f", f"{file.name}:1: '{file.stem}:f' {wanted}", kind="fitness")
 
 
-def test_plug_in_that_prints_does_not_disturb_the_report(
-    lab: Writer,
-) -> None:
+def test_plug_in_that_prints_does_not_disturb_the_report(lab: Writer) -> None:
     file = lab("def f(a, b):\n    print('hello')\n    return 1.0")
     last(f"{file}:f", "")
 
@@ -266,10 +260,7 @@ def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
     ],
 )
 def test_a_wrong_parameter_is_placed_in_the_experiment(
-    lab: Writer,
-    experiment: Writer,
-    tables: str,
-    expected: str,
+    lab: Writer, experiment: Writer, tables: str, expected: str
 ) -> None:
     file = lab(
         "from msgspec import Struct\n\n\nclass Own(Struct):\n    height_m: float\n"
