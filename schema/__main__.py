@@ -80,13 +80,10 @@ def parser(_command: str = "robot") -> Flags:
 
 def _summary(robot: Robot) -> str:
     brain = robot.brain
-    return (
-        f"{counted(len(robot.parts), 'part')}, "
-        f"{counted(brain.count('input'), 'input')}, "
-        f"{counted(brain.count('output'), 'output')}, "
-        f"{counted(brain.count('hidden'), 'hidden neuron')}, "
-        f"{counted(len(brain.connections), 'connection')}"
-    )
+    neurons = [counted(brain.count(layer), layer) for layer in ("input", "output")]
+    hidden = counted(brain.count("hidden"), "hidden neuron")
+    edges = counted(len(brain.connections), "connection")
+    return ", ".join([counted(len(robot.parts), "part"), *neurons, hidden, edges])
 
 
 def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> None:

@@ -72,10 +72,8 @@ def _light_sensor_problems(experiment: Experiment, types: BodySpace) -> Iterator
     ]
     if not sensing:
         return
-    problem = (
-        f"space.part_types: the light sensor of {shown(sensing[0])} needs "
-        "environment.light = [x, y, z], got none"
-    )
+    needs = "needs environment.light = [x, y, z], got none"
+    problem = f"space.part_types: the light sensor of {shown(sensing[0])} {needs}"
     for where, own in _each_island(experiment):
         if not light_of(own.environment, own.arena):
             yield f"{where}{problem}"

@@ -71,10 +71,8 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
     if selection.population < selection.parents_needed:
         yield f"selection.population: {_by(selection)}, got {selection.population}"
     if selection.reevaluation is not None and not selection.keep_parents:
-        yield (
-            "selection.reevaluation: no individual outlives its brood if "
-            "selection.keep_parents is false"
-        )
+        why = "no individual outlives its brood if keep_parents is false"
+        yield f"selection.reevaluation: {why}"
 
 
 def _by(selection: SelectionSection) -> str:
@@ -133,11 +131,9 @@ def _arena_problems(experiment: Experiment, arena: ArenaSection) -> Iterator[str
     """Yield what is wrong with distances and intervals of an arena."""
     radius_m = 0.5 * arena.wall_diameter_m
     if 0.0 < radius_m <= arena.birth_radius_m:
-        yield (
-            f"arena.birth_radius_m: must be less than half of wall_diameter_m, "
-            f"{radius_m:g} m, as robots are born inside the wall; got "
-            f"{arena.birth_radius_m:g}"
-        )
+        rule = f"must be less than half of wall_diameter_m, {radius_m:g} m"
+        why = "as robots are born inside the wall"
+        yield f"arena.birth_radius_m: {rule}, {why}; got {arena.birth_radius_m:g}"
     clock = experiment.simulation
     tick_s = lcm(clock.brain_steps, clock.pose_steps) * clock.timestep_s
     shared = "the common multiple of simulation.brain_steps and pose_steps"
@@ -160,10 +156,9 @@ def _learning_problems(experiment: Experiment) -> Iterator[str]:
     if experiment.selection.reevaluation is not None:
         yield "learning: cannot be combined with selection.reevaluation; remove one"
     if learning.inherit == "lamarckian" and experiment.encoding.type == "cppn":
-        yield (
-            "learning.inherit: must be 'darwinian' with encoding.type = 'cppn': no "
-            "pattern can be made of a given brain"
-        )
+        why = "no pattern can be made of a given brain"
+        rule = "must be 'darwinian' with encoding.type = 'cppn'"
+        yield f"learning.inherit: {rule}: {why}"
 
 
 def _scenery_problems(experiment: Experiment) -> Iterator[str]:

@@ -85,7 +85,7 @@ def add_scenery(spec: mujoco.MjSpec, scenery: str, simulation: Simulation) -> No
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     moving = {
-        body: _add_object(spec, model, data, body) for body in _object_bodies(model)
+        body: _add_object(spec, model, data, body) for body in model.jnt_bodyid.tolist()
     }
     for index in range(model.ngeom):
         body = int(model.geom_bodyid[index])
@@ -117,10 +117,6 @@ def refuse_objects(environment: Environment, simulation: Simulation) -> None:
         raise _invalid(
             f"arenas have no objects that move, got {count} <freejoint>; remove them"
         )
-
-
-def _object_bodies(model: mujoco.MjModel) -> list[int]:
-    return [int(body) for body in model.jnt_bodyid]
 
 
 def _add_object(
@@ -236,7 +232,7 @@ def _check_shapes(model: mujoco.MjModel) -> None:
 def _check_objects(model: mujoco.MjModel) -> None:
     if model.njnt > MOST_OBJECTS:
         raise _invalid(f"must have <= {MOST_OBJECTS} <freejoint>, got {model.njnt}")
-    inside = set(range(1, model.nbody)).difference(_object_bodies(model))
+    inside = set(range(1, model.nbody)).difference(model.jnt_bodyid.tolist())
     for body in sorted(inside):
         if model.body_weldid[body]:
             where = f"<body name={model.body(body).name!r}>"
