@@ -61,7 +61,7 @@ def list_plugins(arguments: list[str], kinds: Sequence[Kind]) -> int:
     """Run ``revolve plugins``; return 0, or 1 if a module cannot be loaded."""
     options = list_flags().parse_args(arguments)
     allow(options.plugins)
-    rows = [*_built_in(kinds), *_found(kinds)]
+    rows = list(_offered(kinds))
     if options.json:
         print(json.dumps([row._asdict() for row in rows], indent=1))
     else:
@@ -71,14 +71,11 @@ def list_plugins(arguments: list[str], kinds: Sequence[Kind]) -> int:
     return 0 if all(row.kind for row in rows) else 1
 
 
-def _built_in(kinds: Sequence[Kind]) -> Iterator[Listed]:
+def _offered(kinds: Sequence[Kind]) -> Iterator[Listed]:
+    """Yield built-in plug-ins, then those of packages and modules of ``--plugins``."""
     for kind in kinds:
         for name, plugin in kind.built_in.items():
             yield Listed(kind.name, name, place_of(name, plugin), BUILT_IN)
-
-
-def _found(kinds: Sequence[Kind]) -> Iterator[Listed]:
-    """Yield what installed packages and the modules of ``--plugins`` offer."""
     installed = [entry.module for entry in entry_points(group=GROUP)]
     entries = [entry.partition("=")[0] for entry in allowed()]
     named = [entry.rpartition("/")[2].removesuffix(".py") for entry in entries]

@@ -120,17 +120,15 @@ def sweep_points(sweep: Sweep) -> list[Point]:
     Raises:
         ExperimentError: more points than are allowed.
     """
-    size = sweep.samples or math.prod(map(_size, sweep.settings.values()))
+    settings = sweep.settings.values()
+    sizes = (each.steps if isinstance(each, Range) else len(each) for each in settings)
+    size = sweep.samples or math.prod(sizes)
     check_most(size, MOST_SWEEP_POINTS, "points", "sweep", ExperimentError)
     if sweep.samples:
         rows: Iterable[tuple[Any, ...]] = zip(*_latin_hypercube(sweep), strict=True)
     else:
         rows = product(*map(_values, sweep.settings.values()))
     return [dict(zip(sweep.settings, row, strict=True)) for row in rows]
-
-
-def _size(values: tuple[Any, ...] | Range) -> int:
-    return values.steps if isinstance(values, Range) else len(values)
 
 
 def _values(values: tuple[Any, ...] | Range) -> list[Any]:

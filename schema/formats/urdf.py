@@ -91,7 +91,10 @@ def _joint(
     """Return the joint between a body and its parent."""
     body = int(model.jnt_bodyid[joint])
     parent = model.body(int(model.body_parentid[body])).name
-    made = ET.Element("joint", name=model.joint(joint).name, type=_kind(model, joint))
+    kind = "revolute" if model.jnt_limited[joint] else "continuous"
+    if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+        kind = "prismatic"
+    made = ET.Element("joint", name=model.joint(joint).name, type=kind)
     made.append(_origin(model.body_pos[body], model.body_quat[body]))
     ET.SubElement(made, "parent", link=parent)
     ET.SubElement(made, "child", link=model.body(body).name)
@@ -104,13 +107,6 @@ def _joint(
     damping = float(model.dof_damping[model.jnt_dofadr[joint]])
     ET.SubElement(made, "dynamics", damping=repr(damping))
     return made
-
-
-def _kind(model: mujoco.MjModel, joint: int) -> str:
-    """Return URDF's type of a joint."""
-    if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
-        return "prismatic"
-    return "revolute" if model.jnt_limited[joint] else "continuous"
 
 
 def _origin(position: Floats, quaternion: Floats) -> ET.Element:
