@@ -22,7 +22,10 @@ def with_ids(
     ids = {
         "body.parts": [shown(name) for name in parts],
         "brain.neurons": [shown(name) for name in neurons],
-        "brain.connections": [link_name(*ends) for ends in connections],
+        "brain.connections": [
+            f"connection {shown(source)} -> {shown(target)}"
+            for source, target in connections
+        ],
     }
 
     def named(found: re.Match[str]) -> str:
@@ -33,8 +36,3 @@ def with_ids(
         return f"{stem}: " if dot else stem
 
     return _INDEXED.sub(named, message)
-
-
-def link_name(source: str, target: str) -> str:
-    """Return the name of a connection for messages."""
-    return f"connection {shown(source)} -> {shown(target)}"
