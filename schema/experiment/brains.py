@@ -84,11 +84,7 @@ def types_of(
 
 
 def neuron_kinds(brain: BrainSection, space: Space) -> NeuronKinds:
-    """Return the types of output and hidden neurons that robots may have, by name.
-
-    Raises:
-        ExperimentError: no such type, a broken contract, or wrong parameters.
-    """
+    """Return the neuron types that robots may have; errors as of ``types_of``."""
     if ":" in brain.type:
         return _own_brain(brain, space.neuron_types).neurons
     built_in = load_object(brain.type, _TYPE, _BUILT_IN)
@@ -101,12 +97,9 @@ def brain_half(
     space: Space,
     built_in: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], Half]],
 ) -> Half:
-    """Return the half of an experiment's brain type that one room needs.
+    """Return the half of a brain type that one room needs; errors as of ``types_of``.
 
     ``built_in`` has that half of the built-in types, by short name.
-
-    Raises:
-        ExperimentError: no such type, a broken contract, or wrong parameters.
     """
     if ":" in brain.type:
         # An own class has both halves.

@@ -108,11 +108,7 @@ def object_count(environment: Environment, simulation: Simulation) -> int:
 
 
 def refuse_objects(environment: Environment, simulation: Simulation) -> None:
-    """Raise if the scenery of an arena has objects.
-
-    Raises:
-        ExperimentError: it has some, or is not valid.
-    """
+    """Raise ``ExperimentError`` if the scenery of an arena has objects, or is wrong."""
     if count := object_count(environment, simulation):
         raise _invalid(
             f"arenas have no objects that move, got {count} <freejoint>; remove them"

@@ -156,11 +156,7 @@ def arena_settings_of(experiment: Experiment) -> ArenaSettings:
 
 
 def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
-    """Return the JSON that every request to advance an arena holds.
-
-    Raises:
-        ExperimentError: the experiment has no arena.
-    """
+    """Return the JSON that every request to advance an arena holds."""
     return msgspec.json.encode(replace(arena_settings_of(experiment), origin=origin))
 
 

@@ -111,11 +111,7 @@ def _digest(root: ET.Element) -> str:
 
 
 def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
-    """Return the robot and the settings of a file.
-
-    Raises:
-        InvalidRobot: as ``robot_from_mjcf``, or the file cannot be read.
-    """
+    """Return the robot and the settings of a file; errors as of ``robot_from_mjcf``."""
     text = text_of(path, str(path), most=MOST_MJCF_BYTES, kind=InvalidRobot)
     return robot_from_mjcf(text, str(path))
 

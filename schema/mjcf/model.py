@@ -203,9 +203,6 @@ def add_ground(
     """Add the infinite plane z = 0, named ``ground``, rough ground and scenery.
 
     Rough ground becomes the geom ``rough``, scenery ``scenery/{k}``.
-
-    Raises:
-        ExperimentError: invalid scenery.
     """
     spec.worldbody.add_geom(
         name="ground",

@@ -113,11 +113,7 @@ def allow_kept(
 
 
 def refuse_other(folder: Path, kept: Mapping[str, KeptPlugin]) -> None:
-    """Raise unless this process uses the sources that a folder was made with.
-
-    Raises:
-        ExperimentError: a source differs.
-    """
+    """Raise unless this process uses the sources that a folder was made with."""
     for name, note in kept.items():
         digest = digest_in_use(name)
         if digest == note.digest:

@@ -154,11 +154,7 @@ def check_neurons(brain: Brain, kinds: NeuronKinds) -> None:
 
 
 def check_widths(brain: Brain, width: Widths) -> None:
-    """Raise if a brain has more neurons than an experiment allows.
-
-    Raises:
-        InvalidRobot: more input, output or hidden neurons.
-    """
+    """Raise ``InvalidRobot`` if a brain has more neurons than an experiment allows."""
     limits: dict[Layer, tuple[str, int]] = {
         "input": ("max_inputs", width.inputs),
         "output": ("max_outputs", width.outputs),

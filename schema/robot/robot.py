@@ -123,11 +123,7 @@ def check_robot(
 
 
 def check_number(robot: Robot) -> None:
-    """Raise if a robot has more parts or neurons than one in a file may have.
-
-    Raises:
-        InvalidRobot: it has more.
-    """
+    """Raise ``InvalidRobot`` if a robot has more parts or neurons than a file may."""
     check_most(len(robot.parts), MOST_PARTS, "parts", "body", InvalidRobot)
     neurons = len(robot.brain.neurons)
     check_most(neurons, MOST_NEURONS, "neurons", "brain", InvalidRobot)
