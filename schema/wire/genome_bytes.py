@@ -24,17 +24,16 @@ def encode_genome(genome: Genome) -> bytes:
     """Return the bytes of a genome; equal genomes give equal bytes."""
     nodes: list[bytes] = []
     for node, parent, parent_slot in walk(genome):
+        numbers = node.parameters
         place = parent, parent_slot, node.slot, node.orientation
-        part = (
-            _place(node.kind, *place)
-            + _packed(_PART_PARAMETERS, node.parameters)
-            + _gene(node.gene)
-        )
+        head, packed = _part(node.kind, place, len(numbers))
+        part = head + packed.pack(*numbers) + _gene(node.gene)
         fields = [_PART, _varint(len(part)), part]
         for key, neurons in ((_OUTPUT, node.outputs), (_HIDDEN, node.hidden)):
             for gene in neurons:
-                data = _kind(gene.kind) + _packed(_NEURON_PARAMETERS, gene.parameters)
-                fields += key, _varint(len(data)), data
+                numbers = gene.parameters
+                head, packed = _neuron(gene.kind, len(numbers))
+                fields += key, head, packed.pack(*numbers)
         for connection in node.connections:
             kept = _connections.get(id(connection))
             fields.append(kept[1] if kept else _connection(connection))
@@ -43,14 +42,9 @@ def encode_genome(genome: Genome) -> bytes:
     return b"".join(nodes)
 
 
-def _packed(key: bytes, numbers: tuple[float, ...]) -> bytes:
-    """Return a repeated field; nothing if it is empty."""
-    head, packer = _head(key, len(numbers))
-    return head + packer.pack(*numbers)
-
-
 @cache
-def _head(key: bytes, count: int) -> tuple[bytes, Struct]:
+def _numbers(key: bytes, count: int) -> tuple[bytes, Struct]:
+    """Return what precedes the numbers of a repeated field, and their packer."""
     return key + _varint(8 * count) if count else b"", Struct(f"<{count}d")
 
 
@@ -63,13 +57,14 @@ def _varint(number: int) -> bytes:
 
 
 @lru_cache(_MOST_KEPT)
-def _place(
-    kind: str, parent: int, parent_slot: int, slot: int, orientation: int
-) -> bytes:
-    """Return the fields of a part before its parameters."""
-    part = pb.Part(kind=kind, parent=parent, parent_slot=parent_slot)
-    part.slot, part.orientation = slot, orientation
-    return part.SerializeToString()
+def _part(
+    kind: str, place: tuple[int, int, int, int], count: int
+) -> tuple[bytes, Struct]:
+    """Return what precedes the parameters of a part, and their packer."""
+    part = pb.Part(kind=kind)
+    part.parent, part.parent_slot, part.slot, part.orientation = place
+    head, packed = _numbers(_PART_PARAMETERS, count)
+    return part.SerializeToString() + head, packed
 
 
 @lru_cache(_MOST_KEPT)
@@ -78,8 +73,11 @@ def _gene(gene: int) -> bytes:
 
 
 @lru_cache(_MOST_KEPT)
-def _kind(kind: str) -> bytes:
-    return pb.NeuronGene(kind=kind).SerializeToString()
+def _neuron(kind: str, count: int) -> tuple[bytes, Struct]:
+    """Return what precedes the parameters of a neuron, its length first; as above."""
+    head, packed = _numbers(_NEURON_PARAMETERS, count)
+    data = pb.NeuronGene(kind=kind).SerializeToString() + head
+    return _varint(len(data) + packed.size) + data, packed
 
 
 def _connection(gene: ConnectionGene) -> bytes:
