@@ -7,7 +7,7 @@ function call, and convert it into a new genome.
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import count
-from operator import add, sub
+from operator import add
 from typing import NamedTuple, TypeVar
 
 from msgspec import Struct, field
@@ -255,7 +255,9 @@ class SizeCounts(NamedTuple):
 
     def minus(self, other: Counts) -> "SizeCounts":
         """Return what is left without other counts."""
-        return SizeCounts(*map(sub, self, other))
+        parts, inputs, outputs, hidden = self
+        p, i, o, h = other
+        return SizeCounts(parts - p, inputs - i, outputs - o, hidden - h)
 
 
 def size_limits(space: Space) -> SizeCounts:

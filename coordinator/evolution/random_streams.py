@@ -124,7 +124,9 @@ class BufferedRng:
             low, high = p.low, p.high
             near = rest * v + epsilon * (low + (high - low) * number())
             # Rounding must not carry a value out of its range.
-            moved.append(low if near < low else min(near, high))
+            if not low <= near <= high:
+                near = low if near < low else high
+            moved.append(near)
         return tuple(moved)
 
     def normal(self, mean: float, sd: float) -> float:

@@ -1,6 +1,5 @@
 """Tables of an unfinished run: killed at any byte, and on full disks."""
 
-import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -13,7 +12,7 @@ from coordinator.storage.recorder import BUFFERED, Recorder
 from schema.errors import RunFolderError
 from schema.tables.columns import POPULATION, TABLES
 from schema.tables.files import parquet_path, read_table
-from schema.tables.segments import segment_path, segments_of
+from schema.tables.segments import segment_path
 from tests.coordinator.conftest import DETAILS, Check, Feed, Make
 from tests.segments import write_segment
 
@@ -89,68 +88,6 @@ def test_rows_of_a_replaced_coordinator_count_once(
     new.close()
     third = feed_rows(tmp_path, rows)
     third.finish()
-    check_complete(tmp_path, rows)
-
-
-def test_a_segment_cut_at_any_byte_gives_exactly_its_whole_batches(
-    tmp_path: Path, make_records: Make
-) -> None:
-    rows = [record for record in make_records(2) if record.table == "births"]
-    recorder = Recorder(tmp_path, DETAILS)
-    path = segment_path(tmp_path, "births", 0)
-    ends = []
-    for record in rows:
-        recorder.write(record)
-        recorder.flush()
-        ends.append(path.stat().st_size)
-    recorder.close()
-    data = path.read_bytes()
-    whole = read_table(tmp_path, "births")
-    # All cuts near the end of a batch, and some in each eight bytes of the others.
-    near = {end + off for end in ends for off in range(-16, 17)}
-    for cut in sorted({*range(0, len(data), 5), *near} & set(range(len(data)))):
-        path.write_bytes(data[:cut])
-        kept = read_table(tmp_path, "births")
-        assert kept.num_rows == sum(end <= cut for end in ends)
-        assert kept.equals(whole.slice(0, kept.num_rows))
-
-
-def test_a_run_resumes_from_a_segment_cut_anywhere(
-    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
-) -> None:
-    rows = make_records(9)
-    first = tmp_path / "first"
-    first.mkdir()
-    feed_rows(first, rows[:15], every=4).close()
-    data = segment_path(first, "births", 0).read_bytes()
-    rng = np.random.default_rng(7)
-    for cut in [0, 1, len(data), *rng.integers(0, len(data), 25)]:
-        folder = tmp_path / f"run-{cut}"
-        (folder / "segments").mkdir(parents=True)
-        segment_path(folder, "births", 0).write_bytes(data[:cut])
-        recorder = feed_rows(folder, rows)
-        recorder.flush()
-        check_complete(folder, rows)
-        recorder.finish()
-        check_complete(folder, rows)
-
-
-def test_rows_behind_a_damaged_segment_are_written_again(
-    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
-) -> None:
-    rows = make_records(20)
-    feed_rows(tmp_path, rows[:20], every=5).close()
-    feed_rows(tmp_path, rows[:40], every=5).close()
-    path = segment_path(tmp_path, "births", 0)
-    os.truncate(path, path.stat().st_size * 3 // 4)
-    kept = read_table(tmp_path, "births").num_rows
-    assert 0 < kept < 8
-    recorder = feed_rows(tmp_path, rows)
-    recorder.flush()
-    check_complete(tmp_path, rows)
-    # The number of the segment that was of no use is free again.
-    assert [number for number, _ in segments_of(tmp_path, "births")] == [0, 1]
-    recorder.finish()
     check_complete(tmp_path, rows)
 
 
