@@ -64,15 +64,7 @@ class MigrationEpochs:
         seed: int,
         run: int,
     ) -> None:
-        """Initialise the first epoch.
-
-        Args:
-            experiment: settings of the island, migration included.
-            number: number of the island.
-            links: its neighbours.
-            seed: seed of the run.
-            run: number of the repeat, from 0.
-        """
+        """Initialise the first epoch; arguments as in ``Island``."""
         self.island = number
         self.links = links
         self.epoch = 0

@@ -148,11 +148,7 @@ def joined_name(experiments: Sequence[Experiment]) -> str:
 
 
 def _check_folders(experiments: Sequence[Experiment]) -> None:
-    """Raise unless names can be those of folders.
-
-    Raises:
-        ExperimentError: one cannot.
-    """
+    """Raise unless names can be those of folders."""
     for name in (experiment.name for experiment in experiments):
         if "/" in name or name.startswith("."):
             raise ExperimentError(
@@ -162,11 +158,7 @@ def _check_folders(experiments: Sequence[Experiment]) -> None:
 
 
 def _check_distinct(experiments: Sequence[Experiment]) -> None:
-    """Raise unless names differ.
-
-    Raises:
-        ExperimentError: two experiments have the same name.
-    """
+    """Raise unless names differ."""
     names = [experiment.name for experiment in experiments]
     for name in names:
         if names.count(name) > 1:
@@ -254,11 +246,7 @@ def campaign_plugins(folder: Path) -> dict[str, KeptPlugin]:
 
 
 def _read(folder: Path) -> "_Document":
-    """Return the content of a folder's ``campaign.toml``.
-
-    Raises:
-        RunFolderError: there is no campaign, or its description is damaged.
-    """
+    """Return the content of a folder's ``campaign.toml``."""
     try:
         text = read_small(folder / CAMPAIGN, MOST_DESCRIPTION).decode("utf-8")
         found = msgspec.convert(tomllib.loads(text), type=_Document)

@@ -335,12 +335,7 @@ class TableFile:
         return self._numbered(columns, len(rows))
 
     def _numbered(self, columns: dict[str, pa.Array], rows: int) -> pa.RecordBatch:
-        """Return a batch of the next rows, with record numbers and those of the run.
-
-        Args:
-            columns: of ``ROWS``, by name.
-            rows: their number.
-        """
+        """Return a batch of the next rows, with record numbers and those of the run."""
         columns["record"] = pa.array(
             range(self._stored, self._stored + rows), pa.int64()
         )

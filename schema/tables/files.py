@@ -127,12 +127,7 @@ def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 
 
 def _read_together(counts: Mapping[int, int], most: int) -> Iterator[list[int]]:
-    """Yield all islands in order, in groups that are read in one pass.
-
-    Args:
-        counts: number of rows by island.
-        most: rows of a group of several islands.
-    """
+    """Yield all islands in order; groups of several have at most ``most`` rows."""
     group: list[int] = []
     rows = 0
     for island in sorted(counts):

@@ -73,13 +73,7 @@ def grow_brain(
 def _connections(
     network: CppnGenome, neurons: Sequence[Neuron], at: np.ndarray[tuple[int, int]]
 ) -> tuple[Connection, ...]:
-    """Return the connections whose output ``link`` is above 0.
-
-    Args:
-        network: the genome.
-        neurons: N neurons in the order of the brain.
-        at: (N, 4) of their places.
-    """
+    """Return the connections whose output ``link`` is above 0; places are (N, 4)."""
     targets = [i for i, neuron in enumerate(neurons) if neuron.layer != "input"]
     ends = [(source, target) for source in range(len(neurons)) for target in targets]
     if not ends:

@@ -17,12 +17,7 @@ class BrainParameters:
     """
 
     def __init__(self, rules: Learning, kinds: NeuronKinds) -> None:
-        """Initialise.
-
-        Args:
-            rules: the section ``learning``.
-            kinds: neuron types of the experiment.
-        """
+        """Initialise."""
         low, high = rules.weight_limits
         self._weight = Parameter("weight", low, high, low)
         self._has_weights = rules.what != "neurons"
