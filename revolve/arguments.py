@@ -21,12 +21,6 @@ def whole_number(
 ) -> int:
     """Return an argument that is a whole number.
 
-    Args:
-        name: of the argument, for messages.
-        value: of the argument; an integer of Python or NumPy.
-        least: smallest number allowed.
-        most: greatest number allowed.
-
     Raises:
         RevolveError: anything else.
     """

@@ -9,7 +9,6 @@ import os
 import signal
 import sys
 from multiprocessing.connection import Connection
-from typing import Any, TextIO, cast
 
 import msgspec
 
@@ -17,8 +16,6 @@ from revolve.command import main as run_command
 from schema.agent.supervisor import prepare_process, stop_with_input
 
 _SIMULATE = "simulate"
-_MISTAKE = 2
-"""Exit code after a user's error."""
 
 
 def main(words: list[str]) -> int:
@@ -37,7 +34,7 @@ def main(words: list[str]) -> int:
 
 
 def _run(connection: Connection) -> int:
-    """Run the command of ``sys.argv``; send the error or the line that it ends with."""
+    """Run the command of ``sys.argv``; send the error that it ends with."""
     is_told = False
 
     def tell(error: Exception) -> None:
@@ -47,35 +44,17 @@ def _run(connection: Connection) -> int:
         is_told = True
         connection.send_bytes(msgspec.msgpack.encode(problem_of(error)))
 
-    written = _StandardError(sys.stderr)
-    sys.stderr = cast("TextIO", written)
     try:
         code = run_command(tell=tell)
     except SystemExit as end:
         # Of a parser, which has written what is wrong.
         code = end.code if isinstance(end.code, int) else 1
-    if code == _MISTAKE and written.last_line and not is_told:
-        from schema.errors import RevolveError  # noqa: PLC0415 - as above
+    from schema.agent.flags import Flags  # noqa: PLC0415 - as above
+    from schema.errors import RevolveError  # noqa: PLC0415 - as above
 
-        tell(RevolveError(written.last_line))
+    if Flags.last_error and not is_told:
+        tell(RevolveError(Flags.last_error))
     return code
-
-
-class _StandardError:
-    """Standard error that remembers the last line that this process writes."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self.last_line = ""
-
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - of any attribute
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        """Write a text."""
-        if lines := text.strip().splitlines():
-            self.last_line = lines[-1]
-        return self._stream.write(text)
 
 
 def _serve(connection: Connection) -> int:

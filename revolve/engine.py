@@ -77,7 +77,6 @@ class Engine:
         self._find_fault = find_fault
         self._give_up_after_s = give_up_after_s
         self._orders: SimpleQueue[WantedJob] = SimpleQueue()
-        self._cancelled: SimpleQueue[Future[Any]] = SimpleQueue()
         self._client = Client(
             unique_name(f"python-{socket.gethostname()[:40]}"), _EPOCH
         )
@@ -126,7 +125,6 @@ class Engine:
         with self._lock:
             self.check()
             self._orders.put(order)
-        order.future.add_done_callback(self._note_cancelled)
         self._network.wake()
 
     def close(self) -> None:
@@ -135,11 +133,6 @@ class Engine:
         if self._owner == os.getpid():
             self._network.wake()
             self._thread.join()
-
-    def _note_cancelled(self, future: "Future[Any]") -> None:
-        if future.cancelled():
-            self._cancelled.put(future)
-            self._network.wake()
 
     def _run(self) -> None:
         why = _CLOSED
@@ -178,7 +171,6 @@ class Engine:
         while not self._is_closing:
             for order in _all_of(self._orders):
                 self._request(fleet, order)
-            self._withdraw(fleet)
             ends = fleet.listen(_WAIT_S, time.monotonic())
             for end in ends.get(self._client, ()):
                 assert isinstance(end, Deliver)
@@ -208,7 +200,11 @@ class Engine:
         return f"{joined} and cannot do the jobs, the last of them {agent}: {why}"
 
     def _do_chores(self, fleet: JobRouter) -> None:
-        """Tell the user what is wrong with agents."""
+        """Drop the jobs of cancelled futures; tell what is wrong with agents."""
+        for number, order in list(self._open.items()):
+            if order.future.cancelled():
+                del self._open[number]
+                fleet.tell(Withdrawn(number))
         for fenced in fleet.fenced():
             fleet.faults.note("fenced", fenced.agent, fenced.reason)
         for line in fleet.faults.lines():
@@ -236,15 +232,6 @@ class Engine:
         about = (self._client, order, read, order.simulated_s)
         fleet.request(Job(number, order.kind, encode(request), -1, *about))
 
-    def _withdraw(self, fleet: JobRouter) -> None:
-        """Drop the jobs of cancelled futures."""
-        cancelled = set(map(id, _all_of(self._cancelled)))
-        if cancelled:
-            for number, order in list(self._open.items()):
-                if id(order.future) in cancelled:
-                    del self._open[number]
-                    fleet.tell(Withdrawn(number))
-
     def _settle(self, end: Deliver) -> None:
         order = self._open.pop(end.job.number, None)
         if order is None or not order.future.set_running_or_notify_cancel():
@@ -259,8 +246,8 @@ class Engine:
 
 def _all_of(queue: "SimpleQueue[Any]") -> list[Any]:
     """Remove and return all entries of a queue."""
-    found = []
+    entries = []
     with suppress(Empty):
         while True:
-            found.append(queue.get_nowait())
-    return found
+            entries.append(queue.get_nowait())
+    return entries

@@ -61,10 +61,6 @@ def main(arguments: list[str]) -> int:
 
     Returns:
         0 if done, 1 if refused.
-
-    Raises:
-        NetworkError: no coordinator answers, or several have such a run.
-        InvalidRobot: the file holds no robot.
     """
     options = parser().parse_args(arguments[1:])
     action = _action(options)

@@ -1,7 +1,7 @@
 """Deployment of a run: its network, its own processes, its viewer."""
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -113,13 +113,9 @@ def connected_agents(
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
         # All at once before one is waited for: their grace times run together.
-        stack.callback(_terminate, pools)
+        for pool in pools:
+            stack.callback(pool.terminate)
         yield network, pools
-
-
-def _terminate(pools: Iterable[ProcessPool]) -> None:
-    for pool in pools:
-        pool.terminate()
 
 
 def _remove(file: Path, text: str) -> None:

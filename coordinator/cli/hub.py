@@ -19,11 +19,7 @@ from schema.agent.supervisor import stop_on_signals
 
 
 def main(arguments: list[str]) -> int:
-    """Route messages until Ctrl-C; return the exit code.
-
-    Raises:
-        NetworkError: an address that cannot be listened on, or invalid certificates.
-    """
+    """Route messages until Ctrl-C; return the exit code."""
     options = parser().parse_args(arguments[1:])
     start_log("hub", as_json=options.log_json)
     tls, certificates = tls_of(options), access_of(options)

@@ -34,9 +34,6 @@ def main(arguments: list[str]) -> int:
     Returns:
         0 if all events are printed, 1 if the journal is damaged behind them, or has
         none of the birth or island that the flags name.
-
-    Raises:
-        RunFolderError: the folder holds no run, or the run no journal.
     """
     options = parser().parse_args(arguments[1:])
     selection = EventFilter(options.island, *options.birth)

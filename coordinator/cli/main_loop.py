@@ -41,8 +41,7 @@ def execute_runs(
 ) -> RunScheduler:
     """Execute runs until all are finished or a signal stops them.
 
-    Returns:
-        The scheduler, stopped: what is finished and what failed.
+    The scheduler that it returns knows what is finished and what failed.
     """
     stop = stop_on_signals()
     with ExitStack() as stack:

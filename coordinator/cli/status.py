@@ -60,10 +60,6 @@ def main(arguments: list[str]) -> int:
 
     Returns:
         0 if done, 1 if a run is damaged or has failed.
-
-    Raises:
-        NetworkError: no coordinator answers at the address.
-        RunFolderError: the folder holds no run and no campaign.
     """
     flags = parser()
     options = flags.parse_args(arguments[1:])

@@ -53,9 +53,6 @@ def issue(
         now: the time, in UTC.
         days: how long it is valid [d], if the authority is valid as long.
 
-    Returns:
-        When the certificate expires, in UTC.
-
     Raises:
         RevolveError: the authority's files cannot be read, or it has expired.
     """

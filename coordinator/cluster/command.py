@@ -23,11 +23,7 @@ RESTART = "copy members/hub/access.json to the hub, and restart it"
 
 
 def main(arguments: list[str]) -> int:
-    """Create or change a kit, or list its certificates; return the exit code.
-
-    Raises:
-        RevolveError: no kit, a name that is used or unknown, or a full disk.
-    """
+    """Create or change a kit, or list its certificates; return the exit code."""
     options = parser().parse_args(arguments[1:])
     folder = Path(options.folder)
     if options.action == "init":
@@ -43,7 +39,8 @@ def main(arguments: list[str]) -> int:
         kit.revoke(options.name)
         print(f"{options.name} is revoked as soon as you {RESTART}")
     else:
-        names = [options.name] if options.name else _valid(kit)
+        valid = [one.name for one in kit.cluster.members if not one.is_revoked]
+        names = [options.name] if options.name else valid
         for name in names:
             kit.renew(name)
             print(f"copy {folder / 'members' / name} to its machine")
@@ -77,11 +74,6 @@ def _init(folder: Path, options: argparse.Namespace) -> None:
         "  revolve worker\n"
         f"samples for systemd, SLURM, Compose and Apptainer: {folder / 'samples'}"
     )
-
-
-def _valid(kit: Kit) -> list[str]:
-    """Return the names of all certificates that are not revoked."""
-    return [member.name for member in kit.cluster.members if not member.is_revoked]
 
 
 def _list(kit: Kit) -> None:

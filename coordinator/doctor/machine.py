@@ -96,12 +96,7 @@ def check_viewer(*, has_package: bool, no_screen: str) -> Finding:
 
 
 def check_pictures(code: int | None, output: str) -> Finding:
-    """Check that robots can be rendered.
-
-    Args:
-        code: exit code of a process that tried to; None: it did not end in time.
-        output: its last line.
-    """
+    """Check that robots can be rendered."""
     is_late, late = code is None, "not rendered in time"
     number = code or 0
     ended = f"ended by signal {-number}" if number < 0 else f"exit code {number}"

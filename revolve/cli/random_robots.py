@@ -16,10 +16,6 @@ def main(arguments: list[str]) -> int:
     """Write random robots, one file each, and return the exit code.
 
     They are the founders, vetted, of the experiment's first run with the seed.
-
-    Raises:
-        ExperimentError: no such experiment, or it allows (nearly) no robot.
-        InvalidRobot: a file cannot be written.
     """
     options = parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)

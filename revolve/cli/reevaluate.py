@@ -25,13 +25,7 @@ _EXAMPLES = {
 
 
 def main(arguments: list[str]) -> int:
-    """Re-evaluate robots, write table and figure, and return the exit code.
-
-    Raises:
-        RunFolderError: no run, an unfinished one, or a folder that cannot be written.
-        MissingExtra: a library is not installed.
-        RevolveError: no worker is left.
-    """
+    """Re-evaluate robots, write table and figure, and return the exit code."""
     command, *words = arguments
     options = parser(command).parse_args(words)
     allow(options.plugins)

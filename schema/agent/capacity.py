@@ -54,11 +54,6 @@ def system_text(file: Path) -> str:
 
 
 def shards_that_fit(memory: int, processes: int) -> int:
-    """Return how many arenas each of several processes can keep, at least one.
-
-    Args:
-        memory: of the machine [bytes].
-        processes: that share it.
-    """
+    """Return how many arenas each of several processes can keep in a memory [bytes]."""
     fit = int(_SHARE * memory) // (SHARD_BYTES * processes)
     return max(1, min(fit, MOST_SHARDS))

@@ -146,11 +146,7 @@ def add_shared(flags: argparse.ArgumentParser, *names: str) -> None:
 
 
 def access_of(options: argparse.Namespace) -> tuple[Certificate, ...] | None:
-    """Return the certificates that ``--access`` lists; None without it.
-
-    Raises:
-        NetworkError: the file cannot be read or is invalid.
-    """
+    """Return the certificates that ``--access`` lists; None without it."""
     return tuple(read_certificates(Path(options.access))) if options.access else None
 
 
@@ -203,11 +199,7 @@ def host_name() -> str:
 def agent_of(
     options: argparse.Namespace, role: Role, name: str, *, tls: Tls | None
 ) -> Agent:
-    """Return an agent with the fleet, limits and plug-ins of a command line.
-
-    Raises:
-        NetworkError: an invalid name of a fleet.
-    """
+    """Return an agent with the fleet, limits and plug-ins of a command line."""
     return Agent(
         role,
         name,

@@ -26,6 +26,8 @@ class Flags(argparse.ArgumentParser):
         settings: those of argparse.
     """
 
+    last_error = ""
+
     def __init__(
         self,
         *,
@@ -37,7 +39,8 @@ class Flags(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print the error and where to find help; exit with status 2."""
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        Flags.last_error = f"{self.prog}: {message} (see {self.prog} --help)"
+        self.exit(2, f"{self.last_error}\n")
 
     def format_help(self) -> str:
         """Return the help, with the examples at the end."""

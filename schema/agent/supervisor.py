@@ -182,11 +182,7 @@ class ProcessPool:
         return [place.process for place in self._places if place.process]
 
     def look_after(self) -> list[str]:
-        """Start missing processes, each at most once a second.
-
-        Returns:
-            A line about each process that has ended, for the user.
-        """
+        """Start missing processes, each once a second at most; return what ended."""
         now_s = time.monotonic()
         lines = []
         for place in self._places:

@@ -76,20 +76,6 @@ def test_a_flag_has_the_same_description_in_all_commands(
     assert different == {}
 
 
-def test_descriptions_of_flags_that_all_roles_share_are_equal_to_the_letter(
-    parsers: dict[str, Flags],
-) -> None:
-    shared = ("--fleet", "--tls-ca", "--tls-key", "--plugins", "--log-json", "--access")
-    for flag in shared:
-        helps = {
-            action.help
-            for parser in parsers.values()
-            for action in parser._actions
-            if flag in action.option_strings
-        }
-        assert len(helps) == 1, flag
-
-
 def test_help_of_a_command_is_that_of_its_flag(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -3,7 +3,6 @@
 import re
 from pathlib import Path
 
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from msgspec.structs import replace
@@ -165,29 +164,3 @@ def test_robots_have_their_recorded_fitness_without_changes(
     for one in chosen:
         alone = evaluate(plain(one.robot), one.settings, one.identity)
         assert alone.fitness == one.row["recorded"]
-
-
-def test_failed_robots_are_not_the_best(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A failed evaluation counts as 0, and all others have a fitness below 0."""
-    monkeypatch.chdir(tmp_path)
-    Path("below.py").write_text(
-        "def fitness(track, _fitness):\n"
-        "    x = track.core_position[:, 0]\n"
-        "    # Not on the short and long tracks of the check.\n"
-        "    is_undefined = len(x) == 5 and x[-1] > x[0]\n"
-        "    return float('nan') if is_undefined else -1.0 - abs(x[-1] - x[0])\n"
-    )
-    text = f'{SHORT}[fitness]\nfunction = "below:fitness"\n'
-    Path("below.toml").write_text(text.replace("[robust]\ndraws = 2\n", ""))
-    words = ["run", "below.toml", "--seed", "3", "--in-process", "--quiet"]
-    assert main([*words, "--births", "8", "--out", "a"]) == 0
-    evaluations = rv.read("a").evaluations
-    assert evaluations["status"].to_pylist().count("failed") in range(1, 7)
-    greatest = pc.max(evaluations["fitness"]).as_py()
-    for most in (1, 2):
-        chosen = chosen_robots([Path("a")], most)
-        assert [one.row["recorded"] for one in chosen if one.row["is_best"]] == [
-            greatest
-        ]

@@ -115,10 +115,6 @@ def test_the_document_has_these_keys_and_values() -> None:
     )
 
 
-def test_the_time_left_is_unknown_without_a_rate() -> None:
-    assert RunStatus("/x", "x", 0, "running", 0.0, HALF.islands).left_s is None
-
-
 def test_a_damaged_run_is_shown_beside_the_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
