@@ -71,73 +71,74 @@ def test_no_line_is_wider_than_the_terminal(width: int) -> None:
     assert "best 0.512" in islands[-1]
 
 
+def waiting(
+    capsys: pytest.CaptureFixture[str],
+    *steps: tuple[float, Status],
+    active: tuple[Any, ...] = (),
+    **settings: Any,  # noqa: ANN401 - of Display
+) -> list[str]:
+    """Return what a display writes about waiting; steps are its times [s]."""
+    current = steps[0][1]
+    scheduler: Any = SimpleNamespace(active=active, status=lambda _now_s: current)
+    with Display(scheduler, **{"quiet": False, **settings}) as display:
+        for now_s, status in steps:
+            current = status
+            display.update(now_s)
+    lines = capsys.readouterr().err.splitlines()
+    return [line.partition("waiting")[2] for line in lines if "waiting" in line]
+
+
+def without(workers: int, analyzers: int, **settings: Any) -> Status:  # noqa: ANN401
+    run = RunStatus("/r", "a", 0, "running", 0.0, (_ISLAND,))
+    return Status((run,), workers, analyzers, 0.0, **settings)
+
+
 @pytest.mark.parametrize("is_quiet", [False, True])
 def test_a_run_without_agents_says_how_to_start_some(
     capsys: pytest.CaptureFixture[str], *, is_quiet: bool
 ) -> None:
-    status = Status((RunStatus("/r", "a", 0, "running", 0.0, (_ISLAND,)),), 0, 0, 0.0)
-    scheduler: Any = SimpleNamespace(active=[], status=lambda _now_s: status)
-    waiting = "waiting for workers and analyzers: none is connected"
+    missing = " for workers and analyzers: none is connected"
     how = (
         "; to start some on this machine: revolve worker --connect runs/a --plugins "
-        "own.py, revolve analyzer --connect runs/a --plugins own.py\n"
+        "own.py, revolve analyzer --connect runs/a --plugins own.py"
     )
-    for place, seconds, told in (
-        ("runs/a", (0.0, 3.0, 30.0), f"{waiting}{how}"),
-        ("", (0.0, 3.0), ""),
-        ("", (0.0, 11.0), f"{waiting}\n"),
+    for place, times_s, told in (
+        ("runs/a", (0.0, 3.0, 30.0), [f"{missing}{how}"]),
+        ("", (0.0, 3.0), []),
+        ("", (0.0, 11.0), [missing]),
     ):
-        with Display(
-            scheduler, quiet=is_quiet, place=place, plugins=["own.py"]
-        ) as display:
-            for now_s in seconds:
-                display.update(now_s)
-        lines = capsys.readouterr().err.splitlines(keepends=True)
-        assert "".join(line for line in lines if "waiting" in line) == told
+        steps = [(now_s, without(0, 0)) for now_s in times_s]
+        found = waiting(capsys, *steps, quiet=is_quiet, place=place, plugins=["own.py"])
+        assert found == told
 
 
 def test_a_run_whose_jobs_no_worker_can_do_says_so_once(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    status = Status((RunStatus("/r", "a", 0, "waiting", 0.0, (_ISLAND,)),), 1, 1, 0.0)
     folder = SimpleNamespace(path=Path("runs/all/a-0"))
     run = SimpleNamespace(
         lacking=["worker"], held=folder, waiting={0: ""}, recovery=None
     )
-    scheduler: Any = SimpleNamespace(active=[run], status=lambda _now_s: status)
-    with Display(scheduler, quiet=False) as display:
-        for now_s in (0.0, 1.0, 30.0):
-            display.update(now_s)
-    lines = [line for line in capsys.readouterr().err.splitlines() if "jobs" in line]
-    assert len(lines) == 1
-    assert lines[0].endswith("waiting: a-0: none of the workers can do its jobs")
+    steps = [(now_s, without(1, 1)) for now_s in (0.0, 1.0, 30.0)]
+    told = waiting(capsys, *steps, active=(run,))
+    assert told == [": a-0: none of the workers can do its jobs"]
 
 
 def test_a_run_that_misses_others_than_before_says_so_again(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    run = RunStatus("/r", "a", 0, "running", 0.0, (_ISLAND,))
-    shown_status = [Status((run,), workers=0, analyzers=0, births_per_s=0.0)]
-    scheduler: Any = SimpleNamespace(active=[], status=lambda _now_s: shown_status[0])
-    with Display(scheduler, quiet=False, place="runs/a") as display:
-        display.update(0.0)
-        display.update(3.0)
-        shown_status[0] = Status((run,), workers=1, analyzers=0, births_per_s=0.0)
-        display.update(6.0)
-        display.update(9.0)
-        refused = (PeerFault("refused", "w-0", 1),)
-        shown_status[0] = Status((run,), 0, 1, 0.0, faults=refused)
-        display.update(12.0)
-        display.update(15.0)
-    lines = capsys.readouterr().err.splitlines()
-    waiting = [line.partition("waiting for ")[2] for line in lines if "waiting" in line]
+    refused = without(0, 1, faults=(PeerFault("refused", "w-0", 1),))
+    states = [without(0, 0), without(1, 0), refused]
+    steps = [(3.0 * number, states[number // 2]) for number in range(6)]
     how = "none is connected; to start some on this machine: "
     unfit = how.replace("none is connected", "none that is connected can do the jobs")
-    analyzer = "revolve analyzer --connect runs/a"
-    assert waiting == [
-        f"workers and analyzers: {how}revolve worker --connect runs/a, {analyzer}",
-        f"analyzers: {how}{analyzer}",
-        f"workers: {unfit}revolve worker --connect runs/a",
+    worker, analyzer = (
+        f"revolve {role} --connect runs/a" for role in ("worker", "analyzer")
+    )
+    assert waiting(capsys, *steps, place="runs/a") == [
+        f" for workers and analyzers: {how}{worker}, {analyzer}",
+        f" for analyzers: {how}{analyzer}",
+        f" for workers: {unfit}{worker}",
     ]
 
 

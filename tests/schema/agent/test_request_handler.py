@@ -216,12 +216,8 @@ def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None
     made = server(raising(error))
     assert made.reply(request()) == Reply(reason=reason)
     assert made.counts.refused == 1
-
-
-@pytest.mark.parametrize("error", [InvalidRobot, UnknownPlugin, ValueError])
-def test_reasons_are_short_printable_lines(error: type[Exception]) -> None:
-    """They quote the request, which may be long or meant for a terminal."""
-    quoted = error("\x1b[2J\n" + "x" * 10_000_000)
+    # It may quote the request, which may be long or meant for a terminal.
+    quoted = type(error)("\x1b[2J\n" + "x" * 10_000_000)
     reason = server(raising(quoted)).reply(request()).reason
     assert len(reason) == LONGEST_REASON
     assert reason.isprintable()
