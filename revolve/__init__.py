@@ -102,8 +102,8 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public object
     if line := stranger():
         raise ImportError(line)
     import_module("schema.agent.import_path").check_graphics()
-    found = globals()[name] = getattr(import_module(home), name)
-    return found
+    value = globals()[name] = getattr(import_module(home), name)
+    return value
 
 
 def __dir__() -> list[str]:

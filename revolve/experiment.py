@@ -99,9 +99,9 @@ class Experiment:
 
         docs/experiments.md has their meaning.
         """
-        found = _without_none(msgspec.to_builtins(self._document))
-        assert isinstance(found, dict)
-        return found
+        settings = _without_none(msgspec.to_builtins(self._document))
+        assert isinstance(settings, dict)
+        return settings
 
     def to_toml(self) -> str:
         """Return the experiment as a TOML text with all keys, of islands their own."""

@@ -60,6 +60,6 @@ def problem_of(error: Exception) -> Problem:
 def error_of(problem: Problem) -> RevolveError:
     """Return the error of a message."""
     kind = getattr(schema.errors, problem.kind, RevolveError)
-    found = kind(problem.line)
-    assert isinstance(found, RevolveError)
-    return found
+    error = kind(problem.line)
+    assert isinstance(error, RevolveError)
+    return error

@@ -83,7 +83,7 @@ class Robot:
         """
         named = None if experiment is None else document_of(experiment)
         try:
-            found, settings, own = read_with_settings(
+            robot, settings, own = read_with_settings(
                 Path(path), named, say=lambda _line: None
             )
         except InvalidRobot as error:
@@ -95,7 +95,7 @@ class Robot:
             sections = msgspec.structs.asdict(settings)
             del sections["ablation"]
             own = Document(name=Path(path).stem, **sections)
-        return cls(found.parts, found.brain, None if own is None else Experiment(own))
+        return cls(robot.parts, robot.brain, None if own is None else Experiment(own))
 
     @classmethod
     def random(
@@ -228,10 +228,10 @@ def checked(
     Raises:
         InvalidRobot: it is not well formed with these types.
     """
-    found = plain(robot)
-    check_number(found)
-    check_robot(found, *types)
-    return found
+    plainly = plain(robot)
+    check_number(plainly)
+    check_robot(plainly, *types)
+    return plainly
 
 
 def task_of(

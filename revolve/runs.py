@@ -130,12 +130,12 @@ class Run:
 
     def _birth(self, birth: BirthId) -> pa.Table:
         """Return the row of a birth."""
-        found = read_table(self.folder, "births", where=born_as(birth))
-        if not found.num_rows:
+        rows = read_table(self.folder, "births", where=born_as(birth))
+        if not rows.num_rows:
             raise RunFolderError(
                 f"{self.folder}: has no birth {birth.number} on island {birth.island}"
             )
-        return found
+        return rows
 
     def robots(self, births: pa.Table | None = None) -> list[Robot]:
         """Return the robots of some births, with the brains that they have learnt.
@@ -342,7 +342,7 @@ def _common(
 def _done(words: tuple[str, ...], folder: Path, *, progress: bool) -> Run:
     """Run a command; return the run that it has finished."""
     run_command(words, is_quiet=not progress)
-    found = Run(folder)
-    if found.state != "finished":
+    finished = Run(folder)
+    if finished.state != "finished":
         raise RevolveError(f"{folder}: not finished: revolve.resume continues it")
-    return found
+    return finished

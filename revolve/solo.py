@@ -24,10 +24,10 @@ _TASKS = msgspec.msgpack.Decoder(Task)
 def outcome_of(data: bytes) -> bytes:
     """Return the encoded outcome of an encoded task; no error passes."""
     try:
-        found = _done(_TASKS.decode(data))
+        outcome = _done(_TASKS.decode(data))
     except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
-        found = Outcome(problem=problem_of(error))
-    return msgspec.msgpack.encode(found)
+        outcome = Outcome(problem=problem_of(error))
+    return msgspec.msgpack.encode(outcome)
 
 
 def _done(task: Task) -> Outcome:

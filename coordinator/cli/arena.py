@@ -74,12 +74,12 @@ def main(arguments: list[str]) -> int:
 
 def _coordinator(options: argparse.Namespace) -> str:
     """Return the name of the coordinator whose run ``--run`` selects."""
-    found = ask_status(options)
-    runs = [run for status in found.values() for run in status.runs]
+    statuses = ask_status(options)
+    runs = [run for status in statuses.values() for run in status.runs]
     selected = selected_names(options.run, map(_name, runs))
     folders = {
         name: chosen
-        for name, status in found.items()
+        for name, status in statuses.items()
         if (chosen := [run.folder for run in status.runs if _name(run) in selected])
     }
     if len(folders) == 1:
@@ -89,7 +89,7 @@ def _coordinator(options: argparse.Namespace) -> str:
         return name
     raise NetworkError(
         f"{options.connect}: exactly one coordinator must have a run "
-        f"{options.run!r}, got {len(folders)} of {len(found)}; choose one by --run"
+        f"{options.run!r}, got {len(folders)} of {len(statuses)}; choose one by --run"
     )
 
 

@@ -163,9 +163,9 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
             if not holds_run(path):
                 planned.append(Planned(status, partial(RunFolder, path, details)))
                 continue
-            found = read_details(path)
+            known = read_details(path)
             status = (
-                unbegun_status(path, found)
+                unbegun_status(path, known)
                 if _is_to_be_rewritten(path)
                 else folder_status(path)
             )
@@ -179,9 +179,9 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
             # The damaged run fails when the scheduler opens it; the others continue.
             planned.append(Planned(status, partial(_raise, error)))
             continue
-        check_adopted(path, found, details)
+        check_adopted(path, known, details)
         theirs, ours = (
-            experiment_from_text(each.document).births for each in (found, details)
+            experiment_from_text(each.document).births for each in (known, details)
         )
         if theirs != ours:
             tell_user(f"{path}: keeps its own number of births, {theirs} (not {ours})")

@@ -116,8 +116,8 @@ def _answer(event: Answered) -> Fields:
     if isinstance(event, Asked):
         return {"request": event.number, "trials": len(event.points)}
     if not isinstance(event, Verdict):
-        found = event.evaluation
-        outcome = asdict(found) if found else {"reason": event.reason}
+        evaluation = event.evaluation
+        outcome = asdict(evaluation) if evaluation else {"reason": event.reason}
         return {"trial": event.trial, **outcome, **_worker(event.provenance)}
     fields: Fields = {"attempt": event.attempt}
     if not isinstance(event, Vetted):

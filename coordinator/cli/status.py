@@ -128,13 +128,13 @@ def _live(folder: Path, options: argparse.Namespace) -> tuple[str, Status] | Non
     """Return name and status of a folder's coordinator; None if none is running."""
     try:
         options.connect = read_address(folder)
-        found = ask_status(options)
+        statuses = ask_status(options)
     except NetworkError as error:
         if read_holder(folder):
             tell_user(f"its coordinator cannot be asked: {error}")
         return None
     here = folder.resolve()
-    for name, status in found.items():
+    for name, status in statuses.items():
         paths = [Path(run.folder) for run in status.runs]
         if any(here in (path, path.parent) for path in paths):
             return name, status

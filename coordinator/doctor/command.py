@@ -50,8 +50,8 @@ def main(arguments: list[str]) -> int:
             has_failed |= finding.level == "fail"
     finally:
         left_s = max(0.1, _RENDER_S - (time.monotonic() - began_s))
-        found = system.end_rendering(rendering, left_s)
-    print(machine.check_pictures(*found))
+        end = system.end_rendering(rendering, left_s)
+    print(machine.check_pictures(*end))
     return int(has_failed)
 
 
@@ -107,11 +107,11 @@ def _hub(
         is_wanted = bool(options.connect or os.environ.get(CONNECT_VARIABLE))
         yield hub.no_hub(connect, why, is_wanted=is_wanted)
         return
-    found = probe(connect, options.fleet, tls, name)
-    if found.error:
-        yield hub.refused(why_no_hub(connect, tls, f": {found.error}"))
+    seen = probe(connect, options.fleet, tls, name)
+    if seen.error:
+        yield hub.refused(why_no_hub(connect, tls, f": {seen.error}"))
         return
-    yield from hub.check_hub(found, connect)
+    yield from hub.check_hub(seen, connect)
 
 
 def parser(_command: str = "doctor") -> Flags:

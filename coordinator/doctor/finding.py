@@ -35,7 +35,7 @@ Case = tuple[bool, Level, str, str]
 
 def judged(subject: str, text: str, *cases: Case) -> Finding:
     """Return the finding of the first case that holds, else "ok" with the text."""
-    for holds, level, found, advice in cases:
+    for holds, level, what, advice in cases:
         if holds:
-            return Finding(level, subject, found, advice)
+            return Finding(level, subject, what, advice)
     return Finding("ok", subject, text)

@@ -38,8 +38,8 @@ def check_cpu(machine: str, flags: Collection[str], tag: str) -> Finding:
         flags: features of the CPU; empty if the system does not list them.
         tag: platform tag of this machine.
     """
-    found = cpu_class(machine, flags)
-    is_old = found.startswith("x86_64") and found not in _BEST_CLASS
+    level = cpu_class(machine, flags)
+    is_old = level.startswith("x86_64") and level not in _BEST_CLASS
     mixed = (
         "an arena may continue on a machine with the same tag and round differently: "
         "use machines of one kind"

@@ -24,9 +24,9 @@ def main(arguments: list[str]) -> int:
     for number in range(options.count):
         attempt, why, is_done = 0, "", False
         while not is_done:
-            found = breeder.candidate(BirthId(0, number), attempt, (), why=why)
-            assert found is not None
-            attempt, robot = found.attempt + 1, found.robot
+            candidate = breeder.candidate(BirthId(0, number), attempt, (), why=why)
+            assert candidate is not None
+            attempt, robot = candidate.attempt + 1, candidate.robot
             why = analyze(robot, space, vetting).reason
             is_done = options.unvetted or not why
         path: Path = options.file

@@ -82,18 +82,18 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     tables, left_out = read_tables(run)
     for each in left_out:
         raise RunFolderError(f"{each.folder}: {each.what}: {each.why}")
-    found = robots(RunTables(tables, islands=run.islands))
-    if not found.num_rows:
+    table = robots(RunTables(tables, islands=run.islands))
+    if not table.num_rows:
         raise RunFolderError(f"{folder}: no robot was evaluated")
-    order, is_last = _fittest_first(found), found["is_last"].to_pylist()
+    order, is_last = _fittest_first(table), table["is_last"].to_pylist()
     last = set([row for row in order if is_last[row]][:most])
-    first = found.slice(order[0], 1).to_pylist()[0]
+    first = table.slice(order[0], 1).to_pylist()[0]
     ever = individual(next(best_ever(folder), first))
     own = OwnRun(folder)
     births = tables["births"]
     recorded = _recorded(tables)
     chosen: list[Chosen] = []
-    for number, row in enumerate(found.to_pylist()):
+    for number, row in enumerate(table.to_pylist()):
         island, birth = row["birth_island"], row["birth"]
         name = BirthId(island, birth)
         if not (number in last or name == ever):
@@ -127,17 +127,17 @@ def _recorded(tables: dict[str, pa.Table]) -> dict[tuple[int, BirthId], _Recorde
     Of a robot that has learnt there it is the first of its best trials.
     """
     learnt = best_trials(tables["learning"])
-    found: dict[tuple[int, BirthId], _Recorded] = {}
+    recorded: dict[tuple[int, BirthId], _Recorded] = {}
     for row in tables["evaluations"].to_pylist():
         island, birth = row["island"], individual(row)
         own = learnt.get(birth, 0) if island == birth.island else 0
-        found[island, birth] = _Recorded(row["trial"] or own, row["simulated_s"])
-    return found
+        recorded[island, birth] = _Recorded(row["trial"] or own, row["simulated_s"])
+    return recorded
 
 
-def _fittest_first(found: pa.Table) -> list[int]:
+def _fittest_first(table: pa.Table) -> list[int]:
     """Return the rows of robots by descending fitness, failed robots last."""
-    rows = found.to_pylist()
+    rows = table.to_pylist()
     keys = [(row["is_failed"], *fittest_first(row)) for row in rows]
     return sorted(range(len(rows)), key=keys.__getitem__)
 

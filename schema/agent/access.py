@@ -182,12 +182,12 @@ def read_certificates(file: Path) -> list[Certificate]:
         with file.open("rb") as source:
             data = source.read(_MOST_BYTES)
         # A longer file is cut, so that it does not decode.
-        found = msgspec.json.decode(data, type=list[Certificate])
-        check_certificates(found)
+        certificates = msgspec.json.decode(data, type=list[Certificate])
+        check_certificates(certificates)
     except OSError as error:
         raise NetworkError(f"{file}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError, NetworkError) as error:
         raise NetworkError(
             f"{file}: must be a JSON list of objects with name and role: {error}"
         ) from None
-    return found
+    return certificates

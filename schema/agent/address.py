@@ -151,8 +151,8 @@ def _is_usable(place: Path) -> bool:
     """Return whether this user may have a directory there, and paths fit sockets."""
     longest = f"{place}/{secrets.token_hex(8)}.sock"
     is_path = _SOCKET.fullmatch(f"{UNIX}/{longest}") and len(longest) <= _LONGEST_PATH
-    found = place if os.path.lexists(place) else place.parent
-    return bool(is_path) and os.access(found, os.W_OK)
+    existing = place if os.path.lexists(place) else place.parent
+    return bool(is_path) and os.access(existing, os.W_OK)
 
 
 def can_lock(folder: Path) -> bool:
@@ -168,12 +168,12 @@ def can_lock(folder: Path) -> bool:
 def _make_private(place: Path) -> None:
     try:
         place.mkdir(mode=0o700, exist_ok=True)
-        found = place.lstat()
+        facts = place.lstat()
     except OSError as error:
         why = f"{error.strerror}; set XDG_RUNTIME_DIR to another directory"
         raise NetworkError(f"{place}: cannot be used: {why}") from None
-    is_private = stat.S_IMODE(found.st_mode) == stat.S_IRWXU
-    if not (stat.S_ISDIR(found.st_mode) and is_private and found.st_uid == os.getuid()):
+    is_private = stat.S_IMODE(facts.st_mode) == stat.S_IRWXU
+    if not (stat.S_ISDIR(facts.st_mode) and is_private and facts.st_uid == os.getuid()):
         raise NetworkError(
             f"{place}: must be a directory of this user with mode 0700, or others "
             "could join the fleet: remove it, or set XDG_RUNTIME_DIR"

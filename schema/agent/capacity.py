@@ -19,7 +19,7 @@ def group_numbers(*names: str) -> list[list[int]]:
     Groups of version 1 and 2 count, and their parents: in a container the limits are
     at the root. A group in which one is missing, or no number, does not.
     """
-    found = []
+    numbers = []
     for line in system_text(_OWN).splitlines():
         _, controllers, path = line.split(":", 2)
         group = _ROOT / controllers / path.lstrip("/")
@@ -27,8 +27,8 @@ def group_numbers(*names: str) -> list[list[int]]:
             texts = [system_text(each / name) for name in names]
             words = " ".join(texts).split()
             if all(texts) and all(map(str.isdecimal, words)):
-                found.append([int(word) for word in words])
-    return found
+                numbers.append([int(word) for word in words])
+    return numbers
 
 
 def core_quota() -> float:

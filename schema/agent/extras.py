@@ -29,23 +29,23 @@ def install_advice(extra: str) -> str:
     """
     wanted = f"[{extra}]" if extra else ""
     try:
-        found = distribution(NAME)
+        package = distribution(NAME)
     except PackageNotFoundError:
         return f"pip install {shlex.quote(f'{NAME}{wanted}')}"
-    flag, place = _origin(found)
+    flag, place = _origin(package)
     python = shlex.quote(sys.executable)
     install = f"{python} -m pip install"
     # Environments that uv makes have no pip.
-    if (found.read_text("INSTALLER") or "").strip() == "uv":
+    if (package.read_text("INSTALLER") or "").strip() == "uv":
         install = f"uv pip install --python {python}"
     return f"{install} {flag}{shlex.quote(f'{place}{wanted}')}"
 
 
-def _origin(found: Distribution) -> tuple[str, str]:
+def _origin(package: Distribution) -> tuple[str, str]:
     """Return a flag, and the folder or wheel that a package came from, or its name."""
     try:
         source = msgspec.json.decode(
-            found.read_text("direct_url.json") or "", type=_Source
+            package.read_text("direct_url.json") or "", type=_Source
         )
     except msgspec.MsgspecError:
         return "", NAME

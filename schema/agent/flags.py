@@ -53,7 +53,7 @@ class Flags(argparse.ArgumentParser):
         namespace: Any = None,  # noqa: ANN401
     ) -> tuple[Any, list[str]]:
         """Parse arguments; exit with an error that names the first unknown one."""
-        found, unknown = super().parse_known_args(args, namespace)
+        options, unknown = super().parse_known_args(args, namespace)
         if unknown:
             word = unknown[0].partition("=")[0]
             if not word.startswith("-"):
@@ -62,7 +62,7 @@ class Flags(argparse.ArgumentParser):
             known = [flag.lstrip("-") for flag in self._option_string_actions]
             near = nearest(word.lstrip("-"), known).replace(" '", " '--")
             self.error(f"no flag {word[:80]!r}{near}")
-        return found, []
+        return options, []
 
 
 def whole_number(least: int = 1, most: int | None = None) -> Callable[[str], int]:

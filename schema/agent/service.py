@@ -181,9 +181,9 @@ class HubWatch:
         """Do ``seen`` for a session; tell if a new hub drops what it sends."""
         if not self.seen(session.info.routers_zid()) or not self._advice:
             return
-        found = usable([me.trial], session, client_config(self.address, self.tls))
+        allowed = usable([me.trial], session, client_config(self.address, self.tls))
         # Not if the hub has gone meanwhile.
-        if found == [] and [*session.info.routers_zid()]:
+        if allowed == [] and [*session.info.routers_zid()]:
             self.warn(
                 f"the hub at {self.address} drops all that this {me.role} sends: its "
                 "certificate was revoked, or is not in the access list of the hub as "

@@ -113,9 +113,9 @@ def _descendants(process: int) -> list[int]:
             _, parent, _, own = entry.read_text().rpartition(")")[2].split()[:4]
             if int(own) == session:
                 below.setdefault(int(parent), []).append(int(entry.parent.name))
-    found, open_ = [], [process]
+    descendants, open_ = [], [process]
     while open_:
         children = below.get(open_.pop(), [])
-        found += children
+        descendants += children
         open_ += children
-    return found
+    return descendants
