@@ -26,23 +26,14 @@ FitnessFunction = Callable[[Trace, Any], float]
 
 @dataclass(frozen=True, slots=True)
 class TraceFunction:
-    """Fitness function or measure of an experiment, with its parameters.
-
-    Attributes:
-        name: for messages.
-        function: of a trace and the arguments.
-        arguments: of the function after the trace.
-    """
+    """Fitness function or measure of an experiment, with its arguments after a trace."""
 
     name: str
     function: Callable[..., float]
     arguments: tuple[Any, ...] = ()
 
     def value(self, trace: Trace) -> float:
-        """Return the value of a trace.
-
-        Args:
-            trace: of T samples with all channels that the function declares; T >= 2.
+        """Return the value of a trace, which has two samples or more.
 
         Raises:
             FitnessUndefined: the function raised or gave no finite number.
@@ -61,24 +52,14 @@ class TraceFunction:
 
 @dataclass(frozen=True, slots=True)
 class Functions:
-    """Functions of an experiment that compute numbers from traces.
-
-    Attributes:
-        fitness: its fitness function.
-        measures: its measures, in its order.
-        channels: that these functions declare.
-    """
+    """Functions of an experiment, and the channels of traces that they declare."""
 
     fitness: TraceFunction
     measures: tuple[TraceFunction, ...]
     channels: tuple[str, ...]
 
     def evaluation(self, trace: Trace, simulated_s: float) -> Evaluation:
-        """Return the evaluation of a trace.
-
-        Args:
-            trace: with all channels that the functions declare.
-            simulated_s: simulated time, warm-up included [s].
+        """Return the evaluation of a trace; the time includes the warm-up [s].
 
         Raises:
             FitnessUndefined: the fitness function or a measure raised or gave no

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 
 import worker.fitness
-from schema.experiment.document import Experiment, Fitness, Measures
+from schema.experiment.document import Fitness, Measures
 from schema.experiment.kinds import Kind, sections_of, takes
 from schema.experiment.settings import FITNESS, fitness_function
 from schema.plugins.simple_traces import check_function
@@ -32,10 +32,6 @@ def check_measures(measures: Measures) -> None:
         check_function(measure.function, *measure.arguments)
 
 
-def _measures(experiment: Experiment) -> Iterator[Measures]:
-    return single_measures(experiment.measures)
-
-
 FITNESS_KIND = Kind(
     "fitness",
     "fitness.function",
@@ -57,7 +53,7 @@ MEASURE_KIND = Kind(
     # One with parameters looks like a fitness function: ``--kind`` says that it is not.
     is_one=partial(takes, 1),
     section=lambda path: Measures(names=(path,)),
-    sections=_measures,
+    sections=lambda experiment: single_measures(experiment.measures),
     path=lambda measures: measures.names[0],
     load=lambda measures: measures_of(measures)[0].function,
     check=check_measures,

@@ -33,7 +33,6 @@ class FairQueue(Generic[T]):
         self._level_s = 0.0
 
     def __len__(self) -> int:
-        """Return the number of waiting items."""
         return sum(map(len, self._waiting.values()))
 
     def put(self, source: bytes, item: T, size: int = 0) -> list[T]:

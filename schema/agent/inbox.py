@@ -18,7 +18,6 @@ class Inbox(Generic[T]):
     """
 
     def __init__(self) -> None:
-        """Initialise it empty."""
         self._items: SimpleQueue[T] = SimpleQueue()
         # Held while the getting thread waits; ``put`` releases it.
         self._bell = threading.Lock()

@@ -62,12 +62,10 @@ class Agent:
     """A process that does jobs, and the address of its hub.
 
     Attributes:
-        role: "worker" or "analyzer".
         name: never used by another process.
         slots: jobs at a time; one process does one.
         platform: tag of CPU, system and libraries.
         threads: that advance one arena together.
-        cpu_limit_s: CPU time limit of a job [s].
         wait_limit_s: time that a job may wait without using CPU time [s].
         processes: that share the memory of this machine.
         shards: arenas whose state the process keeps.

@@ -282,10 +282,9 @@ def serve(
     stop: threading.Event,
     say: Callable[[str], None] = tell_user,
     *,
-    warn: Callable[[str], None] | None = None,
+    warn: Callable[[str], None] = warn_user,
     outlet: Outlet | None = None,
     slot: ProcessSlot = UNSUPERVISED,
-    totals: Callable[[ReplyCounts], None] | None = None,
 ) -> None:
     """Do jobs until stopped; wait for the hub as long as needed.
 
@@ -296,12 +295,10 @@ def serve(
         compute: does the work of a request; raises if the request is bad.
         agent: this agent, and the address of its hub.
         stop: ends the loop; checked between jobs.
-        say: called with a line when the hub is there, as ``HubWatch`` does.
-        warn: called with a line when the hub is gone; None: ``say``.
+        say: as of ``HubWatch``.
+        warn: likewise.
         outlet: publishes through this agent's session while there is one.
         slot: this process's slot in a pool, if it has one.
-        totals: called at the end with counts of the replies, before the session
-            closes: that can take longer than a pool waits.
 
     Raises:
         NetworkError: an invalid name or address, or ``HubLost``.
@@ -314,23 +311,22 @@ def serve(
     hub = HubWatch(
         agent.connect,
         say,
-        warn or say,
+        warn,
         agent.give_up_after_s,
         tells_first=agent.tells_hub,
         # The first process of a pool speaks for all.
         tls=None if slot.index else agent.tls,
         fleet=agent.fleet,
     )
+    outlet = outlet or Outlet()
     session = _open(config, hub, stop)
     if session is not None:
         with session:
-            if outlet is not None:
-                outlet.lead_to(session)
+            outlet.lead_to(session)
             _serve_session(session, server, hub, stop, me)
-            if totals is not None:
-                totals(server.counts)
-            if outlet is not None:
-                outlet.lead_to(None)
+            # First: closing the session can take longer than a pool waits.
+            _tell_totals(agent.name, server.counts)
+            outlet.lead_to(None)
 
 
 def own_agent(agent: Agent, index: int) -> Agent:
@@ -345,10 +341,7 @@ def own_agent(agent: Agent, index: int) -> Agent:
 
 
 def serve_as_process(
-    compute: Compute,
-    agent: Agent,
-    slot: ProcessSlot,
-    outlet: Outlet | None = None,
+    compute: Compute, agent: Agent, slot: ProcessSlot, outlet: Outlet | None = None
 ) -> None:
     """Serve as one process of a pool until a signal or until the parent is gone."""
     allow(agent.plugins)
@@ -356,20 +349,9 @@ def serve_as_process(
     stop_with_parent(stop)
     own = agent if agent.version else own_agent(agent, slot.index)
     start_log(own.name)
-    say, warn = (
-        (tell_user, warn_user) if slot.index == 0 else (_keep_quiet, _keep_quiet)
-    )
+    say, warn = (_keep_quiet, _keep_quiet) if slot.index else (tell_user, warn_user)
     try:
-        serve(
-            compute,
-            own,
-            stop,
-            say,
-            warn=warn,
-            outlet=outlet,
-            slot=slot,
-            totals=partial(_tell_totals, own.name),
-        )
+        serve(compute, own, stop, say, warn=warn, outlet=outlet, slot=slot)
     except HubLost:
         sys.exit(GAVE_UP)  # the pool's command says why
 
@@ -392,7 +374,7 @@ def _keep_quiet(_line: str) -> None:
 
 
 def _open(
-    config: zenoh.Config, hub: "HubWatch", stop: threading.Event
+    config: zenoh.Config, hub: HubWatch, stop: threading.Event
 ) -> zenoh.Session | None:
     """Return a session as soon as there is a hub; None if stopped before."""
     while not stop.is_set():
@@ -409,7 +391,7 @@ def _open(
 def _serve_session(
     session: zenoh.Session,
     server: Server,
-    hub: "HubWatch",
+    hub: HubWatch,
     stop: threading.Event,
     me: Member,
 ) -> None:
@@ -485,7 +467,7 @@ def _queue_all(
 
 
 def _answer(
-    query: zenoh.Query, server: Server, jobs: zenoh.KeyExpr, hub: "HubWatch"
+    query: zenoh.Query, server: Server, jobs: zenoh.KeyExpr, hub: HubWatch
 ) -> None:
     """Reply with the answer, or with the reason why there is none."""
     payload = query.payload

@@ -19,6 +19,7 @@ Role = Literal["worker", "analyzer", "coordinator"]
 
 _CHUNKS: dict[Role, str] = {"worker": "w", "analyzer": "an", "coordinator": "co"}
 _ROLES: dict[str, Role] = {chunk: role for role, chunk in _CHUNKS.items()}
+_KEYS = ("jobs", "alive", "info", "cancelled", "command", "state", "events", "trial")
 # No key separator, no wildcard, no leading "@", which the engine reserves.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,95}")
 
@@ -29,59 +30,40 @@ class Member:
 
     Attributes:
         name: its own, never used again.
-        jobs: key that takes one ``Request`` and gives one ``Answer``.
         session: id of the process's Zenoh session, hexadecimal. A hub accepts one
             session of an id at a time, and a reply carries the id of the session that
             gave it. Only the process itself can thus reply in its name.
+        jobs: key that takes one ``Request`` and gives one ``Answer``.
+        alive: key of the liveliness token of the process.
+        info: key that gives the ``AgentInfo`` of the process.
+        cancelled: key that takes the fingerprint of a ``Request`` that is no longer
+            wanted.
+        command: key that takes one ``OperatorRequest`` and gives one ``OperatorReply``.
+        state: key that gives viewers an ``Update`` of everything since the beginning.
+        events: key on which an ``Update`` appears when something has happened.
+        trial: key on which ``revolve doctor`` tries the rights of a certificate.
     """
 
     fleet: str
     role: Role
     name: str
-    jobs: str = field(init=False, compare=False)
     session: str = field(init=False, compare=False)
+    jobs: str = field(init=False, compare=False)
+    alive: str = field(init=False, compare=False)
+    info: str = field(init=False, compare=False)
+    cancelled: str = field(init=False, compare=False)
+    command: str = field(init=False, compare=False)
+    state: str = field(init=False, compare=False)
+    events: str = field(init=False, compare=False)
+    trial: str = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         # Once per process and not for each job.
-        object.__setattr__(self, "jobs", f"{self._prefix}/jobs")
+        for key in _KEYS:
+            object.__setattr__(self, key, f"{self._prefix}/{key}")
         # An id must not begin with 0.
         session = f"a{sha256(self._prefix.encode()).hexdigest()[:31]}"
         object.__setattr__(self, "session", session)
-
-    @property
-    def alive(self) -> str:
-        """Key of the liveliness token of the process."""
-        return f"{self._prefix}/alive"
-
-    @property
-    def info(self) -> str:
-        """Key that gives the ``AgentInfo`` of the process."""
-        return f"{self._prefix}/info"
-
-    @property
-    def cancelled(self) -> str:
-        """Key that takes the fingerprint of a ``Request`` that is no longer wanted."""
-        return f"{self._prefix}/cancelled"
-
-    @property
-    def command(self) -> str:
-        """Key that takes one ``OperatorRequest`` and gives one ``OperatorReply``."""
-        return f"{self._prefix}/command"
-
-    @property
-    def state(self) -> str:
-        """Key that gives viewers an ``Update`` of everything since the beginning."""
-        return f"{self._prefix}/state"
-
-    @property
-    def events(self) -> str:
-        """Key on which an ``Update`` appears when something has happened."""
-        return f"{self._prefix}/events"
-
-    @property
-    def trial(self) -> str:
-        """Key on which ``revolve doctor`` tries the rights of a certificate."""
-        return f"{self._prefix}/trial"
 
     def poses(self, shard: int) -> str:
         """Key on which a ``Live`` is published after each advance of a shard."""

@@ -117,7 +117,6 @@ class Table:
     """
 
     def __init__(self, node: DocumentNode | None, path: str, file: str) -> None:
-        """Read a node."""
         self._path = path
         self._stem = f"{path}." if path else ""
         self._file = file

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from math import isclose, pi
 
 from schema.errors import InvalidRobot, shown
-from schema.formats.ids import with_ids
 from schema.formats.robogen_frames import SQUARE, our_orientation, our_slot
+from schema.formats.yaml_reader import with_ids
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import INPUT, Brain, Connection, Layer, Neuron
 from schema.robot.robot import Part, Robot, check_number, check_robot, part_type
@@ -85,8 +85,6 @@ class RobogenRobot:
     """Robot of a RoboGen file.
 
     Attributes:
-        root: the core.
-        hidden: names of the hidden neurons.
         kinds: types and parameters of neurons that differ from ``USUAL``.
         weights: (source, target, weight) of each connection.
     """

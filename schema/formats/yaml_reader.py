@@ -4,10 +4,10 @@ Messages name the ids of the file, its name and line.
 """
 
 import re
+from collections.abc import Sequence
 
 from schema.errors import InvalidRobot, shown
 from schema.formats.document import Table
-from schema.formats.ids import with_ids
 from schema.formats.yaml import VERSION
 from schema.parts import BodySpace, Parameter
 from schema.robot.brain import (
@@ -25,7 +25,9 @@ from schema.robot.robot import Part, Robot, check_number, check_robot
 FULL_TURN = 360
 OTHER_TYPES = " (name the experiment with its part types: --experiment FILE.toml)"
 """End of the message about an unknown part type."""
-_INDEXED = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.\w+)?")
+_FIELD = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.\w+)?")
+_INDEXED = re.compile(r"(body\.parts|brain\.neurons|brain\.connections)\[(\d+)\](\.?)")
+_WORDS = {"body.parts": "part", "brain.neurons": "neuron", "brain.connections": ""}
 
 
 class Reader:
@@ -35,8 +37,6 @@ class Reader:
     complete robot name a line, too.
 
     Attributes:
-        space: the allowed part types.
-        parts: the parts read so far.
         part_index: their indices by name, in their order.
     """
 
@@ -49,7 +49,6 @@ class Reader:
     def __init__(
         self, space: BodySpace, file: str, kinds: NeuronKinds = BUILT_IN_KINDS
     ) -> None:
-        """Initialise for a document of a name, with the allowed types."""
         self.space = space
         self._kinds = kinds
         self._file = file
@@ -85,7 +84,7 @@ class Reader:
 
     def _place(self, message: str) -> str:
         """Return ``file:line`` of the field that a message of ``check_robot`` names."""
-        found = _INDEXED.search(message)
+        found = _FIELD.search(message)
         at = found.group() if found else ""
         line = self._lines.get(at) or self._lines.get(at.rpartition(".")[0])
         return self._file if line is None else f"{self._file}:{line}"
@@ -200,3 +199,32 @@ def _values(table: Table, parameters: tuple[Parameter, ...]) -> tuple[float, ...
     params = table.table("params")
     params.refuse_others(*(parameter.name for parameter in parameters))
     return tuple(params.number(item.name, item.default) for item in parameters)
+
+
+def with_ids(
+    message: str,
+    parts: Sequence[str],
+    neurons: Sequence[str],
+    connections: Sequence[tuple[str, str]],
+) -> str:
+    """Return a message of ``check_robot`` with ids in place of indices.
+
+    ``body.parts[2].slot: ...`` becomes ``part 'leg': slot: ...``.
+    """
+    ids = {
+        "body.parts": [shown(name) for name in parts],
+        "brain.neurons": [shown(name) for name in neurons],
+        "brain.connections": [
+            f"connection {shown(source)} -> {shown(target)}"
+            for source, target in connections
+        ],
+    }
+
+    def named(found: re.Match[str]) -> str:
+        kind, index, dot = found[1], int(found[2]), found[3]
+        if index >= len(ids[kind]):
+            return found[0]
+        stem = f"{_WORDS[kind]} {ids[kind][index]}".strip()
+        return f"{stem}: " if dot else stem
+
+    return _INDEXED.sub(named, message)

@@ -1,4 +1,4 @@
-"""Brains of all robots of an arena, in one batch.
+"""Brains of all robots of an arena, in one batch; sensors that see other robots.
 
 The arithmetic is that of ``worker.robot``, equal to the last bit. Sensors and motors
 are read and commanded one by one: that takes less than a hundredth of the physics.
@@ -8,14 +8,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from schema.errors import SensorFailed
 from schema.experiment.settings import ArenaSettings
 from schema.plugins.protocols import Bank
 from schema.robot.trace import Floats
+from schema.wire.arena import Casualty
+from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.filters.filters import Filter, filtered_outputs, filtered_readings
 from worker.filters.noise import Noise
 from worker.robot.banks import broken_rows
 from worker.robot.brains import Controls
+from worker.robot.own_sensors import Surroundings
 
 
 class BatchedControllers:
@@ -30,7 +34,6 @@ class BatchedControllers:
     """
 
     def __init__(self, settings: ArenaSettings, controls: Controls) -> None:
-        """Initialise without robots."""
         simulation = settings.simulation
         self._settings, self._controls = settings, controls
         self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
@@ -89,3 +92,35 @@ class BatchedControllers:
         tick = step // self._tick_steps
         received = filtered_readings(filters, tick, readings)
         return filtered_outputs(filters, tick, bank.step(received, ages))
+
+
+def look(
+    population: ArenaPopulation, robots: Sequence[ArenaRobot], step: int
+) -> list[Casualty]:
+    """Write readings of light sensors and own ones; return robots of failed sensors."""
+    looking = [robot for robot in robots if robot.view.sensors.looks]
+    if not looking:
+        return []
+    population.kinematics()
+    settings = population.model_cache.settings
+    places = np.array([robot.view.qpos[:3] for robot in population.robots])
+    rows = population.robot_rows.rows
+    failed = []
+    for robot in looking:
+        sensors = robot.view.sensors
+        cluster = population.cluster_of[robot.birth]
+        is_newborn = step == robot.window.born
+        around = Surroundings(
+            (step - robot.window.born) * settings.simulation.timestep_s,
+            # Nothing has been stepped since a birth.
+            sensors.touching() if is_newborn else cluster.touched,
+            [(c.model, c.data) for c in population.clusters if c is not cluster],
+            np.delete(places, rows[robot.birth], axis=0),
+            settings.light,
+        )
+        try:
+            sensors.look(around)
+        except SensorFailed as error:
+            x, y, z = robot.view.qpos[:3].tolist()
+            failed.append(Casualty(robot.birth, step, str(error), (x, y, z)))
+    return failed

@@ -16,7 +16,7 @@ from worker.clusters.cluster import Cluster
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, FitnessWindow
 from worker.clusters.states import PLAUSIBLE, Rollout
-from worker.robot.engine_warnings import warning_names
+from worker.robot.placed import warning_names
 
 FASTEST_CORE = 20.0
 """Core speed above which the physics is broken [m/s]; a fall from the thesis's

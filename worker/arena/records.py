@@ -21,7 +21,6 @@ class Samples:
     """Adds samples to the windows of an arena's robots."""
 
     def __init__(self, settings: ArenaSettings, population: ArenaPopulation) -> None:
-        """Find out which channels are recorded."""
         wanted = functions_of(settings).channels
         self._population = population
         self._is_recorded = bool(wanted)
@@ -83,7 +82,6 @@ class PoseLog:
     """Samples of all robots' poses."""
 
     def __init__(self, timestep_s: float) -> None:
-        """Initialise without samples; ``timestep_s`` is the length of a step."""
         self._timestep_s = timestep_s
         self._samples: list[tuple[int, Layout, Floats, Floats]] = []
 
@@ -117,7 +115,6 @@ class Contacts:
     """Contact durations of an advance; each check counts one whole interval."""
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Initialise without contacts."""
         steps = settings.arena.proximity_steps
         self._interval_s = steps * settings.simulation.timestep_s
         self._counts: Counter[tuple[BirthId, BirthId]] = Counter()

@@ -33,7 +33,6 @@ class ReplayedAdvance:
     """One advance of a replayed arena.
 
     Attributes:
-        step: reached.
         is_equal: whether the state there has the recorded digest.
         samples: poses of all robots that the advance records.
         motion: poses of the chosen robots at every tick of the controllers.

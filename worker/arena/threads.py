@@ -18,7 +18,6 @@ class ThreadTeam:
     """
 
     def __init__(self, threads: int = 1) -> None:
-        """Initialise; the other threads start with the first jobs."""
         self.threads = threads
         self._others = ThreadPoolExecutor(max(1, threads - 1), "arena")
 

@@ -26,16 +26,15 @@ from schema.wire.arena import (
 from schema.wire.arena_state import ArenaState
 from schema.wire.codec import encode
 from schema.wire.poses import PoseArrays
-from worker.arena.batched_control import BatchedControllers
+from worker.arena.batched_control import BatchedControllers, look
 from worker.arena.changes import check_changes, diverged, newborn
-from worker.arena.looking import look
 from worker.arena.records import Contacts, PoseLog, Samples
 from worker.arena.snapshot import read_snapshot, state_of
 from worker.arena.threads import ThreadTeam
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import Rollout, Schedule
-from worker.robot.engine_warnings import silence_engine
+from worker.robot.placed import silence_engine
 
 _FEW = 5
 """Fewer clusters than this are stepped faster by one thread than by several."""

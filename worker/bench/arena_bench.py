@@ -53,12 +53,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class RobotSource:
-    """Random robots, from the generator and the analyzer of the other rooms.
-
-    Attributes:
-        generate: returns a random genome of an experiment.
-        analyze: vets a robot.
-    """
+    """Random robots, from the generator and the analyzer of the other rooms."""
 
     generate: Callable[[np.random.Generator, Experiment, BirthId], Genome]
     analyze: Callable[[Robot, BodySpace, Vetting], Report]

@@ -44,7 +44,6 @@ class Timing:
     """CPU time of whole evaluations and of their engine steps alone.
 
     Attributes:
-        robots: number of robots.
         evaluation_s: build, control, sensors, fitness and steps [s].
         engine_s: the same steps with the same controls only [s].
         failures: why the evaluations of further robots failed.

@@ -37,7 +37,6 @@ class StateHistory:
     """
 
     def __init__(self, cluster: "Cluster") -> None:
-        """Initialise without rows."""
         warnings = cluster.data.warning.number
         # Copies between memory views are faster than between arrays, and one view of
         # all rows is faster than one of each, as few of them stay in the caches.

@@ -13,17 +13,11 @@ from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Channels, Probe, probed_channels
 
 
-class EngineView:
-    """A robot's slice of a model and its state, with its sensors and motors.
+class EngineView(PlacedRobot):
+    """A robot in a model, with its sensors and motors.
 
     Attributes:
-        placed: places of its elements.
-        model, data: that hold the robot.
-        joints, dofs: its slices of qpos and qvel.
         qpos, qvel, ctrl: its part of the state, live.
-        root: its first body.
-        geoms: first and last + 1 of its geoms.
-        sensors, servos: of the robot.
         probe: of its work, torques and contacts; None if nothing needs them.
     """
 
@@ -35,21 +29,11 @@ class EngineView:
         settings: EvaluationSettings | ArenaSettings,
         prefix: str = "",
     ) -> None:
-        """Find a robot in a model by the prefix of its names."""
-        self.model, self.data = model, data
-        space = body_space(settings.space)
-        self.placed = placed = PlacedRobot(robot, space, model, data, prefix)
-        self.joints, self.dofs = placed.joints, placed.dofs
-        self.root, self.geoms = placed.root, placed.geoms
-        self.sensors = Sensors(
-            placed,
-            width=settings.space.max_inputs,
-            has_light=settings.light is not None,
-        )
-        self.servos = Servos(placed)
-        self.probe: Probe | None = None
-        if probed_channels(settings):
-            self.probe = Probe(placed)
+        super().__init__(robot, body_space(settings.space), model, data, prefix)
+        width, has_light = settings.space.max_inputs, settings.light is not None
+        self.sensors = Sensors(self, width=width, has_light=has_light)
+        self.servos = Servos(self)
+        self.probe = Probe(self) if probed_channels(settings) else None
         self.qpos: Floats = data.qpos[self.joints]
         self.qvel: Floats = data.qvel[self.dofs]
         self.ctrl: Floats = data.ctrl[self.servos.actuators]

@@ -78,9 +78,7 @@ class Body:
 
     Attributes:
         robot: its parts, and its brain at birth or in the snapshot.
-        bounds: bounding spheres.
         solo: the cluster in which it is alone.
-        channels: of its trace.
     """
 
     robot: Robot
@@ -90,12 +88,7 @@ class Body:
 
 
 class ModelCache:
-    """Compiles the models of one arena and caches shared clusters.
-
-    Attributes:
-        settings: of the arena.
-        controls: brains of the arena.
-    """
+    """Compiles the models of one arena and caches shared clusters."""
 
     def __init__(self, settings: ArenaSettings) -> None:
         """Initialise an empty cache.
@@ -127,7 +120,7 @@ class ModelCache:
             furnish=self._furnish,
         ).compile()
         solo = Cluster((birth,), {"": robot}, model, self.settings)
-        channels = Channels(solo.views[0].placed, self.settings)
+        channels = Channels(solo.views[0], self.settings)
         return Body(robot, bounding_spheres(model), solo, channels)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:

@@ -35,19 +35,14 @@ class ArenaPopulation:
     """The living robots, by birth, and their clusters, by first member.
 
     Attributes:
-        model_cache: engine models.
         robot_rows: the living robots and their indices.
-        robots: the living robots, by birth.
         clusters: of all of them.
         by_cost: the same clusters, most expensive first.
-        cluster_of: the cluster of each birth.
-        layout: indices into the clusters' states.
         rollout: the interval that is being handled; None between two intervals.
         merges, splits: numbers of merges and splits of clusters.
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Initialise without robots."""
         self.model_cache = ModelCache(settings)
         self._number(())
         self.clusters: tuple[Cluster, ...] = ()

@@ -157,7 +157,6 @@ class Proximity:
     """The proximity test of an arena, by its settings."""
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Read distances and intervals from the settings."""
         arena, clock = settings.arena, settings.simulation
         self._merge_m = arena.merge_distance_m
         self._split_m = max(arena.split_distance_m, arena.merge_distance_m)

@@ -40,7 +40,6 @@ class FitnessWindow:
     """
 
     def __init__(self, simulation: Simulation, born: int) -> None:
-        """Initialise an empty window."""
         self.born = born
         self._clock = simulation
         self._intervals = simulation.window_steps // simulation.pose_steps
@@ -80,11 +79,8 @@ class ArenaRobot:
     """A living robot of an arena.
 
     Attributes:
-        birth: its name.
-        body: its engine models.
         robot: its parts and its present brain.
         view: its present slice of the engine's state.
-        window: its latest positions.
         place: of the core's centre at the last sample, world frame [m].
         encoded: bytes of ``robot``, for snapshots.
         packed: its brain in the form of its brain type.

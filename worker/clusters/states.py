@@ -30,10 +30,9 @@ PLAUSIBLE = 1e6
 
 
 class RobotRows:
-    """Constants of R robots, valid until the next birth or death.
+    """Constants of R robots, by birth; valid until the next birth or death.
 
     Attributes:
-        robots: by birth.
         rows: row of each birth.
         islands, numbers: (R,) births.
         sizes: (R,) numbers of each one's position.
@@ -47,7 +46,6 @@ class RobotRows:
     """
 
     def __init__(self, robots: Sequence[ArenaRobot]) -> None:
-        """Number robots that are ordered by birth."""
         self.robots = tuple(robots)
         births = [robot.birth for robot in robots]
         self.rows = {birth: row for row, birth in enumerate(births)}
@@ -111,7 +109,6 @@ class StateColumns:
     """
 
     def __init__(self, moments: int) -> None:
-        """Initialise without clusters."""
         self.states = np.zeros((moments, 0))
         self._starts: dict[Cluster, int] = {}
         self._end = 0
@@ -143,7 +140,6 @@ class Layout:
     A state has W numbers, as ``StateColumns``.
 
     Attributes:
-        robot_rows: the robots.
         clusters: in the order of the state.
         cluster_indices: (R,) index of each robot's cluster.
         starts: (R,) first index of each one's position.
@@ -156,7 +152,6 @@ class Layout:
     def __init__(
         self, clusters: Sequence[Cluster], robot_rows: RobotRows, columns: StateColumns
     ) -> None:
-        """Place the clusters and compute the indices."""
         self.robot_rows = robot_rows
         self.clusters = tuple(clusters)
         rows = [
@@ -244,7 +239,6 @@ class Schedule:
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Read the intervals from an arena's settings."""
         clock, merge_steps = settings.simulation, settings.arena.proximity_steps
         self.tick_steps = clock.brain_steps
         self._sample_steps, self._merge_steps = clock.pose_steps, merge_steps
@@ -300,7 +294,6 @@ class Rollout:
     """
 
     def __init__(self, plan: tuple[int, ...], is_merge: tuple[bool, ...]) -> None:
-        """Initialise at the first moment, without states."""
         self.plan = plan
         checks = [moment for moment, is_due in enumerate(is_merge) if is_due]
         self._after_merges = max(checks, default=-1) + 1

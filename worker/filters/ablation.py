@@ -66,7 +66,6 @@ class AblationCase:
         part: index of the part; None unless the scope is ``one``.
         channel: number of the input or motor of the brain; None likewise.
         name: for people, such as ``touch left of part 5``.
-        ablation: of the robot.
     """
 
     group: str

@@ -32,7 +32,6 @@ class Calibrated:
         tick_s: float,
         width: Widths,
     ) -> None:
-        """Initialise with no value on its way."""
         known = {entry.part: entry for entry in entries}
         own = [
             (space[part.kind], known.get(part.kind) or Calibration(part=part.kind))

@@ -29,7 +29,6 @@ class Pushes:
         model: mujoco.MjModel,
         data: mujoco.MjData,
     ) -> None:
-        """Draw the directions."""
         tick_s = simulation.tick_s
         self._every = max(1, round(environment.push_interval_s / tick_s))
         steps = simulation.evaluation_steps

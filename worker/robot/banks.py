@@ -39,7 +39,6 @@ class PackedNetwork:
         weights: (S, I + S), from inputs and previous states to each neuron.
         numbers: (4, S): frequency [rad/s], shift, scale, offset.
         kinds: (2, S): whether it is a sigmoid, whether it is an oscillator.
-        own: neurons of users' types.
     """
 
     weights: Floats
@@ -65,7 +64,6 @@ class NetworkBank:
         tick_s: float,
         values: int = 1,
     ) -> None:
-        """Start all networks at state 0."""
         count, states = len(networks), width.states
         self._tick_s = tick_s
         self._weights = np.empty((count, states, width.inputs + states))
@@ -142,7 +140,6 @@ class GuardedBank:
     def __init__(
         self, bank: Callable[[Sequence[Any]], Bank], packed: Sequence[Any], outputs: int
     ) -> None:
-        """Initialise brains at rest."""
         self._bank_of, self._packed, self._width = bank, packed, outputs
         self._bank = bank(packed)
         self.failed: dict[int, str] = {}

@@ -69,9 +69,6 @@ class Controls:
     """Brains of one experiment in a worker.
 
     Attributes:
-        width: greatest numbers of neurons.
-        tick_s: time between two ticks [s].
-        neurons: types of output and hidden neurons by name.
         is_checked: states may be not finite, because the code is a user's.
     """
 

@@ -28,9 +28,8 @@ from worker.measures import functions_of
 from worker.robot.banks import GuardedBank, broken_rows
 from worker.robot.brains import SoloNetwork, controls_of, solo_brain
 from worker.robot.devices import Sensors, Servos
-from worker.robot.engine_warnings import silence_engine, warning_names
 from worker.robot.own_sensors import Surroundings
-from worker.robot.placed import PlacedRobot
+from worker.robot.placed import PlacedRobot, silence_engine, warning_names
 from worker.robot.recording import Channels, Probe, probed_channels, step_with
 
 Watch = Callable[[mujoco.MjData], None]
@@ -44,8 +43,6 @@ class ControlLoop:
     ends included, and so are the channels that fitness and measures declare.
 
     Attributes:
-        model: of the robot in its environment.
-        data: the engine's state.
         now: physics steps since the start.
         watch: called with the state at each tick, after the commands; may be None.
     """
@@ -111,9 +108,6 @@ class ControlLoop:
         self._positions: list[float] = []
         self._rows: list[Floats] = []
         self._undisturbed: Floats = self._inputs
-        self.now, self._next_sample = 0, self._clock.warmup_steps
-        self._tick, self._is_unread = 0, True
-
         self.now, self._next_sample = 0, self._clock.warmup_steps
         self._tick, self._is_unread = 0, True
 

@@ -80,7 +80,6 @@ class CpgBank:
     def __init__(
         self, packed: Sequence[PackedCpg], width: Widths, tick_s: float
     ) -> None:
-        """Start all oscillators at their phase offsets."""
         count = width.outputs
         self._coupling = np.zeros((len(packed), count, count))
         numbers = np.zeros((4, len(packed), count))

@@ -16,8 +16,7 @@ import numpy as np
 from schema.errors import ExperimentError
 from schema.parts import Sensor, Vector
 from schema.robot.trace import Floats
-from worker.robot.light import brightness
-from worker.robot.own_sensors import OwnSensors, Surroundings
+from worker.robot.own_sensors import OwnSensors, Surroundings, brightness
 from worker.robot.placed import PlacedRobot, contact_reader
 
 LOWEST_OUTPUT = 1e-5
@@ -210,7 +209,6 @@ class Servos:
     """
 
     def __init__(self, placed: PlacedRobot) -> None:
-        """Find the actuators of a robot in a model."""
         model, data = placed.model, placed.data
         self.motors: list[tuple[int, float, float, float, float]] = []
         found: list[int] = []

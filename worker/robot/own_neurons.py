@@ -31,7 +31,6 @@ class _Group(NamedTuple):
     """The N neurons of one type.
 
     Attributes:
-        kind: the type.
         robots: (N,) rows of their networks in the batch.
         places: (K, N) columns of their states.
         parameters: (P, N).

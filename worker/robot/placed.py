@@ -1,8 +1,11 @@
-"""Places of a robot's elements in a model, which other robots may share; contacts."""
+"""Places of a robot's elements in a model, its contacts, and the engine's warnings."""
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import mujoco
+import numpy as np
+import numpy.typing as npt
 
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.parts import BodySpace
@@ -20,8 +23,6 @@ class PlacedRobot:
     """A robot in a model, which is found there by the prefix of its names.
 
     Attributes:
-        robot: its parts and its brain.
-        space: its part types.
         model, data: a compiled model that holds it, and the model's state.
         prefix: of its names in the model.
         root: its first body.
@@ -37,7 +38,6 @@ class PlacedRobot:
         data: mujoco.MjData,
         prefix: str = "",
     ) -> None:
-        """Find a robot in a model."""
         self.robot, self.space, self.prefix = robot, space, prefix
         self.model, self.data = model, data
         free = model.joint(f"{prefix}free").id
@@ -80,3 +80,20 @@ def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:
         return pairs
 
     return read_some if model.geom_gap.any() else read_all
+
+
+def warning_names(counts: npt.NDArray[np.integer]) -> str:
+    """Return the names of the engine's warnings whose counts are not 0."""
+    return ", ".join(
+        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
+        for index in counts.nonzero()[0].tolist()
+    )
+
+
+@lru_cache(maxsize=1)
+def silence_engine() -> None:
+    """Keep the engine's warnings out of stderr and of its log file.
+
+    The engine still counts them in ``MjData.warning``.
+    """
+    mujoco.set_mju_user_warning(lambda _message: None)

@@ -40,7 +40,6 @@ class Channels:
     def __init__(
         self, placed: PlacedRobot, settings: EvaluationSettings | ArenaSettings
     ) -> None:
-        """Lay out the channels that the functions of an experiment declare."""
         robot, wanted = placed.robot, functions_of(settings).channels
         joints = placed.dofs.stop - placed.dofs.start - FREE_DOFS
         inputs = robot.brain.count("input")
@@ -131,7 +130,6 @@ class Probe:
     """
 
     def __init__(self, placed: PlacedRobot) -> None:
-        """Start without work."""
         model, data, dofs = placed.model, placed.data, placed.dofs
         self._contacts = contact_reader(model, data)
         self._velocities = data.qvel

@@ -45,9 +45,6 @@ class ChangedSettings:
     """Settings of an evaluation with one change.
 
     Attributes:
-        name: of the change, for people.
-        settings: with the change.
-        group: what is changed.
         is_small: by less than any two machines of the real world differ.
     """
 

@@ -2,8 +2,10 @@
 
 import threading
 
+import pytest
 import zenoh
 
+from schema.agent import service
 from schema.agent.address import new_socket
 from schema.agent.network import Agent, hub_config
 from schema.agent.request_handler import ReplyCounts
@@ -30,22 +32,19 @@ class NotedOutlet(Outlet):
         self._stop.set()
 
 
-def test_totals_are_told_before_the_session_closes() -> None:
+def test_totals_are_told_before_the_session_closes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     steps: list[str] = []
-    stop = threading.Event()
 
-    def totals(counts: ReplyCounts) -> None:
+    def totals(_name: str, counts: ReplyCounts) -> None:
         steps.append(f"{counts.refused} refused")
 
-    address = new_socket()
+    monkeypatch.setattr(service, "_tell_totals", totals)
+    stop, address = threading.Event(), new_socket()
+    agent, outlet = Agent("worker", "w", address), NotedOutlet(steps, stop)
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
-        serve(
-            compute,
-            Agent("worker", "w", address),
-            stop,
-            outlet=NotedOutlet(steps, stop),
-            totals=totals,
-        )
+        serve(compute, agent, stop, outlet=outlet)
     assert steps == ["open", "0 refused", "closing"]
 
 
@@ -62,7 +61,9 @@ def test_an_agent_says_that_a_coordinator_has_another_version() -> None:
     key = Member("default", "worker", "w").info
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))) as hub:
         thread = threading.Thread(
-            target=serve, args=(compute, agent, stop, lines.append)
+            target=serve,
+            args=(compute, agent, stop),
+            kwargs={"warn": lines.append},
         )
         thread.start()
         try:
