@@ -26,7 +26,7 @@ FitnessFunction = Callable[[Trace, Any], float]
 
 @dataclass(frozen=True, slots=True)
 class TraceFunction:
-    """Fitness function or measure of an experiment, with its arguments after a trace."""
+    """Fitness function or measure of an experiment, with arguments beside a trace."""
 
     name: str
     function: Callable[..., float]

@@ -1,5 +1,7 @@
 """Identities and settings of evaluations, and what two of them have in common."""
 
+from typing import Any
+
 from msgspec.structs import replace
 
 from schema.experiment.document import Fitness, Simulation, Space
@@ -20,8 +22,12 @@ OTHERS = (
 )
 
 
-def with_simulation(simulation: Simulation) -> EvaluationSettings:
-    return EvaluationSettings(space=Space(), simulation=simulation, fitness=Fitness())
+def with_simulation(
+    simulation: Simulation,
+    **rest: Any,  # noqa: ANN401 - any further settings
+) -> EvaluationSettings:
+    settings = {"space": Space(), "fitness": Fitness(), **rest}
+    return EvaluationSettings(simulation=simulation, **settings)
 
 
 def bits(track: Trace) -> bytes:

@@ -5,8 +5,8 @@ import pytest
 from msgspec import Struct
 
 from schema.errors import ExperimentError, FitnessUndefined
-from schema.experiment.document import Experiment, Fitness
-from schema.experiment.settings import fitness_argument, fitness_function
+from schema.experiment.document import Fitness
+from schema.experiment.settings import fitness_argument
 from schema.plugins.simple_traces import check_function
 from schema.robot.trace import Trace
 from worker.fitness import (
@@ -16,7 +16,6 @@ from worker.fitness import (
     straight_velocity,
     thesis,
 )
-from worker.kinds import check_fitness
 
 WEIGHTS = Fitness()
 
@@ -52,26 +51,9 @@ def test_fitness_above_the_limit_is_zero() -> None:
     assert thesis(track((0, 0, 0), (0.126, 0, 0)), weights) == 0.0
 
 
-def test_default_function_keeps_the_contract() -> None:
-    fitness = Experiment(name="test").fitness
-    function = fitness_function(fitness)
-    assert function is thesis
-    check_fitness(fitness)
-
-
 def _writes(track: Trace, fitness: Fitness) -> float:
     track.core_position[0] += 1.0
     return fitness.limit
-
-
-def _counts_calls() -> FitnessFunction:
-    calls: list[int] = []
-
-    def count(track: Trace, fitness: Fitness) -> float:
-        calls.append(len(track.core_position))
-        return float(len(calls)) + fitness.limit
-
-    return count
 
 
 class Light(Struct, frozen=True):
@@ -126,18 +108,8 @@ def test_function_may_raise_for_some_traces() -> None:
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (
-            lambda trace, _: trace.energy[-1],
-            r"energy is not recorded: .* @needs",
-        ),
+        (lambda trace, _: trace.energy[-1], "energy is not recorded: .* @needs"),
         (_writes, "must not write to its arguments"),
-        (lambda *_: "fast", "must return a number, got 'fast'"),
-        (
-            lambda trace, _: trace.core_position,
-            r"a number, got array\(",
-        ),
-        (lambda *_: float("inf"), "must return a finite number, got inf"),
-        (_counts_calls(), "must return the same twice"),
     ],
 )
 def test_function_that_breaks_the_contract_is_rejected(

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from schema.errors import ExperimentError, FitnessUndefined, UnknownPlugin
-from schema.experiment.document import Fitness, Measures, Simulation, Space
-from schema.experiment.settings import EvaluationSettings
+from schema.experiment.document import Measures, Simulation
 from schema.plugins.permission import allow
 from schema.plugins.simple_traces import simple_traces
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
+from tests.worker.evaluations import with_simulation
 from worker.fitness import TraceFunction
 from worker.kinds import check_measures
 from worker.measures import BUILT_IN, functions_of, measures_of
@@ -36,12 +36,6 @@ def about_z(*degrees: float) -> np.ndarray[Any, Any]:
     half = np.radians(degrees) / 2
     zero = np.zeros(len(degrees))
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1)
-
-
-def test_velocities_of_legs_of_3_and_4_metres() -> None:
-    found = trace((0, 0, 0), (3, 0, 0), (3, 4, 0))
-    assert value("path_velocity", found) == 3.5
-    assert value("straight_velocity", found) == 2.5
 
 
 ROLL = np.array([(1.0, 0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0)])
@@ -178,9 +172,7 @@ def test_own_measures_have_parameters(own: str) -> None:
     trace = Trace(1.0, np.array([(0, 0, 0.4), (0, 0, 0.6)]), {"contact": np.eye(2)})
     assert measures.labels == ("high", "height", "limp")
     assert [each.value(trace) for each in measures_of(measures)] == [0.5, 0.5, 0.5]
-    settings = EvaluationSettings(
-        space=Space(), simulation=Simulation(), fitness=Fitness(), measures=measures
-    )
+    settings = with_simulation(Simulation(), measures=measures)
     assert functions_of(settings).channels == ("contact",)
     assert functions_of(msgspec.structs.replace(settings)) is functions_of(settings)
 

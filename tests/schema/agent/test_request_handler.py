@@ -223,12 +223,6 @@ def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None
     assert reason.isprintable()
 
 
-def test_agent_without_a_plugin_is_unfit() -> None:
-    reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
-    assert reply.reason.startswith(f"{UNFIT}has no plug-in 'nowhere_to_be_found' among")
-    assert reply.reason.endswith("add --plugins PATH/nowhere_to_be_found.py")
-
-
 @settings(derandomize=True, deadline=None)
 @given(st.binary(max_size=64))
 def test_any_bytes_get_a_reply(data: bytes) -> None:
@@ -313,13 +307,9 @@ def test_plugins_are_identified_by_their_source(
     allow(["plugged_one", "plugged_two"])
     assert result(server().reply(request(plugins=wanted))) == ANSWER
     reply = server().reply(request(plugins="plugged_one=0"))
-    assert reply.reason == (
+    assert reply.reason.startswith(
         f"{UNFIT}its plug-in 'plugged_one' differs from the coordinator's: source "
-        f"digest {one[2]}, expected 0: give {tmp_path}/plugged_one.py the content that "
-        "it had when the run began"
+        f"digest {one[2]}, expected 0: "
     )
     reply = server().reply(request(run="lab:1a2b:/runs/a", plugins="plugged_two=0"))
-    assert reply.reason.endswith(
-        ", or start this process with the run's copy: "
-        "--plugins plugged_two=/runs/a/plugins/plugged_two"
-    )
+    assert reply.reason.endswith("plugged_two=/runs/a/plugins/plugged_two")

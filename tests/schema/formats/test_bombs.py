@@ -220,10 +220,3 @@ def test_mjcf_that_reads_another_file_is_refused(tmp_path: Path) -> None:
     path.write_text(mjcf(f'<include file="{other}"/>'))
     with pytest.raises(InvalidRobot, match=r"robot\.xml: was edited"):
         read_robot(path)
-
-
-def test_mjcf_of_a_robot_is_read_without_its_lights(tmp_path: Path) -> None:
-    """Elements that belong to no part may be added by hand."""
-    path = tmp_path / "robot.xml"
-    path.write_text(mjcf("<statistic extent='2'/>", "<light/><camera name='c'/>"))
-    assert read_robot(path) == robot_of()

@@ -16,10 +16,10 @@ from schema.experiment.settings import (
     vetting_settings,
 )
 from schema.parts import BUILT_IN, PartType
-from schema.plugins import permission, source
+from schema.plugins import permission
 from schema.plugins.load import load_function, load_object
 from schema.plugins.permission import allow, allowed
-from schema.plugins.source import check_plugins, plugins_of
+from schema.plugins.source import check_plugins, forget_digests, plugins_of
 from tests.documents import parse_experiment
 
 FITNESS = "def fitness(track, settings):\n    return 1.0\n"
@@ -203,16 +203,11 @@ def test_digest_does_not_depend_on_how_a_module_is_found(
     by_file = plugins_of(named)
     check_plugins(by_file)
     permission._allowed.clear()
-    _forget_digests()
+    forget_digests()
     assert plugins_of(named) == "digested="
     monkeypatch.syspath_prepend(tmp_path)
-    _forget_digests()
+    forget_digests()
     assert plugins_of(named) == by_file
-
-
-def _forget_digests() -> None:
-    plugins_of.cache_clear()
-    source._digest.cache_clear()
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ class Picky(Breaking):
     ) -> Floats:
         del parameters
         if ((tick.age_s > 1.0) & (inputs > 1.0)).any():
-            raise ValueError("input too great")
+            raise ValueError("input\ntoo great")
         return 0.5 + 0.9 * state
 
 

@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
-from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.brain import INPUT, Brain, Neuron
@@ -17,6 +17,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import SECOND, crowd, populated, seconds, settings_of
+from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
 from worker.robot.evaluation import simulate
 
@@ -51,12 +52,7 @@ WALL = scene('<geom type="box" size="0.05 2 0.3" pos="-1.05 0 0.3"/>')
 
 
 def alone(simulation: Simulation, environment: Environment) -> EvaluationSettings:
-    return EvaluationSettings(
-        space=Space(),
-        simulation=simulation,
-        fitness=Fitness(),
-        environment=environment,
-    )
+    return with_simulation(simulation, environment=environment)
 
 
 def arena(environment: Environment, **keys: object) -> ArenaSettings:

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import SensorFailed
-from schema.experiment.document import Experiment, Space, body_space
+from schema.experiment.document import Simulation, Space, body_space
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.mjcf.model import solo_spec
 from schema.plugins.permission import allow
@@ -20,6 +20,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import populated, seconds, settings_of, state_of
+from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
 from worker.robot.devices import Sensors
 from worker.robot.evaluation import evaluate, simulate
@@ -57,12 +58,7 @@ def arena(piston: str = "PISTON", **keys: object) -> ArenaSettings:
 
 def offline(piston: str = "PISTON") -> EvaluationSettings:
     """Return evaluation settings with a piston."""
-    experiment = Experiment(name="test")
-    return EvaluationSettings(
-        space=space_of(piston),
-        simulation=experiment.simulation,
-        fitness=experiment.fitness,
-    )
+    return with_simulation(Simulation(), space=space_of(piston))
 
 
 def crawler() -> Robot:

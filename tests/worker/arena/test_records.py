@@ -12,7 +12,6 @@ from schema.experiment.document import Measures
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import (
     ArenaSettings,
-    EvaluationSettings,
     arena_settings_of,
 )
 from schema.plugins.needs import needs
@@ -21,6 +20,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
 from schema.wire.arena import Advance, BrainChange, Changes, Insertion
+from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
 from worker.measures import BUILT_IN
 from worker.robot.evaluation import simulate
@@ -80,12 +80,7 @@ def test_channels_of_a_lone_robot_equal_those_of_an_evaluation(
     together = traces[-1]
     alone = simulate(
         turtle,
-        EvaluationSettings(
-            space=own.space,
-            simulation=own.simulation,
-            fitness=own.fitness,
-            measures=own.measures,
-        ),
+        with_simulation(own.simulation, space=own.space, measures=own.measures),
     )
     np.testing.assert_array_equal(together.core_position, alone.core_position)
     assert set(together.channels) == set(alone.channels)

@@ -6,12 +6,11 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.document import Fitness, Simulation
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NO_IDENTITY, Origin
 from schema.experiment.settings import (
-    EvaluationSettings,
     arena_settings,
     read_arena_settings,
 )
@@ -20,6 +19,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes, Insertion, PastAdvance, Rebuild
 from tests.worker.arena_cases import crowd, settings_of
+from tests.worker.evaluations import with_simulation
 from worker.arena.replay import ReplayedAdvance, alone, together
 from worker.arena.world import World
 
@@ -117,14 +117,9 @@ def test_replay_of_a_drift_is_an_approximation_and_says_so(
 def test_poses_of_an_evaluation_leave_out_the_objects(turtle: Robot) -> None:
     box = '<geom type="box" size=".1 .1 .1"/>'
     body = f'<body pos="2 0 0.1"><freejoint/>{box}</body>'
-    settings = EvaluationSettings(
-        space=Space(),
-        simulation=Simulation(window_steps=80),
-        fitness=Fitness(),
-        environment=Environment(
-            scenery=f"<mujoco><worldbody>{body}</worldbody></mujoco>"
-        ),
-    )
+    scenery = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
+    clock, environment = Simulation(window_steps=80), Environment(scenery=scenery)
+    settings = with_simulation(clock, environment=environment)
     _, plain = alone(turtle, replace(settings, environment=FLAT), NO_IDENTITY)
     _, poses = alone(turtle, settings, NO_IDENTITY)
     lengths = [len(angles) for angles in poses["angles"].to_pylist()]

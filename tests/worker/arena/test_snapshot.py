@@ -97,17 +97,6 @@ def test_snapshot_right_after_changes_continues_equally(robot_of: Robots) -> Non
     assert seconds(restored, 1.0) == seconds(world, 1.0)
 
 
-def test_snapshots_are_independent_of_the_model_cache(robot_of: Robots) -> None:
-    """A world that is restored repeatedly equals one that is not."""
-    steady = populated(SETTINGS, crowd(robot_of, 5, 0.3))
-    passed = populated(SETTINGS, crowd(robot_of, 5, 0.3))
-    for until in range(50, 1001, 50):
-        passed.advance(until)
-        passed = World.restore(SETTINGS, passed.snapshot())
-    steady.advance(1000)
-    assert passed.digest() == steady.digest()
-
-
 def test_other_bytes_are_rejected_as_snapshot(turtle: Robot) -> None:
     world = populated(SETTINGS, [Insertion(BirthId(0, 0), turtle, (0.0, 0.0))])
     data = world.snapshot()

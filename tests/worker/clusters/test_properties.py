@@ -1,6 +1,5 @@
 """Properties of clusters: partitions, symmetry, and states that moves do not change."""
 
-from collections.abc import Callable, Iterator
 from itertools import combinations
 from random import Random
 
@@ -27,22 +26,6 @@ births = st.sampled_from(BIRTHS)
 links = st.lists(st.tuples(births, births), max_size=10)
 few = settings(max_examples=12, deadline=None)
 many = settings(max_examples=100, deadline=None)
-
-
-@pytest.fixture
-def arenas() -> Iterator[Callable[..., World]]:
-    """Return a function that makes worlds; their invariants hold at the end."""
-    made: list[World] = []
-
-    def arena(robots: int, radius_m: float = 0.6, **arena: float) -> World:
-        newborns = crowd(random_robot, robots, radius_m)
-        made.append(populated(settings_of(**arena), newborns))
-        return made[-1]
-
-    yield arena
-    for world in made:
-        check_population(world.population)
-        world.close()
 
 
 def partition(data: DataObject, members: tuple[BirthId, ...]) -> list[Group]:
@@ -141,15 +124,15 @@ def test_any_sequence_of_operations_keeps_the_invariants(data: DataObject) -> No
     world.close()
 
 
-def test_arenas_keep_the_invariants_while_robots_meet(
-    arenas: Callable[..., World],
-) -> None:
+def test_arenas_keep_the_invariants_while_robots_meet() -> None:
     for radius_m, drop_m in ((0.4, 0.3), (0.8, 0.0)):
-        world = arenas(12, radius_m, drop_m=drop_m)
+        newborns = crowd(random_robot, 12, radius_m)
+        world = populated(settings_of(drop_m=drop_m), newborns)
         for _ in range(20):
             world.advance(world.step + 33)
             check_population(world.population)
         assert world.population.merges
+        world.close()
 
 
 @pytest.mark.parametrize("moments", [1, 3])

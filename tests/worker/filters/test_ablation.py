@@ -7,7 +7,6 @@ from msgspec.structs import replace
 
 from schema.errors import InvalidRobot
 from schema.experiment.document import (
-    Fitness,
     Measures,
     Simulation,
     Space,
@@ -20,16 +19,13 @@ from schema.robot.brain import INPUT, Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
+from tests.worker.evaluations import with_simulation
 from worker.filters.ablation import all_ablations
 from worker.robot.evaluation import evaluate, mean_inputs, simulate
 
 GREY = (0.5, 0.5, 0.5)
 TICK_STEPS = 25
-SETTINGS = EvaluationSettings(
-    space=Space(),
-    simulation=Simulation(window_steps=1200, warmup_steps=400),
-    fitness=Fitness(),
-)
+SETTINGS = with_simulation(Simulation(window_steps=1200, warmup_steps=400))
 LEG = (
     Part("Core", -1, -1, -1, 0, GREY),
     Part("ActiveHinge", 0, 2, 0, 0, GREY),

@@ -7,22 +7,21 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
-from schema.experiment.document import Fitness, Simulation, Space, body_space
+from schema.experiment.document import Simulation, Space, body_space
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.robust import Calibration, Response
-from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.experiment.settings import evaluation_settings_of
 from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from tests.documents import parse_experiment
+from tests.worker.evaluations import with_simulation
 from worker.bench.spider import spider
 from worker.filters.calibration import Calibrated
 from worker.robot.evaluation import evaluate
 
 TICK_S = 0.125
-SETTINGS = EvaluationSettings(
-    space=Space(), simulation=Simulation(window_steps=400), fitness=Fitness()
-)
+SETTINGS = with_simulation(Simulation(window_steps=400))
 
 
 def calibrated(*entries: Calibration, robot: Robot | None = None) -> Calibrated:

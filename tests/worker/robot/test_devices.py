@@ -177,13 +177,6 @@ def test_touch_sensor_reads_contact_with_the_ground() -> None:
         assert found == [float(height == min(heights)) for height in heights]
 
 
-def test_unused_readings_stay_zero(turtle: Robot) -> None:
-    model, data = alone(turtle)
-    sensors = Sensors(PlacedRobot(turtle, BUILT_IN, model, data), width=12)
-    for _ in ticks(model, data, [sensors], 4):
-        assert sensors.readings[0, 8:].tolist() == [0.0] * 4
-
-
 def test_commanded_velocity_is_proportional_to_the_error(
     robot_of: Callable[[int], Robot],
 ) -> None:

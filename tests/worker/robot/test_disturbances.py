@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import SimulationDiverged
-from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.document import Simulation
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.robust import RANGES, Robust
 from schema.experiment.settings import EvaluationSettings
@@ -15,15 +15,12 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
+from tests.worker.evaluations import with_simulation
 from worker.robot import evaluation
 from worker.robot.disturbances import combined, disturbances
 from worker.robot.evaluation import evaluate, simulate
 
-SETTINGS = EvaluationSettings(
-    space=Space(),
-    simulation=Simulation(window_steps=400, friction=0.5, drop_m=0.01),
-    fitness=Fitness(),
-)
+SETTINGS = with_simulation(Simulation(window_steps=400, friction=0.5, drop_m=0.01))
 STILL = Robust(
     draws=1,
     friction=(1, 1),

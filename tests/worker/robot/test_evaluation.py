@@ -1,14 +1,10 @@
 """Off-line evaluation of one robot."""
 
-import hashlib
-import subprocess
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import msgspec
-import mujoco
 import pytest
 from msgspec.structs import replace
 
@@ -23,7 +19,6 @@ from schema.robot.ids import NOBODY
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
 from schema.wire.messages import Evaluate, Request
-from schema.wire.protobuf import encode_robot
 from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
     FitnessFunction,
@@ -74,21 +69,6 @@ def test_sampling_interval_does_not_change_the_motion(turtle: Robot) -> None:
     assert coarse.core_position[-1].tobytes() == fine.core_position[-1].tobytes()
 
 
-def test_number_of_physics_steps_is_warm_up_plus_window(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    steps: list[int] = []
-    step = mujoco.mj_step
-
-    def counted(model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
-        steps.append(nstep)
-        step(model, data, nstep=nstep)
-
-    monkeypatch.setattr(mujoco, "mj_step", counted)
-    simulate(turtle, with_simulation(replace(WORLD, warmup_steps=7)))
-    assert sum(steps) == 2407
-
-
 def test_robot_without_a_brain_stays_at_its_place() -> None:
     grey = (0.5, 0.5, 0.5)
     robot = Robot(
@@ -106,36 +86,6 @@ def test_simulation_is_independent_of_threads(robot_of: RobotOf) -> None:
     assert found == alone
 
 
-ELSEWHERE = """
-import hashlib, sys
-from schema.wire.protobuf import decode_robot
-from schema.experiment.document import Fitness, Simulation, Space
-from schema.experiment.settings import EvaluationSettings
-from worker.robot.evaluation import simulate
-settings = EvaluationSettings(
-    space=Space(), simulation=Simulation(), fitness=Fitness()
-)
-for line in sys.stdin:
-    track = simulate(decode_robot(bytes.fromhex(line)), settings)
-    print(hashlib.sha256(track.core_position.tobytes()).hexdigest())
-"""
-
-
-def test_simulation_is_equal_in_another_process(robot_of: RobotOf) -> None:
-    robots = [robot_of(seed) for seed in range(4)]
-    found = subprocess.run(
-        [sys.executable, "-c", ELSEWHERE],
-        input="\n".join(encode_robot(robot).hex() for robot in robots),
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=Path(__file__).parents[3],
-    ).stdout.split()
-    assert found == [
-        hashlib.sha256(bits(simulate(robot, SETTINGS))).hexdigest() for robot in robots
-    ]
-
-
 def test_divergence_is_reported_with_reason_and_time(
     robot_of: RobotOf,
     capfd: pytest.CaptureFixture[str],
@@ -151,14 +101,6 @@ def test_divergence_is_reported_with_reason_and_time(
         simulate(robot_of(3), with_simulation(absurd))
     assert capfd.readouterr() == ("", "")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_divergence_does_not_affect_the_next_simulation(robot_of: RobotOf) -> None:
-    before = bits(simulate(robot_of(4), SETTINGS))
-    absurd = replace(WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0)
-    with pytest.raises(SimulationDiverged):
-        simulate(robot_of(3), with_simulation(absurd))
-    assert bits(simulate(robot_of(4), SETTINGS)) == before
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,13 @@ from schema.errors import (
     SensorFailed,
     SimulationDiverged,
 )
-from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.document import Fitness, Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
+from tests.worker.evaluations import with_simulation
 from worker.robot.disturbances import disturbances
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import (
@@ -27,11 +28,7 @@ from worker.robot.robustness import (
     summary,
 )
 
-SETTINGS = EvaluationSettings(
-    space=Space(),
-    simulation=Simulation(window_steps=400, drop_m=0.01),
-    fitness=Fitness(),
-)
+SETTINGS = with_simulation(Simulation(window_steps=400, drop_m=0.01))
 CHANGE = ChangedSettings("none", SETTINGS)
 
 
@@ -101,10 +98,6 @@ def test_noise_is_the_only_disturbance_of_its_change(turtle: Robot) -> None:
     ]
     assert evaluate(turtle, noisy).fitness == pytest.approx(sum(trials) / 4)
     assert len({*trials}) == 4
-
-
-def test_starts_are_the_same_each_time() -> None:
-    assert small_changes(SETTINGS) == small_changes(SETTINGS)
 
 
 def test_fitness_is_that_of_an_evaluation_with_the_changed_settings(
