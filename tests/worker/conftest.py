@@ -5,12 +5,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+import worker.measures
 from schema.experiment.document import Experiment, body_space
 from schema.parts import BodySpace
+from schema.plugins.needs import needs
 from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
 from schema.robot.robot import Part, Robot, check_robot
+from schema.robot.trace import COMPUTED, RECORDED, Trace
+from tests.schema import robots
 
-GREY = (0.5, 0.5, 0.5)
+GREY = robots.GREY
 
 
 def random_robot(seed: int, size: int = 12) -> Robot:
@@ -81,6 +85,22 @@ def _random_brain(rng: np.random.Generator, robot: Robot, space: BodySpace) -> B
     return Brain(neurons, edges)
 
 
+@pytest.fixture
+def traces(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
+    """Return the traces that the measure ``keep`` gets, which needs all channels."""
+    kept: list[Trace] = []
+
+    @needs(*RECORDED, *COMPUTED)
+    def keep(trace: Trace) -> float:
+        kept.append(trace)
+        return 1.0
+
+    monkeypatch.setitem(worker.measures.BUILT_IN, "keep", keep)
+    worker.measures.measures_of.cache_clear()
+    worker.measures.functions_of.cache_clear()
+    return kept
+
+
 @pytest.fixture(scope="session")
 def robot_of() -> Callable[[int], Robot]:
     """Return a function seed -> random planar robot."""
@@ -90,8 +110,7 @@ def robot_of() -> Callable[[int], Robot]:
 @pytest.fixture(scope="session")
 def turtle() -> Robot:
     """Return a core with two hinged bricks beside it, driven by oscillators."""
-    parts = (
-        Part("Core", -1, -1, -1, 0, GREY),
+    turtle = robots.robot_of(
         Part("ActiveHinge", 0, 2, 0, 0, GREY),
         Part("FixedBrick", 1, 1, 0, 0, GREY),
         Part("ActiveHinge", 0, 3, 1, 90, GREY),
@@ -99,9 +118,8 @@ def turtle() -> Robot:
         Part("TouchSensor", 4, 0, 0, 0, GREY),
     )
     neurons = (
-        *(Neuron("input", INPUT, 0) for _ in range(6)),
-        *(Neuron("input", INPUT, 5) for _ in range(2)),
+        *turtle.brain.neurons[:8],
         Neuron("output", "Oscillator", 1, (1.5, 0.0, 1.0)),
         Neuron("output", "Oscillator", 3, (1.5, 0.25, 1.0)),
     )
-    return Robot(parts, Brain(neurons))
+    return Robot(turtle.parts, Brain(neurons))

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +13,23 @@ from worker import robot_command
 from worker.bench.spider import spider
 from worker.robot.evaluation import evaluate
 from worker.robot_command import main
+
+Simulate = Callable[..., Any]
+
+
+@pytest.fixture
+def simulated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Simulate:
+    """Return a function that simulates the spider by the sections of an experiment."""
+    write_robot(spider(), tmp_path / "spider.yaml")
+    file = tmp_path / "mine.toml"
+
+    def run(sections: str, *flags: str) -> Any:  # noqa: ANN401 - out and err
+        file.write_text(f'name = "mine"\n{sections}\n')
+        words = [str(tmp_path / "spider.yaml"), "--experiment", str(file), *flags]
+        assert main(["robot simulate", *words]) == 0
+        return capsys.readouterr()
+
+    return run
 
 
 def test_file_has_the_evaluation_of_its_robot(
@@ -27,14 +45,10 @@ def test_file_has_the_evaluation_of_its_robot(
         assert lines[3] == "simulated:         12.0 s"
 
 
-def test_fitness_in_an_arena_is_told_from_that_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml")
-    for experiment, is_arena in (("scenario1", False), ("scenario3", True)):
-        words = [str(tmp_path / "spider.yaml"), "--experiment", experiment]
-        assert main(["robot simulate", *words]) == 0
-        assert ("simulated alone; in an arena" in capsys.readouterr().err) is is_arena
+def test_fitness_in_an_arena_is_told_from_that_alone(simulated: Simulate) -> None:
+    for sections, is_arena in (("", False), ("[arena]", True)):
+        said = simulated(sections).err
+        assert ("simulated alone; in an arena" in said) is is_arena
 
 
 @pytest.mark.parametrize(
@@ -46,49 +60,29 @@ def test_fitness_in_an_arena_is_told_from_that_alone(
     ],
 )
 def test_draws_of_a_run_are_told_from_those_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], section: str
+    simulated: Simulate, section: str
 ) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml")
-    file = tmp_path / "mine.toml"
     for text, is_told in (("", False), (section, True)):
-        file.write_text(f'name = "mine"\n{text}\n')
-        words = [str(tmp_path / "spider.yaml"), "--experiment", str(file)]
-        assert main(["robot simulate", *words]) == 0
-        assert (
-            "use other random numbers than the run" in capsys.readouterr().err
-        ) is is_told
+        said = simulated(text).err
+        assert ("use other random numbers than the run" in said) is is_told
 
 
-def test_drawn_lengths_of_a_run_are_told_from_that_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml")
-    file = tmp_path / "mine.toml"
+def test_drawn_lengths_of_a_run_are_told_from_that_alone(simulated: Simulate) -> None:
     told = (
         "revolve: simulated for 2 s; the run draws the length of each evaluation "
         "(simulation.evaluation_s)\n"
     )
     for text, is_told in (("", False), ("evaluation_s = [2.0, 4.0]\n", True)):
         clock = "warmup_steps = 200\nwindow_steps = 200\n"
-        file.write_text(f'name = "mine"\n[simulation]\n{clock}{text}')
-        words = [str(tmp_path / "spider.yaml"), "--experiment", str(file)]
-        assert main(["robot simulate", *words]) == 0
-        shown = capsys.readouterr()
+        shown = simulated(f"[simulation]\n{clock}{text}")
         assert "simulated:         2.0 s" in shown.out
         assert (told in shown.err) is is_told
 
 
-def test_robustness_is_shown_by_change_and_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_robot(spider(), tmp_path / "spider.yaml")
-    short = tmp_path / "short.toml"
-    short.write_text('name = "short"\n[simulation]\nwindow_steps = 400\n')
-    words = [str(tmp_path / "spider.yaml"), "--experiment", str(short)]
-    assert main(["robot simulate", *words]) == 0
-    plain = capsys.readouterr().out.splitlines()
-    assert main(["robot simulate", *words, "--robustness"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_robustness_is_shown_by_change_and_in_one_line(simulated: Simulate) -> None:
+    short = "[simulation]\nwindow_steps = 400"
+    plain = simulated(short).out.splitlines()
+    lines = simulated(short, "--robustness").out.splitlines()
     assert lines[:4] == plain
     assert len(lines) == 4 + 11 + 1
     assert lines[4].startswith("time step 0.0025 s:")
@@ -98,18 +92,11 @@ def test_robustness_is_shown_by_change_and_in_one_line(
 
 
 def test_a_long_simulation_shows_its_progress(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    simulated: Simulate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("schema.agent.terminal.progress_line.SOON_S", 0.0)
     monkeypatch.setattr("schema.agent.terminal.progress_line.SPAN_S", 0.0)
-    write_robot(spider(), tmp_path / "spider.yaml")
-    long = tmp_path / "long.toml"
-    long.write_text(
-        'name = "long"\n[simulation]\nwarmup_steps = 0\nwindow_steps = 20000\n'
-    )
-    words = [str(tmp_path / "spider.yaml"), "--experiment", str(long)]
-    assert main(["robot simulate", *words]) == 0
-    said = capsys.readouterr()
+    said = simulated("[simulation]\nwarmup_steps = 0\nwindow_steps = 20000")
     *_, line = said.err.splitlines()
     found = re.fullmatch(r"simulated (\d+\.\d) of 100 s", line)
     assert found
@@ -118,7 +105,7 @@ def test_a_long_simulation_shows_its_progress(
 
 
 def test_until_the_first_tick_the_model_is_built(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    simulated: Simulate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A robot of 1000 parts takes minutes, in which nothing is simulated."""
     shown: list[str] = []
@@ -129,8 +116,7 @@ def test_until_the_first_tick_the_model_is_built(
         yield shown.append
 
     monkeypatch.setattr(robot_command, "progress_if_long", progress)
-    write_robot(spider(), tmp_path / "spider.yaml")
-    assert main(["robot simulate", str(tmp_path / "spider.yaml")]) == 0
+    simulated("")
     parts = len(spider().parts)
     assert shown[0] == f"building the model of {parts} parts"
     assert shown[1] == "simulated 0.0 of 12 s"

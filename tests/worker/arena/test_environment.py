@@ -12,10 +12,10 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
-from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Changes, Insertion
+from tests.schema import robots
 from tests.worker.arena_cases import SECOND, crowd, populated, seconds, settings_of
 from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
@@ -23,14 +23,9 @@ from worker.robot.evaluation import simulate
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)
-GREY = (0.5, 0.5, 0.5)
-CORE = Part("Core", -1, -1, -1, 0, GREY)
-BOX = Robot((CORE,), Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))))
+BOX = robots.robot_of()
 """A core alone, 9 cm by 9 cm by 4.5 cm, with its imu."""
-WITH_PADS = Robot(
-    (CORE, Part("TouchSensor", 0, 3, 0, 0, GREY)),
-    Brain((*BOX.brain.neurons, *(Neuron("input", INPUT, 1) for _ in range(2)))),
-)
+WITH_PADS = robots.robot_of(Part("TouchSensor", 0, 3, 0, 0, robots.GREY))
 """The same with two pads in front of its face towards -x."""
 G = 9.81
 

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-import worker.measures
 from schema.experiment.document import Measures
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import (
     ArenaSettings,
     arena_settings_of,
 )
-from schema.plugins.needs import needs
 from schema.robot.brain import Brain, Connection
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -31,24 +29,9 @@ ARENA = replace(SETTINGS.arena, drop_m=0.0)
 NAMES = tuple(BUILT_IN)
 
 
-def forget() -> None:
-    """Forget the functions of earlier tests."""
-    worker.measures.measures_of.cache_clear()
-    worker.measures.functions_of.cache_clear()
-
-
 @pytest.fixture
-def recorded(monkeypatch: pytest.MonkeyPatch) -> tuple[ArenaSettings, list[Trace]]:
+def recorded(traces: list[Trace]) -> tuple[ArenaSettings, list[Trace]]:
     """Return settings with a measure that keeps the traces that it gets."""
-    traces: list[Trace] = []
-
-    @needs(*RECORDED, *COMPUTED)
-    def keep(trace: Trace) -> float:
-        traces.append(trace)
-        return 0.0
-
-    monkeypatch.setitem(worker.measures.BUILT_IN, "keep", keep)
-    forget()
     measures = Measures(names=("keep", *NAMES))
     return replace(SETTINGS, simulation=CLOCK, arena=ARENA, measures=measures), traces
 

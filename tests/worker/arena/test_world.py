@@ -10,7 +10,6 @@ from msgspec.structs import replace
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Fitness, Space
 from schema.experiment.settings import EvaluationSettings
-from schema.parts import LIGHT_SENSOR
 from schema.plugins.protocols import Bank
 from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
@@ -18,6 +17,7 @@ from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
 from schema.wire.arena import BrainChange, Changes, Insertion
 from schema.wire.poses import PoseArrays
+from tests.schema import robots
 from tests.worker.arena_cases import (
     EXPERIMENT,
     SECOND,
@@ -203,16 +203,9 @@ def test_contacts_of_two_robots_are_recorded(turtle: Robot) -> None:
 
 
 def light_robot() -> Robot:
-    """Return a rotated core with a light sensor that faces world +x."""
-    core = Part("Core", -1, -1, -1, 0, (0.5,) * 3)
-    hinge = Part("ActiveHinge", 0, 3, 0, 0, (0.5,) * 3)
-    lamp = Part("LightSensor", 0, 2, 0, 0, (0.5,) * 3)
-    neurons = (
-        *(Neuron("input", "Input", 0) for _ in range(6)),
-        Neuron("input", "Input", 1),
-        Neuron("output", "Simple", 2, (0.0, 0.5)),
-    )
-    return Robot((core, lamp, hinge), Brain(neurons))
+    """Return a core with a light sensor that faces world +x, and a hinge."""
+    lamp = Part("LightSensor", 0, 2, 0, 0, robots.GREY)
+    return robots.robot_of(lamp, Part("ActiveHinge", 0, 3, 0, 0, robots.GREY))
 
 
 @pytest.mark.parametrize(
@@ -233,7 +226,6 @@ def test_light_decreases_with_distance_and_can_be_hidden(
     space = Space(
         part_types=(*EXPERIMENT.space.part_types, "schema.parts:LIGHT_SENSOR")
     )
-    assert LIGHT_SENSOR.name == "LightSensor"
     settings = replace(settings_of(light=light, drop_m=0.0), space=space)
     newborns = [Insertion(A, light_robot(), (0.0, 0.0))]
     if is_hidden:

@@ -14,13 +14,12 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
 from schema.wire.arena import Casualty, Changes, Insertion, Touch
+from tests.schema import robots
 from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of
 from tests.worker.arena_oracle import Oracle
 from worker.arena.world import World
 
 Robots = Callable[[int], Robot]
-GREY = (0.5, 0.5, 0.5)
-CORE = Part("Core", -1, -1, -1, 0, GREY)
 
 
 def live(
@@ -143,7 +142,7 @@ def test_touch_sensors_of_survivors_keep_their_contacts(core: str, imu: int) -> 
 
 def test_contacts_of_survivors_are_counted_when_a_cluster_mate_diverges() -> None:
     """Two robots overlap by 0.5 mm; the third diverges at one of five checks."""
-    robot = Robot((CORE,), Brain((Neuron("input", INPUT, 0),) * 6))
+    robot = robots.robot_of()
     births = [BirthId(0, number) for number in range(3)]
     places = zip(births, (0.0, 0.0895, 0.19), strict=True)
     newborns = [Insertion(birth, robot, (x, 0.0)) for birth, x in places]
@@ -179,10 +178,7 @@ def test_survivor_merges_at_the_check_at_which_its_cluster_mate_diverges() -> No
 
 def on_its_sensor(imu: int = 6) -> Robot:
     """Return a core that turns a touch sensor to the ground."""
-    parts = (
-        CORE,
-        Part("ActiveHinge", 0, 0, 0, 0, GREY),
-        Part("TouchSensor", 1, 1, 0, 0, GREY),
-    )
+    hinge = Part("ActiveHinge", 0, 0, 0, 0, robots.GREY)
+    parts = (robots.CORE, hinge, Part("TouchSensor", 1, 1, 0, 0, robots.GREY))
     inputs = [Neuron("input", INPUT, part) for part in (0,) * imu + (2,) * 2]
     return Robot(parts, Brain((*inputs, Neuron("output", "Simple", 1, (1.0, 1.0)))))

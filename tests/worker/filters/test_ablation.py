@@ -15,30 +15,26 @@ from schema.experiment.document import (
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import Ablation, EvaluationSettings
 from schema.plugins.needs import needs
-from schema.robot.brain import INPUT, Brain, Connection, Neuron
+from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
+from tests.schema import robots
 from tests.worker.evaluations import with_simulation
 from worker.filters.ablation import all_ablations
 from worker.robot.evaluation import evaluate, mean_inputs, simulate
 
-GREY = (0.5, 0.5, 0.5)
 TICK_STEPS = 25
 SETTINGS = with_simulation(Simulation(window_steps=1200, warmup_steps=400))
-LEG = (
-    Part("Core", -1, -1, -1, 0, GREY),
-    Part("ActiveHinge", 0, 2, 0, 0, GREY),
-    Part("FixedBrick", 1, 1, 0, 0, GREY),
-    Part("TouchSensor", 2, 1, 0, 0, GREY),
+LEG = robots.robot_of(
+    Part("ActiveHinge", 0, 2, 0, 0, robots.GREY),
+    Part("FixedBrick", 1, 1, 0, 0, robots.GREY),
+    Part("TouchSensor", 2, 1, 0, 0, robots.GREY),
 )
-INPUTS = (
-    *(Neuron("input", INPUT, 0) for _ in range(6)),
-    *(Neuron("input", INPUT, 3) for _ in range(2)),
-)
+INPUTS = LEG.brain.neurons[:8]
 LEFT, RIGHT, MOTOR = 6, 7, 8
 REFLEX = Robot(
-    LEG,
+    LEG.parts,
     Brain(
         (*INPUTS, Neuron("output", "Simple", 1, (0.0, 1.0))),
         (Connection(LEFT, MOTOR, 1.0),),
@@ -46,7 +42,7 @@ REFLEX = Robot(
 )
 """A leg that lifts while its left pad touches: the pad makes it move."""
 CLOCK = Robot(
-    LEG,
+    LEG.parts,
     Brain(
         (*INPUTS, Neuron("output", "Oscillator", 1, (1.0, 0.0, 1.0))),
         (Connection(LEFT, MOTOR, 1.0), Connection(RIGHT, MOTOR, 1.0)),

@@ -8,20 +8,16 @@ from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
-from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.robot import Part, Robot
+from schema.robot.robot import Part
 from schema.wire.arena import Insertion
+from tests.schema.robots import GREY, robot_of
 from tests.worker.arena_cases import populated, settings_of
 from worker.robot.devices import Sensors
 from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Probe
 
-GREY = (0.5, 0.5, 0.5)
-WITH_PADS = Robot(
-    (Part("Core", -1, -1, -1, 0, GREY), Part("TouchSensor", 0, 3, 0, 0, GREY)),
-    Brain(tuple(Neuron("input", INPUT, part) for part in (0,) * 6 + (1,) * 2)),
-)
+WITH_PADS = robot_of(Part("TouchSensor", 0, 3, 0, 0, GREY))
 """A core with two pads in front of its face towards -x, 5.55 cm from its centre."""
 
 

@@ -13,18 +13,15 @@ from schema.experiment.environment import FLAT
 from schema.mjcf.model import add_ground, robot_spec, set_options, solo_spec
 from schema.parts import BUILT_IN, CORE, BodySpace, PartType, Sensor
 from schema.robot.robot import Part, Robot
+from tests.schema import robots
 from worker.robot.devices import Sensors, Servos
 from worker.robot.placed import PlacedRobot
 
-GREY = (0.5, 0.5, 0.5)
+GREY = robots.GREY
 WORLD = Simulation()
 TICK_S = 0.125
-HINGED = Robot(
-    (
-        Part("Core", -1, -1, -1, 0, GREY),
-        Part("ActiveHinge", 0, 2, 0, 90, GREY),
-        Part("FixedBrick", 1, 1, 0, 270, GREY),
-    )
+HINGED = robots.robot_of(
+    Part("ActiveHinge", 0, 2, 0, 90, GREY), Part("FixedBrick", 1, 1, 0, 270, GREY)
 )
 
 
@@ -36,12 +33,12 @@ def alone(
     return model, mujoco.MjData(model)
 
 
-def two(robots: tuple[Robot, Robot]) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def two(pair: tuple[Robot, Robot]) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return model and data of two robots, ``1:`` and ``2:``, half a metre apart."""
     world = mujoco.MjSpec()
     set_options(world, WORLD, FLAT, is_single=False)
     add_ground(world, WORLD, FLAT)
-    for number, robot in enumerate(robots, start=1):
+    for number, robot in enumerate(pair, start=1):
         child = robot_spec(robot, BUILT_IN, WORLD)
         turn = (math.cos(number / 2), 0.0, 0.0, math.sin(number / 2))
         frame = world.worldbody.add_frame(
@@ -153,12 +150,7 @@ def test_imu_in_a_limb_agrees_with_the_engine_s_sensors() -> None:
 
 def test_touch_sensor_reads_contact_with_the_ground() -> None:
     """The sensor points downwards; the core stands on its two pads."""
-    robot = Robot(
-        (
-            Part("Core", -1, -1, -1, 0, GREY),
-            Part("TouchSensor", 0, 2, 0, 0, GREY),
-        )
-    )
+    robot = robots.robot_of(Part("TouchSensor", 0, 2, 0, 0, GREY))
     model, data = alone(robot)
     sensors = Sensors(PlacedRobot(robot, BUILT_IN, model, data), width=10)
     assert sensors.start()[0, 6:8].tolist() == [0.0, 0.0]
@@ -181,20 +173,18 @@ def test_commanded_velocity_is_proportional_to_the_error(
     robot_of: Callable[[int], Robot],
 ) -> None:
     """Velocity = 0.9 (target - angle), with the engine's joint angles."""
-    robots = (robot_of(1), robot_of(2))
-    model, data = two(robots)
+    pair = (robot_of(1), robot_of(2))
+    model, data = two(pair)
     servos = [
         Servos(PlacedRobot(robot, BUILT_IN, model, data, f"{number}:"))
-        for number, robot in enumerate(robots, start=1)
+        for number, robot in enumerate(pair, start=1)
     ]
     rng = np.random.default_rng(5)
     data.qpos[:] += rng.uniform(-0.3, 0.3, model.nq)
-    outputs = [rng.uniform(-0.2, 1.2, 10) for _ in robots]
+    outputs = [rng.uniform(-0.2, 1.2, 10) for _ in pair]
     for servo, output in zip(servos, outputs, strict=True):
         servo.drive(output)
-    for number, (robot, output) in enumerate(
-        zip(robots, outputs, strict=True), start=1
-    ):
+    for number, (robot, output) in enumerate(zip(pair, outputs, strict=True), start=1):
         motors = [i for i, p in enumerate(robot.parts) if p.kind == "ActiveHinge"]
         for part, value in zip(motors, output, strict=False):
             name = f"{number}:joint{part}"

@@ -14,11 +14,11 @@ from schema.errors import (
     SimulationDiverged,
 )
 from schema.experiment.document import Fitness, Simulation, Space
-from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import NOBODY
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
 from schema.wire.messages import Evaluate, Request
+from tests.schema import robots
 from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
     FitnessFunction,
@@ -70,19 +70,14 @@ def test_sampling_interval_does_not_change_the_motion(turtle: Robot) -> None:
 
 
 def test_robot_without_a_brain_stays_at_its_place() -> None:
-    grey = (0.5, 0.5, 0.5)
-    robot = Robot(
-        (Part("Core", -1, -1, -1, 0, grey),),
-        Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))),
-    )
-    assert evaluate(robot, SETTINGS).fitness < 1e-4
+    assert evaluate(robots.robot_of(), SETTINGS).fitness < 1e-4
 
 
 def test_simulation_is_independent_of_threads(robot_of: RobotOf) -> None:
-    robots = [robot_of(seed) for seed in range(8)]
-    alone = [bits(simulate(robot, SETTINGS)) for robot in robots]
+    chosen = [robot_of(seed) for seed in range(8)]
+    alone = [bits(simulate(robot, SETTINGS)) for robot in chosen]
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(lambda r: bits(simulate(r, SETTINGS)), robots))
+        found = list(pool.map(lambda r: bits(simulate(r, SETTINGS)), chosen))
     assert found == alone
 
 
@@ -124,15 +119,10 @@ def test_engine_failure_is_reported_as_divergence(
 
 
 def test_light_sensor_in_a_world_without_light_is_rejected() -> None:
-    grey = (0.5, 0.5, 0.5)
-    parts = (
-        Part("Core", -1, -1, -1, 0, grey),
-        Part("LightSensor", 0, 2, 0, 0, grey),
-    )
-    inputs = tuple(Neuron("input", INPUT, part) for part in (0,) * 6 + (1,))
+    robot = robots.robot_of(Part("LightSensor", 0, 2, 0, 0, robots.GREY))
     space = Space(part_types=("schema.parts:CORE", "schema.parts:LIGHT_SENSOR"))
     with pytest.raises(ExperimentError, match="no light in this world"):
-        simulate(Robot(parts, Brain(inputs)), replace(SETTINGS, space=space))
+        simulate(robot, replace(SETTINGS, space=space))
 
 
 def test_limits_of_a_search_refuse_no_robot_that_exists(turtle: Robot) -> None:

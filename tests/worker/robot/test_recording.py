@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-import worker.measures
 from schema.experiment.document import Measures, body_space
 from schema.experiment.environment import Environment
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
-from schema.plugins.needs import needs
 from schema.robot.robot import Robot
-from schema.robot.trace import COMPUTED, RECORDED, Trace
+from schema.robot.trace import RECORDED, Trace
 from worker.robot.evaluation import evaluate, simulate
 from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Probe
@@ -26,17 +24,10 @@ CLOCK = replace(PLAIN.simulation, window_steps=400)
 
 
 @pytest.fixture
-def everything(monkeypatch: pytest.MonkeyPatch) -> EvaluationSettings:
+def everything(traces: list[Trace]) -> EvaluationSettings:
     """Return settings with a measure that needs all channels."""
-
-    @needs(*RECORDED, *COMPUTED)
-    def all_channels(_trace: Trace) -> float:
-        return 1.0
-
-    monkeypatch.setitem(worker.measures.BUILT_IN, "everything", all_channels)
-    worker.measures.measures_of.cache_clear()
-    worker.measures.functions_of.cache_clear()
-    return replace(PLAIN, simulation=CLOCK, measures=Measures(names=("everything",)))
+    assert not traces
+    return replace(PLAIN, simulation=CLOCK, measures=Measures(names=("keep",)))
 
 
 def states_at_ticks(robot: Robot, settings: EvaluationSettings) -> dict[float, Any]:
