@@ -6,83 +6,23 @@ import numpy as np
 import pytest
 
 import worker.measures
+from coordinator.evolution.generation import generate
 from schema.experiment.document import Experiment, body_space
-from schema.parts import BodySpace
 from schema.plugins.needs import needs
-from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
-from schema.robot.robot import Part, Robot, check_robot
+from schema.robot.brain import Brain, Neuron
+from schema.robot.genome import develop
+from schema.robot.robot import Part, Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
 from tests.schema import robots
 
 GREY = robots.GREY
 
 
-def random_robot(seed: int, size: int = 12) -> Robot:
-    """Return a planar robot of about ``size`` parts within the thesis's limits."""
-    rng = np.random.default_rng(seed)
-    space = body_space(Experiment(name="test").space)
-    robot = Robot(())
-    while not any(space[part.kind].motor for part in robot.parts):
-        robot = Robot(_random_body(rng, size, space))
-    robot = Robot(robot.parts, _random_brain(rng, robot, space))
-    check_robot(robot, space)
-    return robot
-
-
-def _random_body(
-    rng: np.random.Generator, size: int, space: BodySpace
-) -> tuple[Part, ...]:
-    """Return parts in depth-first order, with random numbers of children."""
-    parts = [Part("Core", -1, -1, -1, 0, GREY)]
-    motors = pads = 0
-
-    def grow(parent: int, own: int, level: int) -> None:
-        nonlocal motors, pads
-        for slot in range(space[parts[parent].kind].arity):
-            if slot == own or len(parts) >= size or rng.random() < 0.3:
-                continue
-            kinds = [k for k in space.values() if not k.is_root]
-            kind = kinds[int(rng.integers(len(kinds)))]
-            if motors + kind.outputs > 10 or pads + kind.inputs > 4:
-                continue
-            motors, pads = motors + kind.outputs, pads + kind.inputs
-            turn = int(rng.integers(4)) * 90
-            if kind.is_levelled:
-                turn = -level % 360
-            values = tuple(float(rng.uniform(p.low, p.high)) for p in kind.parameters)
-            end = int(rng.integers(kind.arity))
-            parts.append(Part(kind.name, parent, slot, end, turn, values))
-            grow(len(parts) - 1, end, (level + turn) % 360)
-
-    grow(0, -1, 0)
-    return tuple(parts)
-
-
-def _random_brain(rng: np.random.Generator, robot: Robot, space: BodySpace) -> Brain:
-    def neuron(layer: str, part: int) -> Neuron:
-        kind = list(NEURON_TYPES)[int(rng.integers(3))]
-        values = tuple(float(rng.uniform(p.low, p.high)) for p in NEURON_TYPES[kind])
-        return Neuron("output" if layer == "output" else "hidden", kind, part, values)
-
-    parts = list(enumerate(robot.parts))
-    inputs = [
-        Neuron("input", INPUT, index)
-        for index, part in parts
-        for _ in range(space[part.kind].inputs)
-    ]
-    outputs = [neuron("output", i) for i, p in parts if space[p.kind].outputs]
-    hidden = [
-        neuron("hidden", part)
-        for part in sorted(rng.integers(len(parts), size=int(rng.integers(11))))
-    ]
-    neurons = (*inputs, *outputs, *hidden)
-    edges = tuple(
-        Connection(source, target, float(rng.random()))
-        for source in range(len(neurons))
-        for target in range(len(inputs), len(neurons))
-        if rng.random() < 0.2
-    )
-    return Brain(neurons, edges)
+def random_robot(seed: int) -> Robot:
+    """Return a random robot within the thesis's limits; its parts may intersect."""
+    experiment = Experiment(name="test")
+    genome = generate(np.random.default_rng(seed), experiment)
+    return develop(genome, body_space(experiment.space))
 
 
 @pytest.fixture

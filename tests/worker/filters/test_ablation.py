@@ -107,7 +107,7 @@ def test_the_brain_runs_on_behind_a_dead_motor(turtle: Robot) -> None:
 def test_an_input_at_0_is_one_without_connections(
     robot_of: Callable[[int], Robot],
 ) -> None:
-    robot = robot_of(2)
+    robot = robot_of(5)
     kept = tuple(e for e in robot.brain.connections if e.source != 2)
     assert len(kept) < len(robot.brain.connections)
     bare = Robot(robot.parts, Brain(robot.brain.neurons, kept))
