@@ -130,8 +130,7 @@ def runtime_directory() -> Path:
 def _runtime(*, is_of_login: bool) -> tuple[Path, bool]:
     """Return ``runtime_directory``, and whether its file system has locks.
 
-    Args:
-        is_of_login: prefer the first, which may be removed when the user logs out.
+    That of the login may be removed when the user logs out.
     """
     login, own = os.environ.get("XDG_RUNTIME_DIR"), f"revolve-{os.getuid()}"
     places = [Path("/tmp") / own]  # noqa: S108 - refused if it is not private

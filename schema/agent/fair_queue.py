@@ -36,13 +36,7 @@ class FairQueue(Generic[T]):
         return sum(map(len, self._waiting.values()))
 
     def put(self, source: bytes, item: T, size: int = 0) -> list[T]:
-        """Add an item; return those that are dropped.
-
-        Args:
-            source: of the item.
-            item: that waits from now on, or is dropped.
-            size: of the item [bytes].
-        """
+        """Add an item of a size [bytes]; return those that are dropped."""
         if source not in self._waiting:
             account_s = max(self._accounts.pop(source, 0.0), self._level_s)
             self._accounts[source] = account_s

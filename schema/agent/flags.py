@@ -21,9 +21,7 @@ class Flags(argparse.ArgumentParser):
 
     Flags cannot be abbreviated: a new flag would change what an abbreviation means.
 
-    Args:
-        examples: command lines, each complete; text after ``#`` is a comment.
-        settings: those of argparse.
+    Its examples are complete command lines; text after ``#`` is a comment.
     """
 
     last_error = ""
@@ -66,12 +64,7 @@ class Flags(argparse.ArgumentParser):
 
 
 def whole_number(least: int = 1, most: int | None = None) -> Callable[[str], int]:
-    """Return a reader of whole numbers.
-
-    Args:
-        least: smallest number allowed; not negative.
-        most: greatest number allowed; None for no limit.
-    """
+    """Return a reader of whole numbers from ``least`` >= 0; None is no limit."""
     limits = f">= {least}" if most is None else f"in {least}..{most}"
 
     def read(text: str) -> int:

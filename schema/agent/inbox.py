@@ -38,10 +38,7 @@ class Inbox(Generic[T]):
         return self._items.get_nowait()
 
     def get(self, timeout_s: float) -> T:
-        """Return the next item, once there is one.
-
-        Args:
-            timeout_s: how long to wait, rarely shorter [s].
+        """Return the next item, once there is one; the wait is rarely shorter.
 
         Raises:
             Empty: none came in time.

@@ -73,10 +73,8 @@ def tell_error(line: str) -> None:
 def start_log(process: str, *, as_json: bool = False) -> None:
     """Give the lines of this process, and of those that it starts, time and level.
 
-    Args:
-        process: name of this process.
-        as_json: write JSON; else the environment decides, or else whether standard
-            error is a terminal.
+    Unless it is JSON, the environment decides on the form, or else whether standard
+    error is a terminal.
 
     Raises:
         RevolveError: the environment names an unknown form.

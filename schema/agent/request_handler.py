@@ -130,11 +130,7 @@ class Server:
         )
 
     def cancel(self, data: bytes) -> None:
-        """Note that a job is cancelled; may be called from any thread.
-
-        Args:
-            data: fingerprint of the job's request.
-        """
+        """Note that the job of a fingerprint is cancelled; from any thread."""
         if len(data) != _FINGERPRINT_BYTES:
             self.counts.cancels += 1
             return

@@ -291,14 +291,8 @@ def serve(
     The current job is finished and the next one dropped: its coordinator gives it to
     another agent.
 
-    Args:
-        compute: does the work of a request; raises if the request is bad.
-        agent: this agent, and the address of its hub.
-        stop: ends the loop; checked between jobs.
-        say: as of ``HubWatch``.
-        warn: likewise.
-        outlet: publishes through this agent's session while there is one.
-        slot: this process's slot in a pool, if it has one.
+    Lines are written as ``HubWatch`` does. The outlet publishes through this agent's
+    session while there is one.
 
     Raises:
         NetworkError: an invalid name or address, or ``HubLost``.

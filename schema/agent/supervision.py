@@ -87,9 +87,7 @@ class CurrentJob:
 def crash_cause(exit_code: int) -> str:
     """Return the crash cause if the job itself ended its process, else "".
 
-    Args:
-        exit_code: as ``multiprocessing`` has it: minus the number of a signal, or the
-            exit status of the process.
+    The code is minus the number of a signal, or the exit status of the process.
     """
     if exit_code >= 0:
         return f"exit with status {exit_code}"
@@ -144,7 +142,7 @@ class ProcessSlot:
 class JobWatch:
     """Time since the current job last used CPU.
 
-    One thread begins and ends jobs, another one measures.
+    One thread begins and ends jobs, whose CPU time has a clock; another one measures.
     """
 
     def __init__(
@@ -152,12 +150,6 @@ class JobWatch:
         cpu_s: Callable[[], float],
         now_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Initialise without a job.
-
-        Args:
-            cpu_s: clock of the CPU time of the thread that does the jobs [s].
-            now_s: monotonic clock [s].
-        """
         self.task: RunningJob | None = None
         self._cpu_s, self._now_s = cpu_s, now_s
         self._measured = (now_s(), cpu_s())

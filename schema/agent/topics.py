@@ -120,11 +120,7 @@ def check_name(name: str, what: str) -> str:
 
 
 def slot_of(name: str) -> str:
-    """Return what the names of a process and of its successors have in common.
-
-    Args:
-        name: made by ``unique_name``; for another one the result is empty.
-    """
+    """Return what the names of a process and its successors, unique, have in common."""
     return name.rpartition(".")[0]
 
 

@@ -102,11 +102,6 @@ def read_robot(
 ) -> Robot:
     """Return the robot of a file.
 
-    Args:
-        path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
-        space: the allowed part types.
-        kinds: the allowed neuron types.
-
     Raises:
         InvalidRobot: another ending, a folder, a file that cannot be read, a text that
             is not a robot, or a robot that is not well formed in this body space.
@@ -157,11 +152,8 @@ def write_robot(
 ) -> None:
     """Write a robot to a file; a file that is there is replaced as a whole.
 
-    Args:
-        robot: the robot.
-        path: ends in .yaml, .yml, .pb, .xml or .urdf.
-        settings: name its types, and are stored in MJCF; None: the default values,
-            with all built-in types (in MJCF, those of the default brain).
+    The settings name its types, and are stored in MJCF; None: the default values, with
+    all built-in types (in MJCF, those of the default brain).
 
     Raises:
         InvalidRobot: another ending, a robot that could not be read again, or no file.

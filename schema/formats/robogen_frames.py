@@ -26,11 +26,8 @@ def our_slot(kind: str, slot: int) -> int:
 def our_orientation(parent: str, slot: int, child: str, quarter: int) -> int:
     """Return the orientation [degrees] that matches RoboGen's quarter turns.
 
-    Args:
-        parent: Revolve's type of the parent.
-        slot: RoboGen's slot of it.
-        child: Revolve's type of the child, attached by its first slot.
-        quarter: RoboGen's quarter turns.
+    The types are Revolve's, the slot of the parent is RoboGen's; the child is attached
+    by its first slot.
     """
     # RoboGen turns the child about its own normal, we turn the tangent: opposite.
     turn = (-90 * quarter) % 360

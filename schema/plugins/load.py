@@ -41,12 +41,8 @@ def load_object(
 ) -> T:
     """Return the built-in or own object that a key of an experiment names.
 
-    Args:
-        path: the short name of a built-in object, or ``module:attribute``.
-        where: the key that holds it, for messages.
-        built_in: objects of this kind by short name.
-        members: attributes that an own object must have.
-        kind: type that an own object must have.
+    ``path`` is the short name of a built-in object, or ``module:attribute`` of an own
+    one, which must have some members or be of a type; ``where`` is for messages.
 
     Raises:
         ExperimentError: no such object (the nearest is named), a module that is not

@@ -13,9 +13,6 @@ _ATTRIBUTE = "__revolve_needs__"
 def needs(*channels: str) -> Callable[[_Function], _Function]:
     """Return a decorator that declares the channels of a trace that a function reads.
 
-    Args:
-        channels: names of channels of ``schema.robot.trace.Trace``.
-
     Raises:
         ExperimentError: no such channel.
     """

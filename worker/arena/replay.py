@@ -76,13 +76,9 @@ def alone(
 def together(
     settings: bytes, past: Rebuild, births: frozenset[BirthId], threads: int = 1
 ) -> Iterator[ReplayedAdvance]:
-    """Replay an arena, advance by advance.
+    """Replay an arena, whose settings are JSON, from a state advance by advance.
 
-    Args:
-        settings: JSON of the arena's settings.
-        past: a state, and the advances since.
-        births: the robots whose motion to return.
-        threads: that step clusters.
+    The motion is that of the robots of some births.
 
     Raises:
         MalformedMessage: a snapshot of other settings.

@@ -22,10 +22,7 @@ class ThreadTeam:
         self._others = ThreadPoolExecutor(max(1, threads - 1), "arena")
 
     def run(self, jobs: Sequence[Job]) -> None:
-        """Run all jobs and return when they have finished.
-
-        Args:
-            jobs: most expensive first, for an even load.
+        """Run all jobs, the most expensive first; return when they have finished.
 
         Raises:
             BaseException: an error that a job raised; no job runs any more.

@@ -126,10 +126,8 @@ class ModelCache:
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
         """Return the height of a robot's core when the arena drops it [m].
 
-        Args:
-            body: of the robot.
-            place: of the core's centre in the ground plane, world frame [m].
-            heading: rotation about z [rad].
+        The place is that of the core's centre, world frame [m]; the heading is the
+        rotation about z [rad].
         """
         environment, model = self.settings.environment, body.solo.model
         if environment.is_even:
@@ -179,11 +177,7 @@ class ModelCache:
 
 
 def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:
-    """Return the bounds of the one robot of a model.
-
-    Args:
-        model: from ``schema.mjcf.model.solo_spec``; static geoms do not count.
-    """
+    """Return the bounds of the one robot of a model; static geoms do not count."""
     root = int(model.jnt_bodyid[0])
     covers: list[list[_Sphere]] = []
     for body in range(root, model.nbody):

@@ -35,13 +35,7 @@ class RobotBounds:
     def __init__(
         self, layout: Layout, states: Floats, velocities: Floats | None = None
     ) -> None:
-        """Compute the speeds.
-
-        Args:
-            layout: of the states.
-            states: (L, W).
-            velocities: of these, if they are known: (L, V) as ``Layout.velocities``.
-        """
+        """Compute the speeds in states (L, W), whose velocities (L, V) may be known."""
         self._layout, self._states = layout, states
         if velocities is None:
             velocities = layout.velocities(states)
@@ -55,13 +49,8 @@ class RobotBounds:
         """Return whether P pairs of robots are near at each moment, (L, P).
 
         They are if the distance of a sphere of each is less than the sum of both
-        margins and a gap. Only spheres are measured whose bodies' hulls are near, seen
-        from above.
-
-        Args:
-            pairs: of robots.
-            margins: (L, R) of the robots [m].
-            gap_m: the gap.
+        margins, (L, R) [m], and a gap. Only spheres are measured whose bodies' hulls
+        are near, seen from above.
         """
         found = np.zeros((len(margins), len(pairs)), dtype=np.bool_)
         if not pairs:
@@ -81,9 +70,7 @@ class RobotBounds:
     def _near_bodies(self, pairs: Pairs, limits: Floats) -> tuple[Indices, Indices]:
         """Return the bodies whose hulls may be near at a moment, seen from above.
 
-        Args:
-            pairs: P > 0 of robots.
-            limits: (P,) distance of two hulls [m].
+        Of P > 0 pairs of robots, the limits (P,) are distances of two hulls [m].
 
         Returns:
             (2, N) pairs of bodies, and the pair of robots of each.
@@ -122,8 +109,7 @@ class RobotBounds:
     def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
         """Return pairs of different clusters whose bounding boxes overlap.
 
-        Args:
-            margins: (R,) that each robot's box is extended by [m].
+        Each robot's box is extended by its margin, (R,) [m].
 
         Returns:
             Rows of the first and of the second robots, ascending by both.

@@ -214,12 +214,7 @@ class Layout:
         return centres
 
     def spheres(self, states: Floats, wanted: Indices) -> Floats:
-        """Return the centres of bounding spheres, (L, 3, B) [m].
-
-        Args:
-            states: (L, W).
-            wanted: (B,) indices of spheres, as ``RobotRows`` numbers them.
-        """
+        """Return the centres of B spheres of ``RobotRows``, (L, 3, B) [m]."""
         bodies = self.robot_rows.sphere_bodies[wanted]
         rotations = self._rotations[bodies][:, None] + np.arange(9)
         rotated = states.take(rotations, axis=1)
@@ -329,10 +324,7 @@ class Rollout:
 def runs(starts: Indices, counts: Indices, spacing: int = 1) -> Indices:
     """Return the numbers of several arithmetic sequences, one after another.
 
-    Args:
-        starts: (R,) first number of each.
-        counts: (R,) length of each.
-        spacing: difference of two numbers of a sequence.
+    The first number and length of each are (R,); the spacing is that of its numbers.
     """
     first: Indices = np.repeat(starts - spacing * (np.cumsum(counts) - counts), counts)
     return first + spacing * np.arange(len(first))

@@ -75,11 +75,9 @@ class _Channels:
         self._past: deque[Floats] = deque(maxlen=1 + max(delays, default=0))
 
     def pass_on(self, values: Floats, before: Floats) -> Floats:
-        """Return the values that leave the channels, (C,).
+        """Return the values that leave the channels, (C,), for those that enter.
 
-        Args:
-            values: (C,) that enter them.
-            before: (C,) that entered them at all times before the first.
+        ``before`` entered at all times before the first.
         """
         if not self._past:
             self._past.extend([before.copy()] * (self._past.maxlen or 1))

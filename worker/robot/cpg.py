@@ -96,8 +96,7 @@ class CpgBank:
 
         Robots are born at their first tick, where no time has passed.
 
-        Args:
-            age_ticks: (R, 1) ticks since each robot's birth, or one number.
+        Ages are (R, 1) ticks since each robot's birth, or one number.
         """
         phase = self.states
         for _ in range(self._steps):

@@ -120,9 +120,7 @@ class Sensors:
     def read(self, interval_s: float, touched: Container[int] | None = None) -> Floats:
         """Read all sensors but those that ``look`` reads; return ``readings``.
 
-        Args:
-            interval_s: since the last reading [s].
-            touched: geoms in contact in the last step, if they are known.
+        The geoms that were in contact in the last step may be known.
         """
         if self.core_imu >= 0:
             self._read_core(interval_s)
@@ -236,10 +234,8 @@ class Servos:
     def drive(self, outputs: Floats) -> None:
         """Command each joint towards its target, until the next tick.
 
-        Writes the state's ``ctrl`` [rad/s], of sliders [m/s].
-
-        Args:
-            outputs: (O,) of the network, unclipped; O may exceed the motors.
+        Writes the state's ``ctrl`` [rad/s], of sliders [m/s]. The outputs of the
+        network are (O,), unclipped; O may exceed the motors.
         """
         angles, commands = self._angles, self._commands
         for index, ((address, low, span, gain, fastest), output) in enumerate(
@@ -266,9 +262,7 @@ def into_frame(
 ) -> Vector:
     """Return a vector of the world in the frame of a rotated body.
 
-    Args:
-        orientation: w, x, y, z of a unit quaternion, body to world.
-        vector: world frame.
+    The orientation is w, x, y, z of a unit quaternion, body to world.
     """
     w, x, y, z = orientation
     ax, ay, az = vector

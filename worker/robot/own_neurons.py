@@ -76,11 +76,8 @@ class OwnNeurons:
     ) -> None:
         """Compute the next states of all these neurons; ``write`` stores them.
 
-        Args:
-            sums: (R, S) weighted sums of readings and previous states.
-            states: (R, K S) previous states.
-            age_ticks: (R, 1) ticks since each robot's birth, or one number.
-            tick_s: time between two ticks [s].
+        Sums, (R, S), are weighted ones of readings and previous states, (R, K S); ages
+        are (R, 1) ticks since each robot's birth, or one number.
 
         Raises:
             SimulationDiverged: the code of a type raised, or gave no such array.
@@ -104,9 +101,8 @@ class OwnNeurons:
     def write(self, outputs: Floats, states: Floats) -> None:
         """Store the computed states.
 
-        Args:
-            outputs: (R, S) of the present tick; gets the first states.
-            states: (R, K S); gets the others.
+        The outputs (R, S) of the present tick get the first ones, ``states`` (R, K S)
+        the others.
         """
         for group, result in zip(self._groups, self._results, strict=True):
             outputs[group.robots, group.places[0]] = result[0]

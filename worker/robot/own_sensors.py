@@ -141,12 +141,9 @@ class OwnSensors:
         sensors: Sequence[tuple[int, str, OwnSensor, int]],
         placed: PlacedRobot,
     ) -> None:
-        """Find their parts.
+        """Find the parts of the sensors.
 
-        Args:
-            sensors: of each, index and type of its part, the sensor, and its first
-                index in the readings.
-            placed: the robot in a model.
+        Of each: index and type of its part, the sensor, its first index in readings.
         """
         # Its code may change the number of inputs of a sensor; the brain has these.
         self._sensors = [
@@ -182,13 +179,10 @@ class OwnSensors:
 def brightness(
     light: Vector, state: State, geom: int, others: Sequence[State]
 ) -> float:
-    """Return the reading of a light sensor.
+    """Return the reading of the light sensor in a box of a model.
 
-    Args:
-        light: position of the light, world frame [m].
-        state: model and data that hold the sensor; frames are those of the state.
-        geom: box of the sensor.
-        others: other models of the same world, whose geoms may hide the light, too.
+    The light has a position, world frame [m]; frames are those of the state. Geoms of
+    other models of the same world may hide it, too.
     """
     model, data = state
     outward = data.geom_xmat[geom].reshape(3, 3)[:, 0]
@@ -208,11 +202,8 @@ def brightness(
 def ray_share(state: State, start: Floats, ray: Floats, but: int = -1) -> float:
     """Return where a ray meets the first geom, in its lengths; infinite if it does not.
 
-    Args:
-        state: model and data; frames are those of the state.
-        start: (3,) of the ray, world frame [m].
-        ray: (3,) its direction and length.
-        but: body whose geoms it passes; -1 is none.
+    Start (3,), and direction with length (3,), are in the world frame [m]; frames are
+    those of the state. The ray passes the geoms of a body; -1 is none.
     """
     hit = np.zeros(1, dtype=np.int32)
     share = mujoco.mj_ray(*state, start, ray, None, 1, but, hit)

@@ -76,12 +76,8 @@ class Channels:
     ) -> Floats:
         """Return a sample as a row.
 
-        Args:
-            qpos: (7 + J,) of the robot, or more.
-            qvel: (6 + J,) of the robot, or more.
-            probe: ``Probe.numbers``; None if there is no probe.
-            readings: (1, I') of its sensors, I' >= I.
-            neighbours: number of robots near it.
+        Positions are (7 + J,) or more, velocities (6 + J,) or more, readings (1, I')
+        with I' >= I; ``probe`` is ``Probe.numbers``.
         """
         values: dict[str, Floats | int] = {
             "core_attitude": qpos[3:FREE],
