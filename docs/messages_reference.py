@@ -1,6 +1,7 @@
 """Text of docs/reference/messages.md: keys and messages between processes."""
 
 import inspect
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -23,7 +24,7 @@ import schema.wire.status
 import schema.wire.updates
 from docs.struct_tables import attributes, introduction, rows
 from schema.agent import topics
-from schema.agent.topics import Member, Role
+from schema.agent.topics import KEYS, Member, Role
 from schema.experiment.identity import Origin
 from schema.robot.results import Evaluation, Report
 from schema.wire.codec import Message
@@ -79,16 +80,7 @@ def page() -> str:
 
 def key_names() -> list[str]:
     """Return the names of the keys that a process may have."""
-    return [
-        "jobs",
-        *(
-            name
-            for name, found in vars(Member).items()
-            if not name.startswith("_")
-            and name != "session"
-            and (isinstance(found, property) or inspect.isfunction(found))
-        ),
-    ]
+    return [*KEYS, "poses"]
 
 
 def _keys() -> Iterator[str]:
@@ -111,10 +103,8 @@ def _with_shard(poses: Any) -> str:  # noqa: ANN401 - a method of one number
 
 
 def _key_meaning(name: str) -> str:
-    if name == "jobs":
-        return attributes(Member)[name].removeprefix("key that ").removesuffix(".")
-    text = introduction(getattr(Member, name)).partition("\n\n")[0].replace("\n", " ")
-    return text.removeprefix("Key that ").removeprefix("Key ").removesuffix(".")
+    text = attributes(Member).get(name) or introduction(getattr(Member, name))
+    return re.sub("^[Kk]ey (that )?", "", text).removesuffix(".")
 
 
 def described_proto() -> FileDescriptorProto:

@@ -19,7 +19,8 @@ Role = Literal["worker", "analyzer", "coordinator"]
 
 _CHUNKS: dict[Role, str] = {"worker": "w", "analyzer": "an", "coordinator": "co"}
 _ROLES: dict[str, Role] = {chunk: role for role, chunk in _CHUNKS.items()}
-_KEYS = ("jobs", "alive", "info", "cancelled", "command", "state", "events", "trial")
+KEYS = ("jobs", "alive", "info", "cancelled", "command", "state", "events", "trial")
+"""Attributes of a member that are keys, by their last word."""
 # No key separator, no wildcard, no leading "@", which the engine reserves.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,95}")
 
@@ -59,7 +60,7 @@ class Member:
 
     def __post_init__(self) -> None:
         # Once per process and not for each job.
-        for key in _KEYS:
+        for key in KEYS:
             object.__setattr__(self, key, f"{self._prefix}/{key}")
         # An id must not begin with 0.
         session = f"a{sha256(self._prefix.encode()).hexdigest()[:31]}"
