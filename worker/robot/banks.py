@@ -92,15 +92,9 @@ class NetworkBank:
         self._outputs = self.states[:, : width.outputs]
 
     def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
-        """Update all networks once and return their outputs.
+        """Update all networks once; see ``schema.plugins.protocols.Bank``.
 
-        Args:
-            readings: (R, I) sensor readings, finite; unused inputs 0.
-            age_ticks: (R, 1) ticks since each robot's own birth, or one number.
-
-        Returns:
-            (R, O) output states, a view that the next tick overwrites; finite,
-            not yet clipped to [0, 1].
+        Outputs are finite, and a view that the next tick overwrites.
         """
         new, other = self._next, self._other
         self._readings[...] = readings
