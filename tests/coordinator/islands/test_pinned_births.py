@@ -1,0 +1,79 @@
+"""Births of one seed, as they were when they were last meant to change."""
+
+from hashlib import sha256
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from schema.experiment.document import (
+    BrainSection,
+    EncodingSection,
+    Experiment,
+    Generation,
+    Islands,
+    Space,
+    Variation,
+)
+from schema.experiment.file import read_experiment
+from schema.experiment.learning import Learning
+from schema.experiment.migration import Migration
+from tests.coordinator.archipelago_run import ArchipelagoRun
+
+
+def shipped(name: str, births: int, **changes: Any) -> Experiment:  # noqa: ANN401 - any setting
+    return replace(read_experiment(name), births=births, **changes)
+
+
+WILD = Variation(
+    p_delete_subtree=0.9, p_duplicate_subtree=0.2, p_swap_subtree=0.5,
+    p_delete_hidden_neuron=0.3, p_remove_brain_connection=0.2,
+    body_epsilon=0.3, brain_epsilon=0.3,
+)  # fmt: skip
+CASES = {
+    "thesis": shipped("scenario1", 90),
+    "cpg": shipped("scenario1", 60, brain=BrainSection(type="cpg")),
+    "cppn": shipped("scenario1", 40, encoding=EncodingSection(type="cppn")),
+    "wild": shipped(
+        "scenario1",
+        90,
+        variation=WILD,
+        space=Space(planar=False, max_parts=14),
+        generation=Generation(parts_mean=9.0, p_connect_neurons=0.3),
+    ),
+    "bridge": shipped("bridge", 60),
+    "learning": shipped(
+        "scenario1",
+        40,
+        learning=Learning(learner="(1+1)-es", budget=4, inherit="lamarckian"),
+    ),
+    "arena": shipped("scenario3", 40),
+    "islands": Experiment(
+        name="islands",
+        islands=(
+            Islands(count=2, births=45),
+            Islands(births=30, arena=read_experiment("scenario3").arena),
+        ),
+        migration=Migration(topology="fully-connected", epoch=15),
+    ),
+}
+PINNED = {
+    "thesis": "2fd5ff2ee5d92d41",
+    "cpg": "4e0e04b402e78e6c",
+    "cppn": "4689814650c2a4b1",
+    "wild": "f9744c1f3fffc54b",
+    "bridge": "8fc8f945dfb67e87",
+    "learning": "7143492eb48f4f4a",
+    "arena": "ac1038555201cc33",
+    "islands": "08ace85029065eaf",
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_births_of_a_seed_stay_the_same(case: str) -> None:
+    lived = ArchipelagoRun(CASES[case], seed=7).live()
+    digest = sha256()
+    for table in ("births", "population", "deaths", "migrations", "learning"):
+        for row in lived.rows(table):
+            digest.update(repr(sorted(row.items())).encode())
+    assert digest.hexdigest()[:16] == PINNED[case]
