@@ -17,7 +17,6 @@ from coordinator.islands.events import (
     NeighbourClosed,
     Record,
     Started,
-    Vetted,
 )
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
@@ -28,8 +27,8 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.wire.arena import AdvanceShard
 from schema.wire.messages import Evaluate, Vet
-from tests.coordinator.arena_world import World, distinct_fitness
-from tests.coordinator.reports import PROVENANCE, VIABLE
+from tests.coordinator.arena_world import Verdict, World, distinct_fitness, viable
+from tests.coordinator.reports import PROVENANCE
 
 Fit = Callable[[BirthId, int], float]
 
@@ -53,6 +52,7 @@ class ArchipelagoRun:
     seed: int = 1
     order: Iterator[int] | None = None
     fit: Fit = distinct_on_islands
+    verdict: Verdict = viable
     slow: tuple[int, ...] = ()
     islands: dict[int, Island | Arena] = field(default_factory=dict)
     worlds: dict[int, World] = field(default_factory=dict)
@@ -95,7 +95,7 @@ class ArchipelagoRun:
         number, asked = self.waiting.popleft()
         match asked:
             case Vet():
-                self.tell(number, Vetted(asked.birth, asked.attempt, VIABLE))
+                self.tell(number, self.verdict(asked))
             case Evaluate():
                 found = Evaluation(self.fit(asked.birth, number), 0.1, 0.0, 12.0)
                 answer = Evaluated(

@@ -1,7 +1,6 @@
 """Properties of every arena in any world."""
 
 import random
-from collections.abc import Iterator
 from pathlib import Path
 
 from hypothesis import given, settings
@@ -12,7 +11,6 @@ from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
     Advanced,
     Append,
-    ArenaCommand,
     Commanded,
     Pause,
     Record,
@@ -24,7 +22,7 @@ from coordinator.islands.events import (
 )
 from coordinator.storage.journal import decode_record, encode_event
 from schema.robot.ids import BirthId
-from schema.wire.arena import NO_POSES, AdvanceShard
+from schema.wire.arena import NO_POSES
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,
@@ -35,32 +33,6 @@ from tests.coordinator.arena_world import (
 )
 
 fixed = settings(max_examples=12, derandomize=True, database=None, deadline=None)
-
-
-def shuffled(seed: int) -> Iterator[int]:
-    rng = random.Random(seed)  # noqa: S311 - the order of a test, not a secret
-    while True:
-        yield rng.randrange(10)
-
-
-def decisions(commands: list[ArenaCommand]) -> list[ArenaCommand]:
-    """Return the commands apart from vettings, whose order may differ."""
-    return [one for one in commands if isinstance(one, AdvanceShard | Record | Append)]
-
-
-@given(seed=st.integers(0, 2**32))
-@fixed
-def test_the_order_of_reports_changes_no_command(seed: int) -> None:
-    one = ArenaRun(
-        Arena(experiment(40), 7, 0), World(distinct_fitness), reject_some
-    ).live()
-    other = ArenaRun(
-        Arena(experiment(40), 7, 0),
-        World(distinct_fitness),
-        reject_some,
-        order=shuffled(seed),
-    ).live()
-    assert decisions(one.commands) == decisions(other.commands)
 
 
 @given(

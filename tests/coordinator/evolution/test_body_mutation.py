@@ -82,10 +82,6 @@ CHAIN = node(
 )
 
 
-def test_the_text_form_of_a_genome() -> None:
-    assert shape(CHAIN) == "C(1F(1H(1A)) 2T)"
-
-
 def test_deletion_keeps_the_least_number_of_parts() -> None:
     setting = experiment({"min_parts": 3}, p_delete_subtree=1.0)
     found: Counter[str] = Counter()
@@ -161,30 +157,6 @@ def test_swapping_skips_a_tree_of_one_line() -> None:
     assert to_genome(preorder(root)) == line
 
 
-@pytest.mark.parametrize(
-    ("step", "key"),
-    [
-        (delete_subtree, "p_delete_subtree"),
-        (duplicate_subtree, "p_duplicate_subtree"),
-        (swap_subtrees, "p_swap_subtree"),
-    ],
-)
-@pytest.mark.parametrize("probability", [0.0, 0.05, 0.4])
-def test_each_step_happens_with_its_probability(
-    step: Any,  # noqa: ANN401 - one of three functions
-    key: str,
-    probability: float,
-) -> None:
-    chances: dict[str, Any] = {key: probability}
-    setting = experiment(**chances)
-    happened = 0
-    for seed in range(N):
-        root = to_mutable(CHAIN, TYPES)
-        step(draws(seed), root, setting)
-        happened += to_genome(preorder(root)) != CHAIN
-    assert is_near(happened, N * probability)
-
-
 def test_parameters_of_parts_move_and_colours_stay() -> None:
     bar = node("Core", (0, node("ParametricBarJoint")), (1, node("ActiveHinge")))
     lengths = []
@@ -224,26 +196,6 @@ def added(seed: int, setting: Experiment, genome: Genome = CHAIN) -> Genome:
     root = to_mutable(genome, TYPES)
     add_parts(draws(seed), preorder(root), gene_ids(BirthId(0, 7)), setting)
     return to_genome(preorder(root))
-
-
-def test_how_many_parts_are_added() -> None:
-    # Deletable at least 1 part: 3, 2, 1, 1, mean 1.75.
-    setting = experiment(
-        {"min_parts": 1}, p_delete_subtree=1.0, p_duplicate_subtree=0.0
-    )
-    found = [sum(1 for _ in walk(added(seed, setting))) - 5 for seed in range(1000)]
-    assert (min(found), max(found)) == (0, 4)
-    assert np.mean(found) == pytest.approx(1.75, abs=5 / 1000**0.5)
-
-
-def test_no_part_is_added_beyond_the_limit_or_without_deletion() -> None:
-    greedy = experiment(
-        {"min_parts": 1, "max_parts": 6}, p_delete_subtree=1.0, p_duplicate_subtree=0.0
-    )
-    sizes = {sum(1 for _ in walk(added(seed, greedy))) for seed in range(200)}
-    assert sizes == {5, 6}
-    shrinking = experiment(p_delete_subtree=0.05, p_duplicate_subtree=0.1)
-    assert added(1, shrinking) == CHAIN
 
 
 def test_a_new_part_has_its_own_identity_colour_and_outgoing_connections() -> None:

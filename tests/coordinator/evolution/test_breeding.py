@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coordinator.evolution.breeding import Breeder, Individual, failed_last
+from coordinator.evolution.breeding import Breeder, Individual
 from schema.errors import ExperimentError
 from schema.experiment.document import Culling, Experiment, SelectionSection, Space
 from schema.robot.genome import NeuronGene, Node
@@ -43,11 +43,6 @@ def test_founders_have_no_parents_and_each_attempt_gives_another_robot() -> None
     assert attempts == [breeder().conceive(CHILD, k, (), None) for k in range(9)]
 
 
-def test_without_reproduction_children_are_random_as_well() -> None:
-    made = breeder(parents="none").conceive(CHILD, 3, founders(), None)
-    assert made == breeder().conceive(CHILD, 3, (), None)
-
-
 def test_a_couple_is_replaced_after_max_mating_attempts() -> None:
     population = founders()
     couple = None
@@ -61,16 +56,6 @@ def test_a_couple_is_replaced_after_max_mating_attempts() -> None:
     blocks = [set(seen[start : start + 5]) for start in (0, 5, 10)]
     assert all(len(block) == 1 for block in blocks)
     assert len(set.union(*blocks)) == 3
-
-
-def test_each_attempt_of_a_couple_has_its_own_stream() -> None:
-    population = founders()
-    couple = None
-    children = []
-    for attempt in range(5):
-        couple, child = breeder().conceive(CHILD, attempt, population, couple)
-        children.append(child)
-    assert len(set(children)) == 5
 
 
 def test_parents_that_cannot_mate_give_no_genome() -> None:
@@ -104,17 +89,6 @@ def test_too_many_failed_attempts_raise_an_error(
     assert "\n" not in message
     for word in (f"{what} = {limit}", "too crowded"):
         assert word in message
-
-
-def test_without_culling_the_best_survive() -> None:
-    genomes = [one.genome for one in founders(4)]
-    fitness = (0.9, 0.1, 0.5, 0.6)
-    living = [
-        Individual(BirthId(0, number), genome, value, rank=1, generation=0)
-        for number, (genome, value) in enumerate(zip(genomes, fitness, strict=True))
-    ]
-    found = breeder(population=3).survivors(living[:3], living[3:])
-    assert [one.birth.number for one in found] == [0, 2, 3]
 
 
 def test_with_culling_weak_robots_are_removed_at_the_interval() -> None:
@@ -161,19 +135,3 @@ def test_a_failed_robot_is_no_fitter_than_a_negative_fitness(
     both = judged(*parents, *children)
     found = breeder(population=2, parents="random").survivors(both[:2], both[2:])
     assert [one.birth.number for one in found] == alive
-
-
-def test_failed_robots_are_culled_with_the_worst() -> None:
-    # Mean -1.75, limit -2.275.
-    both = judged(None, -1.0, -1.0, -1.0, -1.0, -1.0, -4.0)
-    culling = Culling(interval=1, population_floor=4, population_limit=20)
-    own = breeder(population=6, parents="random", culling=culling)
-    assert [one.birth.number for one in own.survivors(both[:6], both[6:])] == [
-        *range(1, 6)
-    ]
-
-
-def test_fitness_is_not_changed_where_none_is_negative() -> None:
-    members = judged(None, 0.0, 0.5)
-    assert all(a is b for a, b in zip(failed_last(members), members, strict=True))
-    assert [one.known_fitness for one in failed_last(judged(None, -1.0))] == [None, -1]

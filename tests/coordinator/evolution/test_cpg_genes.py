@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coordinator.evolution.brains import brain_genes, brain_rules
-from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
 from coordinator.evolution.random_streams import BufferedRng
@@ -123,8 +122,3 @@ def test_oscillators_and_weights_move_by_their_share() -> None:
     assert np.mean(frequencies) == pytest.approx(1.025, abs=0.02)
     assert 0.0 <= min(shifts) < 0.002
     assert 0.248 < max(shifts) <= 0.25 + 1e-12
-
-
-def test_built_in_brain_types_pass_the_check() -> None:
-    check_brain_genes(CPG)
-    check_brain_genes(Experiment(name="test"))

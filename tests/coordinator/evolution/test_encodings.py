@@ -10,16 +10,13 @@ from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.encodings import encoding_of, outside_limits
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.revolve_angle import RevolveAngle
 from coordinator.islands.rows import birth_record
 from schema.errors import ExperimentError, InvalidRobot, UnknownPlugin
 from schema.experiment.document import EncodingSection, Experiment, Space
 from schema.parts import BUILT_IN
-from schema.robot.genome import Genome, develop
+from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
-from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Part, Robot, check_robot
-from schema.wire.genome_bytes import encode_genome
 from schema.wire.protobuf import decode_robot
 
 Own = Callable[..., Experiment]
@@ -35,21 +32,6 @@ def rng(attempt: int = 0) -> np.random.Generator:
 def thesis_genomes() -> tuple[Genome, Genome]:
     first, second = (generate(rng(k), THESIS, BirthId(0, k)) for k in (1, 2))
     return first, second
-
-
-def test_the_thesis_encoding_draws_what_its_functions_draw() -> None:
-    encoding, thesis = encoding_of(THESIS), RevolveAngle(THESIS, BUILT_IN, None)
-    first, second = thesis_genomes()
-    assert encoding.random(rng(1), BirthId(0, 1)) == first
-    children = [thesis.mate(first, second, rng(k), BIRTH) for k in range(9)]
-    assert [encoding.mate(first, second, rng(k), BIRTH) for k in range(9)] == children
-    child = next(filter(None, children))
-    assert encoding.develop(child) == develop(child, encoding.types)
-    assert encoding.to_bytes(child) == encode_genome(child)
-    assert encoding.from_bytes(encode_genome(child)) == child
-    robot = encoding.develop(child)
-    assert encoding.from_robot(robot) == genome_of(robot)
-    assert not encoding.stores_robots
 
 
 def test_steps_of_the_thesis_encoding_keep_its_rules() -> None:
@@ -234,23 +216,3 @@ def test_an_encoding_that_never_keeps_the_limits_stops_the_run(
     experiment = replace(experiment, encoding=broken.encoding)
     with pytest.raises(ExperimentError, match=r"the robot has 2 parts, outside space"):
         Breeder(experiment, 7, 0).candidate(BirthId(0, 0), 0, ())
-
-
-def test_candidates_of_an_own_encoding_depend_on_their_name_alone(
-    own_encoding: Own,
-) -> None:
-    experiment = own_encoding()
-    first, second = (Breeder(experiment, 7, 0) for _ in range(2))
-    population = []
-    for number in range(8):
-        candidate = first.candidate(BirthId(0, number), 0, ())
-        assert candidate is not None
-        one = candidate.individual(generation=0)
-        population.append(replace(one, fitness=number / 8))
-    child = first.candidate(BIRTH, 0, population)
-    again = second.candidate(BIRTH, 0, population)
-    other = second.candidate(BirthId(2, 41), 0, population)
-    assert child == again
-    assert child is not None
-    assert other is not None
-    assert child.genome != other.genome

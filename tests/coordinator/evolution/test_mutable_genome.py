@@ -23,7 +23,7 @@ from coordinator.evolution.mutable_genome import (
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import BUILT_IN
 from schema.robot.frames import place_parts, shapes_of
-from schema.robot.genome import Genome, NeuronGene, Node, develop, walk
+from schema.robot.genome import Genome, NeuronGene, Node, develop
 from schema.robot.ids import BirthId
 
 EXPERIMENT = Experiment(name="test")
@@ -73,13 +73,6 @@ def test_conversion_to_a_mutable_tree_and_back_keeps_the_genome(seed: int) -> No
 
 
 @given(SEEDS)
-def test_branches_are_in_the_order_of_the_genome(seed: int) -> None:
-    genome = random_genome(seed)
-    found = [(b.kind.name, b.parent_slot) for b in preorder(to_mutable(genome, TYPES))]
-    assert found == [(one.kind, slot) for one, _, slot in walk(genome)]
-
-
-@given(SEEDS)
 def test_a_path_leads_from_its_source_to_its_target(seed: int) -> None:
     branches = preorder(to_mutable(random_genome(seed), TYPES))
     for source in branches:
@@ -118,18 +111,6 @@ def test_free_places_are_the_unoccupied_slots() -> None:
     ]
     core = [("Core", 0), ("Core", 2)]
     assert found == [*core, ("FixedBrick", 1), ("Hinge", 1)]
-
-
-def test_cutting_detaches_a_branch_and_frees_its_slot() -> None:
-    root = to_mutable(TREE, TYPES)
-    brick = preorder(root)[3]
-    brick.cut()
-    assert (brick.parent, brick.parent_slot) == (None, -1)
-    assert [b.kind.name for b in preorder(root)] == [
-        "Core",
-        "ActiveHinge",
-        "TouchSensor",
-    ]
 
 
 def test_levelling_undoes_all_turns_before_a_brick() -> None:

@@ -36,18 +36,6 @@ def test_a_stream_is_that_of_numpys_seed_and_key(
     assert mine.random(9).tolist() == np.random.default_rng(words).random(9).tolist()
 
 
-def test_certain_and_impossible_chances(draws: BufferedRng) -> None:
-    assert all(draws.chance(1.0) for _ in range(N))
-    assert not any(draws.chance(0.0) for _ in range(N))
-
-
-def test_picks_are_uniform(draws: BufferedRng) -> None:
-    found = Counter(draws.pick("abcde") for _ in range(N))
-    assert sorted(found) == list("abcde")
-    # Five standard deviations of a binomial.
-    assert all(abs(n - N / 5) < 5 * (N * 0.16) ** 0.5 for n in found.values())
-
-
 def test_samples_are_without_replacement_and_uniform_in_each_place(
     draws: BufferedRng,
 ) -> None:

@@ -149,18 +149,6 @@ def test_crossover_fails_on_too_few_parts() -> None:
     assert set(sizes) == {None, 5}
 
 
-def test_crossover_keeps_the_donated_subtree_unchanged() -> None:
-    first, second = founder(1), founder(2)
-    child = next(c for seed in range(9) if (c := crossed(seed, first, second)))
-    given = {one.gene: one for one, _, _ in walk(second)}
-    mine = {one.gene: one for one, _, _ in walk(first)}
-    gifts = [one for one, _, _ in walk(child) if one.gene in given]
-    assert gifts
-    assert all(given[one.gene] == one for one in gifts)
-    rest = [one for one, _, _ in walk(child) if one.gene not in given]
-    assert all(mine[one.gene].parameters == one.parameters for one in rest)
-
-
 def test_nothing_mutates_where_all_probabilities_are_zero() -> None:
     setting = experiment(**STILL)
     for seed in range(20):

@@ -142,20 +142,6 @@ def test_other_answers_are_refused_in_one_line(
         select_survivors((), everybody, rng, selection, rule_of(selection, "survivors"))
 
 
-def test_own_survivors_come_in_birth_order(lab: Callable[[str], str]) -> None:
-    selection = SelectionSection(population=2, survivors=f"{lab(LAB)}:smallest")
-    everybody = population(9, 5, 7, 4)
-    chosen = select_survivors(
-        everybody[:2],
-        everybody[2:],
-        np.random.default_rng(0),
-        selection,
-        rule_of(selection, "survivors"),
-    )
-    # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
-    assert chosen == (everybody[1], everybody[3])
-
-
 def rules(lab: Callable[[str], str], change: str) -> tuple[Rule, Rule]:
     """Return rules that change their population and choose its first places."""
     name = lab(

@@ -106,14 +106,6 @@ def test_edges_go_one_way() -> None:
     assert living(lived, 1, 4) == [(1, 0), (1, 1), (1, 2), (1, 3)]
 
 
-def test_migrants_have_no_births_and_change_no_rank() -> None:
-    lived = small_islands(6, 6).live()
-    names = [(row["island"], row["birth"]) for row in lived.rows("births")]
-    assert names == [(island, birth) for island in (0, 1) for birth in range(6)]
-    assert {row["rank"] for row in lived.rows("births")} == {1, 2}
-    assert all(island.births == 6 for island in lived.islands.values())
-
-
 def test_an_immigrant_that_lives_on_the_island_already_is_dropped() -> None:
     # Broods are no better than immigrants: 1:3 stays the best of both islands.
     worst = SelectionSection(population=4, children=2, parents="random")
@@ -178,15 +170,6 @@ def test_slow_islands_change_no_row(slow: tuple[int, ...]) -> None:
     lived = small_islands(12, 8, 10)
     lived.slow = slow
     assert lived.live().outcome == outcome
-
-
-def test_a_fast_island_waits_for_its_neighbour_s_epoch() -> None:
-    lived = small_islands(12, 12)
-    lived.slow = (1,)
-    lived.start()
-    while any(number == 0 for number, _ in lived.waiting):
-        lived.turn()
-    assert (lived.islands[0].births, lived.islands[1].births) == (4, 0)
 
 
 def test_the_last_command_informs_the_neighbours() -> None:

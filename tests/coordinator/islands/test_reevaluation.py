@@ -89,10 +89,6 @@ def test_a_duration_depends_on_seed_run_birth_and_trial_only() -> None:
     assert len({steps(3, 1), *others}) == 5
 
 
-def test_both_ends_of_the_range_may_be_equal() -> None:
-    assert steps(0, range_s=(20.0, 20.0)) == 4000
-
-
 def test_re_evaluations_are_due_every_five_births_after_the_founders() -> None:
     found = reevaluations(share=0.01)
     when = [births for births in range(4, 26) if repeat(found, births, [0, 1, 2])]
@@ -205,14 +201,3 @@ def test_duplicate_outcomes_are_ignored_and_unrequested_ones_raise() -> None:
     judged_anew, _ = found.conclude(population)
     assert [each.fitness for each in judged_anew] == [0.3, 0.1]
     found.take(judged(1, 1, 0.1))
-
-
-def test_rows_are_in_birth_order_in_any_order_of_answers() -> None:
-    found = reevaluations(share=1.0)
-    population = tuple(one(number) for number in range(4))
-    found.start(9, population)
-    for number in (2, 0, 3, 1):
-        found.take(judged(number, 1, number / 10))
-    _, records = found.conclude(population)
-    assert [record.row["birth"] for record in records] == [0, 1, 2, 3]
-    assert found.conclude(population) == (population, [])

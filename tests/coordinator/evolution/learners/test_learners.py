@@ -59,11 +59,6 @@ def test_learners_beat_random_search_on_quadratics(
         assert own > 0.3 * base
 
 
-def test_the_start_is_never_lost() -> None:
-    for learner in LEARNERS:
-        assert search(learner, sphere, (0.7,) * 3, 10, 1) == 0.0
-
-
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_built_in_learners_keep_their_contract(learner: str) -> None:
     check_learner(Learning(learner=learner))
