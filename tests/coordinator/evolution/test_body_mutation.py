@@ -18,7 +18,6 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
-from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.revolve_angle import (
     add_parts,
     delete_subtree,
@@ -30,39 +29,12 @@ from coordinator.evolution.revolve_angle import (
 from schema.experiment.document import (
     Experiment,
     Generation,
-    Space,
-    Variation,
-    body_space,
 )
-from schema.parts import BUILT_IN
-from schema.robot.genome import Genome, NeuronGene, Node, walk
+from schema.robot.genome import Genome, walk
 from schema.robot.ids import BirthId
+from tests.coordinator.genomes import TYPES, draws, experiment, node
 
-TYPES = body_space(Space())
-NEURON = NeuronGene("Simple", (0.0, 0.5))
 N = 2000
-
-
-def node(kind: str, *children: tuple[int, Node], slot: int = 0) -> Node:
-    own = tuple(parameter.default for parameter in BUILT_IN[kind].own_parameters)
-    return Node(
-        kind,
-        -1 if kind == "Core" else slot,
-        0,
-        (*own, 0.5, 0.5, 0.5),
-        outputs=(NEURON,) * BUILT_IN[kind].outputs,
-        children=children,
-    )
-
-
-def experiment(space: dict[str, Any] | None = None, **variation: Any) -> Experiment:  # noqa: ANN401 - any setting
-    return Experiment(
-        name="test", space=Space(**(space or {})), variation=Variation(**variation)
-    )
-
-
-def draws(seed: int = 0) -> BufferedRng:
-    return BufferedRng(np.random.default_rng(seed))
 
 
 def shape(genome: Genome) -> str:

@@ -10,33 +10,24 @@ from hypothesis import strategies as st
 from coordinator.evolution.brains import brain_genes, brain_rules
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
-from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import BrainSection, Experiment, Variation, body_space
 from schema.robot.brain import Brain
-from schema.robot.genome import Genome, NeuronGene, Node, develop
+from schema.robot.genome import Genome, NeuronGene, develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
+from tests.coordinator.genomes import draws, node
 
 CPG = Experiment(name="test", brain=BrainSection(type="cpg"))
 TYPES = body_space(CPG.space)
 GENE = NeuronGene("PhaseOscillator", (1.0, 0.0, 0.5, 0.5))
-GREY = (0.5, 0.5, 0.5)
-
-
-def hinge(*children: tuple[int, Node]) -> Node:
-    return Node("ActiveHinge", 0, 0, GREY, outputs=(GENE,), children=children)
-
-
-def brick(*children: tuple[int, Node]) -> Node:
-    return Node("FixedBrick", 0, 0, GREY, children=children)
+HINGE = node("ActiveHinge", outputs=(GENE,))
 
 
 def coupled(genome: Genome, seed: int = 0) -> Genome:
     branches = preorder(to_mutable(genome, TYPES))
-    draws = BufferedRng(np.random.default_rng(seed))
-    brain_genes(CPG).grow(draws, branches, branches, brain_rules(CPG))
+    brain_genes(CPG).grow(draws(seed), branches, branches, brain_rules(CPG))
     return to_genome(branches)
 
 
@@ -66,9 +57,9 @@ def neighbours(robot: Robot) -> set[tuple[int, int]]:
 
 def test_motors_without_a_motor_between_them_are_coupled_both_ways() -> None:
     """Two legs: core - hinge - brick - hinge, and core - brick - hinge."""
-    first = hinge((1, brick((1, hinge()))))
-    second = brick((2, hinge()))
-    genome = coupled(Node("Core", -1, 0, GREY, children=((0, first), (1, second))))
+    first = node("ActiveHinge", (1, node("FixedBrick", (1, HINGE))), outputs=(GENE,))
+    second = node("FixedBrick", (2, HINGE))
+    genome = coupled(node("Core", (0, first), (1, second)))
     robot = develop(genome, TYPES)
     # Hinges are parts 1, 3 and 5.
     assert couplings(robot.brain) == Counter([(1, 3), (3, 1), (1, 5), (5, 1)])
@@ -77,7 +68,7 @@ def test_motors_without_a_motor_between_them_are_coupled_both_ways() -> None:
 
 
 def test_growth_adds_only_what_is_missing() -> None:
-    genome = coupled(Node("Core", -1, 0, GREY, children=((0, hinge()), (1, hinge()))))
+    genome = coupled(node("Core", (0, HINGE), (1, HINGE)))
     assert coupled(genome, seed=1) == genome
 
 
@@ -102,14 +93,13 @@ def test_oscillators_and_weights_move_by_their_share() -> None:
     still = Experiment(
         name="test", brain=CPG.brain, variation=Variation(brain_epsilon=0.25)
     )
-    genome = coupled(Node("Core", -1, 0, GREY, children=((0, hinge()), (1, hinge()))))
+    genome = coupled(node("Core", (0, HINGE), (1, HINGE)))
     before = [e.weight for e in develop(genome, TYPES).brain.connections]
     frequencies, shifts = [], []
     for seed in range(500):
         branches = preorder(to_mutable(genome, TYPES))
-        draws, rules = BufferedRng(np.random.default_rng(seed)), brain_rules(still)
-        genes = brain_genes(still)
-        genes.vary(draws, branches, rules, genes.prune(draws, branches, rules))
+        made, rules, genes = draws(seed), brain_rules(still), brain_genes(still)
+        genes.vary(made, branches, rules, genes.prune(made, branches, rules))
         brain = develop(to_genome(branches), TYPES).brain
         frequencies += [n.parameters[0] for n in brain.neurons if n.layer == "output"]
         shifts += [

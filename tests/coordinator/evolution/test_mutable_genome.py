@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     copied,
     follow,
@@ -20,45 +19,18 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
-from schema.experiment.document import Experiment, Space, body_space
-from schema.parts import BUILT_IN
+from schema.experiment.document import body_space
 from schema.robot.frames import place_parts, shapes_of
-from schema.robot.genome import Genome, NeuronGene, Node, develop
+from schema.robot.genome import develop
 from schema.robot.ids import BirthId
+from tests.coordinator.genomes import NEURON, TYPES, experiment, founder, node
 
-EXPERIMENT = Experiment(name="test")
-TYPES = body_space(EXPERIMENT.space)
-GREY = (0.5, 0.5, 0.5)
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def node(
-    kind: str,
-    *children: tuple[int, Node],
-    slot: int = 0,
-    orientation: int = 0,
-    hidden: int = 0,
-) -> Node:
-    own = tuple(parameter.default for parameter in BUILT_IN[kind].own_parameters)
-    neuron = NeuronGene("Simple", (0.0, 0.5))
-    return Node(
-        kind,
-        -1 if kind == "Core" else slot,
-        orientation,
-        own + GREY,
-        outputs=(neuron,) * BUILT_IN[kind].outputs,
-        hidden=(neuron,) * hidden,
-        children=children,
-    )
-
-
-def random_genome(seed: int, experiment: Experiment = EXPERIMENT) -> Genome:
-    return generate(np.random.default_rng(seed), experiment)
 
 
 TREE = node(
     "Core",
-    (1, node("ActiveHinge", (0, node("TouchSensor")), slot=1, hidden=2)),
+    (1, node("ActiveHinge", (0, node("TouchSensor")), slot=1, hidden=(NEURON,) * 2)),
     (3, node("FixedBrick", (0, node("Hinge")), (2, node("TouchSensor")), slot=3)),
 )
 """Core - (1) motor - sensor; core - (3) brick - (0) hinge, (2) sensor."""
@@ -66,7 +38,7 @@ TREE = node(
 
 @given(SEEDS)
 def test_conversion_to_a_mutable_tree_and_back_keeps_the_genome(seed: int) -> None:
-    genome = random_genome(seed)
+    genome = founder(seed)
     root = to_mutable(genome, TYPES)
     assert to_genome(preorder(root)) == genome
     assert to_genome(preorder(copied(root))) == genome
@@ -74,7 +46,7 @@ def test_conversion_to_a_mutable_tree_and_back_keeps_the_genome(seed: int) -> No
 
 @given(SEEDS)
 def test_a_path_leads_from_its_source_to_its_target(seed: int) -> None:
-    branches = preorder(to_mutable(random_genome(seed), TYPES))
+    branches = preorder(to_mutable(founder(seed), TYPES))
     for source in branches:
         for target in branches:
             path = path_between(source, target)
@@ -126,7 +98,7 @@ def test_levelling_undoes_all_turns_before_a_brick() -> None:
 
 @given(SEEDS)
 def test_all_slots_of_a_levelled_robot_point_sideways(seed: int) -> None:
-    robot = develop(random_genome(seed), TYPES)
+    robot = develop(founder(seed), TYPES)
     rotations, _ = place_parts(robot, shapes_of(robot, TYPES))
     for part, rotation in zip(robot.parts, rotations, strict=True):
         for slot in TYPES[part.kind].shape(part.parameters).slots:
@@ -134,11 +106,11 @@ def test_all_slots_of_a_levelled_robot_point_sideways(seed: int) -> None:
 
 
 def test_without_planarity_some_robots_leave_the_plane() -> None:
-    free = Experiment(name="free", space=Space(planar=False))
+    free = experiment({"planar": False})
     types = body_space(free.space)
     turned = 0
     for seed in range(50):
-        robot = develop(random_genome(seed, free), types)
+        robot = develop(founder(seed, free), types)
         rotations, _ = place_parts(robot, shapes_of(robot, types))
         turned += bool(np.abs(rotations[:, 2, 0]).max() > 0.5)
     assert turned > 25

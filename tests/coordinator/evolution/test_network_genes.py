@@ -1,7 +1,6 @@
 """The steps of mutation that change a network, one by one."""
 
 from collections import Counter
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coordinator.evolution.brains import brain_rules
-from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
 from coordinator.evolution.network import (
     add_connections,
@@ -19,25 +17,15 @@ from coordinator.evolution.network import (
     vary_neurons,
 )
 from coordinator.evolution.random_streams import BufferedRng
-from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.robot.brain import NEURON_TYPES, Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop, walk
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, develop, walk
+from tests.coordinator.genomes import TYPES, draws, experiment, founder, node
 
-TYPES = body_space(Space())
-GREY = (0.5, 0.5, 0.5)
 N = 2000
 
 
 def neuron(bias: float) -> NeuronGene:
     return NeuronGene("Simple", (bias, 0.5))
-
-
-def experiment(**variation: Any) -> Experiment:  # noqa: ANN401 - any setting
-    return Experiment(name="test", variation=Variation(**variation))
-
-
-def draws(seed: int = 0) -> BufferedRng:
-    return BufferedRng(np.random.default_rng(seed))
 
 
 def scripted(*numbers: float) -> BufferedRng:
@@ -52,12 +40,8 @@ def edge(
     return ConnectionGene(source, path, target, 0.25)
 
 
-HINGE = Node(
+HINGE = node(
     "ActiveHinge",
-    0,
-    0,
-    GREY,
-    outputs=(neuron(0.0),),
     hidden=(neuron(0.1), neuron(0.2), neuron(0.3)),
     connections=(
         edge(("hidden", 0), (), ("output", 0)),
@@ -67,11 +51,9 @@ HINGE = Node(
         edge(("hidden", 5), (), ("output", 0)),
     ),
 )
-CORE = Node(
+CORE = node(
     "Core",
-    -1,
-    0,
-    GREY,
+    (2, HINGE),
     connections=(
         edge(("input", 0), (2,), ("hidden", 0)),
         edge(("input", 1), (2,), ("hidden", 1)),
@@ -79,7 +61,6 @@ CORE = Node(
         edge(("input", 3), (3,), ("hidden", 2)),
         edge(("input", 4), (2,), ("output", 0)),
     ),
-    children=((2, HINGE),),
 )
 
 
@@ -117,7 +98,7 @@ def test_deleting_hidden_neurons_keeps_other_connections(
     seed: int, probability: float
 ) -> None:
     """Oracle on the robot: drop the edges of the removed neurons, and no others."""
-    genome = generate(np.random.default_rng(seed), experiment())
+    genome = founder(seed)
     root = to_mutable(genome, TYPES)
     delete_hidden_neurons(draws(seed), preorder(root), probability)
     after = to_genome(preorder(root))
@@ -185,12 +166,7 @@ def test_how_many_hidden_neurons_are_added(before: int, expected: float) -> None
 
 
 def test_hidden_neurons_are_added_up_to_the_limit() -> None:
-    setting = Experiment(
-        name="test",
-        space=Space(max_hidden=5),
-        variation=Variation(p_delete_hidden_neuron=1.0),
-    )
-    rules = brain_rules(setting)
+    rules = brain_rules(experiment({"max_hidden": 5}, p_delete_hidden_neuron=1.0))
     root = to_mutable(CORE, TYPES)
     add_hidden_neurons(draws(), preorder(root), 9, rules, NEURON_TYPES)
     assert sum(len(branch.hidden) for branch in preorder(root)) == 5
@@ -206,25 +182,7 @@ def test_how_many_connections_are_added(before: int, count: int) -> None:
 
 
 def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
-    bare = Node(
-        "Core",
-        -1,
-        0,
-        GREY,
-        children=(
-            (
-                2,
-                Node(
-                    "ActiveHinge",
-                    0,
-                    0,
-                    GREY,
-                    outputs=(neuron(0.0),),
-                    hidden=(neuron(0.1),),
-                ),
-            ),
-        ),
-    )
+    bare = node("Core", (2, node("ActiveHinge", hidden=(neuron(0.1),))))
     found: Counter[tuple[int, int]] = Counter()
     for seed in range(N):
         root = to_mutable(bare, TYPES)
@@ -238,7 +196,7 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
 
 
 def test_no_connection_is_added_without_a_target() -> None:
-    lone = Node("Core", -1, 0, GREY, children=((0, Node("Hinge", 0, 0, GREY)),))
+    lone = node("Core", (0, node("Hinge")))
     root = to_mutable(lone, TYPES)
     add_connections(draws(), preorder(root), 40, brain_rules(experiment()))
     assert to_genome(preorder(root)) == lone

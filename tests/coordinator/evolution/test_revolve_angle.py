@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     preorder,
     size_limits,
@@ -18,41 +17,17 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
-from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.revolve_angle import RevolveAngle, crossover, donor_of
-from schema.experiment.document import Experiment, Space, Variation, body_space
-from schema.parts import BUILT_IN
+from schema.experiment.document import Experiment, body_space
 from schema.robot.frames import place_parts, shapes_of
-from schema.robot.genome import Genome, NeuronGene, Node, develop, walk
+from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
+from tests.coordinator.genomes import TYPES, draws, experiment, founder, kinds, node
 
 DEFAULT = Experiment(name="test")
-TYPES = body_space(DEFAULT.space)
 CHILD = BirthId(0, 99)
 SEEDS = st.integers(0, 2**32 - 1)
-NEURON = NeuronGene("Simple", (0.0, 0.5))
-
-
-def node(kind: str, *children: tuple[int, Node], slot: int = 0, gene: int = 0) -> Node:
-    own = tuple(parameter.default for parameter in BUILT_IN[kind].own_parameters)
-    return Node(
-        kind,
-        -1 if kind == "Core" else slot,
-        0,
-        (*own, 0.5, 0.5, 0.5),
-        gene,
-        outputs=(NEURON,) * BUILT_IN[kind].outputs,
-        children=children,
-    )
-
-
-def experiment(space: dict[str, Any] | None = None, **variation: Any) -> Experiment:  # noqa: ANN401 - any setting
-    return Experiment(
-        name="test", space=Space(**(space or {})), variation=Variation(**variation)
-    )
-
-
 STILL: dict[str, Any] = {
     "p_delete_subtree": 0.0,
     "p_duplicate_subtree": 0.0,
@@ -68,21 +43,12 @@ def encoding(setting: Experiment = DEFAULT) -> RevolveAngle:
     return RevolveAngle(setting, body_space(setting.space), None)
 
 
-def founder(seed: int, setting: Experiment = DEFAULT) -> Genome:
-    return generate(np.random.default_rng(seed), setting, BirthId(0, seed % 2**32))
-
-
-def kinds(genome: Genome) -> list[str]:
-    return [one.kind for one, _, _ in walk(genome)]
-
-
 def crossed(
     seed: int, first: Genome, second: Genome, setting: Experiment = DEFAULT
 ) -> Genome | None:
     branches = to_branches(first, TYPES)
     root = branches[0]
-    draws = BufferedRng(np.random.default_rng(seed))
-    done = crossover(draws, branches, donor_of(second, TYPES), setting)
+    done = crossover(draws(seed), branches, donor_of(second, TYPES), setting)
     if not done:
         assert to_genome(preorder(root)) == first, "a failure changes nothing"
         return None

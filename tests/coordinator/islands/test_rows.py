@@ -7,25 +7,15 @@ from msgspec.structs import replace
 from coordinator.islands.events import Evaluated, EvaluationFailed
 from coordinator.islands.rows import evaluation_record, named_measures, sizes
 from schema.parts import BUILT_IN
-from schema.robot.genome import ConnectionGene, NeuronGene, Node, develop
+from schema.robot.genome import ConnectionGene, Node, develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from schema.tables.columns import EVALUATIONS, ROWS
+from tests.coordinator.genomes import NEURON, node
 
 BIRTH = BirthId(0, 3)
 FOUND = Evaluation(0.5, 0.1, 0.08, 12.0, (0.25, -3.0))
 LABELS = ("height", "limp")
-NEURON = NeuronGene("Simple", (0.0, 0.5))
-
-
-def node(kind: str, **rest: object) -> Node:
-    part = BUILT_IN[kind]
-    own: dict[str, object] = {
-        "orientation": 0,
-        "parameters": tuple(each.default for each in part.parameters),
-        "outputs": (NEURON,) * part.outputs,
-    }
-    return Node(kind, -1 if part.is_root else 0, **(own | rest))  # type: ignore[arg-type]
 
 
 def test_measures_have_their_names_in_the_evaluations_row() -> None:
@@ -48,11 +38,9 @@ def test_sizes_of_a_small_robot() -> None:
     nowhere = ConnectionGene(("input", 0), (3, 3), ("output", 0), 1.0)
     loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
     touch = node("TouchSensor", connections=(nowhere,))
-    hinge = node(
-        "ActiveHinge", children=((1, touch),), hidden=(NEURON,), connections=(loop,)
-    )
-    passive = node("Hinge", children=((1, node("FixedBrick")),))
-    core = node("Core", children=((0, hinge), (3, passive)), hidden=(NEURON, NEURON))
+    hinge = node("ActiveHinge", (1, touch), hidden=(NEURON,), connections=(loop,))
+    passive = node("Hinge", (1, node("FixedBrick")))
+    core = node("Core", (0, hinge), (3, passive), hidden=(NEURON, NEURON))
     assert sizes(develop(core, BUILT_IN), core, BUILT_IN) == {
         "parts": 5,
         "joints": 2,
@@ -67,10 +55,8 @@ def test_sizes_of_a_small_robot() -> None:
 
 def test_connections_of_other_genomes_are_those_of_the_robot() -> None:
     loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
-    robot = develop(
-        node("Core", children=((0, node("ActiveHinge", connections=(loop,))),)),
-        BUILT_IN,
-    )
+    core = node("Core", (0, node("ActiveHinge", connections=(loop,))))
+    robot = develop(core, BUILT_IN)
     assert sizes(robot, "a genome of another type", BUILT_IN)["connections"] == 1
 
 
@@ -78,7 +64,7 @@ def test_connections_of_other_genomes_are_those_of_the_robot() -> None:
 def test_a_tree_with_one_leaf_has_one_extremity(length: int) -> None:
     chain: tuple[tuple[int, Node], ...] = ()
     for _ in range(length):
-        chain = ((1, node("FixedBrick", children=chain)),)
-    core = node("Core", children=chain)
+        chain = ((1, node("FixedBrick", *chain)),)
+    core = node("Core", *chain)
     counts = sizes(develop(core, BUILT_IN), core, BUILT_IN)
     assert (counts["parts"], counts["extremities"]) == (length + 1, 1)
