@@ -50,6 +50,7 @@ class ArchipelagoRun:
 
     experiment: Experiment
     seed: int = 1
+    run: int = 0
     order: Iterator[int] | None = None
     fit: Fit = distinct_on_islands
     verdict: Verdict = viable
@@ -65,11 +66,11 @@ class ArchipelagoRun:
 
     def __post_init__(self) -> None:
         """Make the islands."""
-        self.islands = archipelago(self.experiment, self.seed, 0)
+        self.islands = archipelago(self.experiment, self.seed, self.run)
         self.worlds = {number: World(distinct_fitness) for number in self.islands}
         self.commands = {number: [] for number in self.islands}
         own = {each: island_experiment(self.experiment, each) for each in self.islands}
-        self.learners = Learners(own, Origin(seed=self.seed))
+        self.learners = Learners(own, Origin(seed=self.seed, run=self.run))
 
     def live(self, turns: int = 1_000_000) -> "ArchipelagoRun":
         """Run to the end, or for some turns."""

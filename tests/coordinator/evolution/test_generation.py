@@ -130,30 +130,11 @@ def test_impossible_restrictions_raise_an_error() -> None:
         make(0, Experiment(name="test", space=space))
 
 
-def test_other_brains_of_a_body_are_drawn_as_those_of_random_robots() -> None:
-    """Means of counts over many brains, as of random robots with the same body."""
-    body = robots(1)[0]
-    rngs = (np.random.default_rng(seed) for seed in range(400))
-    made = [random_brain(rng, body, DEFAULT) for rng in rngs]
-    assert all(robot.parts == body.parts for robot in made)
-    for robot in made[:20]:
+def test_another_brain_of_a_body_is_drawn_as_that_of_a_random_robot() -> None:
+    (body,) = robots(1)
+    made = [random_brain(np.random.default_rng(n), body, DEFAULT) for n in range(100)]
+    for robot in made:
+        assert robot.parts == body.parts
         check_robot(robot, body_space(DEFAULT.space))
-    assert len({robot.brain for robot in made}) == 400
-    hidden = [robot.brain.count("hidden") for robot in made]
-    assert {*hidden} == {*range(11)}
-    assert 4.6 < np.mean(hidden) < 5.4
-    outputs = [
-        n.kind for robot in made for n in robot.brain.neurons if n.layer == "output"
-    ]
-    assert all(
-        0.28 < outputs.count(kind) / len(outputs) < 0.39 for kind in NEURON_TYPES
-    )
-    possible = sum(
-        len(robot.brain.neurons)
-        * (len(robot.brain.neurons) - robot.brain.count("input"))
-        for robot in made
-    )
-    edges = sum(len(robot.brain.connections) for robot in made)
-    assert edges / possible == pytest.approx(
-        DEFAULT.generation.p_connect_neurons, rel=0.03
-    )
+    assert len({robot.brain for robot in made}) == 100
+    assert {robot.brain.count("hidden") for robot in made} == {*range(11)}

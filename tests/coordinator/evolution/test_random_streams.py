@@ -49,13 +49,6 @@ def test_samples_are_without_replacement_and_uniform_in_each_place(
         assert all(abs(n - N / 6) < 5 * (N * 5 / 36) ** 0.5 for n in found.values())
 
 
-def test_values_fill_their_range(draws: BufferedRng) -> None:
-    found = [draws.values((Parameter("p", 20.0, 100.0, 50.0),))[0] for _ in range(N)]
-    assert 20.0 <= min(found) < 20.1
-    assert 99.9 < max(found) <= 100.0
-    assert np.mean(found) == pytest.approx(60.0, abs=5 * 80 / 12**0.5 / N**0.5)
-
-
 def test_nearby_values_move_by_a_share_and_stay_in_range(draws: BufferedRng) -> None:
     moving = Parameter("p", -1.0, 1.0, 0.0)
     fixed = Parameter("c", 0.0, 1.0, 0.5, is_mutable=False)

@@ -119,54 +119,48 @@ def culled(fitness: list[float], **rules: float) -> tuple[str, list[int]]:
     return reason, [one.birth.number for one in found]
 
 
-def test_fitness_equal_to_the_share_of_the_mean_survives() -> None:
-    # Mean 1.0, limit 0.5: one half is enough, a little less is not.
-    fitness = [0.5, 0.499, 1.501, 1.5, *([1.0] * 8)]
-    assert culled(fitness, survive_share_of_mean=0.5) == ("selection", [1])
+FULL = [1.0] * 30
+# 0.7 * 0.1 = 0.06999999999999999, but 0.1 - 0.3 * 0.1 = 0.07.
+LAST_BIT = 0.7 * 0.1
 
 
-def test_the_limit_lies_below_a_negative_mean() -> None:
-    # Mean -1.0, limit -1.0 - 0.3 * 1.0 = -1.3: that is enough, a little less is not.
-    fitness = [-1.3, -1.3001, -0.3999, *([-1.0] * 9)]
-    assert culled(fitness) == ("selection", [1])
-    assert culled([-1.0] * 29) == ("selection", [])
-    assert culled([0.0] * 29) == ("selection", [])
-    # A share above 1 spares only what is better than the mean, of either sign.
-    for mean in (-1.0, 1.0):
-        few = [mean + 0.3, mean - 0.3, *([mean] * 8)]
-        assert 0 not in culled(few, survive_share_of_mean=1.2, population_floor=1)[1]
-        assert len(culled(few, survive_share_of_mean=1.2, population_floor=1)[1]) == 9
+@pytest.mark.parametrize(
+    ("fitness", "rules", "expected"),
+    [
+        # Mean 1, limit 0.5: one half is enough, a little less is not.
+        (
+            [0.5, 0.499, 1.501, 1.5, *FULL[:8]],
+            {"survive_share_of_mean": 0.5},
+            ("selection", [1]),
+        ),
+        ([LAST_BIT, 0.2 - LAST_BIT, *([0.1] * 8)], {}, ("selection", [])),
+        # Mean -1, limit -1 - 0.3 * 1: that is enough, a little less is not.
+        ([-1.3, -1.3001, -0.3999, *([-1.0] * 9)], {}, ("selection", [1])),
+        ([-1.0] * 29, {}, ("selection", [])),
+        ([0.0] * 29, {}, ("selection", [])),
+        # Down to the floor, the worst first; of equals the younger.
+        ([0.03, 0.01, 0.02, *FULL[:7]], {}, ("selection", [1, 2])),
+        ([0.0, 0.0, 0.0, *FULL[:7]], {}, ("selection", [2, 1])),
+        ([0.0, *FULL[:7]], {}, ("selection", [])),
+        ([], {}, ("selection", [])),
+        # Seven tenths of a full arena of equals.
+        (FULL[:29], {}, ("selection", [])),
+        (FULL, {}, ("cull", [*range(29, 8, -1)])),
+        (FULL, {"population_floor": 12}, ("cull", [*range(29, 11, -1)])),
+        ([0.1, *FULL[:29]], {}, ("selection", [0])),
+    ],
+)
+def test_culled_robots_by_hand(
+    fitness: list[float], rules: dict[str, float], expected: tuple[str, list[int]]
+) -> None:
+    assert culled(fitness, **rules) == expected
 
 
-def test_the_limit_of_other_means_is_share_times_mean_to_the_last_bit() -> None:
-    # 0.7 * 0.1 = 0.06999999999999999, but 0.1 - 0.3 * 0.1 = 0.07.
-    limit = 0.7 * 0.1
-    assert culled([limit, 0.2 - limit, *([0.1] * 8)]) == ("selection", [])
-
-
-def test_the_weakest_are_culled_down_to_the_floor() -> None:
-    fitness = [0.03, 0.01, 0.02, *([1.0] * 7)]
-    assert culled(fitness) == ("selection", [1, 2])
-
-
-def test_the_younger_of_equals_is_culled() -> None:
-    assert culled([0.0, 0.0, 0.0, *([1.0] * 7)]) == ("selection", [2, 1])
-
-
-@pytest.mark.parametrize("count", [0, 1, 7, 8])
-def test_no_robot_is_culled_at_or_below_the_floor(count: int) -> None:
-    assert culled([0.0, *([1.0] * 7)][:count])[1] == []
-
-
-def test_seven_tenths_of_a_full_arena_of_equals_are_culled() -> None:
-    assert culled([1.0] * 29) == ("selection", [])
-    reason, found = culled([1.0] * 30)
-    assert (reason, len(found)) == ("cull", 21)
-    assert found == list(range(29, 8, -1))
-
-
-def test_one_weak_robot_spares_a_full_arena() -> None:
-    assert culled([0.1, *([1.0] * 29)]) == ("selection", [0])
+@pytest.mark.parametrize("mean", [-1.0, 1.0])
+def test_a_share_above_1_spares_only_what_is_better_than_the_mean(mean: float) -> None:
+    few = [mean + 0.3, mean - 0.3, *([mean] * 8)]
+    _, gone = culled(few, survive_share_of_mean=1.2, population_floor=1)
+    assert sorted(gone) == [*range(1, 10)]
 
 
 def after_culling(

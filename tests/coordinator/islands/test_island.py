@@ -190,13 +190,6 @@ def test_the_order_of_answers_changes_no_record(turns: list[int]) -> None:
     assert records(shuffled) == records(lived())
 
 
-@pytest.mark.parametrize(("seed", "run"), [(12, 0), (11, 1)])
-def test_another_seed_or_run_gives_other_genomes(seed: int, run: int) -> None:
-    one = rows(lived(), "births")
-    other = rows(lived(seed, run), "births")
-    assert all(a["genome"] != b["genome"] for a, b in zip(one, other, strict=True))
-
-
 IMPOSSIBLE = (
     (Started(), "it has started before"),
     (EvaluationFailed(BirthId(0, 0), "why", PROVENANCE), "it has not been vetted"),

@@ -62,24 +62,18 @@ def test_a_moved_robot_dies_at_its_source_and_lives_at_its_target() -> None:
     assert all(row["birth_island"] is None for row in lived.rows("deaths")[:1])
     rows = [row for row in lived.rows("fitness") if row["birth_island"] == 0]
     assert {(row["island"], row["birth"]) for row in rows} >= {(1, name.number)}
-
-
-def test_an_immigrant_is_no_birth_and_must_mature_again() -> None:
-    lived = arenas(9, 9, handling="evict", replaced="none").live()
-    for number in (0, 1):
-        births = [row for row in lived.rows("births") if row["island"] == number]
-        assert sorted(row["birth"] for row in births) == list(range(9))
-    at_first = next(row for row in lived.rows("fitness") if row["birth_island"] == 0)
-    assert not at_first["is_mature"]
-    assert at_first["age_s"] <= 5.0
+    # It must mature again.
+    assert not rows[0]["is_mature"]
+    assert rows[0]["age_s"] <= 5.0
 
 
 def test_copies_live_in_both_arenas_and_replace_the_worst() -> None:
     lived = arenas(9, 9).live()
     first = lived.rows("migrations")[0]
     name = BirthId(0, first["birth"])
-    assert name in inserted(lived, 0)
-    assert name in inserted(lived, 1)
+    there, here = inserted(lived, 1)[name], inserted(lived, 0)[name]
+    assert there != here
+    assert dist(there, (0.0, 0.0)) <= 2.0
     replaced = [row for row in lived.rows("deaths") if row["reason"] == "replaced"]
     assert {row["island"] for row in replaced} == {0, 1}
     samples = [
@@ -124,14 +118,6 @@ def test_infants_do_not_migrate_and_immigrants_keep_what_they_learnt() -> None:
     assert len({*names}) == len(names)
 
 
-def test_immigrants_are_inserted_at_random_places() -> None:
-    lived = arenas(9, 9).live()
-    name = BirthId(0, lived.rows("migrations")[0]["birth"])
-    there, here = inserted(lived, 1)[name], inserted(lived, 0)[name]
-    assert there != here
-    assert dist(there, (0.0, 0.0)) <= 2.0
-
-
 def test_seconds_may_end_an_epoch_before_births_do() -> None:
     lived = arenas(12, 12, epoch=11, epoch_s=30.0).live()
     times = [row["sim_time_s"] for row in lived.rows("migrations") if not row["island"]]
@@ -141,19 +127,9 @@ def test_seconds_may_end_an_epoch_before_births_do() -> None:
 def test_immigrants_of_a_full_arena_await_room() -> None:
     full = {"population_limit": 5, "population_floor": 3, "full_cull_share": 0.4}
     lived = arenas(8, 8, rules=full, epoch=6, replaced="none").live()
-    arena = lived.islands[1]
-    assert isinstance(arena, Arena)
-    most = max(
-        len({row["birth"] for row in lived.rows("fitness") if row["sim_time_s"] == at})
-        for at in {row["sim_time_s"] for row in lived.rows("fitness")}
-    )
-    assert most <= 10
-    arrived = [one for one in inserted(lived, 1) if one.island == 0]
-    sent = [row for row in lived.rows("migrations") if row["to"] == 1]
-    assert len(arrived) <= len(sent)
     assert all(island.is_finished for island in lived.islands.values())
-    for number, world in lived.worlds.items():
-        assert len(world.born) <= 5, number
+    assert all(len(world.born) <= 5 for world in lived.worlds.values())
+    assert any(birth.island == 0 for birth in inserted(lived, 1))
 
 
 def falling(lived: ArchipelagoRun, island: int, step: int) -> None:

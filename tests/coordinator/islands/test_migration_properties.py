@@ -119,15 +119,6 @@ def test_every_archipelago_ends_and_repeats(
         assert least <= len(island.population) <= SELECTION.population
 
 
-def test_random_migrants_depend_on_the_seed() -> None:
-    wanted = document(OFF_LINE, OFF_LINE, emigrants="random", replaced="random")
-    outcomes = [
-        ArchipelagoRun(wanted, seed=seed).live().rows("migrations")
-        for seed in (1, 1, 2)
-    ]
-    assert outcomes[0] == outcomes[1] != outcomes[2]
-
-
 @pytest.mark.parametrize("requester", [None, 0, 3])
 def test_an_evaluation_is_for_its_requester(requester: int | None) -> None:
     birth, signed = BirthId(2, 7), Provenance("worker-1", "x86", 0.5)

@@ -24,36 +24,25 @@ def edges(
     return connections(migration, islands, seed, 0)
 
 
-def test_unconnected_islands_have_no_edges() -> None:
-    assert edges("unconnected", 4) == ()
-
-
-def test_a_ring() -> None:
-    assert edges("ring", 4) == both((0, 1), (1, 2), (2, 3), (3, 0))
-
-
-def test_a_ring_of_two_is_one_connection() -> None:
-    assert edges("ring", 2) == both((0, 1))
-
-
-def test_fully_connected_islands() -> None:
-    assert edges("fully-connected", 3) == both((0, 1), (0, 2), (1, 2))
-
-
-def test_a_star_has_island_0_in_the_middle() -> None:
-    assert edges("star", 4) == both((0, 1), (0, 2), (0, 3))
-
-
-def test_a_grid_of_six_has_two_rows() -> None:
-    # 0 1 2
-    # 3 4 5
-    assert edges("grid", 6) == both(
-        (0, 1), (1, 2), (3, 4), (4, 5), (0, 3), (1, 4), (2, 5)
-    )
-
-
-def test_a_grid_of_a_prime_number_is_a_line() -> None:
-    assert edges("grid", 3) == both((0, 1), (1, 2))
+@pytest.mark.parametrize(
+    ("topology", "islands", "expected"),
+    [
+        ("unconnected", 4, ()),
+        ("ring", 4, both((0, 1), (1, 2), (2, 3), (3, 0))),
+        ("ring", 2, both((0, 1))),
+        ("fully-connected", 3, both((0, 1), (0, 2), (1, 2))),
+        ("star", 4, both((0, 1), (0, 2), (0, 3))),
+        # 0 1 2
+        # 3 4 5
+        ("grid", 6, both((0, 1), (1, 2), (3, 4), (4, 5), (0, 3), (1, 4), (2, 5))),
+        # A prime number gives a line.
+        ("grid", 3, both((0, 1), (1, 2))),
+    ],
+)
+def test_edges_by_hand(
+    topology: Topology, islands: int, expected: tuple[Edge, ...]
+) -> None:
+    assert edges(topology, islands) == expected
 
 
 def test_the_user_s_edges_go_one_way() -> None:
