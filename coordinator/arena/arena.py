@@ -7,6 +7,9 @@ one, in reverse order of their generation. Source: Hupkes 2016, section 5.3.3; t
 of the original.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 from coordinator.arena.arena_migration import ArenaMigration
 from coordinator.arena.candidates import VettingQueue
 from coordinator.arena.infancy import Infancy
@@ -30,10 +33,14 @@ from coordinator.islands.events import (
     Asked,
     Commanded,
     Finish,
+    Immigrated,
     MigrationEvent,
+    NeighbourClosed,
     Record,
     Started,
     Verdict,
+    Vetted,
+    VettingFailed,
 )
 from coordinator.islands.migration import MigrationEpochs
 from schema.errors import ExperimentError, UnexpectedEvent
@@ -100,6 +107,16 @@ class Arena:
         self._advances = 0
         self._awaited: AdvanceShard | None = None
         self._has_started = self._is_held = False
+        self._handlers: dict[type, Callable[[Any], list[ArenaCommand]]] = {
+            Started: self._started,
+            Vetted: self._vetted,
+            VettingFailed: self._vetted,
+            Advanced: self._advanced,
+            Commanded: self._commanded,
+            Asked: self._asked,
+            Immigrated: self._migrated,
+            NeighbourClosed: self._migrated,
+        }
 
     @property
     def population(self) -> tuple[Individual, ...]:
@@ -140,18 +157,11 @@ class Arena:
         if isinstance(event, Started) == self._has_started:
             why = "it has started before" if self._has_started else "it has not started"
             raise self._unexpected(event, why)
-        if isinstance(event, Started):
-            self._has_started = True
-            return [*self._vetting_queue.begin_founders()]
-        if isinstance(event, Verdict):
-            return self._vetted(event)
-        if isinstance(event, Advanced):
-            return self._advanced(event) if self._is_awaited(event) else []
-        if isinstance(event, Commanded):
-            return self._commanded(event)
-        if isinstance(event, Asked):
-            return self._asked(event)
-        return self._migrated(event)
+        return self._handlers[type(event)](event)
+
+    def _started(self, _event: Started) -> list[ArenaCommand]:
+        self._has_started = True
+        return [*self._vetting_queue.begin_founders()]
 
     def _vetted(self, event: Verdict) -> list[ArenaCommand]:
         was_busy = self._vetting_queue.is_busy
@@ -196,6 +206,8 @@ class Arena:
 
     def _advanced(self, event: Advanced) -> list[ArenaCommand]:
         """Record the result of an advance, and decide."""
+        if not self._is_awaited(event):
+            return []
         advance = event.advance
         over_s = self.clock.seconds(advance.step - self.step)
         self._awaited = None

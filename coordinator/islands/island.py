@@ -6,8 +6,10 @@ are committed in birth order, whatever the order of their answers.
 Source: Hupkes 2016, section 5.3; the code of the original.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.evolution.encodings import encoding_of
@@ -15,15 +17,19 @@ from coordinator.islands.events import (
     Answered,
     Asked,
     Evaluated,
+    EvaluationFailed,
     Finish,
+    Immigrated,
     IslandCommand,
     IslandEvent,
     MigrationEvent,
+    NeighbourClosed,
     Outcome,
     Record,
     Started,
     Verdict,
     Vetted,
+    VettingFailed,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.learning import IslandLearning, NewbornLearning
@@ -105,6 +111,16 @@ class Island:
         self._window = self._brood_end = selection.population
         self._brood_window = experiment.window
         self._in_flight: dict[int, _Birth] = {}
+        self._handlers: dict[type, Callable[[Any], list[IslandCommand]]] = {
+            Started: self._started,
+            Vetted: self._vetted,
+            VettingFailed: self._vetted,
+            Evaluated: self._evaluated,
+            EvaluationFailed: self._evaluated,
+            Asked: self._learnt,
+            Immigrated: self._migrated,
+            NeighbourClosed: self._migrated,
+        }
         self._brood: list[Individual] = []
 
     @property
@@ -129,82 +145,80 @@ class Island:
             ExperimentError: no robot meets the restrictions; the island cannot
                 continue.
         """
-        if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
-            raise self._unexpected(event, "fitness must be finite")
-        if isinstance(event, Started):
-            if self._begun:
-                raise self._unexpected(event, "it has started before")
-            commands = self._proceed()
-        elif isinstance(event, MigrationEvent) or (
-            isinstance(event, Outcome) and event.requester is not None
-        ):
-            commands = self._migrated(event)
-        elif isinstance(event, Outcome) and event.trial and self._learning is None:
-            if self._reevaluations is None:
-                raise self._unexpected(event, "it re-evaluates no robot")
-            self._reevaluations.take(event)
-            commands = self._proceed()
-        else:
-            commands = self._answered(event)
+        commands = self._handlers[type(event)](event)
         simulation = self.experiment.simulation
         if simulation.evaluation_s is None:
             return commands
         return with_durations(commands, simulation, self._seed, self._run)
 
-    def _answered(self, event: Answered) -> list[IslandCommand]:
-        """Handle a vetting, a learner's answer, or an evaluation of a newborn."""
-        found = self._birth_of(event)
-        if found is None:
+    def _started(self, event: Started) -> list[IslandCommand]:
+        if self._begun:
+            raise self._unexpected(event, "it has started before")
+        return self._proceed()
+
+    def _vetted(self, event: Verdict) -> list[IslandCommand]:
+        newborn = self._newborn(event)
+        if newborn is None:
             return []
-        candidate = found.candidate
-        if not isinstance(event, Verdict):
-            return self._judged_newborn(found, event)
+        candidate = newborn.candidate
+        if event.attempt > candidate.attempt:
+            raise self._unexpected(event, f"it is at attempt {candidate.attempt}")
+        if event.attempt < candidate.attempt or newborn.is_viable:
+            return []
         if not (isinstance(event, Vetted) and event.report.is_viable):
             attempt, couple = candidate.attempt + 1, candidate.couple
             why = event.report.reason if isinstance(event, Vetted) else event.reason
             return [self._begin(event.birth, attempt, couple, why)]
-        found.is_viable = True
+        newborn.is_viable = True
         if self._learning is None:
             return [Evaluate(candidate.birth, candidate.robot)]
-        found.learning = NewbornLearning(candidate, self._learning)
-        return [*found.learning.start()]
+        newborn.learning = NewbornLearning(candidate, self._learning)
+        return [*newborn.learning.start()]
 
-    def _judged_newborn(
-        self, found: _Birth, event: Outcome | Asked
-    ) -> list[IslandCommand]:
-        """Handle an evaluation of a newborn, or the answer of its learner."""
-        if found.learning is None:
-            if isinstance(event, Asked):
-                raise self._unexpected(event, "it has no learners")
-            found.outcome = event
-            return self._proceed()
-        commands = found.learning.take(event)
-        if not found.learning.is_done:
-            return [*commands]
-        found.candidate, found.outcome = found.learning.conclude()
+    def _evaluated(self, event: Outcome) -> list[IslandCommand]:
+        """Handle an evaluation of a newborn, a parent or an immigrant."""
+        if event.evaluation and not isfinite(event.evaluation.fitness):
+            raise self._unexpected(event, "fitness must be finite")
+        if event.requester is not None:
+            return self._migrated(event)
+        if self._learning is not None:
+            return self._learnt(event)
+        if event.trial:
+            if self._reevaluations is None:
+                raise self._unexpected(event, "it re-evaluates no robot")
+            self._reevaluations.take(event)
+        elif newborn := self._newborn(event):
+            newborn.outcome = event
         return self._proceed()
 
-    def _birth_of(self, event: Answered) -> _Birth | None:
-        """Return the birth that an answer belongs to; None for a duplicate answer.
+    def _learnt(self, event: Outcome | Asked) -> list[IslandCommand]:
+        """Handle a trial of a newborn, or the answer of its learner."""
+        newborn = self._newborn(event)
+        if newborn is None:
+            return []
+        if newborn.learning is None:
+            raise self._unexpected(event, "it has no learners")
+        commands = newborn.learning.take(event)
+        if not newborn.learning.is_done:
+            return [*commands]
+        newborn.candidate, newborn.outcome = newborn.learning.conclude()
+        return self._proceed()
+
+    def _newborn(self, event: Answered) -> _Birth | None:
+        """Return the birth that an answer belongs to; None if it has its outcome.
 
         Raises:
-            UnexpectedEvent: the answer to a request that was never sent.
+            UnexpectedEvent: the birth has not begun, or was not vetted before.
         """
         birth = event.birth
         if birth.island != self._number or not 0 <= birth.number < self._begun:
             raise self._unexpected(event, f"births 0..{self._begun - 1} have begun")
-        found = self._in_flight.get(birth.number)
-        if found is None or found.outcome is not None:
+        newborn = self._in_flight.get(birth.number)
+        if newborn is None or newborn.outcome is not None:
             return None
-        if isinstance(event, Verdict):
-            attempt = found.candidate.attempt
-            if event.attempt > attempt:
-                raise self._unexpected(event, f"it is at attempt {attempt}")
-            is_old = event.attempt < attempt or found.is_viable
-            return None if is_old else found
-        if not found.is_viable:
+        if not (newborn.is_viable or isinstance(event, Verdict)):
             raise self._unexpected(event, "it has not been vetted")
-        return found
+        return newborn
 
     def _unexpected(self, event: IslandEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
@@ -244,17 +258,17 @@ class Island:
         self._in_flight[birth.number] = _Birth(candidate)
         return Vet(birth, candidate.attempt, candidate.robot)
 
-    def _commit(self, found: _Birth, outcome: Outcome) -> list[IslandCommand]:
+    def _commit(self, newborn: _Birth, outcome: Outcome) -> list[IslandCommand]:
         """Add an evaluated candidate to the brood; return its rows."""
         del self._in_flight[self.births]
-        candidate = found.candidate
+        candidate = newborn.candidate
         individual = candidate.individual(self._generation).evaluated(
             outcome.evaluation, self._labels
         )
         self._brood.append(individual)
         self.births += 1
         born = birth_record(candidate, individual, self._encoding)
-        trials = found.learning.records() if found.learning else ()
+        trials = newborn.learning.records() if newborn.learning else ()
         return [born, evaluation_record(outcome, self._labels), *trials]
 
     def _close_brood(self) -> list[IslandCommand]:
