@@ -118,9 +118,7 @@ class Infancy:
     def end_trials(self, event: Advanced, moment: Moment) -> list[Ask | Record]:
         """End the trials whose window is whole, and those of robots that diverged.
 
-        Args:
-            event: whose judgements the living have taken.
-            moment: after it.
+        The living have taken the judgements of the event.
 
         Returns:
             Requests to learners; rows of robots that grew up or diverged.
@@ -141,16 +139,10 @@ class Infancy:
         now_s: float,
         provenance: Provenance = Provenance(),  # noqa: B008 - immutable
     ) -> list[Record]:
-        """End an infancy before its time; the present trial has failed.
-
-        Args:
-            birth: id of a robot, infant or not.
-            reason: why it ends.
-            now_s: simulated time [s].
-            provenance: of the failure.
+        """End an infancy before its time [s]; the present trial has failed.
 
         Returns:
-            The rows of the infant's trials; none if it is no infant.
+            The rows of the infant's trials; none if the robot is no infant.
         """
         infant = self._infants.pop(birth, None)
         if infant is None:
@@ -196,7 +188,9 @@ class Infancy:
         """Exchange the brain for that of the next trial."""
         wanted = infant.queue.popleft()
         infant.trial, infant.end = wanted.trial, step + self._window
-        self._exchange(self._found(birth), wanted.robot)
+        self._living.replace_brain(
+            self._found(birth), wanted.robot, restarts_window=True
+        )
 
     def _grow(self, birth: BirthId) -> list[Record]:
         """Give a robot the best brain that it tried; it is an infant no longer."""
@@ -207,11 +201,8 @@ class Infancy:
         living.individual = replace(
             living.individual, genome=grown.genome, learnt=grown.learnt
         )
-        self._exchange(living, adult)
+        self._living.replace_brain(living, adult, restarts_window=True)
         return _rows(infant, adult)
-
-    def _exchange(self, living: LivingRobot, robot: Robot) -> None:
-        self._living.replace_brain(living, robot, restarts_window=True)
 
     def _found(self, birth: BirthId) -> LivingRobot:
         living = self._living.get(birth)
@@ -226,9 +217,7 @@ def _asks(commands: Sequence[Evaluate | Ask]) -> list[Ask]:
 def _rows(infant: _Infant, adult: Robot | None = None) -> list[Record]:
     """Return the rows of the trials that have ended.
 
-    Args:
-        infant: that tried them.
-        adult: the robot with the brain of the best trial; None if it did not grow up.
+    The adult has the brain of the best trial; it is None if it did not grow up.
     """
     records = infant.learning.records()
     best = None if adult is None else encode_robot(adult)

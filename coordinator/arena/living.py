@@ -144,11 +144,7 @@ class LivingRobots:
     ) -> list[Record]:
         """Insert a newborn; return the rows of its birth and of the population.
 
-        Args:
-            candidate: the newborn.
-            encoding: of the arena.
-            moment: of its birth, which counts.
-            place: where; random if None.
+        The moment counts its birth; the place is random if None.
         """
         individual = candidate.individual(generation=None)
         place = place or self.random_place(candidate.birth, Purpose.PLACE)
@@ -179,10 +175,7 @@ class LivingRobots:
     ) -> None:
         """Replace the brain of a living robot by that of ``changed``.
 
-        Args:
-            robot: the living robot.
-            changed: the same body with the new brain.
-            restarts_window: its window of fitness begins now, so it is immature.
+        If it restarts its window of fitness, the robot is immature.
         """
         robot.robot, birth = changed, robot.birth
         inserted = self._insertions.get(birth)
@@ -259,11 +252,7 @@ def draw_place(
 
     Places are uniform in radius, so denser in the centre (as in the
     code of the original).
-
-    Args:
-        draws: source of two numbers for each try, the angle first.
-        others: last known places of the living [m].
-        arena: radius, distance and number of tries.
+    The angle is drawn first. The others are last known places of the living [m].
     """
     place = (0.0, 0.0)
     for _ in range(arena.birth_place_tries):

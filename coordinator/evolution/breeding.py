@@ -70,9 +70,7 @@ class Individual(Struct, frozen=True):
     ) -> "Individual":
         """Return the individual with the results of an evaluation.
 
-        Args:
-            evaluation: None if it failed.
-            labels: names of its measures.
+        The evaluation is None if it failed; the labels name its measures.
         """
         if evaluation is None:
             return replace(self, fitness=0.0, has_failed=True, measures=NO_MEASURES)
@@ -209,19 +207,12 @@ class Breeder:
     ) -> tuple[Couple | None, object | None]:
         """Return the parents of one attempt and the genome of their child.
 
-        Args:
-            birth: id of the birth.
-            attempt: number of the attempt, from 0, through all couples.
-            population: possible parents; empty for a founder.
-            couple: parents of the attempt before; None at attempt 0.
+        Arguments and errors are as of ``candidate``. After ``max_mating_attempts`` new
+        parents are selected.
 
         Returns:
             The parents, None for a random robot; and the genome, None if mating
-            failed. After ``max_mating_attempts`` new parents are selected.
-
-        Raises:
-            ExperimentError: no random robot meets the restrictions, or the selection
-                of parents or an encoding's own code fails.
+            failed.
         """
         selection = self._experiment.selection
         if self._is_random(population):
@@ -238,11 +229,6 @@ class Breeder:
         self, attempts: int, population: Sequence[Individual], why: str
     ) -> None:
         """Raise if too many attempts at a birth have failed.
-
-        Args:
-            attempts: number of failed attempts.
-            population: possible parents; empty for a founder.
-            why: reason why the last attempt failed.
 
         Raises:
             ExperimentError: the experiment's limit for random robots is reached, or
@@ -264,9 +250,7 @@ class Breeder:
     ) -> tuple[Individual, ...]:
         """Return the population after a brood, in birth order.
 
-        Args:
-            parents: the population before.
-            children: the brood, in birth order; at least one.
+        The brood has at least one child, and is in birth order.
 
         Raises:
             ExperimentError: the selection of survivors fails.

@@ -18,9 +18,6 @@ def check_brain_genes(experiment: Experiment) -> None:
 
     It is part of the thesis's encoding, which is checked with it.
 
-    Args:
-        experiment: names the brain type.
-
     Raises:
         ExperimentError: as of ``check_encoding``; genes that are no tuples of genes, a
             connection that comes twice, or a parameter outside its range.

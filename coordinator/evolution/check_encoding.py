@@ -26,11 +26,8 @@ def check_encoding(experiment: Experiment, look: Look = lambda *_: None) -> None
     """Raise unless the encoding of an island keeps its contract.
 
     Random genomes and their children are made twice from equal random streams, written
-    as bytes and read, and developed. No robot is evaluated.
-
-    Args:
-        experiment: settings of the island.
-        look: raises for a genome that breaks another rule.
+    as bytes and read, and developed. No robot is evaluated. ``look`` raises for a
+    genome that breaks another rule.
 
     Raises:
         UnknownPlugin: no such encoding.

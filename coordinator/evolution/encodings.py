@@ -45,9 +45,6 @@ METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
 def encoding_of(experiment: Experiment) -> "IslandEncoding":
     """Return the encoding of one island.
 
-    Args:
-        experiment: settings of the island.
-
     Raises:
         UnknownPlugin: no such encoding, or a module that is not allowed.
         ExperimentError: a class without the methods of an encoding, invalid
@@ -148,11 +145,7 @@ class IslandEncoding:
             ) from error
 
     def with_brain(self, genome: object, robot: Robot) -> object:
-        """Return a genome that has also what a robot has learnt.
-
-        Args:
-            genome: of the robot at birth.
-            robot: with the brain that it has learnt.
+        """Return the genome of a robot at birth with the brain that it has learnt.
 
         Raises:
             InvalidRobot: the encoding cannot describe the robot.

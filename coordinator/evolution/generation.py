@@ -45,10 +45,7 @@ def generate(
 
     The analyzer checks later whether its parts intersect.
 
-    Args:
-        rng: the stream to draw from.
-        experiment: body space, restrictions, probabilities.
-        birth: id of the individual; the identities of its parts derive from it.
+    The identities of its parts derive from its birth id.
 
     Raises:
         ExperimentError: no random tree meets the restrictions.
@@ -79,11 +76,6 @@ def random_brain(
 
     Each motor gets a random neuron, then the brain type adds hidden neurons and
     connections. The body stays as it is.
-
-    Args:
-        rng: the stream to draw from.
-        robot: of the experiment.
-        experiment: brain type, restrictions, probabilities.
     """
     draws, brain = BufferedRng(rng), brain_genes(experiment)
     types = body_space(experiment.space)
@@ -131,12 +123,7 @@ def random_part(
 ) -> MutableGenome:
     """Return a detached part without hidden neurons.
 
-    Args:
-        draws: source of its slot, orientation, parameters and neurons.
-        kind: its type; a root gets no slot and no orientation.
-        genes: source of identities; the part gets the next one.
-        brain: gives its output neurons.
-        colour: red, green, blue; empty for a random colour.
+    A root gets no slot and no orientation; an empty colour is a random one.
     """
     return MutableGenome(
         kind,

@@ -84,10 +84,6 @@ def _populations(least: int, labels: Labels) -> Iterator[list[Individual]]:
 def check_rule(rule: Rule, labels: Labels = None) -> str:
     """Raise unless a rule of selection keeps its contract on simple populations.
 
-    Args:
-        rule: of parents or survivors.
-        labels: measures of the individuals.
-
     Returns:
         A warning: what it raises for a population with failed robots, which is no
         error, as a run in which no robot fails goes on; or an empty text.
@@ -170,9 +166,7 @@ def _by_hand(path: str) -> _Encoded:
 def brain_kind(check: Callable[[Experiment], None]) -> Kind:
     """Return the kind of brain types.
 
-    Args:
-        check: of both halves of the brain type of an experiment; one of them runs in
-            workers.
+    The check is that of both halves of a brain type; one of them runs in workers.
     """
     return Kind(
         "brain",

@@ -169,10 +169,7 @@ class RevolveAngle:
     ) -> Genome | None:
         """Mutate a tree, step by step in the order of the thesis.
 
-        Args:
-            draws: source of all choices.
-            root: root of the tree, which is of no use afterwards.
-            birth: as of ``mate``.
+        The tree is of no use afterwards.
 
         Returns:
             The genome of the tree; None if no motor is left.
@@ -223,12 +220,6 @@ def crossover(
 
     The replaced subtree is uniform. The donated one is uniform among those with which
     the tree stays within its limits; it keeps its own slot and orientation.
-
-    Args:
-        draws: source of all choices.
-        branches: those of the tree that changes, depth first.
-        donor: the other tree.
-        experiment: restrictions.
 
     Returns:
         Whether a subtree was replaced; if not, the tree is unchanged.
@@ -321,12 +312,6 @@ def add_parts(
 ) -> list[MutableGenome]:
     """Add random parts, `expected_parts` on average, with neurons and connections.
 
-    Args:
-        draws: source of all choices.
-        branches: those of the tree, depth first.
-        genes: identities of the parts.
-        experiment: restrictions and probabilities.
-
     Returns:
         The branches of the tree then, depth first.
     """
@@ -366,10 +351,6 @@ def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) ->
 
     It is the mean number of parts that deletion removes minus the mean number that
     duplication adds, but at most the number that still fits.
-
-    Args:
-        branches: those of the tree, depth first.
-        experiment: restrictions and probabilities.
     """
     variation, space = experiment.variation, experiment.space
     sizes = subtree_sizes(branches)

@@ -61,11 +61,6 @@ class Rule:
         The rule gets a list of its own. It may sort it or remove from it, as rules of
         earlier runs do; what it returns are then places in the changed list.
 
-        Args:
-            count: number of places that it must return.
-            population: the candidates.
-            rest: further arguments, without the parameters.
-
         Raises:
             ExperimentError: it raises, returns anything else, or puts individuals into
                 its list.
@@ -125,10 +120,7 @@ def select_parents(
 ) -> tuple[S, S]:
     """Return two different parents, the one that gives its root first.
 
-    Args:
-        population: the candidates, in a reproducible order.
-        rng: source of all choices.
-        rule: of ``rule_of``.
+    The population is in a reproducible order.
 
     Raises:
         ExperimentError: the rule raises, or returns no two places.
@@ -146,14 +138,8 @@ def select_survivors(
 ) -> tuple[S, ...]:
     """Return the next population of constant size, in birth order.
 
-    Args:
-        parents: the population before.
-        children: the brood.
-        rng: source of all choices.
-        selection: size of the population; whether parents compete with their children.
-            A brood cut short by the end of the run always competes with its parents,
-            or the population would shrink.
-        rule: of ``rule_of``.
+    A brood cut short by the end of the run always competes with its parents, or the
+    population would shrink.
 
     Raises:
         ExperimentError: the rule raises, or returns other than that many places.
@@ -244,12 +230,7 @@ def cull_population(
 
     The rule is that of an arena, with births as its clock. A full arena waits for its
     next cull; a full off-line population is culled at once, or no brood would follow.
-
-    Args:
-        parents: the population before.
-        children: the brood, in birth order.
-        founders: number of births before the first interval begins.
-        rules: interval between culls, limits and shares.
+    The first interval begins after the founders.
     """
     living = sorted([*parents, *children], key=lambda one: one.birth)
     births = children[-1].birth.number + 1 - founders
@@ -271,10 +252,6 @@ def select_culled(
     none, and the mature alone reach the population limit, a share of the limit is
     culled ("cull"). At least ``population_floor`` of the mature remain. The original
     did not sort the list first.
-
-    Args:
-        mature: the robots that were evaluated over a whole window.
-        rules: those of an arena or of an off-line island.
     """
     weakest = fittest_first(mature)[::-1]
     spare = max(0, len(weakest) - rules.population_floor)

@@ -80,12 +80,7 @@ class MigrationEpochs:
         self._active = links.neighbours
 
     def is_due(self, births: int, now_s: float = -inf) -> bool:
-        """Return whether the epoch ends now.
-
-        Args:
-            births: number of births on the island.
-            now_s: simulated time of an arena [s].
-        """
+        """Return whether the epoch ends now; arenas give their simulated time [s]."""
         return births >= self._due_births or now_s >= self._due_s
 
     @property
@@ -105,10 +100,8 @@ class MigrationEpochs:
     ) -> tuple[list[Emigrate], list[Individual]]:
         """End the epoch; return the commands, and the individuals that were moved.
 
-        Args:
-            candidates: possible emigrants, in a reproducible order.
-            living: size of the population.
-            spare: greatest number of individuals that may be moved away.
+        The candidates are in a reproducible order; at most ``spare`` of them may be
+        moved away.
         """
         self.is_waiting = True
         targets = [to for to in self.links.targets if to in self._active]
@@ -191,9 +184,8 @@ class MigrationEpochs:
     ) -> Individual | None:
         """Return the individual that an immigrant replaces; None if it replaces none.
 
-        Args:
-            candidates: individuals that may be replaced, in a reproducible order.
-            arrival: number of immigrants that settled on the island before.
+        The candidates are in a reproducible order; ``arrival`` counts the immigrants
+        that settled on the island before.
         """
         if not candidates or self._migration.replaced == "none":
             return None

@@ -65,10 +65,8 @@ class Reevaluations:
     def start(self, births: int, population: Sequence[Individual]) -> list[Evaluate]:
         """Return the re-evaluations that are due; each number of births counts once.
 
-        Args:
-            births: number of births.
-            population: the parents of the last brood. Immigrants among them keep the
-                fitness that they arrived with.
+        The population are the parents of the last brood. Immigrants among them keep the
+        fitness that they arrived with.
         """
         if births < self._due_births:
             return []

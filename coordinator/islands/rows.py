@@ -33,12 +33,7 @@ def birth_record(
 ) -> Record:
     """Return the births row of a candidate that is born.
 
-    Args:
-        candidate: the candidate.
-        individual: the individual that it becomes.
-        encoding: of the island.
-        sim_time_s: simulated time of its birth on-line [s].
-        place: its place of birth in the ground plane [m].
+    On-line it has its simulated time [s] and its place in the ground plane [m].
     """
     with at_birth(candidate.birth):
         genome = encoding.to_bytes(candidate.genome)
@@ -85,11 +80,6 @@ def body_rows(robot: Robot) -> list[Row]:
 
 def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     """Return the counts of a births row.
-
-    Args:
-        robot: the phenotype.
-        genome: of the phenotype.
-        space: its part types.
 
     Returns:
         ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
@@ -145,12 +135,7 @@ def named_measures(
 
 
 def evaluation_record(outcome: Outcome, labels: Sequence[str] = ()) -> Record:
-    """Return the evaluations row of an outcome.
-
-    Args:
-        outcome: of the evaluation.
-        labels: names of its measures.
-    """
+    """Return the evaluations row of an outcome; the labels name its measures."""
     island = outcome.birth.island if outcome.requester is None else outcome.requester
     found = outcome.evaluation
     row = {

@@ -22,11 +22,7 @@ def connections(
 ) -> tuple[Edge, ...]:
     """Return the directed edges along which migrants travel, in order.
 
-    Args:
-        migration: settings; they name the topology.
-        islands: number of islands.
-        seed: seed of the run; only random topologies depend on it.
-        run: number of the repeat, from 0.
+    Only random topologies depend on the seed and the number of the repeat.
 
     Raises:
         ExperimentError: networkx cannot build the graph, e.g. a connected small world

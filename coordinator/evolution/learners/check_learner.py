@@ -17,13 +17,9 @@ def check_learner(rules: Learning) -> None:
     It learns 1, 3 and 20 parameters, with trials that fail among others. After each
     request, a second learner is told what was tried and must want the same.
 
-    Args:
-        rules: the section ``learning``.
-
     Raises:
-        UnknownPlugin: no such learner, or a module that is not allowed.
-        ExperimentError: it raises, asks for other than points from 0 to 1, or depends
-            on anything but what it was told and the random stream.
+        ExperimentError: as of ``learner_class``; it raises, asks for other than points
+            from 0 to 1, or depends on anything but what it was told and the stream.
     """
     for count in (1, 3, 20):
         start = (0.25,) * count

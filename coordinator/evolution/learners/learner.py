@@ -56,14 +56,10 @@ class NewbornLearner:
     def __init__(self, rules: Learning, start: Sequence[float]) -> None:
         """Make the learner.
 
-        Args:
-            rules: the section ``learning``.
-            start: parameters of the brain at birth, as shares of their ranges.
+        Its start are the parameters of the brain at birth, as shares of their ranges.
 
         Raises:
-            UnknownPlugin: no such learner, or a module that is not allowed.
-            ExperimentError: a class without the methods of a learner, invalid
-                parameters, or an error when the class is called.
+            ExperimentError: as of ``learner_class``, or the class raises.
         """
         self._class, parameters = learner_class(rules)
         self._count = len(start)
@@ -84,9 +80,7 @@ class NewbornLearner:
     def ask(self, rng: np.random.Generator, most: int) -> Points:
         """Return the next points to try together.
 
-        Args:
-            rng: stream of this request alone.
-            most: greatest number of points, at least 1.
+        The stream is that of this request alone.
 
         Raises:
             ExperimentError: the learner raises, or returns anything else.

@@ -110,8 +110,8 @@ def test_trials_of_a_request_are_in_flight_together(learner: str) -> None:
     asked = Learners({0: island.experiment}, Origin()).answer(ask)
     trials = requests(island.handle(asked))
     assert len(trials) == len(asked.points) == (size or 3 + int(3 * log(count)))
-    assert [each.trial for each in trials] == [*range(1, len(trials) + 1)]  # type: ignore[union-attr]
-    commands = [each for one in (*trials, first) for each in island.handle(judge(one))]  # type: ignore[arg-type]
+    assert [each.trial for each in trials] == [*range(1, len(trials) + 1)]
+    commands = [each for one in (*trials, first) for each in island.handle(judge(one))]
     if learner != "random":
         (again,) = commands
         assert isinstance(again, Ask)
