@@ -93,12 +93,12 @@ def test_too_many_failed_attempts_raise_an_error(
 
 def test_with_culling_weak_robots_are_removed_at_the_interval() -> None:
     rules = Culling(interval=2, population_floor=1)
-    living = [replace(one, fitness=1.0) for one in founders(6)]
+    living = [replace(one, fitness=1.0) for one in founders(7)]
     living[1] = replace(living[1], fitness=0.1)
-    culling = breeder(population=4, culling=rules)
-    assert culling.survivors(living[:4], living[4:5]) == tuple(living[:5])
-    found = culling.survivors(living[:5], living[5:])
-    assert [one.birth.number for one in found] == [0, 2, 3, 4, 5]
+    culling = breeder(population=5, culling=rules)
+    assert culling.survivors(living[:5], living[5:6]) == tuple(living[:6])
+    found = culling.survivors(living[:6], living[6:])
+    assert [one.birth.number for one in found] == [0, 2, 3, 4, 5, 6]
 
 
 @pytest.mark.parametrize("found", [Evaluation(0.1, 0.1, 0.1, 12.0, (2.0,)), None])

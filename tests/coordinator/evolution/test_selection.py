@@ -99,6 +99,11 @@ def test_the_best_of_parents_and_children_survive_in_birth_order() -> None:
     assert survivors(OLD, NEW, population=3) == [0, 2, 3]
 
 
+def test_only_children_survive_without_keep_parents() -> None:
+    more = individuals(0.4, 0.0, 0.3, 0.2, first=3)
+    assert survivors(OLD, more, population=3, keep_parents=False) == [3, 5, 6]
+
+
 def test_a_brood_cut_short_does_not_shrink_the_population() -> None:
     assert survivors(OLD, NEW[:1], population=3, keep_parents=False) == [0, 2, 3]
 

@@ -153,6 +153,13 @@ def test_no_brood_exceeds_the_population_limit_or_the_births() -> None:
     assert max(sizes.values()) < 10
 
 
+def test_a_full_population_that_must_not_shrink_has_one_child_at_a_time() -> None:
+    culling = Culling(population_limit=6, population_floor=6)
+    selection = replace(BRIDGE.selection, reevaluation=None, culling=culling)
+    born = rows(lived(replace(BRIDGE, births=9, selection=selection)), "births")
+    assert [row["generation"] for row in born] == [0] * 6 + [1, 2, 3]
+
+
 def test_robots_are_evaluated_once_without_re_evaluation() -> None:
     selection = replace(BRIDGE.selection, reevaluation=None)
     plain = replace(BRIDGE, selection=selection, simulation=Simulation())
