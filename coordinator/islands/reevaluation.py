@@ -108,7 +108,7 @@ class Reevaluations:
         """Return the population with its new fitness, and the rows of the trials."""
         outcomes, self._outcomes = self._outcomes, {}
         records = []
-        for birth, outcome in sorted(outcomes.items()):
+        for birth, outcome in outcomes.items():
             assert outcome is not None
             found = outcome.evaluation
             self._trials[birth].append(found.fitness if found else None)

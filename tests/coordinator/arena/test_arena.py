@@ -262,7 +262,11 @@ def test_answers_that_were_never_requested_raise() -> None:
 
 
 def test_second_answers_are_ignored() -> None:
-    lived = ArenaRun(Arena(experiment(20), 1, 0), verdict=reject_some).live()
+    lived = ArenaRun(Arena(experiment(20), 1, 0), verdict=reject_some)
+    lived.tell(Started())
+    while lived.waiting:
+        lived.turn()
+        assert lived.arena.handle(lived.events[-1]) == []
     assert not any(lived.arena.handle(event) for event in lived.events[1:])
 
 

@@ -129,6 +129,29 @@ def test_swapping_skips_a_tree_of_one_line() -> None:
     assert to_genome(preorder(root)) == line
 
 
+@pytest.mark.parametrize(
+    ("step", "key"),
+    [
+        (delete_subtree, "p_delete_subtree"),
+        (duplicate_subtree, "p_duplicate_subtree"),
+        (swap_subtrees, "p_swap_subtree"),
+    ],
+)
+@pytest.mark.parametrize("probability", [0.0, 0.05, 0.4])
+def test_each_step_happens_with_its_probability(
+    step: Any,  # noqa: ANN401 - one of three functions
+    key: str,
+    probability: float,
+) -> None:
+    setting = experiment(**{key: probability})
+    happened = 0
+    for seed in range(N):
+        root = to_mutable(CHAIN, TYPES)
+        step(draws(seed), root, setting)
+        happened += to_genome(preorder(root)) != CHAIN
+    assert is_near(happened, N * probability)
+
+
 def test_parameters_of_parts_move_and_colours_stay() -> None:
     bar = node("Core", (0, node("ParametricBarJoint")), (1, node("ActiveHinge")))
     lengths = []

@@ -3,10 +3,10 @@
 from itertools import cycle
 from typing import Any
 
-import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coordinator.islands.events import (
     Answered,
@@ -156,7 +156,7 @@ def test_a_failed_evaluation_has_no_measures_and_counts_as_zero() -> None:
 
 
 def test_the_last_brood_is_cut_where_the_births_end() -> None:
-    experiment = msgspec.structs.replace(small(), births=9)
+    experiment = replace(small(), births=9)
     island = Island(experiment, 7, 0)
     commands = live(island, answer)
     assert [row["birth"] for row in rows(commands, "births")] == list(range(9))
@@ -165,7 +165,7 @@ def test_the_last_brood_is_cut_where_the_births_end() -> None:
 
 
 def test_a_run_may_consist_of_founders_only() -> None:
-    island = Island(msgspec.structs.replace(small(), births=6), 7, 0)
+    island = Island(replace(small(), births=6), 7, 0)
     assert live(island, answer)[-1] == Finish(0)
     assert island.births == len(island.population) == 6
 
@@ -181,6 +181,21 @@ def test_the_window_limits_births_in_flight_and_changes_none(window: int) -> Non
 
     assert records(live(island, watched)) == records(lived())
     assert max(in_flight) == window
+
+
+def test_without_selection_fitness_decides_nothing() -> None:
+    def negated(command: Vet | Evaluate) -> Answered:
+        event = well(command)
+        if not isinstance(event, Evaluated):
+            return event
+        fitness = -event.evaluation.fitness
+        return replace(event, evaluation=replace(event.evaluation, fitness=fitness))
+
+    runs = [
+        live(Island(small(parents="random", survivors="random"), 7, 0), reply)
+        for reply in (well, negated)
+    ]
+    assert rows(runs[0], "births") == rows(runs[1], "births")
 
 
 @settings(max_examples=12, deadline=None)
@@ -232,7 +247,7 @@ def test_an_error_is_raised_if_no_child_is_ever_viable() -> None:
 
 @pytest.mark.parametrize("name", ["scenario1", "scenario2", *BASELINES])
 def test_the_shipped_experiments_run_to_their_end(name: str) -> None:
-    experiment = msgspec.structs.replace(read_experiment(name), births=50)
+    experiment = replace(read_experiment(name), births=50)
     assert experiment.name == name
     island = Island(experiment, 1, 0)
     commands = live(island, answer)

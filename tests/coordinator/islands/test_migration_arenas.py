@@ -126,9 +126,12 @@ def test_seconds_may_end_an_epoch_before_births_do() -> None:
 
 def test_immigrants_of_a_full_arena_await_room() -> None:
     full = {"population_limit": 5, "population_floor": 3, "full_cull_share": 0.4}
-    lived = arenas(8, 8, rules=full, epoch=6, replaced="none").live()
+    lived = arenas(8, 8, rules=full, epoch=6, migrants=3, replaced="none")
+    lived.start()
+    while lived.waiting:
+        lived.turn()
+        assert all(len(island.population) <= 5 for island in lived.islands.values())
     assert all(island.is_finished for island in lived.islands.values())
-    assert all(len(world.born) <= 5 for world in lived.worlds.values())
     assert any(birth.island == 0 for birth in inserted(lived, 1))
 
 
