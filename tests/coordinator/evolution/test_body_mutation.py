@@ -143,7 +143,8 @@ def test_each_step_happens_with_its_probability(
     key: str,
     probability: float,
 ) -> None:
-    setting = experiment(**{key: probability})
+    chances: dict[str, Any] = {key: probability}
+    setting = experiment(**chances)
     happened = 0
     for seed in range(N):
         root = to_mutable(CHAIN, TYPES)
