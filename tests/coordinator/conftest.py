@@ -1,17 +1,10 @@
-"""Invariants of the state machines after each test; hand-made rows of tables."""
+"""Invariants of the state machines after each test."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
 import pytest
 
-from coordinator.islands.events import Record
-from coordinator.storage.folder import RunDetails
-from coordinator.storage.recorder import Recorder
-from schema.tables.columns import TABLES
-from schema.tables.files import read_table
 from tests.coordinator.invariants import CHECKS
 
 
@@ -34,129 +27,3 @@ def _invariants(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
     for machine in made:
         CHECKS[type(machine)](machine)
-
-
-DETAILS = RunDetails("a/b c", 2, 1, "{}")
-Make = Callable[..., list[Record]]
-Feed = Callable[..., Recorder]
-Check = Callable[[Path, list[Record]], None]
-
-PART = {
-    "idx": 0,
-    "parent": -1,
-    "parent_slot": -1,
-    "child_slot": -1,
-    "kind": "Core",
-    "rot": 0,
-    "params": [0.5, 0.25, 1 / 3],
-    "gene": 2**64 - 1,
-}
-
-
-def birth_row(number: int) -> dict[str, Any]:
-    """Return a births row; founders up to 3, then two parents each."""
-    parents = [] if number < 3 else [number - 3, number - 2]
-    counts = ("parts", "joints", "motors", "extremities", "inputs", "outputs")
-    return {
-        "island": 0,
-        "birth": number,
-        "parents": [{"island": 0, "birth": parent} for parent in parents],
-        "generation": None if number % 5 == 4 else number // 3,
-        "rank": 1 + number // 3,
-        "attempts": 1,
-        "genome": bytes([number % 256]) * (number % 7),
-        "body": [{**PART, "idx": index} for index in range(1 + number % 4)],
-        **dict.fromkeys(counts, number % 4),
-        "hidden": 0,
-        "connections": 3,
-        **dict.fromkeys(("sim_time_s", "x", "y", "robot")),
-    }
-
-
-def evaluation_row(number: int, worker: str, platform: str) -> dict[str, Any]:
-    """Return an evaluations row; every seventh failed."""
-    is_failed = number % 7 == 6
-    value = None if is_failed else number / 3
-    return {
-        "island": 0,
-        "birth_island": None,
-        "birth": number,
-        "trial": 0,
-        "status": "failed" if is_failed else "ok",
-        "reason": "diverged" if is_failed else "",
-        "fitness": value,
-        "path_velocity": value,
-        "straight_velocity": value,
-        "simulated_s": 12.0,
-        "wall_s": 0.5,
-        "worker": worker,
-        "platform": platform,
-        "measures": None if is_failed else [("height", value), ("turning", 0.5)],
-    }
-
-
-def records(
-    count: int, worker: str = "worker-1", platform: str = "linux-x86"
-) -> list[Record]:
-    """Return the rows of ``count`` births with a population after every third."""
-    rows: list[Record] = []
-    for number in range(count):
-        rows.append(Record("births", birth_row(number)))
-        rows.append(Record("evaluations", evaluation_row(number, worker, platform)))
-        if number % 3 == 2:
-            rows.extend(
-                Record(
-                    "population",
-                    {
-                        "island": 0,
-                        "births": number + 1,
-                        "birth_island": None,
-                        "birth": each,
-                        "fitness": 0.5,
-                    },
-                )
-                for each in range(number - 2, number + 1)
-            )
-    return rows
-
-
-@pytest.fixture
-def make_records() -> Callable[..., list[Record]]:
-    """Return a function (births, worker, platform) -> all rows of a run."""
-    return records
-
-
-def feed(folder: Path, rows: list[Record], every: int = 10) -> Recorder:
-    """Return a recorder after it has recorded rows, with regular flushes."""
-    recorder = Recorder(folder, DETAILS)
-    for index, record in enumerate(rows, start=1):
-        recorder.write(record)
-        if index % every == 0:
-            recorder.flush()
-    return recorder
-
-
-def expected(rows: list[Record], table: str) -> pa.Table:
-    """Return the expected content of a table."""
-    own = [record.row for record in rows if record.table == table]
-    numbered = [{"record": index, **row} for index, row in enumerate(own)]
-    return pa.Table.from_pylist(numbered, TABLES[table])
-
-
-def assert_complete(folder: Path, rows: list[Record]) -> None:
-    """Fail unless every table holds exactly these rows."""
-    for name in TABLES:
-        found = read_table(folder, name)
-        assert found.equals(expected(rows, name), check_metadata=True), name
-
-
-@pytest.fixture
-def feed_rows() -> Callable[..., Recorder]:
-    """Return a function (folder, rows, every=10) -> recorder that took them."""
-    return feed
-
-
-@pytest.fixture
-def check_complete() -> Callable[[Path, list[Record]], None]:
-    """Return a function that fails unless a folder's tables hold these rows."""
-    return assert_complete

@@ -13,9 +13,11 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.recorder import Recorder
 from schema.experiment.document import Experiment, Simulation
 from schema.experiment.file import experiment_text
+from tests.coordinator.records import make_records
 
 DETAILS = RunDetails("test", 0, 1, "{}")
 START = datetime(2026, 1, 1, tzinfo=UTC)
+BIRTH = make_records(1)[0]
 
 
 def written(path: Path, birth: Record, **row: Any) -> Path:  # noqa: ANN401 - any value
@@ -43,40 +45,25 @@ def older(experiment: Experiment) -> str:
 
 def test_an_older_document_of_the_same_experiment_is_no_difference(
     tmp_path: Path,
-    make_records: Any,  # noqa: ANN401 - the fixture
 ) -> None:
-    birth = make_records(1)[0]
     document = older(Experiment(name="test"))
     assert document != experiment_text(Experiment(name="test"))
-    first = written(tmp_path / "a", birth)
-    assert compare(first, written(tmp_path / "b", birth, document=document)) == []
+    first = written(tmp_path / "a", BIRTH)
+    assert compare(first, written(tmp_path / "b", BIRTH, document=document)) == []
 
 
-def test_another_experiment_is_a_difference(
-    tmp_path: Path,
-    make_records: Any,  # noqa: ANN401 - the fixture
-) -> None:
-    birth = make_records(1)[0]
+def test_another_experiment_is_a_difference(tmp_path: Path) -> None:
     other = Experiment(name="test", simulation=Simulation(friction=0.5))
-    first = written(tmp_path / "a", birth)
-    (line,) = compare(first, written(tmp_path / "b", birth, document=older(other)))
+    first = written(tmp_path / "a", BIRTH)
+    (line,) = compare(first, written(tmp_path / "b", BIRTH, document=older(other)))
     assert line.startswith("runs: first at record 0, column document:")
 
 
-def test_platforms_of_arenas_are_compared(
-    tmp_path: Path,
-    make_records: Any,  # noqa: ANN401 - the fixture
-) -> None:
-    birth = make_records(1)[0]
-    other = Record("births", {**birth.row, "rank": 9})
-    first = written(tmp_path / "a", birth)
-    lines = compare(first, written(tmp_path / "b", other, platform="there"))
-    assert lines[1:] == [
-        (
-            "platforms differ: here against there; only runs on the same platform are "
-            "guaranteed to be equal"
-        )
-    ]
+def test_platforms_of_arenas_are_compared(tmp_path: Path) -> None:
+    other = Record("births", {**BIRTH.row, "rank": 9})
+    first = written(tmp_path / "a", BIRTH)
+    _, line = compare(first, written(tmp_path / "b", other, platform="there"))
+    assert line.startswith("platforms differ: here against there; only runs on the ")
 
 
 def campaign(
@@ -91,16 +78,12 @@ def campaign(
     return folder
 
 
-def test_campaigns_are_compared_run_by_run(
-    tmp_path: Path,
-    make_records: Any,  # noqa: ANN401 - the fixture
-) -> None:
-    birth = make_records(1)[0]
-    same = dict.fromkeys(("a-0", "b-0", "a-1", "b-1"), birth)
+def test_campaigns_are_compared_run_by_run(tmp_path: Path) -> None:
+    same = dict.fromkeys(("a-0", "b-0", "a-1", "b-1"), BIRTH)
     first = campaign(tmp_path / "first", same)
     assert compare(first, campaign(tmp_path / "equal", same)) == []
-    rank, other = birth.row["rank"], Record("births", {**birth.row, "rank": 9})
-    second = campaign(tmp_path / "second", {"a-0": birth, "b-0": other, "b-1": birth})
+    rank, other = BIRTH.row["rank"], Record("births", {**BIRTH.row, "rank": 9})
+    second = campaign(tmp_path / "second", {"a-0": BIRTH, "b-0": other, "b-1": BIRTH})
     assert compare(first, second) == [
         f"b-0: births: first at record 0, column rank: {rank} against 9",
         f"a-1: {second / 'a-1'}: no such folder",
@@ -108,13 +91,9 @@ def test_campaigns_are_compared_run_by_run(
     ]
 
 
-def test_runs_of_only_one_campaign_are_named(
-    tmp_path: Path,
-    make_records: Any,  # noqa: ANN401 - the fixture
-) -> None:
-    birth = make_records(1)[0]
-    first = campaign(tmp_path / "a", {"a-0": birth}, "a", repeats=1)
-    second = campaign(tmp_path / "b", {"a-0": birth, "b-0": birth}, "ab", repeats=1)
+def test_runs_of_only_one_campaign_are_named(tmp_path: Path) -> None:
+    first = campaign(tmp_path / "a", {"a-0": BIRTH}, "a", repeats=1)
+    second = campaign(tmp_path / "b", {"a-0": BIRTH, "b-0": BIRTH}, "ab", repeats=1)
     for pair in ((first, second), (second, first)):
         assert compare(*pair) == [
             f"b-0: {first / 'b-0'}: no such folder",

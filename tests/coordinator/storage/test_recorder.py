@@ -13,15 +13,13 @@ from schema.errors import RunFolderError
 from schema.tables.columns import POPULATION, TABLES
 from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path
-from tests.coordinator.conftest import DETAILS, Check, Feed, Make
+from tests.coordinator.records import DETAILS, check_complete, feed_rows, make_records
 from tests.segments import write_segment
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 
 
-def test_rows_are_read_before_and_after_the_end(
-    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
-) -> None:
+def test_rows_are_read_before_and_after_the_end(tmp_path: Path) -> None:
     rows = make_records(20)
     recorder = feed_rows(tmp_path, rows)
     recorder.flush()
@@ -34,9 +32,7 @@ def test_rows_are_read_before_and_after_the_end(
     )
 
 
-def test_enough_rows_are_on_disk_without_a_flush(
-    tmp_path: Path, make_records: Make
-) -> None:
+def test_enough_rows_are_on_disk_without_a_flush(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, DETAILS)
     births = [record for record in make_records(BUFFERED) if record.table == "births"]
     for record in births[:-1]:
@@ -50,10 +46,7 @@ def test_enough_rows_are_on_disk_without_a_flush(
 @pytest.mark.parametrize("seed", range(5))
 def test_resumed_runs_write_the_same_rows_as_one(
     tmp_path: Path,
-    make_records: Make,
     seed: int,
-    feed_rows: Feed,
-    check_complete: Check,
 ) -> None:
     rng = np.random.default_rng(seed)
     rows = make_records(30)
@@ -68,9 +61,6 @@ def test_resumed_runs_write_the_same_rows_as_one(
 @pytest.mark.parametrize("begun", [0, 10])
 def test_rows_of_a_replaced_coordinator_count_once(
     tmp_path: Path,
-    make_records: Make,
-    feed_rows: Feed,
-    check_complete: Check,
     begun: int,
 ) -> None:
     """It pauses with buffered rows, before or after its first segment."""
@@ -93,9 +83,6 @@ def test_rows_of_a_replaced_coordinator_count_once(
 
 def test_a_full_disk_loses_no_row(
     tmp_path: Path,
-    make_records: Make,
-    feed_rows: Feed,
-    check_complete: Check,
     full_beyond: FullBeyond,
 ) -> None:
     rows = make_records(20)
@@ -115,9 +102,7 @@ def test_a_full_disk_loses_no_row(
     check_complete(tmp_path, rows)
 
 
-def test_a_segment_of_another_version_is_refused(
-    tmp_path: Path, make_records: Make, feed_rows: Feed
-) -> None:
+def test_a_segment_of_another_version_is_refused(tmp_path: Path) -> None:
     feed_rows(tmp_path, make_records(3)).close()
     path = segment_path(tmp_path, "population", 0)
     newer = POPULATION.with_metadata({"revolve.schema_version": "999"})
@@ -126,9 +111,7 @@ def test_a_segment_of_another_version_is_refused(
         Recorder(tmp_path, DETAILS)
 
 
-def test_a_row_without_a_column_raises_key_error(
-    tmp_path: Path, make_records: Make
-) -> None:
+def test_a_row_without_a_column_raises_key_error(tmp_path: Path) -> None:
     row = dict(make_records(1)[0].row)
     del row["rank"]
     recorder = Recorder(tmp_path, DETAILS)

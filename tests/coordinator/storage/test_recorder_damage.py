@@ -21,7 +21,7 @@ from schema.tables.segments import (
     segments_of,
     warn_once,
 )
-from tests.coordinator.conftest import DETAILS, Check, Feed, Make
+from tests.coordinator.records import DETAILS, check_complete, feed_rows, make_records
 
 
 def flip(path: Path, byte: int) -> None:
@@ -33,9 +33,6 @@ def flip(path: Path, byte: int) -> None:
 @pytest.mark.parametrize("seed", range(30))
 def test_damage_anywhere_is_written_again(
     tmp_path: Path,
-    make_records: Make,
-    feed_rows: Feed,
-    check_complete: Check,
     seed: int,
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -59,9 +56,7 @@ def test_damage_anywhere_is_written_again(
     assert not (tmp_path / "segments").exists()
 
 
-def test_an_opened_segment_is_cut_with_its_checksums(
-    tmp_path: Path, make_records: Make, feed_rows: Feed
-) -> None:
+def test_an_opened_segment_is_cut_with_its_checksums(tmp_path: Path) -> None:
     rows = [each for each in make_records(6) if each.table == "births"]
     feed_rows(tmp_path, rows, every=1).close()
     path = segment_path(tmp_path, "births", 0)
@@ -80,8 +75,6 @@ def test_an_opened_segment_is_cut_with_its_checksums(
 @pytest.mark.parametrize("removed", [0, 1])
 def test_a_kill_while_a_segment_is_removed_is_no_damage(
     tmp_path: Path,
-    make_records: Make,
-    feed_rows: Feed,
     *,
     caplog: pytest.LogCaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
@@ -130,9 +123,7 @@ def test_a_batch_whose_checksum_cannot_be_written_is_removed(
     assert len(list(read_segment(tmp_path, "births", path))) == 1
 
 
-def test_damage_before_the_end_is_mended_by_the_next_start(
-    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
-) -> None:
+def test_damage_before_the_end_is_mended_by_the_next_start(tmp_path: Path) -> None:
     rows = make_records(20)
     recorder = feed_rows(tmp_path, rows)
     recorder.flush()
@@ -144,9 +135,7 @@ def test_damage_before_the_end_is_mended_by_the_next_start(
     check_complete(tmp_path, rows)
 
 
-def test_finished_tables_are_sealed_in_the_description(
-    tmp_path: Path, make_records: Make
-) -> None:
+def test_finished_tables_are_sealed_in_the_description(tmp_path: Path) -> None:
     rows = make_records(5)
     folder = tmp_path / "run"
     with RunFolder(folder, DETAILS) as held:

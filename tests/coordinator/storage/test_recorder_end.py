@@ -16,7 +16,7 @@ from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
 from schema.tables import files
 from schema.tables.files import campaign, parquet_path, read_table
-from tests.coordinator.conftest import Check, Feed, Make
+from tests.coordinator.records import check_complete, feed_rows, make_records
 
 
 class Killed(BaseException):
@@ -51,9 +51,7 @@ def kill_at(monkeypatch: pytest.MonkeyPatch, step: int) -> list[str]:
     return steps
 
 
-def test_the_end_may_be_interrupted_at_any_step(
-    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
-) -> None:
+def test_the_end_may_be_interrupted_at_any_step(tmp_path: Path) -> None:
     rows = make_records(8)
     interrupted = 0
     for step in range(100):
@@ -85,8 +83,6 @@ def test_the_end_may_be_interrupted_at_any_step(
 @pytest.mark.parametrize("every", [1, 25, 1000])
 def test_row_groups_are_small_and_written_in_one_piece(
     tmp_path: Path,
-    make_records: Make,
-    feed_rows: Feed,
     monkeypatch: pytest.MonkeyPatch,
     every: int,
 ) -> None:
@@ -114,18 +110,14 @@ def test_row_groups_are_small_and_written_in_one_piece(
     assert set(chunks) == {1}
 
 
-def test_rows_after_the_end_are_refused(
-    tmp_path: Path, make_records: Make, feed_rows: Feed
-) -> None:
+def test_rows_after_the_end_are_refused(tmp_path: Path) -> None:
     feed_rows(tmp_path, make_records(5)).finish()
     recorder = feed_rows(tmp_path, make_records(6), every=1000)
     with pytest.raises(RunFolderError, match="finished with 5 rows, got more"):
         recorder.flush()
 
 
-def test_the_dataset_of_a_campaign_has_all_runs(
-    tmp_path: Path, make_records: Make
-) -> None:
+def test_the_dataset_of_a_campaign_has_all_runs(tmp_path: Path) -> None:
     for run, count in enumerate((4, 7)):
         folder = tmp_path / "runs" / f"any-{run}"
         folder.mkdir(parents=True)

@@ -14,7 +14,7 @@ from schema.tables import files
 from schema.tables.columns import TABLES
 from schema.tables.files import read_table
 from schema.tables.segments import SEGMENTS, segment_path
-from tests.coordinator.conftest import birth_row
+from tests.coordinator.records import birth_row
 
 DETAILS = RunDetails("long", 0, 1, "{}")
 BATCH, GENOME = 64, 4000
