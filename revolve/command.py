@@ -19,8 +19,7 @@ _UNDECODED = (
 
 
 def main(
-    arguments: list[str] | None = None,
-    tell: Callable[[Exception], None] | None = None,
+    arguments: list[str] | None = None, tell: Callable[[Exception], None] | None = None
 ) -> int:
     """Run one command and return its exit code.
 

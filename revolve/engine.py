@@ -219,13 +219,7 @@ class Engine:
         run, epoch = self._client
         settings = order.settings
         request = Request(
-            run,
-            epoch,
-            number,
-            order.work,
-            settings,
-            plugins_of(settings),
-            order.origin,
+            run, epoch, number, order.work, settings, plugins_of(settings), order.origin
         )
         self._open[number] = order
         read = partial(order.read, expected=(_EPOCH, number))

@@ -8,11 +8,7 @@ import msgspec
 from analysis.extras import extra
 from revolve.messages import Outcome, Task, problem_of
 from revolve.trace import pack_trace
-from schema.errors import (
-    FitnessUndefined,
-    SensorFailed,
-    SimulationDiverged,
-)
+from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow

@@ -67,11 +67,7 @@ _LOOPBACK = "127.0.0.1"
 def parser(command: str) -> Flags:
     """Return the parser of a command's arguments."""
     description, examples = _COMMANDS[command]
-    flags = Flags(
-        prog=f"revolve {command}",
-        description=description,
-        examples=examples,
-    )
+    flags = Flags(prog=f"revolve {command}", description=description, examples=examples)
     if command == "compare":
         flags.add_argument("first", metavar="FOLDER", help="run or campaign folder")
         flags.add_argument("second", metavar="FOLDER", help="run or campaign folder")

@@ -5,13 +5,7 @@ Coordinators connect to it like workers, and may come and go.
 
 from coordinator.network.hub_service import serve_hub
 from schema.agent.address import FORMS, HUB, parse_address
-from schema.agent.command import (
-    NETWORK,
-    access_of,
-    add_shared,
-    listen_of,
-    tls_of,
-)
+from schema.agent.command import NETWORK, access_of, add_shared, listen_of, tls_of
 from schema.agent.flags import Flags
 from schema.agent.log import start_log, warn_user
 from schema.agent.network import hub_config

@@ -83,11 +83,7 @@ def issue(
 
 
 def _builder(
-    name: str,
-    issuer: str,
-    key: ec.EllipticCurvePublicKey,
-    now: datetime,
-    end: datetime,
+    name: str, issuer: str, key: ec.EllipticCurvePublicKey, now: datetime, end: datetime
 ) -> x509.CertificateBuilder:
     return (
         x509.CertificateBuilder()

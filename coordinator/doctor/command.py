@@ -120,10 +120,7 @@ def parser(_command: str = "doctor") -> Flags:
         prog="revolve doctor",
         description="Check this machine, its certificate and its connection to the "
         "hub.",
-        examples=(
-            "revolve doctor",
-            "revolve doctor --connect tls/hub.example:7447",
-        ),
+        examples=("revolve doctor", "revolve doctor --connect tls/hub.example:7447"),
     )
     add_shared(flags, "--connect", "--access", *NETWORK)
     return flags

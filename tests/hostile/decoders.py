@@ -28,11 +28,7 @@ from coordinator.islands.events import (
     Vetted,
 )
 from coordinator.network.membership import Membership
-from coordinator.run.advance_checks import (
-    ExpectedAdvance,
-    check_advance,
-    check_poses,
-)
+from coordinator.run.advance_checks import ExpectedAdvance, check_advance, check_poses
 from coordinator.run.requests import read_answer, read_evaluation, read_vetting
 from coordinator.storage.journal import decode_record, encode_event
 from revolve.fleet import _read_value
@@ -116,11 +112,7 @@ from schema.wire.operator import (
     SetBrain,
     decode_operator_reply,
 )
-from schema.wire.protobuf import (
-    decode_genome,
-    decode_robot,
-    encode_robot,
-)
+from schema.wire.protobuf import decode_genome, decode_robot, encode_robot
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 from schema.wire.updates import (
     Birth,

@@ -9,13 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.documents import (
-    CROWD,
-    CROWDED_ARENA,
-    HAMLET,
-    SCENARIO1,
-    SMALL_ARENA,
-)
+from tests.system.documents import CROWD, CROWDED_ARENA, HAMLET, SCENARIO1, SMALL_ARENA
 from tests.system.workspace import Workspace
 
 

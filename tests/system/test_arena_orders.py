@@ -37,8 +37,7 @@ sample_interval_s = 2.0
 
 
 def test_pause_list_insert_remove_snapshot_resume(
-    crowded_arena_workspace: Workspace,
-    crowded_arena_run: Path,
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path
 ) -> None:
     folder = crowded_arena_workspace.folder / "run"
     words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
@@ -94,9 +93,7 @@ def test_pause_list_insert_remove_snapshot_resume(
         assert len(PoseArrays.received(live.advance.poses).births) == event.pose_rows
 
 
-def test_robot_with_its_own_part_types_is_inserted(
-    workspace: Workspace,
-) -> None:
+def test_robot_with_its_own_part_types_is_inserted(workspace: Workspace) -> None:
     shutil.copy(CRITTERS / "bodies.py", workspace.folder)
     (workspace.folder / "mine.toml").write_text(PISTONS)
     folder = workspace.folder / "run"

@@ -122,11 +122,7 @@ def command(
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("which", ["whole", "half"])
 def test_a_damaged_file_gives_one_line_and_never_another_run(
-    folders: Path,
-    tmp_path: Path,
-    command: Command,
-    which: str,
-    name: str,
+    folders: Path, tmp_path: Path, command: Command, which: str, name: str
 ) -> None:
     """Status, log, compare, the readers of analyze and view; then resume."""
     whole = folders / "whole"

@@ -10,12 +10,7 @@ import pytest
 from coordinator.cluster.kit import ClusterKit, Kit
 from tests.system.fleet import kit_files, tls_flags
 from tests.system.test_agents import free_address
-from tests.system.workspace import (
-    PATIENCE_S,
-    Workspace,
-    runtime_directory,
-    wait_until,
-)
+from tests.system.workspace import PATIENCE_S, Workspace, runtime_directory, wait_until
 
 pytestmark = pytest.mark.system
 

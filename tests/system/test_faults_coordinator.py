@@ -26,10 +26,7 @@ pytestmark = [
 PATIENCE_S = 120
 
 
-def stopped_coordinator(
-    workspace: Workspace,
-    undisturbed: Path,
-) -> Fleet:
+def stopped_coordinator(workspace: Workspace, undisturbed: Path) -> Fleet:
     """Return a fleet whose coordinator is stopped by SIGSTOP during its run."""
     fleet = Fleet(workspace, *SCENARIO1)
     fleet.join("judge", "analyzer")
@@ -41,8 +38,7 @@ def stopped_coordinator(
 
 
 def test_stopped_coordinator_keeps_the_lock_of_its_run(
-    workspace: Workspace,
-    undisturbed: Path,
+    workspace: Workspace, undisturbed: Path
 ) -> None:
     fleet = stopped_coordinator(workspace, undisturbed)
     output = workspace.run("resume", "run", "--quiet", code=2)

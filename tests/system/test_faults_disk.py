@@ -21,10 +21,7 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 
 @pytest.fixture
-def partial_journal(
-    workspace: Workspace,
-    undisturbed: Path,
-) -> Path:
+def partial_journal(workspace: Workspace, undisturbed: Path) -> Path:
     """Return the journal of a run that was killed after a third of it."""
     run = workspace.start("run", *SCENARIO1, "--in-process", "--out", "run")
     kill_beyond(run, workspace.folder / "run", size(undisturbed) // 3)

@@ -101,9 +101,7 @@ def test_robot_that_crashes_three_processes_is_quarantined(
         assert compare(folder, workspace.folder / "one") == []
 
 
-def test_external_kills_do_not_lead_to_quarantine(
-    workspace: Workspace,
-) -> None:
+def test_external_kills_do_not_lead_to_quarantine(workspace: Workspace) -> None:
     """Kill the worker of the same robot repeatedly from outside."""
     write_plug_in(
         workspace, "open('here', 'w').write(str(os.getpid())); signal.pause()"
@@ -182,8 +180,7 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
 
 
 def test_audit_of_agreeing_workers_does_not_change_the_run(
-    workspace: Workspace,
-    undisturbed: Path,
+    workspace: Workspace, undisturbed: Path
 ) -> None:
     fleet = Fleet(workspace, *SCENARIO1, "--audit", "0.2")
     fleet.join("one")

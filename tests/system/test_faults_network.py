@@ -64,8 +64,7 @@ def wait_for_line(process: Any, text: str) -> None:  # noqa: ANN401 - a process 
 
 
 def test_disconnecting_a_worker_gives_an_equal_run(
-    network: Network,
-    undisturbed: Path,
+    network: Network, undisturbed: Path
 ) -> None:
     fleet, _ = remote_fleet(network, *SCENARIO1)
     fleet.wait_for(np.random.default_rng(31).uniform(0.1, 0.7) * size(undisturbed))

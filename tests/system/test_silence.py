@@ -36,8 +36,7 @@ pytestmark = [
 
 
 def test_arena_of_a_silent_worker_continues_on_an_idle_one(
-    small_arena_workspace: Workspace,
-    small_arena_run: Path,
+    small_arena_workspace: Workspace, small_arena_run: Path
 ) -> None:
     fleet = Fleet(small_arena_workspace, *HAMLET)
     with fleet.misbehaving("silent") as report:

@@ -180,9 +180,7 @@ def test_a_signal_ends_a_command_with_its_children(
     assert not family(process.pid)
 
 
-def test_a_command_under_nohup_ignores_hangups(
-    tmp_path: Path,
-) -> None:
+def test_a_command_under_nohup_ignores_hangups(tmp_path: Path) -> None:
     process = start(tmp_path, *COMMANDS["worker"], prefix=("nohup",))
     wait_until_begun(tmp_path, "worker", process)
     processes = family(process.pid)

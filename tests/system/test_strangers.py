@@ -139,9 +139,7 @@ def test_a_strangers_plug_ins_evolve_on_two_workers_of_which_one_is_killed(
         assert all(dict(row["measures"])["sway"] > 0.0 for row in rows)
 
 
-def test_all_plug_ins_of_the_package_are_found_and_in_order(
-    lab: Workspace,
-) -> None:
+def test_all_plug_ins_of_the_package_are_found_and_in_order(lab: Workspace) -> None:
     listed = lab.run("plugins").splitlines()
     found = [row.split()[:2] for row in listed if " critters." in row]
     assert sorted(found) == [

@@ -160,8 +160,7 @@ def test_log_contains_each_birth_and_death(
 
 
 def test_viewers_receive_everything_and_do_not_change_the_run(
-    small_arena_workspace: Workspace,
-    small_arena_run: Path,
+    small_arena_workspace: Workspace, small_arena_run: Path
 ) -> None:
     """Start three viewers; kill one and stop another during the run."""
     workspace = small_arena_workspace

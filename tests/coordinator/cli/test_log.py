@@ -250,10 +250,7 @@ def test_follow_prints_what_another_process_appends_until_the_run_is_finished(
 def test_follow_warns_of_printed_records_that_become_void(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with (
-        Journal.open(tmp_path, epoch=1) as old,
-        Journal.open(tmp_path, epoch=2) as new,
-    ):
+    with Journal.open(tmp_path, epoch=1) as old, Journal.open(tmp_path, epoch=2) as new:
         old.append(EVENTS[:2])
 
         def pause(_seconds: float) -> None:

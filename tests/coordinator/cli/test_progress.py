@@ -58,10 +58,7 @@ def test_no_line_is_wider_than_the_terminal(width: int) -> None:
         for run in range(3)
     )  # fmt: skip
     lines = shown(Status(runs, 1, 1, 3.0), width)
-    assert [line.split()[0] for line in lines] == [
-        "1800/9000",
-        *["600/3000"] * 3,
-    ]
+    assert [line.split()[0] for line in lines] == ["1800/9000", *["600/3000"] * 3]
     assert all(len(line) <= width for line in lines)
     assert "40 min" in lines[0]
     islands = shown(one_run("ring", _ISLAND, _ISLAND), width)

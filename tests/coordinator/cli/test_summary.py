@@ -80,10 +80,7 @@ def test_windows_of_all_arenas_are_said() -> None:
     ],
 )
 def test_run_is_extinct_if_all_of_its_arenas_have_too_few_births(
-    births: int,
-    islands: tuple[Islands, ...],
-    *,
-    is_extinct: bool,
+    births: int, islands: tuple[Islands, ...], *, is_extinct: bool
 ) -> None:
     experiment = Experiment("e", births=births, arena=ArenaSection(), islands=islands)
     assert summary._is_extinct(experiment, {0: 2, 1: 0}) is is_extinct

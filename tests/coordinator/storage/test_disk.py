@@ -50,9 +50,7 @@ def test_an_append_to_a_full_disk_leaves_nothing(small_disk: Path) -> None:
     file.close()
 
 
-def test_a_replacement_on_a_full_disk_leaves_the_old_file(
-    small_disk: Path,
-) -> None:
+def test_a_replacement_on_a_full_disk_leaves_the_old_file(small_disk: Path) -> None:
     path = small_disk / "f"
     replace_durably(path, lambda file: file.write_bytes(b"old"))
     with pytest.raises(RunFolderError, match="f: disk full"):

@@ -17,22 +17,14 @@ import pytest
 from msgspec import structs
 
 from coordinator.islands.events import VettingFailed
-from coordinator.storage.folder import (
-    RunDetails,
-    RunFolder,
-    read_details,
-)
+from coordinator.storage.folder import RunDetails, RunFolder, read_details
 from coordinator.storage.journal import Journal
 from coordinator.storage.lock import read_holder
 from schema.agent.version import VERSION
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
-from schema.tables.description import (
-    description_text,
-    read_description,
-    read_state,
-)
+from schema.tables.description import description_text, read_description, read_state
 
 DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
 MINOR = VERSION.rpartition(".")[0]
@@ -158,9 +150,7 @@ def test_a_used_folder_is_refused_with_the_hint_of_other_settings(
         RunFolder(tmp_path / "run", other)
 
 
-def test_only_a_new_run_that_has_not_started_is_forgotten(
-    tmp_path: Path,
-) -> None:
+def test_only_a_new_run_that_has_not_started_is_forgotten(tmp_path: Path) -> None:
     """A run that was archived without epoch and journal keeps its description."""
     path = tmp_path / "run"
     with RunFolder(path, DETAILS) as folder:
@@ -177,9 +167,7 @@ def test_only_a_new_run_that_has_not_started_is_forgotten(
     assert read_details(other) == DETAILS
 
 
-def test_a_folder_with_foreign_files_is_refused_and_unchanged(
-    tmp_path: Path,
-) -> None:
+def test_a_folder_with_foreign_files_is_refused_and_unchanged(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(RunFolderError, match=r"not empty \(contains 'thesis.tex'\)"):
         RunFolder(tmp_path, DETAILS)
@@ -265,9 +253,7 @@ def test_a_child_process_does_not_keep_the_lock(tmp_path: Path) -> None:
             assert again.epoch == 2
 
 
-def test_a_replaced_coordinator_notices_it(
-    tmp_path: Path,
-) -> None:
+def test_a_replaced_coordinator_notices_it(tmp_path: Path) -> None:
     with RunFolder(tmp_path / "run", DETAILS) as old:
         old.confirm()
         # A lock that does not hold: its file was removed, or the disk knows none.

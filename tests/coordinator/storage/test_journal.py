@@ -125,9 +125,7 @@ def test_a_batch_has_the_same_bytes_as_single_events(tmp_path: Path) -> None:
     assert one.read_bytes() == all_.read_bytes()
 
 
-def test_a_journal_cut_anywhere_keeps_exactly_its_whole_records(
-    tmp_path: Path,
-) -> None:
+def test_a_journal_cut_anywhere_keeps_exactly_its_whole_records(tmp_path: Path) -> None:
     sizes = written(tmp_path)
     path = tmp_path / NAME
     data = path.read_bytes()

@@ -44,10 +44,7 @@ def test_enough_rows_are_on_disk_without_a_flush(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_resumed_runs_write_the_same_rows_as_one(
-    tmp_path: Path,
-    seed: int,
-) -> None:
+def test_resumed_runs_write_the_same_rows_as_one(tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows = make_records(30)
     for stop in sorted(rng.integers(0, len(rows), 5)):
@@ -59,10 +56,7 @@ def test_resumed_runs_write_the_same_rows_as_one(
 
 
 @pytest.mark.parametrize("begun", [0, 10])
-def test_rows_of_a_replaced_coordinator_count_once(
-    tmp_path: Path,
-    begun: int,
-) -> None:
+def test_rows_of_a_replaced_coordinator_count_once(tmp_path: Path, begun: int) -> None:
     """It pauses with buffered rows, before or after its first segment."""
     rows = make_records(30)
     old = feed_rows(tmp_path, rows[:begun])
@@ -81,10 +75,7 @@ def test_rows_of_a_replaced_coordinator_count_once(
     check_complete(tmp_path, rows)
 
 
-def test_a_full_disk_loses_no_row(
-    tmp_path: Path,
-    full_beyond: FullBeyond,
-) -> None:
+def test_a_full_disk_loses_no_row(tmp_path: Path, full_beyond: FullBeyond) -> None:
     rows = make_records(20)
     recorder = feed_rows(tmp_path, rows[:20], every=20)
     size = segment_path(tmp_path, "births", 0).stat().st_size

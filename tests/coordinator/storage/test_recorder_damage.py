@@ -15,12 +15,7 @@ from schema.errors import RunFolderError
 from schema.tables.checksums import read_seal, sums_path
 from schema.tables.columns import BIRTHS, TABLES
 from schema.tables.files import parquet_path, read_table
-from schema.tables.segments import (
-    read_segment,
-    segment_path,
-    segments_of,
-    warn_once,
-)
+from schema.tables.segments import read_segment, segment_path, segments_of, warn_once
 from tests.coordinator.records import DETAILS, check_complete, feed_rows, make_records
 
 
@@ -31,10 +26,7 @@ def flip(path: Path, byte: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_damage_anywhere_is_written_again(
-    tmp_path: Path,
-    seed: int,
-) -> None:
+def test_damage_anywhere_is_written_again(tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows = make_records(20)
     feed_rows(tmp_path, rows[:20], every=4).close()

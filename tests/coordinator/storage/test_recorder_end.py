@@ -82,9 +82,7 @@ def test_the_end_may_be_interrupted_at_any_step(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("every", [1, 25, 1000])
 def test_row_groups_are_small_and_written_in_one_piece(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    every: int,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, every: int
 ) -> None:
     """Columns in many chunks take time quadratic in their number."""
     chunks, sizes = [], []

@@ -13,12 +13,7 @@ from hypothesis.strategies import DataObject, SearchStrategy
 from coordinator.islands.rows import body_rows, sizes
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, NeuronGene, Node, develop
-from schema.tables.columns import (
-    BIRTHS,
-    EVALUATIONS,
-    TABLES,
-    repeatable,
-)
+from schema.tables.columns import BIRTHS, EVALUATIONS, TABLES, repeatable
 from schema.wire.genome_bytes import encode_genome
 from schema.wire.protobuf import decode_genome, encode_robot
 

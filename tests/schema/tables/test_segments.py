@@ -14,12 +14,7 @@ from schema.errors import RunFolderError
 from schema.tables import segments
 from schema.tables.checksums import MAGIC, digest_of, sums_path
 from schema.tables.columns import EVALUATIONS, TABLES
-from schema.tables.files import (
-    parquet_path,
-    read_table,
-    stored_batches,
-    stored_rows,
-)
+from schema.tables.files import parquet_path, read_table, stored_batches, stored_rows
 from schema.tables.segments import segment_path, segments_of
 from tests.schema.tables.test_files import ROW
 from tests.segments import write_segment
