@@ -17,14 +17,7 @@ def check_certificate(
     accepted: Sequence[Certificate] | None,
     now: datetime,
 ) -> list[Finding]:
-    """Check a certificate and its key.
-
-    Args:
-        facts: of the certificate.
-        key_mode: permissions of the key's file.
-        accepted: those that the hub accepts; None: not known here.
-        now: the time.
-    """
+    """Check them; ``accepted`` is None where the hub's list is not known."""
     role = next((each.role for each in accepted or () if each.name == facts.name), None)
     days = (facts.ends - now) // timedelta(days=1)
     title = f"{facts.name!r}" + (f", {role}" if role else "")

@@ -319,11 +319,6 @@ def check_adopted(folder: Path, found: RunDetails, wanted: RunDetails) -> None:
 
     The run may only have a different number of births.
 
-    Args:
-        folder: run folder, for the message.
-        found: description of its run.
-        wanted: description of the expected run.
-
     Raises:
         RunFolderError: it is a different run.
     """

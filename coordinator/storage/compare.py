@@ -22,10 +22,6 @@ LONGEST = 60
 def compare(first: Path, second: Path) -> list[str]:
     """Return the differences of two runs or campaigns in their repeatable columns.
 
-    Args:
-        first: a run folder, finished or not, or the folder of a campaign.
-        second: another one of the same kind.
-
     Returns:
         One line for each run that has no births or is the shorter one and not
         finished, for each table whose number of rows
@@ -160,11 +156,7 @@ def _drop_early_ends(tables: list[pa.Table], folders: tuple[Path, Path]) -> list
     """Drop last populations that the longer run does not have; return what they are.
 
     The last brood of a run ends at its number of births, and the brood of a longer run
-    goes on there.
-
-    Args:
-        tables: populations of both runs; changed.
-        folders: of the runs.
+    goes on there. ``tables`` are the populations of both runs, and change.
     """
     lines = []
     ends = [_last_births(table) for table in tables]

@@ -95,11 +95,7 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
     """
 
     def __init__(self, path: Path, details: RunDetails | None = None) -> None:
-        """Create the folder of a new run, or open that of an existing run.
-
-        Args:
-            path: the folder.
-            details: description of a new run; None opens an existing run.
+        """Create the folder of a new run with details, or open that of an existing run.
 
         Raises:
             RunFolderError: another coordinator has locked it (named), a new run's
@@ -146,12 +142,9 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
         replace_text(self.path / STATE, state)
 
     def seal(self, digests: Mapping[str, str]) -> None:
-        """Write the SHA-256 of finished tables to the run's description.
+        """Write the SHA-256 (hexadecimal) of finished tables to the run's description.
 
         Its time of change stays: it is when the run began.
-
-        Args:
-            digests: in hexadecimal, by name of the table; others stay.
 
         Raises:
             RunFolderError: the description is damaged, or the disk is full or failed.
@@ -265,12 +258,7 @@ def _minor(version: str) -> str:
 
 
 def forget_plugins(path: Path, plugins: Mapping[str, KeptPlugin]) -> None:
-    """Remove the copies of plug-ins from a folder.
-
-    Args:
-        path: folder of a run or campaign.
-        plugins: description of each module.
-    """
+    """Remove the copies of plug-ins from a folder."""
     for name, note in plugins.items():
         copy = kept_file(path, name)
         if Path(note.file).resolve() == copy.resolve():

@@ -129,9 +129,6 @@ def check_rewritable(folder: Path) -> None:
 
     The journal determines all rows; those of an arena's poses are computed again.
 
-    Args:
-        folder: run folder.
-
     Raises:
         RunFolderError: the journal is missing, too.
     """
@@ -143,12 +140,7 @@ def check_rewritable(folder: Path) -> None:
 
 
 def unbegun_status(folder: Path, details: RunDetails) -> RunStatus:
-    """Return the status of a run that has not started.
-
-    Args:
-        folder: its future run folder.
-        details: description of the run.
-    """
+    """Return the status of a run that has not started."""
     experiment = experiment_from_text(details.document)
     islands = tuple(
         IslandStatus(0, own.births, None, 0) for own in island_experiments(experiment)

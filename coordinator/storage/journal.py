@@ -164,10 +164,6 @@ def is_begun(folder: Path) -> bool:
 def is_empty(path: Path, data: bytes) -> bool:
     """Return whether a journal has no complete header yet.
 
-    Args:
-        path: the file, for the message.
-        data: its first bytes, as many as the header has or more.
-
     Raises:
         RunFolderError: the file is no journal.
     """
@@ -207,10 +203,6 @@ def check_gap(path: Path, data: bytes, position: Position, start: int = 0) -> No
 
 def decode_record(path: Path, payload: bytes) -> JournalledEvent:
     """Return the event of a record.
-
-    Args:
-        path: the journal, for the message.
-        payload: of an intact record.
 
     Raises:
         RunFolderError: this version cannot decode it.

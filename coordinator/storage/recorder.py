@@ -81,10 +81,7 @@ class Recorder:
         self._poses = self._tables["poses"]
 
     def write(self, record: Record) -> None:
-        """Add one row; it may be buffered before it is written to disk.
-
-        Args:
-            record: ``row`` has every column of the table except ``record``.
+        """Add one row, with every column except ``record``; it may be buffered.
 
         Raises:
             RunFolderError: the disk is full or failed; the row stays buffered.
@@ -356,12 +353,7 @@ class Segment:
     """A new segment of a table, open for appending."""
 
     def __init__(self, path: Path, schema: pa.Schema, *, fsync: bool = False) -> None:
-        """Create the files of a segment, with its schema.
-
-        Args:
-            path: of the segment; neither it nor its checksums exist.
-            schema: of its rows.
-            fsync: survive power loss, too.
+        """Create the files of a segment, which must not exist, with its schema.
 
         Raises:
             RunFolderError: the disk is full or failed.

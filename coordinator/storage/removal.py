@@ -31,10 +31,6 @@ def remove_rows(folder: Path, table: str, rows: int) -> None:
 def cut_segment(path: Path, last: Batch | None) -> None:
     """Cut a segment behind a batch; remove it if there is none.
 
-    Args:
-        path: the segment.
-        last: batch that stays, with all before it.
-
     Raises:
         RunFolderError: the disk failed.
     """

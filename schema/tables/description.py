@@ -186,11 +186,7 @@ def read_state(folder: Path) -> State:
 
 
 def read_small(file: Path, most: int) -> bytes:
-    """Return the content of a small file.
-
-    Args:
-        file: its path.
-        most: greatest size [bytes]; a larger file is not read.
+    """Return the content of a file of at most ``most`` bytes.
 
     Raises:
         FileNotFoundError: there is none.

@@ -68,14 +68,7 @@ def born_as(birth: BirthId) -> pc.Expression:
 
 
 def parquet_path(folder: Path, experiment: str, run: int, table: str) -> Path:
-    """Return the path of a table of a finished run.
-
-    Args:
-        folder: the run folder.
-        experiment: its name, which is percent-encoded.
-        run: number of the repeat.
-        table: its name.
-    """
+    """Return a table's path in a finished run; the experiment is percent-encoded."""
     place = folder / FINISHED / f"experiment={quote(experiment, safe='')}"
     return place / f"run={run}" / f"{table}.parquet"
 
@@ -85,10 +78,6 @@ def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 
     Record numbers show gaps. A replay of the journal writes the rows behind a gap
     again. Only one batch is in memory at a time.
-
-    Args:
-        folder: the run folder.
-        table: its name.
 
     Raises:
         RunFolderError: a segment of another version.
@@ -340,10 +329,6 @@ def _kept(
 
 def campaign(root: Path, table: str) -> "pa.dataset.Dataset":
     """Return one table of all finished runs below a folder.
-
-    Args:
-        root: a run folder, or a folder above several.
-        table: its name, a key of ``TABLES``.
 
     Returns:
         A dataset with the table's columns, ``experiment`` and ``run``.

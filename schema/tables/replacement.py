@@ -13,11 +13,7 @@ _CANNOT = (errno.EACCES, errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.EPE
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Create or replace a file atomically.
-
-    Args:
-        path: the file; its folder must exist.
-        write: function that writes the content to the path it is given.
+    """Create or replace a file atomically; its folder must exist.
 
     Raises:
         OSError: the disk is full or failed; an old file is unchanged.

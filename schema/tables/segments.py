@@ -69,11 +69,6 @@ def parquet_files(folder: Path, table: str) -> list[Path]:
 def read_segment(folder: Path, table: str, path: Path) -> Iterator[Batch]:
     """Yield the complete batches of a segment, up to the first damaged one.
 
-    Args:
-        folder: the run folder.
-        table: name of the table.
-        path: the segment.
-
     Raises:
         RunFolderError: the segment is of another version of its table, or the disk
             fails.

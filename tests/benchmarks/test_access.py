@@ -17,8 +17,8 @@ from schema.agent.network import Agent
 from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
 from tests.benchmarks.dispatch_bench import Rate, Stream, measure
-from tests.system.fleet import make_certificate
-from tests.system.test_agents import free_address
+from tests.system.fleet import kit_files, make_kit
+from tests.system.workspace import free_address
 
 prepare_process()  # as the command does, before the first session is opened
 
@@ -64,10 +64,11 @@ def test_access_rules_and_tls_cost_little_throughput(tmp_path: Path) -> None:
     fleet without requests is idle. Turns take one second, so that changes of the
     machine's speed affect both fleets equally.
     """
-    head = make_certificate(tmp_path, "head", "ca", "127.0.0.1")
-    box = make_certificate(tmp_path, "box", "ca", "127.0.0.1")
+    # Both sides listen to or show these; the coordinator's own session is the hub.
+    make_kit(tmp_path / "lab", head="hub", box="worker")
+    head, box = (kit_files(tmp_path / "lab", name) for name in ("head", "box"))
     rules = (Certificate("head", "coordinator"), Certificate("box", "worker"))
-    tls_address = free_address().replace("tcp/", "tls/")
+    tls_address = free_address("tls")
     tls = Network(
         name=unique_name("head"), listen=(tls_address,), tls=head, certificates=rules
     )

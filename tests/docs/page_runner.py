@@ -39,6 +39,11 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return _BLOCK.findall(page.read_text("utf-8"))
 
 
+def blocks_of(page: Path, language: str) -> list[str]:
+    """Return the text of all blocks of a language, in order."""
+    return [text for found, text in blocks(page) if found == language]
+
+
 def run_page(page: Path, numbers: dict[str, str]) -> int:
     """Run a page in the present folder; return the number of blocks.
 

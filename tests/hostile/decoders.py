@@ -16,17 +16,7 @@ import analyzer.report
 from analysis.viewer.received import received_poses
 from analysis.viewer.scene import Scene, scene_of
 from coordinator.dispatch.faults import PeerFaults
-from coordinator.islands.events import (
-    Advanced,
-    Commanded,
-    Evaluated,
-    EvaluationFailed,
-    Insert,
-    JournalledEvent,
-    Pause,
-    Remove,
-    Vetted,
-)
+from coordinator.islands.events import JournalledEvent
 from coordinator.network.membership import Membership
 from coordinator.run.advance_checks import ExpectedAdvance, check_advance, check_poses
 from coordinator.run.requests import read_answer, read_evaluation, read_vetting
@@ -73,7 +63,6 @@ from schema.parts import BUILT_IN, BodySpace
 from schema.plugins.source import check_plugins
 from schema.robot.brain import check_brain
 from schema.robot.inverse_development import genome_of
-from schema.robot.results import Provenance
 from schema.robot.robot import Robot, check_tree, check_types
 from schema.wire.arena import (
     Advance,
@@ -126,11 +115,11 @@ from schema.wire.updates import (
 )
 from tests.coordinator.run.test_honest_worlds import advances, settings_of
 from tests.coordinator.sent_requests import BIRTH, JUDGED, ROBOT, VIABLE
+from tests.coordinator.storage.test_journal import EVENTS
 from tests.documents import parse_experiment
 from worker.arena.world import World
 
 JOB = (3, 5)
-_SIGNED = Provenance("worker", "platform", 0.5)
 _VERSION = "1"
 _WORKER = Member("default", "worker", "w.00000001")
 
@@ -160,7 +149,7 @@ def targets() -> list[Target]:
         *_viewers(made),
         *_operators(),
         *_agents(),
-        *_journal(made),
+        *_journal(),
         *_files(rules),
     ]
 
@@ -344,18 +333,8 @@ def _agents() -> Iterator[Target]:
     yield Target("member_of", lambda found: member_of(found.decode("latin-1")), (key,))
 
 
-def _journal(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
-    advance = made[0][0]
-    events = (
-        Evaluated(BIRTH, JUDGED, _SIGNED),
-        EvaluationFailed(BIRTH, "diverged", _SIGNED),
-        Vetted(BIRTH, 0, VIABLE),
-        Advanced(0, 1, advance, 9, _SIGNED),
-        Commanded(0, "id", 200, Insert(encode_genome(genome_of(ROBOT)), (0.0, 1.0))),
-        Commanded(0, "id", 200, Remove(BIRTH)),
-        Commanded(0, "id", 200, Pause()),
-    )
-    entries = tuple(encode_event(event) for event in events)
+def _journal() -> Iterator[Target]:
+    entries = tuple(map(encode_event, EVENTS))
     yield _of(JournalledEvent, ADVANCE_BYTES, *entries)
     record = partial(decode_record, Path("journal.bin"))
     yield Target("decode_record", record, entries, (RunFolderError,))

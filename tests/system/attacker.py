@@ -13,12 +13,13 @@ from msgspec.structs import replace
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
 from schema.agent.service import session_config
-from schema.agent.topics import Member, Role, agents_alive, member_of
+from schema.agent.topics import Member, Role
 from schema.limits import ADVANCE_REQUEST_BYTES
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode, fingerprint
 from schema.wire.messages import Answer, Call, Crash, Evaluate, Request, RunningJob
-from tests.system.introduction import introduce
+from tests.system.silent_agents import alive, introduce
+from tests.system.workspace import address_of
 
 _NOW = zenoh.ConsolidationMode.NONE
 _ENDLESS = 10**9
@@ -48,8 +49,7 @@ class Attacker:
 
     def agents(self, role: Role) -> list[Member]:
         """Return the agents of the run that are alive."""
-        tokens = self.session.liveliness().get(agents_alive("default", role))
-        return [member_of(str(each.ok.key_expr)) for each in tokens if each.ok]
+        return alive(self.session, role)
 
     def claim(self, epoch: int) -> None:
         """Claim to each agent to be the run's coordinator of an epoch."""
@@ -147,10 +147,9 @@ class Attacker:
 
 @contextmanager
 def attacker_at(folder: Path) -> Iterator[Attacker]:
-    """Open an attacker's session at the hub of a run's folder."""
+    """Open an attacker's session at the hub of a run, as soon as it listens."""
     with ExitStack() as stack:
-        address = (folder / "address").read_text().strip()
-        yield Attacker(folder, address, stack)
+        yield Attacker(folder, address_of(folder), stack)
 
 
 FALSE_REPLIES = (

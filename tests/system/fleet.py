@@ -3,7 +3,6 @@
 import os
 import shutil
 import signal
-import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,10 +11,11 @@ from typing import Any
 
 import zenoh
 
+from coordinator.cluster.kit import ClusterKit, Kit, MemberRole, utc_now
 from coordinator.islands.events import Advanced
 from coordinator.storage.journal import NAME, Journal
 from schema.agent.network import Tls, client_config
-from schema.agent.topics import agents_alive
+from tests.system.silent_agents import alive
 from tests.system.workspace import Process, Workspace, wait_until
 
 
@@ -101,9 +101,8 @@ class Fleet:
         """Wait for this many workers; start an analyzer, so that births begin."""
         config = zenoh.Config.from_json5(client_config(self.address))
         with zenoh.open(config) as session:
-            key = agents_alive("default", "worker")
             wait_until(
-                lambda: len(list(session.liveliness().get(key))) >= workers,
+                lambda: len(alive(session, "worker")) >= workers,
                 "all workers are there",
             )
         if has_analyzer:
@@ -144,22 +143,12 @@ class Fleet:
         assert self.coordinator.returncode == 0, self.coordinator.communicate()
 
 
-def make_certificate(folder: Path, name: str, authority: str, host: str) -> Tls:
-    """Create a certificate with openssl, signed by a test authority."""
-    script = f"""
-    set -e; cd "{folder}"; exec 2>&1
-    [ -f {authority}.pem ] || openssl req -x509 -newkey rsa:2048 -nodes -days 1 \
-        -keyout {authority}.key -out {authority}.pem -subj /CN={authority}
-    openssl req -newkey rsa:2048 -nodes -subj /CN={name} \
-        -keyout {name}.key -out {name}.csr
-    printf 'subjectAltName=IP:{host},DNS:localhost\nbasicConstraints=CA:FALSE\n' \
-        > {name}.ext
-    openssl x509 -req -in {name}.csr -CA {authority}.pem -CAkey {authority}.key \
-        -CAcreateserial -days 1 -out {name}.pem -extfile {name}.ext
-    """
-    subprocess.run(["sh", "-c", script], check=True, capture_output=True)
-    files = (f"{authority}.pem", f"{name}.pem", f"{name}.key")
-    return Tls(*(str(folder / file) for file in files))
+def make_kit(folder: Path, host: str = "127.0.0.1", **roles: MemberRole) -> Kit:
+    """Make a kit with members, besides the hub, for a day."""
+    kit = Kit.new(folder, ClusterKit(host, 7447, 1), utc_now)
+    for name, role in roles.items():
+        kit.add(name, role)
+    return kit
 
 
 def kit_files(kit: Path, name: str) -> Tls:

@@ -1,4 +1,4 @@
-"""Agents that join, take jobs and never answer."""
+"""Agents that tests make up: they introduce themselves, take jobs, never answer."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -7,9 +7,44 @@ from typing import Any, Literal
 import zenoh
 
 from schema.agent.network import client_config
+from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.service import session_config
-from schema.agent.topics import Member
-from tests.system.introduction import introduce
+from schema.agent.topics import Member, Role, agents_alive, member_of
+from schema.wire.codec import encode
+from schema.wire.messages import AgentInfo, Crash
+
+
+def alive(session: zenoh.Session, role: Role) -> list[Member]:
+    """Return the processes of a role whose tokens a session may see, by name."""
+    tokens = session.liveliness().get(agents_alive("default", role), timeout=2.0)
+    members = [member_of(str(each.ok.key_expr)) for each in tokens if each.ok]
+    return sorted(members, key=lambda member: member.name)
+
+
+def introduce(session: zenoh.Session, member: Member, *deaths: Crash) -> Any:  # noqa: ANN401 - of Zenoh
+    """Declare a queryable that says what a good agent of this machine says.
+
+    Returns:
+        The queryable, which ends with its session or with the last reference to it.
+    """
+    info = encode(
+        AgentInfo(
+            agent=member.name,
+            kind=member.role,
+            slots=1,
+            platform=platform_tag(),
+            version=wire_version(),
+            deaths=deaths,
+            shards=8,
+        )
+    )
+
+    def tell(query: zenoh.Query) -> None:
+        with query:
+            query.reply(member.info, info)
+
+    told = zenoh.handlers.Callback(tell)
+    return session.declare_queryable(member.info, told, complete=True)
 
 
 @contextmanager

@@ -1,26 +1,29 @@
 """Roles of certificates at a real hub, and processes of one user without flags."""
 
-import json
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 import zenoh
 
-from coordinator.cluster.kit import ClusterKit, Kit
+from coordinator.cluster.kit import ClusterKit, Kit, MemberRole
 from coordinator.storage.compare import compare
 from schema.agent.network import Tls, client_config
-from schema.agent.topics import Member, agents_alive, member_of
 from tests.system.documents import SCENARIO1
-from tests.system.fleet import kit_files, make_certificate, tls_flags
-from tests.system.test_agents import free_address
-from tests.system.workspace import Process, Workspace, runtime_directory, wait_until
+from tests.system.fleet import kit_files, make_kit, tls_flags
+from tests.system.silent_agents import alive
+from tests.system.workspace import (
+    Process,
+    Workspace,
+    free_address,
+    runtime_directory,
+    wait_until,
+)
 
 pytestmark = pytest.mark.system
 
-ROLES = {
+ROLES: dict[str, MemberRole] = {
     "chief": "coordinator",
     "good": "worker",
     "bad": "worker",
@@ -32,32 +35,27 @@ RUN = (*SCENARIO1, "--out", "run")
 
 
 class Lab:
-    """A hub with access rules, a coordinator, an analyzer, and certificates for all."""
+    """A hub with access rules, and the kit of all certificates."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
-        self.address = free_address().replace("tcp/", "tls/")
+        self.address = free_address("tls")
         self.folder = workspace.folder / "run"
-        names = [*ROLES, "hub"]
-        self.tls = {name: self.certified(name, "ca") for name in names}
-        members = [{"name": name, "role": role} for name, role in ROLES.items()]
-        (workspace.folder / "access.json").write_text(json.dumps(members))
-        self.hub = self.start("hub", "hub", "--access", "access.json")
+        self.kit = make_kit(workspace.folder / "lab", **ROLES)
+        self.hub = self.start("hub", "hub", "--access", "lab/access.json")
         assert "listening on tls/" in self.hub.stderr.readline()
-
-    def certified(self, name: str, authority: str) -> Tls:
-        return make_certificate(self.workspace.folder, name, authority, "127.0.0.1")
 
     def start(self, name: str, *words: str) -> Process:
         where = "--listen" if words[0] == "hub" else "--connect"
-        files = tls_flags(self.tls[name])
+        files = tls_flags(kit_files(self.kit.folder, name))
         return self.workspace.start(*words, where, self.address, *files)
 
-    @contextmanager
-    def session(self, tls: Tls) -> Iterator[zenoh.Session]:
+    def session(self, name: str) -> zenoh.Session:
+        return self.session_of(kit_files(self.kit.folder, name))
+
+    def session_of(self, tls: Tls) -> zenoh.Session:
         config = client_config(self.address, tls)
-        with zenoh.open(zenoh.Config.from_json5(config)) as session:
-            yield session
+        return zenoh.open(zenoh.Config.from_json5(config))
 
 
 @pytest.fixture
@@ -76,24 +74,17 @@ def replies(session: zenoh.Session, key: str, payload: bytes = b"") -> list[byte
     ]
 
 
-def members(session: zenoh.Session, role: str) -> list[Member]:
-    """Return the processes of a role whose tokens a session may see."""
-    key = agents_alive("default", role)  # type: ignore[arg-type]
-    found = session.liveliness().get(key, timeout=1.0)
-    return [member_of(str(each.ok.key_expr)) for each in found if each.ok]
-
-
 def test_certificates_act_in_their_role_only(lab: Lab, undisturbed: Path) -> None:
     coordinator = lab.start("chief", "coordinator", *RUN)
     lab.start("good", "worker", "--processes", "1")
     with ExitStack() as stack:
         head, operator, viewer, liar, spy = (
-            stack.enter_context(lab.session(lab.tls[name]))
+            stack.enter_context(lab.session(name))
             for name in ("chief", "boss", "looker", "bad", "bad")
         )
-        wait_until(lambda: bool(members(operator, "coordinator")), "the coordinator")
-        wait_until(lambda: bool(members(head, "worker")), "the worker")
-        (chief,), (good,) = members(operator, "coordinator"), members(head, "worker")
+        wait_until(lambda: bool(alive(operator, "coordinator")), "the coordinator")
+        wait_until(lambda: bool(alive(head, "worker")), "the worker")
+        (chief,), (good,) = alive(operator, "coordinator"), alive(head, "worker")
         # Nothing is born without an analyzer: the liar has all the time it wants.
         forged = (
             chief.alive.replace(chief.name, "chief.00000000"),
@@ -109,12 +100,12 @@ def test_certificates_act_in_their_role_only(lab: Lab, undisturbed: Path) -> Non
         ears = spy.declare_subscriber("revolve/**", heard.append)
         liar.put(good.cancelled, b"forged")
         # The one token that its certificate allows is there, so the others were sent.
-        wait_until(lambda: len(members(head, "worker")) == 2, "the liar's own token")
-        assert {each.name for each in members(head, "worker")} == {
+        wait_until(lambda: len(alive(head, "worker")) == 2, "the liar's own token")
+        assert {each.name for each in alive(head, "worker")} == {
             good.name, "bad-0.1",
         }  # fmt: skip
-        assert members(head, "analyzer") == []
-        assert members(operator, "coordinator") == [chief]
+        assert alive(head, "analyzer") == []
+        assert alive(operator, "coordinator") == [chief]
         kept[-1].undeclare()  # type: ignore[no-untyped-call]
         assert replies(spy, good.jobs) == []
         assert replies(spy, chief.command) == []
@@ -133,19 +124,21 @@ def test_certificates_act_in_their_role_only(lab: Lab, undisturbed: Path) -> Non
 
 
 def test_strangers_do_not_connect(lab: Lab) -> None:
-    stranger = lab.certified("stranger", "another")
-    false_ca = Tls(lab.tls["good"].ca, stranger.certificate, stranger.key)
-    unlisted = lab.certified("unlisted", "ca")
-    with pytest.raises(zenoh.ZError), lab.session(false_ca):
-        pass
-    with lab.session(unlisted) as nobody, lab.session(lab.tls["chief"]) as head:
+    foreign = make_kit(lab.folder / "foreign", stranger="worker")
+    stranger = kit_files(foreign.folder, "stranger")
+    ours = kit_files(lab.kit.folder, "good").ca
+    with pytest.raises(zenoh.ZError):
+        lab.session_of(Tls(ours, stranger.certificate, stranger.key))
+    # The hub has read the list without it.
+    lab.kit.add("unlisted", "worker")
+    with lab.session("unlisted") as nobody, lab.session("chief") as head:
         nobody_token = nobody.liveliness().declare_token(
             "revolve/default/w/unlisted-0.1/alive"
         )
-        with lab.session(lab.tls["bad"]) as known:
+        with lab.session("bad") as known:
             token = known.liveliness().declare_token("revolve/default/w/bad-0.1/alive")
-            wait_until(lambda: bool(members(head, "worker")), "the known one's token")
-            assert [each.name for each in members(head, "worker")] == ["bad-0.1"]
+            wait_until(lambda: bool(alive(head, "worker")), "the known one's token")
+            assert [each.name for each in alive(head, "worker")] == ["bad-0.1"]
             token.undeclare()  # type: ignore[no-untyped-call]
         nobody_token.undeclare()  # type: ignore[no-untyped-call]
 
@@ -191,7 +184,7 @@ def test_hub_closes_links_when_their_certificate_expires(workspace: Workspace) -
     for name, left_s in (("late", -5.0), ("brief", 20.0)):
         clock[0] = start - timedelta(days=1) + timedelta(seconds=left_s)
         kit.add(name, "worker")
-    address = free_address().replace("tcp/", "tls/")
+    address = free_address("tls")
     words = ("hub", "--listen", address, "--access", str(folder / "access.json"))
     hub = workspace.start(*words, *tls_flags(kit_files(folder, "hub")))
     assert "listening on tls/" in hub.stderr.readline()

@@ -15,7 +15,7 @@ from schema.tables.files import read_table
 from schema.wire.arena import Live
 from schema.wire.codec import decode
 from schema.wire.poses import PoseArrays
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace, address_of, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -43,8 +43,7 @@ def test_pause_list_insert_remove_snapshot_resume(
     words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
     flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
     coordinator = crowded_arena_workspace.start("run", *words, *flags)
-    wait_until((folder / "address").exists, "the coordinator listens")
-    address = (folder / "address").read_text().split()[0]
+    address = address_of(folder)
 
     def arena(*more: str, code: int = 0) -> str:
         text = crowded_arena_workspace.run(
@@ -99,7 +98,7 @@ def test_robot_with_its_own_part_types_is_inserted(workspace: Workspace) -> None
     folder = workspace.folder / "run"
     flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
     coordinator = workspace.start("run", "mine.toml", "--quiet", "--out", "run", *flags)
-    wait_until((folder / "address").exists, "the coordinator listens")
+    address_of(folder)
     words = ("robot", "random", "guest.yaml", "--experiment", "mine.toml")
     workspace.run(*words, "--seed", "3")
     assert "Piston" in (workspace.folder / "guest.yaml").read_text()

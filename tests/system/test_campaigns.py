@@ -1,7 +1,6 @@
 """Tests of campaigns: interruption, kills, existing runs, a sweep, a shared hub."""
 
 import signal
-import socket
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.description import read_state
 from tests.system.conftest import Once
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace, address_of, free_address, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -111,8 +110,7 @@ def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
 def test_two_coordinators_share_the_workers_of_a_hub(
     lab: Workspace, whole: Path
 ) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        address = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    address = free_address()
     flags = ("--seed", "7", "--repeats", "2", "--connect", address)
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
         commands = [
@@ -134,11 +132,9 @@ def test_two_coordinators_share_the_workers_of_a_hub(
 def test_status_of_all_coordinators_of_a_hub(lab: Workspace) -> None:
     words = ("coordinator", *WORDS[1:], "one", "--listen", "tcp/127.0.0.1:0")
     first = lab.start(*words)
-    place = lab.folder / "one" / "address"
-    wait_until(place.exists, "the first one listens")
-    address = place.read_text().split()[0]
+    address = address_of(lab.folder / "one")
     lab.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
-    wait_until((lab.folder / "two" / "address").exists, "the second one is connected")
+    address_of(lab.folder / "two")  # it is connected
 
     def status() -> str:
         return lab.run("status", "--connect", address)

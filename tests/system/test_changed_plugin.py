@@ -1,12 +1,11 @@
 """A run whose plug-in was changed after its start."""
 
-import contextlib
 import os
 import signal
-from pathlib import Path
 
 import pytest
 
+from tests.system.fleet import agent_processes
 from tests.system.workspace import PATIENCE_S, Workspace, wait_until
 
 pytestmark = pytest.mark.system
@@ -42,7 +41,7 @@ def test_an_edited_module_does_not_stop_its_run(workspace: Workspace) -> None:
     journal = run / "journal.bin"
     wait_until(lambda: journal.exists() and journal.stat().st_size > 3000, "births")
     (package / "far.py").write_text(FAULTY)
-    workers = spawned(started.pid)
+    workers = agent_processes(started.pid)
     assert len(workers) == 2, "a worker and an analyzer"
     for process in workers:
         os.kill(process, signal.SIGKILL)
@@ -59,15 +58,3 @@ def test_an_edited_module_does_not_stop_its_run(workspace: Workspace) -> None:
     workspace.run("robot", "simulate", "a/best.yaml")
     told = workspace.run("check", "mine.toml", code=1)
     assert "far.py:2: 'lab:far' must take 2 arguments" in told
-
-
-def spawned(process: int) -> list[int]:
-    """Return the processes that a coordinator has started for its jobs."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
-            words = (entry / "cmdline").read_text()
-            if int(parent) == process and "spawn_main" in words:
-                found.append(int(entry.name))
-    return found

@@ -5,7 +5,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,13 +12,13 @@ import pytest
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
 from schema.tables.segments import segment_path
+from tests.system.conftest import Once
 from tests.system.documents import SMALL_ARENA
 from tests.system.flipping import flip, flips
 from tests.system.workspace import Workspace, wait_until
 
 pytestmark = pytest.mark.system
 
-Once = Callable[[str, Callable[[Workspace], object]], Path]
 FLIPPING = Path(__file__).with_name("flipping.py")
 BIRTHS = 150
 CUT = 100_000

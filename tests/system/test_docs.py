@@ -12,6 +12,7 @@ from coordinator.storage.compare import compare
 from revolve.cli.commands import COMMANDS
 from schema.experiment.document import ArenaSection
 from schema.parts import ACTIVE_HINGE, PartType
+from tests.docs.page_runner import blocks_of
 from tests.documents import parse_experiment
 from tests.own_brains import write_module
 from tests.system.workspace import Workspace
@@ -22,12 +23,6 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 TOP = Path(__file__).parents[2]
 PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
-
-
-def _blocks(page: Path, language: str) -> list[str]:
-    return re.findall(
-        rf"^```{language}\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL
-    )
 
 
 def _write(workspace: Workspace, files: Mapping[str, str]) -> Path:
@@ -56,9 +51,9 @@ def test_code_of_pages_about_tables_runs(
     workspace: Workspace, page: str, least: int, undisturbed: Path
 ) -> None:
     shutil.copytree(undisturbed, workspace.folder / "runs" / "a")
-    blocks = _blocks(TOP / "docs" / page, "python")
+    blocks = blocks_of(TOP / "docs" / page, "python")
     assert len(blocks) >= least
-    _follow(workspace, _blocks(TOP / "docs" / page, "bash"))
+    _follow(workspace, blocks_of(TOP / "docs" / page, "bash"))
     for block in blocks:
         workspace.python("-W", "error", "-c", block)
 
@@ -66,10 +61,10 @@ def test_code_of_pages_about_tables_runs(
 def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
     """Two workers give the births of one process; the run needs its folder alone."""
     page = TOP / "docs" / "selection.md"
-    (module,) = _blocks(page, "python")
-    (document,) = _blocks(page, "toml")
+    (module,) = blocks_of(page, "python")
+    (document,) = blocks_of(page, "toml")
     folder = _write(workspace, {"crowding.py": module, "crowding.toml": document})
-    (block,) = _blocks(page, "sh")
+    (block,) = blocks_of(page, "sh")
     check, run = (line.split()[1:] for line in block.strip().splitlines())
     workspace.environment |= {
         "XDG_STATE_HOME": str(folder / "state"),
@@ -94,11 +89,11 @@ def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
 @pytest.mark.timeout(600)
 def test_measures_page_runs_from_top_to_bottom(workspace: Workspace) -> None:
     page = TOP / "docs" / "measures.md"
-    module, *readers = _blocks(page, "python")
-    built_in, own = _blocks(page, "toml")
+    module, *readers = blocks_of(page, "python")
+    built_in, own = blocks_of(page, "toml")
     assert len(readers) >= 2
     _write(workspace, {"gaits.py": module, "gaits.toml": own})
-    (block,) = _blocks(page, "sh")
+    (block,) = blocks_of(page, "sh")
     _follow(workspace, block.splitlines())
     for reader in readers:
         workspace.python("-W", "error", "-c", reader)
@@ -115,7 +110,7 @@ def test_measures_page_runs_from_top_to_bottom(workspace: Workspace) -> None:
 
 @pytest.mark.slow
 def test_code_of_the_python_page_runs_from_top_to_bottom(workspace: Workspace) -> None:
-    blocks = _blocks(TOP / "docs" / "python.md", "python")
+    blocks = blocks_of(TOP / "docs" / "python.md", "python")
     assert len(blocks) >= 8
     told = workspace.python("-W", "error", "-c", "\n".join(blocks))
     assert "no such experiment; did you mean 'scenario1'" in told
@@ -124,10 +119,10 @@ def test_code_of_the_python_page_runs_from_top_to_bottom(workspace: Workspace) -
 
 def test_experiments_of_the_experiments_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "experiments.md"
-    (module,) = _blocks(page, "python")
-    (yard,) = _blocks(page, "xml")
+    (module,) = blocks_of(page, "python")
+    (yard,) = blocks_of(page, "xml")
     folder = _write(workspace, {"my_parts.py": module, "yard.xml": yard})
-    documents = _blocks(page, "toml")
+    documents = blocks_of(page, "toml")
     assert len(documents) >= 3
     for document in documents:
         _write(workspace, {"mine.toml": document})
@@ -140,7 +135,7 @@ def test_experiments_of_the_experiments_page_run(workspace: Workspace) -> None:
 def test_experiments_of_the_brains_page_run(workspace: Workspace) -> None:
     """Each runs equally in one process and with two workers."""
     write_module(workspace.folder)
-    for document in _blocks(TOP / "docs" / "brains.md", "toml"):
+    for document in blocks_of(TOP / "docs" / "brains.md", "toml"):
         _write(workspace, {"mine.toml": document})
         runs = [f"out-{len(document)}-{number}" for number in range(2)]
         words = "revolve run mine.toml --births 17 --quiet --out"
@@ -152,14 +147,14 @@ def test_experiments_of_the_brains_page_run(workspace: Workspace) -> None:
 
 def test_parts_page_runs(workspace: Workspace) -> None:
     page = TOP / "docs" / "parts.md"
-    module, knees = _blocks(page, "python")
-    document, with_knees = _blocks(page, "toml")
-    (robot,) = _blocks(page, "yaml")
+    module, knees = blocks_of(page, "python")
+    document, with_knees = blocks_of(page, "toml")
+    (robot,) = blocks_of(page, "yaml")
     _write(
         workspace, {"my_parts.py": module, "mine.toml": document, "kneed.yaml": robot}
     )
     _write(workspace, {"knees.py": knees, "knees.toml": with_knees})
-    (block,) = _blocks(page, "sh")
+    (block,) = blocks_of(page, "sh")
     for told in _follow(workspace, block.splitlines()):
         printed = re.search(r"^fitness: +(\S+)", told, re.MULTILINE)
         assert not printed or 0.025 < float(printed[1]) < 0.035
@@ -179,7 +174,7 @@ def test_parts_page_runs(workspace: Workspace) -> None:
 
 
 def test_experiments_of_the_tasks_page_are_accepted(tmp_path: Path) -> None:
-    documents = _blocks(TOP / "docs" / "tasks.md", "toml")
+    documents = blocks_of(TOP / "docs" / "tasks.md", "toml")
     assert len(documents) >= 5
     for document in documents:
         fitness = parse_experiment(document, str(tmp_path / "mine.toml")).fitness
@@ -197,9 +192,9 @@ def test_arenas_page_lists_all_keys_with_their_defaults() -> None:
 
 def test_commands_of_the_robots_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "robots.md"
-    (document,) = _blocks(page, "toml")
+    (document,) = blocks_of(page, "toml")
     folder = _write(workspace, {"robogen.toml": document})
-    (block,) = _blocks(page, "sh")
+    (block,) = blocks_of(page, "sh")
     own = "revolve robot simulate some.yaml --experiment robogen.toml"
     lines = [*block.splitlines(), own]
     told = _follow(workspace, lines)
@@ -216,15 +211,15 @@ def test_commands_of_the_robots_page_run(workspace: Workspace) -> None:
 
 def test_archipelagos_of_the_islands_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "islands.md"
-    (document,) = _blocks(page, "toml")
+    (document,) = blocks_of(page, "toml")
     _write(workspace, {"mine.toml": document})
-    (block,) = _blocks(page, "sh")
+    (block,) = blocks_of(page, "sh")
     own = "revolve run mine.toml --births 24 --out mine"
     _follow(workspace, [own, *block.splitlines()])
 
 
 def test_campaign_of_the_campaigns_page_runs(workspace: Workspace) -> None:
-    (block,) = _blocks(TOP / "docs" / "campaigns.md", "sh")
+    (block,) = blocks_of(TOP / "docs" / "campaigns.md", "sh")
     *_, last = _follow(workspace, block.splitlines())
     assert "4 of 4 runs already finished" in last
 

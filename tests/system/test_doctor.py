@@ -2,15 +2,18 @@
 
 import socket
 import time
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
-from coordinator.cluster.kit import ClusterKit, Kit
-from tests.system.fleet import kit_files, tls_flags
-from tests.system.test_agents import free_address
-from tests.system.workspace import PATIENCE_S, Workspace, runtime_directory, wait_until
+from tests.system.fleet import kit_files, make_kit, tls_flags
+from tests.system.workspace import (
+    PATIENCE_S,
+    Workspace,
+    address_of,
+    free_address,
+    runtime_directory,
+)
 
 pytestmark = pytest.mark.system
 
@@ -52,7 +55,7 @@ def test_a_hub_that_never_answers_costs_a_few_seconds(workspace: Workspace) -> N
 def test_the_hub_of_a_run(workspace: Workspace) -> None:
     words = ("--listen", "tcp/127.0.0.1:0", "--quiet", "--out", "run")
     workspace.start("coordinator", "scenario1", *words)
-    wait_until((workspace.folder / "run" / "address").exists, "the run has an address")
+    address_of(workspace.folder / "run")
     code, lines = lines_of(workspace, "--connect", "run")
     assert code == 0, lines
     assert "round trip" in lines["hub"]
@@ -61,58 +64,38 @@ def test_the_hub_of_a_run(workspace: Workspace) -> None:
 
 
 def test_rights_of_certificates(workspace: Workspace) -> None:
-    address = free_address().replace("tcp/", "tls/")
-    port = int(address.rsplit(":", 1)[1])
-    kit = Kit.new(
+    kit = make_kit(
         workspace.folder / "lab",
-        ClusterKit("127.0.0.1", port, 90),
-        lambda: datetime.now(UTC).replace(microsecond=0),
-    )
-    kit.add("a", "worker")
-    kit.add("boss", "operator")
-    kit.add("chief", "coordinator")
-    kit.add("gone", "worker")
+        a="worker", boss="operator", chief="coordinator", gone="worker",
+    )  # fmt: skip
     kit.revoke("gone")
-    access = ("--access", str(kit.folder / "access.json"))
-    hub = workspace.start(
-        "hub", "--listen", address, *tls_flags(kit_files(kit.folder, "hub")), *access
-    )
+    address, access = free_address("tls"), ("--access", str(kit.folder / "access.json"))
+
+    def flags(name: str) -> tuple[str, ...]:
+        return tls_flags(kit_files(kit.folder, name))
+
+    def seen(name: str, *more: str) -> tuple[int, dict[str, str]]:
+        return lines_of(workspace, "--connect", address, *flags(name), *more)
+
+    hub = workspace.start("hub", "--listen", address, *flags("hub"), *access)
     assert "listening" in hub.stderr.readline()
-    code, lines = lines_of(
-        workspace, "--connect", address, *tls_flags(kit_files(kit.folder, "a")), *access
-    )
+    code, lines = seen("a", *access)
     assert code == 0, lines
-    assert "'a', worker, 89 days left" in lines["certificate"]
+    assert "'a', worker, 0 days left" in lines["certificate"]
     assert lines["rights"].endswith("those of worker")
-    code, lines = lines_of(
-        workspace,
-        "--connect",
-        address,
-        *tls_flags(kit_files(kit.folder, "gone")),
-        *access,
-    )
+    code, lines = seen("gone", *access)
     assert code == 1
     assert "not in --access" in lines["certificate"]
     assert "revoked" in lines["rights"]
-    chief = (
-        "--connect",
-        address,
-        *tls_flags(kit_files(kit.folder, "chief")),
-        "--out",
-        "run",
-    )
+    chief = ("--connect", address, *flags("chief"), "--out", "run")
     run = workspace.start("coordinator", "scenario1", "--quiet", *chief)
-    wait_until((workspace.folder / "run" / "address").exists, "the run has an address")
-    code, lines = lines_of(
-        workspace, "--connect", address, *tls_flags(kit_files(kit.folder, "boss"))
-    )
+    address_of(workspace.folder / "run")
+    code, lines = seen("boss")
     assert code == 0, lines
     assert lines["rights"].endswith("those of operator")
     assert lines["coordinators"].split()[2].startswith("chief.")
     run.kill()
     (kit.folder / "members" / "a" / "key.pem").chmod(0o644)
-    code, lines = lines_of(
-        workspace, "--connect", address, *tls_flags(kit_files(kit.folder, "a"))
-    )
+    code, lines = seen("a")
     assert code == 1
     assert "644" in lines["key"]

@@ -1,6 +1,5 @@
 """Runs with other encodings than the thesis's: repeatable and resumed."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from schema.parts import BUILT_IN
 from schema.robot.robot import check_robot
 from schema.tables.files import read_table
 from schema.wire.protobuf import decode_robot
+from tests.docs.page_runner import blocks_of
 from tests.system.documents import OFF_LINE, SMALL_ARENA
 from tests.system.fleet import kill_beyond, size
 from tests.system.workspace import Workspace
@@ -35,21 +35,16 @@ count = 2
 """
 
 
-def _blocks(language: str) -> list[str]:
-    pattern = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
-    return pattern.findall(PAGE.read_text())
-
-
 @pytest.fixture
 def folder(workspace: Workspace) -> Path:
     """Return the workspace's folder, with the module of the page."""
-    (text,) = _blocks("python")
+    (text,) = blocks_of(PAGE, "python")
     (workspace.folder / "my_worms.py").write_text(text)
     return workspace.folder
 
 
 def test_experiments_of_the_page_run(workspace: Workspace, folder: Path) -> None:
-    first, second = _blocks("toml")
+    first, second = blocks_of(PAGE, "toml")
     for name, document in (("first", first), ("second", second)):
         (folder / "mine.toml").write_text(document)
         words = ("--births", "20", "--in-process", "--quiet", "--out", name)

@@ -1,15 +1,14 @@
 """Zenoh's own log: on standard error, from level "warn", without secrets."""
 
 import json
-import socket
 from pathlib import Path
 
 import pytest
 import zenoh
 
 from schema.agent.network import Tls, client_config
-from tests.system.fleet import make_certificate, tls_flags
-from tests.system.workspace import PATIENCE_S, Workspace, wait_until
+from tests.system.fleet import kit_files, make_kit, tls_flags
+from tests.system.workspace import PATIENCE_S, Workspace, address_of, free_address
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -29,16 +28,14 @@ def provoke_warning(address: str, tls: Tls) -> None:
 def test_engine_warns_on_standard_error_and_shows_no_secret(
     workspace: Workspace,
 ) -> None:
-    tls = make_certificate(workspace.folder, "node", "authority", "127.0.0.1")
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        address = f"tls/127.0.0.1:{server.getsockname()[1]}"
-    files = tls_flags(tls)
+    tls = kit_files(make_kit(workspace.folder / "lab").folder, "hub")
+    address, files = free_address("tls"), tls_flags(tls)
     words = ("run", "scenario1", "--births", "90", "--workers", "1", "--out", "run")
     process = workspace.start(
         *words, "--quiet", "--listen", address, *files,
         environment={"RUST_LOG": "trace"},
     )  # fmt: skip
-    wait_until((workspace.folder / "run" / "address").exists, "the coordinator listens")
+    address_of(workspace.folder / "run")
     provoke_warning(address, tls)
     out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, err

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coordinator.cluster.kit import MemberRole
 from coordinator.storage.compare import compare
 from tests.system.documents import HAMLET, SCENARIO1
-from tests.system.fleet import Fleet, holders, make_certificate, size, tls_flags
+from tests.system.fleet import Fleet, holders, kit_files, make_kit, size, tls_flags
 from tests.system.machines import NEEDS_ROOT, Network
 from tests.system.workspace import Workspace
 
@@ -40,15 +41,17 @@ def remote_fleet(
     """Return a fleet with worker and analyzer, and what starts agents on a machine."""
     workspace = network.workspace
 
-    def files(name: str) -> tuple[str, ...]:
-        return tls_flags(make_certificate(workspace.folder, name, "ca", HOST))
+    members: dict[str, MemberRole] = {
+        "far": "worker", "near": "worker", "judge": "analyzer"
+    }  # fmt: skip
+    kit = make_kit(workspace.folder / "lab", HOST, **members).folder
 
     def join(fleet: Fleet, name: str, role: str, machine: str) -> int:
         space = network[machine].space
-        return fleet.join(name, role, *files(name), inside=space)
+        return fleet.join(name, role, *tls_flags(kit_files(kit, name)), inside=space)
 
     where = {"listen": f"tls/{HOST}:7447", "inside": network["near"].space}
-    fleet = Fleet(workspace, *words, *files("machine"), **where)
+    fleet = Fleet(workspace, *words, *tls_flags(kit_files(kit, "hub")), **where)
     start = partial(join, fleet)
     start("far", "worker", "far")
     start("judge", "analyzer", "near")

@@ -67,7 +67,6 @@ def test_a_run_beside_a_forger_equals_an_undisturbed_one(
     workers = 1 if name == "deadly" else 2
     flags = ("--workers", str(workers), "--out", "run", "--cpu-limit", "1")
     process = workspace.start("run", *SCENARIO1, *flags)
-    wait_until((folder / "address").exists, "the coordinator listens")
     with attacker_at(folder) as attacker:
         wait_until(
             lambda: len(attacker.agents("worker")) == workers, "the workers are there"
@@ -94,7 +93,6 @@ def test_an_arena_beside_a_forger_equals_an_undisturbed_one(
     folder = small_arena_workspace.folder / "run"
     words = (*HAMLET, "--workers", "2", "--out", "run")
     process = small_arena_workspace.start("run", *words)
-    wait_until((folder / "address").exists, "the coordinator listens")
     with attacker_at(folder) as attacker:
         if name == "cancelled":
             attacker.cancel()

@@ -10,9 +10,8 @@ from schema.agent.network import client_config
 from tests.system.documents import HAMLET, SCENARIO1, SMALL_ARENA
 from tests.system.fleet import kit_files, size, tls_flags
 from tests.system.machines import Running
-from tests.system.test_agents import free_address
 from tests.system.test_view import check_curves
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace, free_address, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -88,7 +87,7 @@ def test_coordinators_and_the_hub_come_and_go(
 def test_printed_configuration_opens_a_hub(workspace: Workspace) -> None:
     kit = workspace.folder / "lab"
     workspace.run("cluster", "init", str(kit), "--hub", "127.0.0.1", "--workers", "a")
-    address = free_address().replace("tcp/", "tls/")
+    address = free_address("tls")
     access = str(kit / "members" / "hub" / "access.json")
     words = ("hub", "--listen", address, "--access", access, "--print-config")
     config = workspace.run(*words, *tls_flags(kit_files(kit, "hub")))

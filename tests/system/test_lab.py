@@ -13,9 +13,10 @@ import zenoh
 from coordinator.cluster.kit import Kit
 from coordinator.storage.compare import compare
 from schema.agent.network import client_config
-from schema.agent.topics import Role, agents_alive, member_of
+from schema.agent.topics import Role
 from tests.system.fleet import size
 from tests.system.machines import NEEDS_ROOT, Machine, Network, Running
+from tests.system.silent_agents import alive
 from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [
@@ -62,10 +63,7 @@ def all_rights(machine: Machine) -> Iterator[zenoh.Session]:
 def names(machine: Machine, role: Role) -> list[str]:
     """Return the names of the processes of a role that are alive."""
     with all_rights(machine) as session:
-        found = session.liveliness().get(agents_alive("default", role), timeout=2.0)
-        return sorted(
-            member_of(str(each.ok.key_expr)).name for each in found if each.ok
-        )
+        return [member.name for member in alive(session, role)]
 
 
 def intrude(

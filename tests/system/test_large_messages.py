@@ -5,7 +5,6 @@ Sessions of this process stand for coordinator, worker and viewer.
 
 import os
 import signal
-import socket
 import sys
 import threading
 import time
@@ -16,9 +15,14 @@ import zenoh
 from schema.agent.network import client_config
 from schema.agent.topics import Member
 from schema.limits import MIB, PAGE_BYTES
-from tests.system.fleet import make_certificate
+from tests.system.fleet import kit_files, make_kit
 from tests.system.test_hub import Site
-from tests.system.workspace import Workspace, runtime_directory, wait_until
+from tests.system.workspace import (
+    Workspace,
+    free_address,
+    runtime_directory,
+    wait_until,
+)
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -56,23 +60,18 @@ os.kill(os.getpid(), signal.SIGSTOP)
 """
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
-
-
 def start_hub(
     workspace: Workspace, protocol: str = "unixsock-stream", **variables: str
 ) -> str:
     """Start a hub; return the configuration of its clients."""
-    place, tls = f"127.0.0.1:{free_port()}", None
+    address, tls = free_address(protocol), None
     if protocol == "unixsock-stream":
-        place = f"{runtime_directory(workspace.folder)}/socket"
+        address = f"{protocol}/{runtime_directory(workspace.folder)}/socket"
     if protocol == "tls":
-        tls = make_certificate(workspace.folder, "own", "authority", "127.0.0.1")
+        tls = kit_files(make_kit(workspace.folder / "lab").folder, "hub")
         files = {"CA": tls.ca, "CERTIFICATE": tls.certificate, "KEY": tls.key}
         variables |= {f"REVOLVE_TLS_{name}": file for name, file in files.items()}
-    address, log = f"{protocol}/{place}", workspace.folder / "hub.log"
+    log = workspace.folder / "hub.log"
     workspace.start("hub", "--listen", address, environment=variables, log=log)
     wait_until(lambda: "listening on" in log.read_text(), "the hub listens")
     return client_config(address, tls)

@@ -44,42 +44,21 @@ MISTAKES = [
     ("runn scenario1", "no command 'runn'; did you mean 'run'?"),
     ("help statsu", "no command 'statsu'; did you mean 'status'?"),
     ("robot chek a.yaml", "did you mean 'check'?; allowed: "),
-    (
-        "run scenario1 --birth 3",
-        "revolve run: no flag '--birth'; did you mean '--births'?",
-    ),
+    ("run scenario1 --birth 3", "no flag '--birth'; did you mean '--births'?"),
     ("run scenario1 --out", "--out: expected one argument"),
     ("run scenario1 --births -5", "--births: must be a whole number >= 1, got '-5'"),
-    (
-        "run scenario1 --workers 1.5",
-        "--workers: must be a whole number >= 0, got '1.5'",
-    ),
-    (
-        f"run scenario1 --seed {2**64}",
-        f"--seed: must be a whole number in 0..{2**64 - 1}",
-    ),
+    ("run scenario1 --workers 1.5", "--workers: must be a whole number >= 0"),
+    (f"run scenario1 --seed {2**64}", f"number in 0..{2**64 - 1}"),
     # Experiments
-    (
-        "run senario1",
-        "senario1: no such experiment; did you mean 'scenario1'?; shipped",
-    ),
+    ("run senario1", "no such experiment; did you mean 'scenario1'?; shipped"),
     ("run thesys", "; did you mean 'thesis'?"),
     ("run mine", "mine: no such experiment; did you mean 'mine.toml'?"),
     ("run scenario1.toml", "; did you mean 'scenario1', which is shipped?"),
-    (
-        "run exp.yaml",
-        "exp.yaml: the file of an experiment must end in .toml, got '.yaml'",
-    ),
+    ("run exp.yaml", "exp.yaml: the file of an experiment must end in .toml"),
     ("run gone.yaml", "got '.yaml', and there is no such file"),
     ("run gone.toml", "gone.toml: cannot be read: No such file"),
-    (
-        "run other",
-        "other: is a folder; an experiment is a .toml file or a shipped name",
-    ),
-    (
-        "run key.toml",
-        "key.toml: birth: no such key; did you mean 'births'?; allowed: name,",
-    ),
+    ("run other", "other: is a folder; an experiment is a .toml file"),
+    ("run key.toml", "key.toml: birth: no such key; did you mean 'births'?"),
     ("run type.toml", "type.toml: births: must be a whole number, got 'many'"),
     ("run range.toml", "range.toml: variation.body_epsilon: must be a number <= 1.0"),
     ("run section.toml", "section.toml: selection.populaton: no such key"),
@@ -94,10 +73,7 @@ MISTAKES = [
     ("status file", "file: must be a folder, got a file"),
     ("run scenario1 --out file", "file: must be a folder, got a file"),
     ("run scenario1 --out other", "not empty (contains 'notes.txt')"),
-    (
-        "run scenario1 --out run",
-        "run: already holds a run with other settings; to resume",
-    ),
+    ("run scenario1 --out run", "run: already holds a run with other settings"),
     ("resume run", "run: already finished"),
     ("compare later later", "was written by another version of Revolve"),
     ("analyze empty", "empty: no run in or below"),
@@ -109,10 +85,7 @@ MISTAKES = [
     ("view run --save a.mp4", "--save a.mp4: must end in .rrd"),
     ("view run --save nowhere/a.gif", "--save nowhere/a.gif: no such folder: nowhere"),
     ("view run --robot best --save a.gif", "--save a.gif: a film takes no --robot"),
-    (
-        "view run --save a.gif --from 1e5 --until 1.1e5",
-        "run: no poses of an arena between 100000 and 110000 s; the run ends at ",
-    ),
+    ("view run --save a.gif --from 1e5 --until 1.1e5", "no poses of an arena between"),
     ("view x --connect hub", "give either a run folder or --connect"),
     ("view --connect tcp/127.0.0.1:1 --save a.rrd", "no hub at"),
     ("view nowhere --serve 9876", "must be HOST:PORT"),
@@ -127,10 +100,7 @@ MISTAKES = [
     ("robot check open.yaml", "open.yaml"),
     ("robot check robot.pb", "robot.pb"),
     ("robot simulate nowhere.yaml", "nowhere.yaml: cannot be read: No such file"),
-    (
-        "robot simulate run",
-        "run: must be the file of a robot, got a folder; the best robot",
-    ),
+    ("robot simulate run", "run: must be the file of a robot, got a folder"),
     ("robot simulate key.toml", "key.toml: must end in one of .yaml, .yml, "),
     ("run thesis scenario1", "must have different names"),
     ("run scenario1 --repeats 0", "--repeats: must be a whole number >= 1"),
@@ -140,11 +110,7 @@ MISTAKES = [
     ("run scenario1 --listen hub --connect tcp/h:1", "exclude each other"),
     *(
         (f"{command} 5000", f"must be <= {4 * cores()}, 4 for each of {cores()} cores")
-        for command in (
-            "worker --processes",
-            "analyzer --processes",
-            "run scenario1 --workers",
-        )
+        for command in ("worker --processes", "run scenario1 --workers")
     ),
     *(
         (f"{role} --connect {flags}", message)
@@ -160,26 +126,14 @@ MISTAKES = [
     ),
     ("worker --connect nowhere", "--connect: must be tcp/HOST:PORT, tls/HOST:PORT, "),
     ("status --connect tcp/127.0.0.1:1", "no hub at tcp/127.0.0.1:1"),
-    (
-        "status",
-        "tcp/127.0.0.1:1; of a run without a hub, name the folder (revolve status",
-    ),
+    ("status", "of a run without a hub, name the folder (revolve status"),
     ("hub --listen here", "--listen: an address must be tcp/"),
     ("run scenario1 --listen here", "--listen: an address must be tcp/HOST:PORT, "),
     ("run scenario1 --listen tcp/0.0.0.0:1", "tcp/0.0.0.0:1 would listen beyond this"),
-    (
-        "run scenario1 --metrics here",
-        "--metrics: must be PORT or HOST:PORT, got 'here'",
-    ),
+    ("run scenario1 --metrics here", "--metrics: must be PORT or HOST:PORT"),
     ("run scenario1 --fleet a/b", "--fleet: must be 1 to 96 letters, digits"),
-    (
-        "run scenario1 --speed 2",
-        "--speed: limits arenas, and there is none in scenario1",
-    ),
-    (
-        "run scenario1 --in-process --workers 3",
-        "--in-process starts no other processes",
-    ),
+    ("run scenario1 --speed 2", "--speed: limits arenas, and there is none in"),
+    ("run scenario1 --in-process --workers 3", "starts no other processes"),
     *(
         (
             f"run scenario1 --in-process {flag} hub",

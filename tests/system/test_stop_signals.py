@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -25,14 +24,12 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-ROOT = Path(__file__).parents[2]
 LIMIT_S = 5.0
 SIGNALS = (
     *(signal.SIGINT, signal.SIGTERM, signal.SIGHUP),
     *(signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU),
 )
 NOWHERE = "tcp/127.0.0.1:9"
-_STARTED: list[int] = []
 
 SLOW = """
 name = "slow"
@@ -79,33 +76,13 @@ def family(process: int) -> set[int]:
     return found
 
 
-def start(folder: Path, *words: str, prefix: tuple[str, ...] = ()) -> Process:
-    (folder / "slow.toml").write_text(SLOW)
-    process = subprocess.Popen(
-        [*prefix, sys.executable, "-m", "revolve", *words],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
-        text=True,
-        cwd=folder,
-        env={
-            **os.environ,
-            "PYTHONPATH": str(ROOT),
-            "XDG_RUNTIME_DIR": runtime_directory(folder),
-        },
-        start_new_session=True,
-    )
-    _STARTED.append(process.pid)
-    return process
-
-
-@pytest.fixture(autouse=True)
-def nothing_stays() -> Iterator[None]:
-    """Kill what a failed test has left."""
-    yield
-    while _STARTED:
-        for each in family(_STARTED.pop()):
-            os.kill(each, signal.SIGKILL)
+def start(workspace: Workspace, *words: str) -> Process:
+    (workspace.folder / "slow.toml").write_text(SLOW)
+    place = {"XDG_RUNTIME_DIR": runtime_directory(workspace.folder)}
+    command = (sys.executable, "-m", "revolve", *words)
+    if words[0] == "nohup":
+        command = (words[0], sys.executable, "-m", "revolve", *words[1:])
+    return workspace.start_command(*command, environment=place)
 
 
 def wait_until_begun(folder: Path, name: str, process: Process) -> str:
@@ -145,10 +122,8 @@ def stop(process: Process, number: int, family_before: set[int]) -> tuple[float,
     while family(process.pid) & family_before or process.poll() is None:
         time.sleep(0.02)  # polling interval
         if time.monotonic() - sent_s > 20:
-            left = family(process.pid)
-            for each in left:
-                os.kill(each, signal.SIGKILL)
-            pytest.fail(f"{len(left)} processes are still there after 20 s")
+            left = len(family(process.pid))
+            pytest.fail(f"{left} processes are still there after 20 s")
     taken_s = time.monotonic() - sent_s
     _, told = process.communicate()
     return taken_s, told
@@ -166,10 +141,10 @@ def cases() -> Iterator[Any]:
 
 @pytest.mark.parametrize(("name", "number"), [*cases()])
 def test_a_signal_ends_a_command_with_its_children(
-    tmp_path: Path, name: str, number: signal.Signals
+    workspace: Workspace, name: str, number: signal.Signals
 ) -> None:
-    process = start(tmp_path, *COMMANDS[name])
-    wait_until_begun(tmp_path, name, process)
+    process = start(workspace, *COMMANDS[name])
+    wait_until_begun(workspace.folder, name, process)
     taken_s, told = stop(process, number, family(process.pid))
     sys.stdout.write(f"{name} {number.name}: {taken_s:.2f} s\n{told}\n")
     assert taken_s < LIMIT_S
@@ -180,9 +155,9 @@ def test_a_signal_ends_a_command_with_its_children(
     assert not family(process.pid)
 
 
-def test_a_command_under_nohup_ignores_hangups(tmp_path: Path) -> None:
-    process = start(tmp_path, *COMMANDS["worker"], prefix=("nohup",))
-    wait_until_begun(tmp_path, "worker", process)
+def test_a_command_under_nohup_ignores_hangups(workspace: Workspace) -> None:
+    process = start(workspace, "nohup", *COMMANDS["worker"])
+    wait_until_begun(workspace.folder, "worker", process)
     processes = family(process.pid)
     for each in processes:
         os.kill(each, signal.SIGHUP)
@@ -197,16 +172,8 @@ def test_a_command_under_nohup_ignores_hangups(tmp_path: Path) -> None:
 
 
 def test_an_agent_gives_up_without_a_hub(workspace: Workspace) -> None:
-    words = (
-        "worker",
-        "--processes",
-        "2",
-        "--connect",
-        NOWHERE,
-        "--give-up-after",
-        "1.5",
-    )
-    output = workspace.run(*words, code=1)
+    words = COMMANDS["worker"]
+    output = workspace.run(*words, "--give-up-after", "1.5", code=1)
     assert said(output) == [
         f"no hub at {NOWHERE}; retrying; press Ctrl-C to stop",
         f"no hub at {NOWHERE} for 1.5 s: giving up (--give-up-after)",

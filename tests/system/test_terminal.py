@@ -19,24 +19,13 @@ pytestmark = pytest.mark.system
 ROOT = Path(__file__).parents[2]
 
 
-def _start(*words: str) -> subprocess.Popen[str]:
-    """Start a command as a shell does: as the leader of a process group."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "revolve", *words],
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-        start_new_session=True,
-    )
-
-
 @pytest.mark.parametrize("awaited", ["run.json", "address"])
 def test_ctrl_c_pressed_twice_while_processes_start(
     workspace: Workspace, awaited: str
 ) -> None:
     """Interrupt the process group twice while its processes import modules."""
     run = workspace.folder / "run"
-    process = _start("run", "scenario1", "--out", str(run))
+    process = workspace.start("run", "scenario1", "--out", str(run))
     wait_until((run / awaited).exists, awaited)
     os.killpg(process.pid, signal.SIGINT)
     time.sleep(0.1)  # interval between two key presses

@@ -5,12 +5,13 @@ import os
 import re
 import secrets
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +35,24 @@ def said(text: str) -> list[str]:
     return [stamp.sub("", line) for line in text.splitlines()]
 
 
+def free_address(protocol: str = "tcp") -> str:
+    """Return an address of this machine at which nobody listens."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return f"{protocol}/127.0.0.1:{server.getsockname()[1]}"
+
+
+def address_of(run: Path) -> str:
+    """Return the address of a run's hub, as soon as it listens."""
+    file = run / "address"
+    wait_until(file.exists, "the coordinator listens")
+    return file.read_text().split()[0]
+
+
 class Workspace:
     """Starts the commands of a test in a folder and kills remaining processes.
 
-    All of them get the variables in ``environment``.
+    Each leads a session of its own, as in a terminal. All of them get the variables in
+    ``environment``.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -74,9 +89,11 @@ class Workspace:
             file = opened.enter_context(log.open("w")) if log else subprocess.PIPE
             process = subprocess.Popen(
                 words,
+                stdin=subprocess.PIPE,
                 stdout=file,
                 stderr=file,
                 text=True,
+                start_new_session=True,
                 cwd=folder or self.folder,
                 env={**os.environ, **root, **self.environment, **(environment or {})},
             )
@@ -98,9 +115,8 @@ class Workspace:
     def clear(self) -> None:
         """Kill remaining processes and write all output to the test report."""
         for process, log in self._started:
-            if process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.kill()
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
             out, err = process.communicate()
             if log is not None:
                 out, err = log.read_text("utf-8", "replace"), ""

@@ -14,8 +14,7 @@ from schema.agent.access import read_certificates
 from schema.agent.network import Tls, client_config, hub_config
 from schema.agent.service import HubWatch, usable
 from schema.agent.topics import Member, Role
-from tests.system.test_agents import free_address
-from tests.system.workspace import wait_until
+from tests.system.workspace import free_address, wait_until
 
 pytestmark = pytest.mark.system
 
@@ -29,7 +28,7 @@ class Lab:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.address = free_address().replace("tcp/", "tls/")
+        self.address = free_address("tls")
         port = int(self.address.rpartition(":")[2])
         now = datetime.now(UTC)
         clock = [now - timedelta(days=91)]
