@@ -46,5 +46,5 @@ def test_engine_warns_on_standard_error_and_shows_no_secret(
     for level in ("INFO", "DEBUG", "TRACE"):
         assert level not in err
     key = Path(tls.key).read_text().splitlines()[1:-1]
-    assert len(key) > 10
+    assert len(key) >= 3
     assert not [line for line in key if line in out + err]

@@ -138,30 +138,13 @@ def check(calm: Outcome, hostile: Outcome, messages: int) -> None:
     }
     # An analyzer or a viewer may end before its memory is read.
     assert growth.keys() >= {"coordinator", "w1", "w2"}
-    report = {
-        "sent": sent,
-        "came": hostile.hostile["came"],
-        "growth_mb": growth,
-        "told": {name: lines_about_drops(text) for name, text in hostile.told.items()},
-    }
-    sys.stdout.write(f"{json.dumps(report, indent=1)}\n")
+    sys.stdout.write(f"{json.dumps([hostile.hostile, growth], indent=1)}\n")
     assert sum(sent.values()) >= messages // 2
     assert max(growth[name] for name in growth if name != "viewer") <= MOST_GROWTH_MB
-    assert dropped(hostile.told["coordinator"], "malformed") > 0
+    assert re.search(r"not used: [1-9]\d* malformed", hostile.told["coordinator"])
     for name in ("w1", "w2"):
         assert re.search(r"refused \d+ requests?", hostile.told[name]), name
     assert re.search(r"dropped \d+ messages", hostile.told["viewer"])
-
-
-def lines_about_drops(text: str) -> list[str]:
-    words = ("not used: ", "refused ", "dropped ")
-    return [line for line in text.splitlines() if any(word in line for word in words)]
-
-
-def dropped(text: str, kind: str) -> int:
-    """Return how many messages of a kind the coordinator has dropped."""
-    found = re.search(rf"not used: (\d+) {kind}", text)
-    return int(found[1]) if found else 0
 
 
 CASES = {"off-line": SCENARIO1, "arena": HAMLET}

@@ -10,6 +10,8 @@ import socket
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,6 +39,33 @@ with RunFolder(Path(sys.argv[1])):
     sys.stdin.read()
 """
 LOOKED_AT_S = 0.05
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[RunFolder, Journal]]:
+    """Open a run as its next coordinator does."""
+    with (
+        RunFolder(path) as folder,
+        Journal.open(path, epoch=folder.epoch) as journal,
+    ):
+        yield folder, journal
+
+
+@contextmanager
+def held(path: Path, before: str = "") -> Iterator[str]:
+    """Hold a run in another process, which is killed; yield how it is named."""
+    with subprocess.Popen(
+        [sys.executable, "-c", before + HOLD, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == b"held\n"
+        yield f"process {child.pid} on {socket.gethostname()}"
+        # Not even SIGKILL leaves the folder locked.
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+    assert read_holder(path) == ""
 
 
 def test_a_description_is_read_as_it_was_written(tmp_path: Path) -> None:
@@ -111,10 +140,7 @@ def test_a_lost_epoch_voids_nothing_that_is_written_later(
             (path / "epoch").unlink()
         elif number == 2 and left is not None:
             (path / "epoch").write_text(left)
-        with (
-            RunFolder(path) as folder,
-            Journal.open(path, epoch=folder.epoch) as journal,
-        ):
+        with opened(path) as (folder, journal):
             folder.confirm()
             assert journal.replay() == events[:number]
             journal.append([event])
@@ -189,24 +215,13 @@ def test_a_second_coordinator_is_refused_and_told_the_holder(
 ) -> None:
     path = tmp_path / "run"
     RunFolder(path, DETAILS).close()
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    ) as child:
-        assert child.stdout is not None
-        assert child.stdout.readline() == b"held\n"
-        name = f"process {child.pid} on {socket.gethostname()}"
+    with held(path) as name:
         assert read_holder(path) == name
         with pytest.raises(RunFolderError, match=f"in use by {name}"):
             RunFolder(path, details)
-        # Not even SIGKILL leaves the folder locked.
-        child.send_signal(signal.SIGKILL)
-        child.wait()
-        assert read_holder(path) == ""
-        with RunFolder(path) as folder:
-            # The refused one did not count.
-            assert folder.epoch == 3
+    with RunFolder(path) as folder:
+        # The refused one did not count.
+        assert folder.epoch == 3
 
 
 def test_reading_the_holder_does_not_refuse_a_coordinator(tmp_path: Path) -> None:
@@ -265,11 +280,8 @@ def test_a_replaced_coordinator_notices_it(tmp_path: Path) -> None:
 
 
 def test_a_lower_epoch_in_the_folder_is_no_takeover(tmp_path: Path) -> None:
-    for _ in range(2):
-        with RunFolder(
-            tmp_path / "run", None if (tmp_path / "run").exists() else DETAILS
-        ):
-            pass
+    RunFolder(tmp_path / "run", DETAILS).close()
+    RunFolder(tmp_path / "run").close()
     with RunFolder(tmp_path / "run") as folder:
         assert folder.epoch == 3
         (tmp_path / "run" / "epoch").write_text("2")
@@ -312,15 +324,7 @@ def test_a_damaged_description_is_refused(
 
 @pytest.mark.parametrize(
     "content",
-    [
-        b"many",
-        b"",
-        b"-3",
-        b"\xff\x00",
-        b"1" * 5000,
-        b"99999999",
-        b"18446744073709551615",
-    ],
+    [b"many", b"", b"-3", b"\xff\x00", b"1" * 5000, b"99999999", b"%d" % (2**64 - 1)],
 )
 def test_a_damaged_epoch_is_replaced_by_one_after_that_of_the_journal(
     tmp_path: Path, content: bytes
@@ -330,10 +334,7 @@ def test_a_damaged_epoch_is_replaced_by_one_after_that_of_the_journal(
     events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(2)]
     RunFolder(path, DETAILS).close()
     for event in events:
-        with (
-            RunFolder(path) as folder,
-            Journal.open(path, epoch=folder.epoch) as journal,
-        ):
+        with opened(path) as (folder, journal):
             (path / "epoch").write_bytes(content)
             with pytest.raises(RunFolderError, match=r"damaged.*revolve resume"):
                 folder.confirm()
@@ -443,23 +444,13 @@ def test_without_file_locks_a_second_coordinator_of_this_machine_is_refused(
             )
         assert read_holder(path) == ""
     assert caplog.text.count(f"{path}: no file locks") == 1
-    with subprocess.Popen(
-        [sys.executable, "-c", NO_LOCKS + HOLD, str(path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    ) as child:
-        assert child.stdout is not None
-        assert child.stdout.readline() == b"held\n"
+    with held(path, NO_LOCKS) as name:
         (tmp_path / "link").symlink_to(path)
-        name = f"process {child.pid} on {socket.gethostname()}"
         for each in (path, tmp_path / "link"):
             assert read_holder(each) == name
             with pytest.raises(RunFolderError, match=f"in use by {name}"):
                 RunFolder(each)
-        child.send_signal(signal.SIGKILL)
-        child.wait()
-        assert read_holder(path) == ""
-        RunFolder(path).close()
+    RunFolder(path).close()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")

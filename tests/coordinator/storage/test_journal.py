@@ -108,13 +108,6 @@ def written(folder: Path) -> list[int]:
     return sizes
 
 
-def test_events_are_read_as_they_were_written(tmp_path: Path) -> None:
-    written(tmp_path)
-    with Journal.open(tmp_path) as journal:
-        assert journal.replay() == EVENTS
-        assert journal.dropped == 0
-
-
 def test_a_batch_has_the_same_bytes_as_single_events(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "all").mkdir()
