@@ -14,8 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
 from analysis.comparison import ablation, robustness
 from analysis.comparison.robustness import table_of
-from analysis.figures.changes import ablation as ablation_figure
-from analysis.figures.changes import robustness as robustness_figure
+from analysis.figures import changes
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.style import save
 from analysis.progress import bars, replaced
@@ -35,6 +34,8 @@ from worker.filters.ablation import all_ablations
 from worker.robot.robustness import all_changes
 
 Row = dict[str, Any]
+
+_OF_ABLATION = ("group", "scope", "kind", "part", "channel")
 
 
 class ReevaluationJob(NamedTuple):
@@ -89,18 +90,10 @@ def write_results(command: str, options: Namespace) -> None:
         RunFolderError: no run, an unfinished one, or a folder that cannot be written.
         RevolveError: no worker is left.
     """
-    study: ModuleType
-    if command == "robustness":
-        name, study, figure, jobs = command, robustness, robustness_figure, _change_jobs
-    else:
-        name, study, figure, jobs = (
-            "ablation",
-            ablation,
-            ablation_figure,
-            _ablation_jobs,
-        )
-    wanted = jobs(options)
-    stem: Path = options.out / name
+    is_ablation = command == "ablate"
+    study: ModuleType = ablation if is_ablation else robustness
+    wanted = (_ablation_jobs if is_ablation else _change_jobs)(options)
+    stem: Path = options.out / ("ablation" if is_ablation else command)
     make_folder(stem.parent)
     path = stem.with_suffix(".parquet")
     for line in replaced(path, "the table", "its runs and its figure"):
@@ -112,7 +105,7 @@ def write_results(command: str, options: Namespace) -> None:
         print(f"{folder}: {study.summary(own)}")
     print(f"{path}: {table.num_rows} evaluations under changes")
     try:
-        save(figure(table), stem)
+        save((changes.ablation if is_ablation else changes.robustness)(table), stem)
     except NothingToDraw as error:
         print(f"left out: figure: {error}")
     else:
@@ -148,31 +141,18 @@ def _ablations(one: Chosen, brains: int) -> Iterator[ReevaluationJob]:
     settings, robot = one.settings, plain(one.robot)
     yield ReevaluationJob(one, None, settings, robot)
     for change in all_ablations(robot, body_space(settings.space)):
-        columns = {
-            "group": change.group,
-            "scope": change.scope,
-            "kind": change.kind,
-            "part": change.part,
-            "channel": change.channel,
-            "change": change.name,
-        }
-        yield ReevaluationJob(
-            one, columns, replace(settings, ablation=change.ablation), robot
-        )
+        columns = {name: getattr(change, name) for name in _OF_ABLATION}
+        columns["change"] = change.name
+        ablated = replace(settings, ablation=change.ablation)
+        yield ReevaluationJob(one, columns, ablated, robot)
     # Other encodings make body and brain of one genome.
     if one.document.encoding.type != REVOLVE_ANGLE:
         return
     birth = BirthId(one.row["island"], one.row["birth"])
     for number in range(brains):
         rng = stream(one.run.seed, one.run.number, birth, number, Purpose.OTHER_BRAIN)
-        columns = {
-            "group": ablation.RANDOM,
-            "scope": "one",
-            "kind": "",
-            "part": None,
-            "channel": number,
-            "change": f"random brain {number + 1}",
-        }
-        yield ReevaluationJob(
-            one, columns, settings, random_brain(rng, robot, one.document)
-        )
+        values = (ablation.RANDOM, "one", "", None, number)
+        columns = dict(zip(_OF_ABLATION, values, strict=True))
+        columns["change"] = f"random brain {number + 1}"
+        other = random_brain(rng, robot, one.document)
+        yield ReevaluationJob(one, columns, settings, other)
