@@ -9,14 +9,14 @@ import pytest
 
 from schema.errors import InvalidRobot
 from schema.formats.files import read_robot
+from tests.docs.page_runner import blocks_of
 
-PAGE = (Path(__file__).parents[2] / "docs" / "robots.md").read_text()
+PAGE = Path(__file__).parents[2] / "docs" / "robots.md"
 
 
 def block(language: str, number: int = 0) -> str:
     """Return a block of a language on the page."""
-    found = re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
-    return str(found[number])
+    return blocks_of(PAGE, language)[number]
 
 
 def test_the_example_runs(
@@ -49,5 +49,5 @@ def test_the_message_is_the_one_of_the_page(
     Path("walker.yaml").write_text(wrong)
     with pytest.raises(InvalidRobot) as error:
         read_robot(Path("walker.yaml"))
-    (quoted,) = re.findall(r"^    (walker\.yaml:.*)$", PAGE, re.MULTILINE)
+    (quoted,) = re.findall(r"^    (walker\.yaml:.*)$", PAGE.read_text(), re.MULTILINE)
     assert str(error.value) == quoted

@@ -46,6 +46,7 @@ from docs.studies.thesis.pictures import digest_in, digests
 from docs.studies.thesis.results import tables_of
 from schema.experiment.file import read_draft, shipped_experiments
 from tests.analysis.drawn import table
+from tests.docs.page_runner import blocks_of
 
 STUDIES = ("ablation", "arena_settings", "equal_evaluations", "learners", "tasks",
            "thesis.results")  # fmt: skip
@@ -357,8 +358,7 @@ def test_arena_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_code_of_the_readme_runs() -> None:
-    page = (DATA / "README.md").read_text("utf-8")
-    blocks = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    blocks = blocks_of(DATA / "README.md", "python")
     assert len(blocks) == 2
     for block in blocks:
         words = [sys.executable, "-W", "error", "-c", block]

@@ -7,12 +7,11 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.recorder import Recorder
 from schema.tables.columns import BIRTHS, EVALUATIONS
 from schema.tables.files import read_table
-from tests.coordinator.conftest import records
+from tests.coordinator.records import make_records
 
 PAGE = Path(__file__).parents[2] / "docs" / "tables.md"
 SEEDS = (7, 2**63 + 1)
@@ -27,8 +26,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         folder = top / "runs" / f"[ä-{seed}] {{*}} ?"
         with RunFolder(folder, details):
             recorder = Recorder(folder, details)
-            for row in records(30):
-                recorder.write(Record(row.table, row.row))
+            for record in make_records(30):
+                recorder.write(record)
             recorder.finish()
     return top
 
