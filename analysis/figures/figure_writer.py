@@ -144,12 +144,8 @@ def draw_figures(
 ) -> Drawings:
     """Draw all figures into a folder, as PDF and PNG, and the best robots as GIF.
 
-    Args:
-        tables: by the names of ``outputs``, and ``benchmark``.
-        runs: by their folders.
-        folder: an existing folder.
-        simulate: returns the worker's simulation, or raises why robots cannot be drawn.
-        bar: shows progress.
+    ``tables`` are those of ``outputs``, and ``benchmark``; ``simulate`` returns the
+    worker's simulation, or raises why robots cannot be drawn.
     """
     writer = FigureWriter(folder)
     lines: dict[str, pa.Table] = {}

@@ -106,11 +106,9 @@ def checked_experiments(
     drafts: Sequence[tuple[str, Draft]],
     check: Callable[[Experiment], None] = lambda _experiment: None,
 ) -> tuple[Experiment, ...]:
-    """Return the experiments of documents that can be runs of one campaign.
+    """Return the experiments of ``read_drafts`` that can be runs of one campaign.
 
-    Args:
-        drafts: of ``read_drafts``.
-        check: raises ``ExperimentError`` for an experiment that is refused.
+    ``check`` may refuse one by an ``ExperimentError``.
 
     Raises:
         ExperimentError: a document is inconsistent or refused, or two experiments have

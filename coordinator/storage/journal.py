@@ -135,11 +135,7 @@ def read_records(
     """Yield sequence number and payload of intact records; advance the position.
 
     A sequence number below ``position.records`` makes the records from it on void.
-
-    Args:
-        data: bytes of the file from ``start`` on.
-        position: position in the file, at least ``start``.
-        start: where the bytes begin in the file.
+    ``data`` are the bytes of the file from ``start`` on.
     """
     while found := _record_at(data, position.end - start):
         (epoch, sequence), end = divmod(found[0], _RECORDS), found[1]
@@ -181,11 +177,7 @@ def is_empty(path: Path, data: bytes) -> bool:
 def check_gap(path: Path, data: bytes, position: Position, start: int = 0) -> None:
     """Raise if an intact record stands anywhere behind the position.
 
-    Args:
-        path: the file, for the message.
-        data: bytes of the file from ``start`` on.
-        position: behind the last intact record.
-        start: where the bytes begin in the file.
+    ``data`` are the bytes of the file from ``start`` on.
 
     Raises:
         RunFolderError: the bytes at the position are damaged.
