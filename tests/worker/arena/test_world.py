@@ -37,6 +37,16 @@ TICK, EXCHANGE = 25, 800
 """Physics steps between two ticks, and before a brain is exchanged."""
 
 
+def test_result_is_independent_of_the_number_of_advances(robot_of: Robots) -> None:
+    newborns = crowd(robot_of, 6, 0.4)
+    whole, pieces = populated(SETTINGS, newborns), populated(SETTINGS, newborns)
+    once = whole.advance(700)
+    for until in (1, 13, 64, 200, 333, 698, 700):
+        last = pieces.advance(until)
+    assert last.digest == once.digest
+    assert last.judgements == once.judgements
+
+
 def test_invalid_changes_change_nothing(robot_of: Robots) -> None:
     world = populated(SETTINGS, crowd(robot_of, 2, 1.0))
     before = world.digest()
