@@ -19,8 +19,8 @@ from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
 from coordinator.evolution.selection import (
-    PARENTS,
-    SURVIVORS,
+    PARENT_RULES,
+    SURVIVOR_RULES,
     Rule,
     rule_of,
 )
@@ -196,8 +196,8 @@ ENCODING = Kind(
 )
 KINDS = (
     ENCODING,
-    _selection_kind("parents", PARENTS, 3),
-    _selection_kind("survivors", SURVIVORS, 4),
+    _selection_kind("parents", PARENT_RULES, 3),
+    _selection_kind("survivors", SURVIVOR_RULES, 4),
     Kind(
         "learner",
         LEARNER,

@@ -110,9 +110,10 @@ def rule_of(selection: SelectionSection, name: str) -> Rule:
     if own := own_rule(selection, name):
         return Rule(key, *own)
     if name == "survivors":
-        return Rule(key, SURVIVORS[path], None, is_own=False)
+        return Rule(key, SURVIVOR_RULES[path], None, is_own=False)
     size = Tournament(selection.tournament_size) if path == "tournament" else None
-    return Rule(key, PARENTS.get(path, random_parents), size, is_own=False)
+    rule = random_parents if path == "none" else PARENT_RULES[path]
+    return Rule(key, rule, size, is_own=False)
 
 
 def select_parents(
@@ -211,12 +212,15 @@ def random_survivors(
     return BufferedRng(rng).sample(range(len(population)), count)
 
 
-PARENTS: dict[str, ParentSelection] = {
+PARENT_RULES: dict[str, ParentSelection] = {
     "tournament": tournament,
     "random": random_parents,
 }
 """Built-in selections of parents; ``none`` selects no parents."""
-SURVIVORS: dict[str, SurvivorSelection] = {"best": best, "random": random_survivors}
+SURVIVOR_RULES: dict[str, SurvivorSelection] = {
+    "best": best,
+    "random": random_survivors,
+}
 """Built-in selections of survivors."""
 
 

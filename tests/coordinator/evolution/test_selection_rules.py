@@ -10,8 +10,8 @@ import pytest
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.kinds import check_rule
 from coordinator.evolution.selection import (
-    PARENTS,
-    SURVIVORS,
+    PARENT_RULES,
+    SURVIVOR_RULES,
     Rule,
     Tournament,
     rule_of,
@@ -19,7 +19,7 @@ from coordinator.evolution.selection import (
     select_survivors,
 )
 from schema.errors import ExperimentError, UnknownPlugin
-from schema.experiment.document import SelectionSection
+from schema.experiment.document import PARENTS, SURVIVORS, SelectionSection
 from schema.plugins import permission
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
@@ -88,10 +88,12 @@ def population(*sizes: int) -> list[Individual]:
 
 def test_built_in_rules_keep_their_contract() -> None:
     # A tournament of one draws from any population.
-    check_rule(Rule("selection.parents", PARENTS["tournament"], Tournament(1)))
-    check_rule(Rule("selection.parents", PARENTS["random"], None))
-    for survivors in SURVIVORS.values():
+    check_rule(Rule("selection.parents", PARENT_RULES["tournament"], Tournament(1)))
+    check_rule(Rule("selection.parents", PARENT_RULES["random"], None))
+    for survivors in SURVIVOR_RULES.values():
         check_rule(Rule("selection.survivors", survivors, None))
+    assert {*PARENT_RULES, "none"} == {*PARENTS}
+    assert {*SURVIVOR_RULES} == {*SURVIVORS}
 
 
 def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
