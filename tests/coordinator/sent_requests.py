@@ -1,5 +1,7 @@
 """Requests about single robots, whose jobs are recorded."""
 
+from typing import Any
+
 from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
@@ -20,10 +22,10 @@ from schema.limits import REQUEST_BYTES
 from schema.parts import BUILT_IN
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Report
+from schema.robot.results import Evaluation
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode, encode
-from schema.wire.messages import Answer, Failure, Request, Result
+from schema.wire.messages import Answer, Request, Result
 from tests.coordinator.sent_jobs import SentJobs
 
 EPOCH = 3
@@ -45,7 +47,6 @@ ROBOT = Robot(
     ),
 )
 JUDGED = Evaluation(0.25, 0.06, 0.05, 12.0)
-VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
 
 
 def request_of(payload: bytes) -> Request:
@@ -54,7 +55,7 @@ def request_of(payload: bytes) -> Request:
 
 
 class SentRequests(SentJobs):
-    """Requests whose jobs are recorded, with two workers and an analyzer."""
+    """Requests whose jobs are recorded, with two workers and two analyzers."""
 
     def __init__(self, evaluation: bytes = b'"evaluation"', audit: float = 0.0) -> None:
         super().__init__()
@@ -73,7 +74,8 @@ class SentRequests(SentJobs):
         self.requests = Requests(context, self.fleet, audit)
         for name in ("one", "two"):
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))
-        self.tell(Joined("judge", "analyzer", 1, "platform"))
+        for name in ("judge", "juror"):
+            self.tell(Joined(name, "analyzer", 1, "platform"))
         self.tell(Ticked(0.0))
 
     def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
@@ -91,9 +93,8 @@ class SentRequests(SentJobs):
         self.now_s += seconds
         self.tell(Ticked(self.now_s))
 
-    def reply(self, result: Result | str, **changes: float) -> Returned:
-        """Return the answer to the newest job; a text is the reason of a failure."""
+    def reply(self, result: Result, /, **changes: Any) -> Returned:  # noqa: ANN401
+        """Return the answer to the newest job, with other values of some fields."""
         number, agent, _ = self.sent[-1]
-        done = Failure(result) if isinstance(result, str) else result
-        answer = replace(Answer(EPOCH, number, 0.5, done), **changes)
+        answer = replace(Answer(EPOCH, number, 0.5, result), **changes)
         return Returned(number, agent, "ok", encode(answer))

@@ -29,10 +29,12 @@ from coordinator.dispatch.events import (
     JobKind,
     Joined,
     Left,
+    Outcome,
     Overdue,
     Progressed,
     Requested,
     Returned,
+    ShardSeen,
     Ticked,
     Withdrawn,
 )
@@ -207,13 +209,6 @@ def test_least_busy_agent_gets_the_job_and_ties_break_on_its_name() -> None:
     assert [agent for ((_, agent),) in out] == ["a", "b", "c", "c", "c", "c", "a", "b"]
 
 
-def test_jobs_go_only_to_agents_of_their_kind() -> None:
-    dispatch = told(Joined("an", "analyzer", 1, "p"))
-    assert given_out(dispatch.handle(Requested(job(0)))) == []
-    assert given_out(dispatch.handle(Requested(job(1, "vet")))) == [(1, "an")]
-    assert (dispatch.agents("worker"), dispatch.waiting("worker")) == (0, 1)
-
-
 def test_jobs_of_an_agent_that_left_go_first_to_others() -> None:
     dispatch = told(worker("a"), *requests(0, 1, 2, 3))
     dispatch.handle(worker("b"))  # takes 2 and 3
@@ -222,40 +217,79 @@ def test_jobs_of_an_agent_that_left_go_first_to_others() -> None:
     assert given_out(dispatch.handle(ok(2, "b"))) == [(1, "b")]
 
 
-def test_loss_of_a_job_after_its_agent_left_changes_nothing() -> None:
-    dispatch = told(worker("a"), *requests(0), worker("b"))
-    assert given_out(dispatch.handle(Left("a"))) == [(0, "b")]
-    assert dispatch.handle(lost(0, "a")) == []
-    assert dispatch.handle(Left("a")) == []
-    assert dispatch.handle(ok(0, "b")) == [Deliver(job(0), "b", "p", b"a0")]
+class Single:
+    """A dispatcher of one job or one advance, which has a number each time.
+
+    Attributes:
+        assigned: its numbers and agents.
+    """
+
+    def __init__(self, shard: int, *names: str) -> None:
+        numbers = count(1)
+        self.dispatch = Dispatch(numbers)
+        self.assigned: list[tuple[int, str]] = []
+        for event in (Ticked(0.0), *map(worker, names)):
+            self.handle(event)
+        kind: JobKind = "evaluate" if shard < 0 else "advance"
+        if shard >= 0:
+            self.handle(ShardSeen(shard, "", client=Client("run", 1)))
+        self._job = Job(next(numbers), kind, shard=shard, client=Client("run", 1))
+        self.handle(Requested(self._job))
+
+    @property
+    def job(self) -> Job:
+        return replace(self._job, number=self.assigned[-1][0])
+
+    def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
+        commands = self.dispatch.handle(event)
+        self.assigned += given_out(commands)
+        return commands
+
+    def come_back(self, outcome: Outcome) -> list[DispatchCommand]:
+        return self.handle(Returned(*self.assigned[-1], outcome, b"a", outcome))
 
 
-def test_agent_that_lost_a_job_is_given_no_job_until_backoff_ends() -> None:
-    dispatch = told(Ticked(10.0), worker("a"), *requests(0))
-    assert dispatch.wake_s is None
-    assert dispatch.handle(lost(0, "a")) == []
-    assert dispatch.wake_s == pytest.approx(10.0 + BACKOFF_S)
-    assert dispatch.handle(Ticked(10.0 + 0.9 * BACKOFF_S)) == []
-    assert given_out(dispatch.handle(Ticked(10.0 + 1.1 * BACKOFF_S))) == [(0, "a")]
+ALIKE = pytest.mark.parametrize("shard", [-1, 0], ids=["job", "advance"])
 
 
-def test_backoff_grows_until_an_answer_arrives() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    backoffs = []
-    for _ in range(9):
-        begin = dispatch._now_s
-        dispatch.handle(lost(0, "a"))
-        assert begin is not None
-        assert dispatch.wake_s is not None
-        backoffs.append(dispatch.wake_s - begin)
-        dispatch.handle(Ticked(dispatch.wake_s))
+@ALIKE
+@pytest.mark.parametrize(
+    "outcome",
+    ["error", "malformed", "unfit", "lost", "fenced", "cancelled", "left"],
+)
+def test_a_job_goes_to_another_agent(shard: int, outcome: Any) -> None:  # noqa: ANN401
+    single = Single(shard, "a", "b")
+    first = single.assigned[0]
+    if outcome == "left":
+        single.handle(Left("a"))
+        single.handle(lost(*first))
+    else:
+        single.handle(Returned(*first, outcome, reason="why"))
+    assert [agent for _, agent in single.assigned] == ["a", "b"]
+    assert single.handle(Returned(*first, "ok", b"late")) == []
+    assert single.come_back("ok") == [Deliver(single.job, "b", "p", b"a")]
+
+
+@ALIKE
+def test_backoff_grows_until_an_answer_arrives(shard: int) -> None:
+    single = Single(shard, "a")
+    now_s, backoffs = 0.0, []
+    assert single.dispatch.wake_s is None
+    outcomes: tuple[Outcome, ...] = ("lost", "malformed", "lost")
+    for outcome in outcomes * 3:
+        assert single.come_back(outcome) == []
+        wake_s = single.dispatch.wake_s
+        assert wake_s is not None
+        assert single.handle(Ticked(now_s + 0.9 * (wake_s - now_s))) == []
+        assert len(single.handle(Ticked(wake_s))) == 1
+        backoffs.append(wake_s - now_s)
+        now_s = wake_s
     doubled = [min(BACKOFF_S * 2**k, LONGEST_BACKOFF_S) for k in range(9)]
     assert backoffs == pytest.approx(doubled)
-    dispatch.handle(ok(0, "a"))
-    dispatch.handle(Requested(job(1)))
-    now_s = dispatch._now_s or 0.0
-    dispatch.handle(lost(1, "a"))
-    assert dispatch.wake_s == pytest.approx(now_s + BACKOFF_S)
+    single.come_back("ok")
+    single.handle(Requested(job(100)))
+    single.handle(lost(100, "a"))
+    assert single.dispatch.wake_s == pytest.approx(now_s + BACKOFF_S)
 
 
 def test_failed_job_goes_to_another_agent() -> None:
@@ -267,54 +301,39 @@ def test_failed_job_goes_to_another_agent() -> None:
     assert given_out(dispatch.handle(ok(1, "b"))) == [(0, "b")]
 
 
-def test_three_errors_are_delivered_with_the_last_reason() -> None:
-    dispatch = told(worker("a"), worker("b"), worker("c"), *requests(0))
-    assert given_out(dispatch.handle(error(0, "a"))) == [(0, "b")]
-    assert given_out(dispatch.handle(error(0, "b"))) == [(0, "c")]
-    assert dispatch.handle(error(0, "c")) == [Deliver(job(0), "c", reason="c cannot")]
-    assert dispatch.pending == 0
+@ALIKE
+def test_errors_end_a_job_and_nothing_else_does(shard: int) -> None:
+    single = Single(shard, "a", "b")
+    outcomes: list[Outcome] = ["lost", "malformed", "cancelled"] * 10
+    outcomes += ["error"] * (MAX_ERRORS - 1)
+    for tick, outcome in enumerate(outcomes, 1):
+        commands = single.come_back(outcome)
+        commands += single.handle(Ticked(10.0 * tick))
+        assert given_out(commands) == single.assigned[tick:]
+        assert len(commands) == 1
+    agents = [agent for _, agent in single.assigned]
+    assert {*agents} == {"a", "b"}
+    given_up = Deliver(single.job, agents[-1], reason="error")
+    assert single.come_back("error") == [given_up]
+    assert single.dispatch.pending == 0
 
 
-def test_only_agent_gets_the_failed_job_again() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    delivered: list[DispatchCommand] = []
-    for tries in range(1, MAX_ERRORS + 1):
-        delivered = dispatch.handle(error(0, "a"))
-        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == (
-            [(0, "a")] if tries < MAX_ERRORS else []
-        )
-    assert delivered == [Deliver(job(0), "a", reason="a cannot")]
-
-
-def test_lost_jobs_are_never_given_up() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    for tries in range(1, 20):
-        assert dispatch.handle(lost(0, "a")) == []
-        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(0, "a")]
-
-
-def test_the_network_waits_for_a_multiple_of_the_typical_duration() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    assert dispatch.wait_s(Assign(job(0), "a")) == LONGEST_WAIT_S
-    dispatch.handle(replace(ok(0, "a"), took_s=20.0))
-    assert dispatch.wait_s(Assign(job(1), "a")) == pytest.approx(2000.0)
+@pytest.mark.parametrize("kind", ["evaluate", "call"])
+@pytest.mark.parametrize(
+    ("took_s", "wait_s"), [(20.0, 2000.0), (0.01, LEAST_WAIT_S), (1e9, LONGEST_WAIT_S)]
+)
+def test_the_network_waits_for_a_multiple_of_the_typical_duration(
+    kind: JobKind, took_s: float, wait_s: float
+) -> None:
+    """It holds memory of each request until then, and there may be millions."""
+    dispatch = told(Ticked(0.0), worker("a"), Requested(job(0, kind)))
+    assert dispatch.wait_s(Assign(job(0, kind), "a")) == LONGEST_WAIT_S
+    dispatch.handle(replace(ok(0, "a"), took_s=took_s))
+    assert dispatch.wait_s(Assign(job(1, kind), "a")) == pytest.approx(wait_s)
+    other: JobKind = "call" if kind == "evaluate" else "evaluate"
+    assert dispatch.wait_s(Assign(job(1, other), "a")) == LONGEST_WAIT_S
     assert longer_s(2000.0) == 20_000.0
     assert longer_s(200_000.0) == LONGEST_WAIT_S
-
-
-def test_the_network_waits_for_a_least_time() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    dispatch.handle(replace(ok(0, "a"), took_s=0.01))
-    assert dispatch.wait_s(Assign(job(1), "a")) == LEAST_WAIT_S
-
-
-def test_the_network_does_not_wait_long_for_replies_to_short_calls() -> None:
-    """It holds memory of each request until then, and there may be millions."""
-    dispatch = told(Ticked(0.0), worker("a"), Requested(job(0, "call")))
-    assert dispatch.wait_s(Assign(job(1, "call"), "a")) == LONGEST_WAIT_S
-    dispatch.handle(replace(ok(0, "a"), took_s=0.01))
-    assert dispatch.wait_s(Assign(job(1, "call"), "a")) == LEAST_WAIT_S
-    assert dispatch.wait_s(Assign(job(1, "evaluate"), "a")) == LONGEST_WAIT_S
 
 
 def test_nothing_is_learned_from_an_agent_that_is_back_with_the_answer() -> None:
@@ -324,14 +343,6 @@ def test_nothing_is_learned_from_an_agent_that_is_back_with_the_answer() -> None
     assert dispatch.handle(replace(ok(0, "a"), took_s=0.001))
     assert dispatch.workers.agents["a"].job_s == 0.0
     assert dispatch.wait_s(Assign(job(2), "a")) == LONGEST_WAIT_S
-
-
-def test_late_answers_change_nothing() -> None:
-    dispatch = told(worker("a"), *requests(0))
-    assert dispatch.handle(ok(7, "a")) == []
-    assert dispatch.handle(ok(0, "b")) == []
-    assert len(dispatch.handle(ok(0, "a"))) == 1
-    assert dispatch.handle(ok(0, "a")) == []
 
 
 def test_repeated_events_change_nothing() -> None:
@@ -414,15 +425,6 @@ def test_each_copy_of_a_job_is_timed_from_its_own_assignment(
     assert learned == pytest.approx(job_s)
 
 
-def test_a_copy_survives_the_loss_of_the_other() -> None:
-    for gone in ("a", "b"):
-        dispatch = late()
-        dispatch.handle(Ticked(9.0))
-        dispatch.handle(Left(gone))
-        (other,) = {"a", "b"} - {gone}
-        assert dispatch.handle(ok(1, other))[0] == Deliver(job(1), other, "p", b"a1")
-
-
 def test_no_agent_gets_a_copy_of_a_job_that_it_has_or_failed_at() -> None:
     dispatch = late()
     dispatch.handle(Ticked(9.0))
@@ -430,12 +432,6 @@ def test_no_agent_gets_a_copy_of_a_job_that_it_has_or_failed_at() -> None:
     assert given_out(dispatch.handle(Ticked(99.0))) == [(2, "b")]
     assert dispatch.handle(ok(2, "b"))[0] == Deliver(job(2), "b", "p", b"a2")
     assert given_out(dispatch.handle(Ticked(199.0))) == []
-
-
-def test_first_job_of_all_is_duplicated_though_no_duration_is_known() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0), worker("b"))
-    assert dispatch.handle(Ticked(FIRST_S)) == []
-    assert given_out(dispatch.handle(Ticked(FIRST_S + 0.3))) == [(0, "b")]
 
 
 def silent(dispatch: Dispatch, now_s: float) -> list[DispatchCommand]:
@@ -727,47 +723,27 @@ def test_many_waiting_jobs_are_withdrawn_in_linear_time() -> None:
     assert seconds(10_000) < 100.0 * few_s
 
 
-def test_an_agent_that_works_is_never_called_silent() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
-    for minute in range(1, 100):
-        commands = dispatch.handle(Ticked(FIRST_S * minute + 1.0))
-        assert {type(command) for command in commands} <= {AskProgress}
-        if commands:
-            dispatch.handle(Progressed("a"))
-
-
-def test_job_that_crashed_three_processes_is_given_up() -> None:
-    dispatch = told(worker("a"), worker("b"), *requests(0))
-    for number, name in enumerate(("a", "b")):
-        assert given_out(dispatch.handle(Left(name))) == [(0, "b")][number:]
-        assert dispatch.handle(died(0, name)) == []
-    assert dispatch.handle(died(0, "a")) == []  # told twice
-    assert given_out(dispatch.handle(worker("c"))) == [(0, "c")]
-    dispatch.handle(Left("c"))
+@ALIKE
+def test_job_that_crashed_three_processes_is_given_up(shard: int) -> None:
+    single = Single(shard, "a", "b", "c")
+    number, _ = single.assigned[0]
+    # "a" has the job and is there, the others never had it.
+    for name in "abxyz":
+        assert single.handle(died(number, name)) == []
+    for name in "abc":
+        single.handle(Left(name))
+    first, second, third = single.assigned
+    assert [agent for _, agent in single.assigned] == ["a", "b", "c"]
+    single.handle(worker("d"))
+    for lost_by in (first, second, first, second):
+        assert single.handle(died(*lost_by)) == []
     reason = "ended its own process 3 times, by SIGPROF, SIGSEGV"
-    assert dispatch.handle(died(0, "c", "SIGPROF")) == [
-        Deliver(job(0), "c", reason=reason, is_deadly=True)
+    assert single.handle(died(*third, "SIGPROF")) == [
+        Deliver(single.job, "c", reason=reason, is_deadly=True),
+        Cancel(single.job, "d"),
     ]
-    assert dispatch.pending == dispatch.waiting("worker") == 0
-    assert dispatch.handle(died(0, "d")) == []
-
-
-def test_deaths_of_agents_that_did_not_lose_the_job_do_not_count() -> None:
-    dispatch = told(worker("a"), worker("b"), *requests(0))
-    # "a" has the job and is there, "b" and "x" never had it.
-    for name in ("a", "b", "x", "y", "z"):
-        assert dispatch.handle(died(0, name)) == []
-    assert dispatch.handle(ok(0, "a")) == [Deliver(job(0), "a", "p", b"a0")]
-
-
-def test_deadly_job_is_cancelled_where_it_still_runs() -> None:
-    dispatch = told(*requests(0))
-    for name in ("a", "b", "c", "z"):
-        dispatch.handle(worker(name))
-        if name != "z":
-            dispatch.handle(Left(name))
-    commands = [dispatch.handle(died(0, name)) for name in ("a", "b", "c")]
-    assert commands[2][1:] == [Cancel(job(0), "z")]
+    assert single.dispatch.pending == single.dispatch.waiting("worker") == 0
+    assert single.handle(died(*third)) == []
 
 
 def test_paired_jobs_go_to_two_workers_if_there_are_two() -> None:

@@ -1,7 +1,5 @@
 """One fleet for several runs: answers are routed to the clients of their jobs."""
 
-from typing import Literal
-
 import pytest
 
 from coordinator.dispatch.events import (
@@ -11,19 +9,19 @@ from coordinator.dispatch.events import (
     Job,
     Joined,
     Left,
+    Outcome,
     Read,
     Returned,
     Ticked,
 )
 from coordinator.dispatch.fleet import JobRouter
-from coordinator.dispatch.pool import FIRST_S, LEAST_WAIT_S, LONGEST_WAIT_S, REPLY_S
+from coordinator.dispatch.pool import FIRST_S, LONGEST_WAIT_S, REPLY_S
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.codec import fingerprint
 from schema.wire.messages import Crash, RunningJob
 from tests.coordinator.sent_jobs import SentJobs
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
-EMPTY = fingerprint(b"")
 
 
 def read(data: bytes) -> object:
@@ -66,15 +64,28 @@ def ended(end: Deliver) -> tuple[int, str, object, str]:
     return end.job.shard, end.agent, end.answer, end.reason
 
 
+def begin(fleet: JobRouter, *, is_arena: bool) -> Client:
+    """Request a job, or an advance; return its client."""
+    if is_arena:
+        fleet.advance(new_shard(fleet))
+    else:
+        request(fleet)
+    return ARENA if is_arena else CLIENT
+
+
+ALIKE = pytest.mark.parametrize("is_arena", [False, True])
+
+
 def test_an_answer_goes_to_its_client(fleet: JobRouter, agents: SentJobs) -> None:
-    numbers = [request(fleet, client) for client in (CLIENT, OTHER, CLIENT)]
+    numbers = [request(fleet, client) for client in (CLIENT, OTHER)]
+    shard = new_shard(fleet)
+    fleet.advance(shard)
     assert fleet.open == 3
-    agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[:2]]
-    (first,), (second,) = fleet.listen(0.0, 1.0).values()
-    assert isinstance(first, Deliver)
-    assert isinstance(second, Deliver)
-    assert [first.job.client, second.job.client] == [CLIENT, OTHER]
-    assert [first.job.number, second.job.number] == numbers[:2]
+    agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[1:]]
+    ends = fleet.listen(0.0, 1.0)
+    assert list(ends) == [OTHER, ARENA]
+    assert ends[OTHER][0].job.number == numbers[1]
+    assert ended(*ends[ARENA]) == (shard, agents.sent[2][1], b"x", "")
     assert fleet.open == 1
     assert fleet.listen(0.0, 2.0) == {}
 
@@ -86,60 +97,49 @@ def test_credits_count_the_workers_that_joined(fleet: JobRouter) -> None:
     assert fleet.dispatch.credits == 2
 
 
+@pytest.mark.parametrize("outcome", ["ok", "expired", "cancelled"])
 def test_jobs_of_a_client_that_left_are_withdrawn(
-    fleet: JobRouter, agents: SentJobs
+    fleet: JobRouter, agents: SentJobs, outcome: Outcome
 ) -> None:
     request(fleet)
     fleet.leave(CLIENT)
     assert fleet.open == 0
-    number, agent, payload = agents.sent[0]
+    ((number, agent, payload),) = agents.sent
     assert agents.cancelled == [(agent, payload)]
-    agents.news = [Returned(number, agent, "ok", b"x")]
-    assert fleet.listen(0.0, 1.0) == {}
+    agents.news = [Returned(number, agent, outcome, b"x", took_s=300.0)]
+    assert fleet.listen(0.0, 300.0) == {}
+    assert [each.kind for each in fleet.faults.counts] == ["late"] * (outcome == "ok")
     # And its worker is free for other clients.
     for _ in range(5):
         request(fleet, OTHER)
     assert len(agents.sent) == 6
 
 
-def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
-    fleet: JobRouter, agents: SentJobs
+@ALIKE
+def test_only_crashes_by_its_own_request_count(
+    fleet: JobRouter, agents: SentJobs, *, is_arena: bool
 ) -> None:
-    request(fleet)
-    waiting = [request(fleet, each) for each in (CLIENT, OTHER, OTHER, OTHER, CLIENT)][
-        -1
-    ]
-    assert waiting not in [number for number, _, _ in agents.sent]
-    fleet.leave(CLIENT)
-    (number, agent, _), *rest = agents.sent
-    fleet.tell(Left(agent))
-    fleet.tell(Crash(RunningJob(agent, "run", 1, number, EMPTY), "SIGSEGV"))
-    fleet.tell(Joined("three", "worker", 9, "p"))
-    again = [each for each, _, _ in agents.sent[1 + len(rest) :]]
-    assert number not in again
-    assert waiting not in again
-    assert fleet.dispatch.pending == 3
-
-
-def test_deaths_by_jobs_of_other_coordinators_do_not_count(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    number = request(fleet)
-    names = ["one", "two", "x"]
-    fleet.tell(Left("one"))
-    fleet.tell(Left("two"))
-    fleet.tell(Joined("x", "worker", 1, "p"))
-    fleet.tell(Left("x"))
-    assert [agent for _, agent, _ in agents.sent] == names
-    for name in names:
-        fleet.tell(Crash(RunningJob(name, "another run", 1, number, EMPTY), "SIGSEGV"))
-    assert fleet.listen(0.0, 1.0) == {}
-    for name in names:
-        fleet.tell(Crash(RunningJob(name, "run", 1, number, EMPTY), "SIGSEGV"))
-    (end,) = fleet.listen(0.0, 1.0)[CLIENT]
-    assert isinstance(end, Deliver)
+    """Not those of other runs and epochs, of other processes, or by other content."""
+    client = begin(fleet, is_arena=is_arena)
+    own, strange = client.run, fingerprint(b"deadly")
+    for name in ("three", "four", "five"):
+        number, agent, payload = agents.sent[-1]
+        fleet.tell(Joined(name, "worker", 1, "p"))
+        fleet.tell(Left(agent))
+        same = fingerprint(payload)
+        for crashed in (
+            RunningJob(agent, "another run", 1, number, same),
+            RunningJob(agent, own, 2, number, same),
+            RunningJob(f"not {agent}", own, 1, number, same),
+            RunningJob(agents.sent[-1][1], own, 1, agents.sent[-1][0], same),
+            RunningJob(agent, own, 1, number, strange),
+        ):
+            fleet.tell(Crash(crashed, "SIGSEGV"))
+        assert fleet.listen(0.0, 1.0) == {}
+        fleet.tell(Crash(RunningJob(agent, own, 1, number, same), "SIGSEGV"))
+    (end,) = fleet.listen(0.0, 1.0)[client]
     assert end.is_deadly
-    assert agents.sent
+    assert fleet.faults.total("death") == 3 * 3
 
 
 def test_late_and_second_answers_are_counted_as_late(
@@ -155,39 +155,23 @@ def test_late_and_second_answers_are_counted_as_late(
     assert [(count.kind, count.count) for count in fleet.faults.counts] == [("late", 3)]
 
 
-def test_deaths_by_what_no_job_can_have_done_are_counted(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    """The process never had the job, has it still, or died of other content."""
-    number = request(fleet)
-    other = fingerprint(b"deadly")
-    fleet.tell(Left(agents.sent[0][1]))
-    (first, _), (second, _) = [sent[1:] for sent in agents.sent]
-    for name, content in (("x", EMPTY), (second, EMPTY), (first, other)):
-        fleet.tell(Crash(RunningJob(name, "run", 1, number, content), "SIGSEGV"))
-    assert fleet.faults.total("death") == 3
-    assert fleet.open == 1
-
-
+@ALIKE
 @pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
 def test_a_job_that_its_agent_declined_is_given_to_another(
-    fleet: JobRouter, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
+    fleet: JobRouter, agents: SentJobs, outcome: Outcome, *, is_arena: bool
 ) -> None:
     """Nobody's word about epochs ends a job, and it never counts as an error."""
-    request(fleet)
+    client = begin(fleet, is_arena=is_arena)
     for now_s in range(1, 7):
         number, agent, _ = agents.sent[-1]
         agents.news = [Returned(number, agent, outcome, reason="epoch 9 has begun")]
         assert fleet.listen(0.0, 10.0 * now_s) == {}
         fleet.tell(Ticked(10.0 * now_s + 5.0))
     assert len(agents.sent) == 7
-    told = fleet.fenced()
+    is_fenced = outcome == "fenced"
+    assert [each.client for each in fleet.fenced()] == [client] * 6 * is_fenced
     assert fleet.fenced() == []
-    if outcome == "fenced":
-        assert {each.client for each in told} == {CLIENT}
-        assert len(told) == 6
-    else:
-        assert fleet.faults.total("cancelled") == 6
+    assert fleet.faults.total("cancelled") == 6 * (not is_fenced)
 
 
 def test_a_job_whose_wait_is_over_stays_with_its_worker(
@@ -212,18 +196,6 @@ def test_a_job_whose_wait_is_over_stays_with_its_worker(
     assert (fleet.faults.total("late"), fleet.open) == (0, 0)
 
 
-def test_a_job_that_is_not_wanted_any_more_is_not_sent_again(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    request(fleet)
-    ((number, agent, _),) = agents.sent
-    fleet.leave(CLIENT)
-    agents.news = [Returned(number, agent, "expired", took_s=300.0)]
-    assert fleet.listen(0.0, 300.0) == {}
-    assert len(agents.sent) == 1
-    assert fleet.dispatch.assigned("worker") == 0
-
-
 def test_a_job_that_was_sent_again_took_all_the_time(
     fleet: JobRouter, agents: SentJobs
 ) -> None:
@@ -243,35 +215,18 @@ def test_a_job_that_was_sent_again_took_all_the_time(
     assert agents.waits_s[-1] == pytest.approx(100.0 * typical_s)
 
 
-def advance_until(
-    fleet: JobRouter, agents: SentJobs, shard: int, *times_s: float
-) -> None:
-    """Advance a shard several times; the answers come at these times."""
-    for now_s in times_s:
-        fleet.advance(shard)
-        number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, "ok", b"x")]
-        fleet.listen(0.0, now_s)
-
-
-def test_an_advance_waits_for_a_multiple_of_the_typical_duration(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    shard = new_shard(fleet)
-    advance_until(fleet, agents, shard, 20.0, 40.0)
-    fleet.advance(shard)
-    # The first one holds what is needed to rebuild the state.
-    assert agents.waits_s == [LONGEST_WAIT_S, LONGEST_WAIT_S, pytest.approx(2000.0)]
-
-
 def test_advances_after_one_that_expired_wait_longer(
     fleet: JobRouter, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
-    advance_until(fleet, agents, shard, 1.0, 2.0)
+    for now_s in (10.0, 20.0):
+        fleet.advance(shard)
+        number, agent, _ = agents.sent[-1]
+        agents.news = [Returned(number, agent, "ok", b"x")]
+        fleet.listen(0.0, now_s)
     fleet.advance(shard)
     number, agent, payload = agents.sent[-1]
-    fleet.tell(Ticked(302.0))
+    fleet.tell(Ticked(320.0))
     fleet.tell(Returned(number, agent, "expired", took_s=300.0))
     assert agents.sent[-1] == (number, agent, payload)
     # Another worker ends it: nothing is learned from an advance that is rebuilt.
@@ -279,10 +234,11 @@ def test_advances_after_one_that_expired_wait_longer(
     number, agent, payload = agents.sent[-1]
     assert payload == b"whole True"
     agents.news = [Returned(number, agent, "ok", b"x")]
-    fleet.listen(0.0, 303.0)
+    fleet.listen(0.0, 321.0)
     fleet.advance(shard)
-    assert agents.waits_s[:3] == [LONGEST_WAIT_S, LONGEST_WAIT_S, LEAST_WAIT_S]
-    assert agents.waits_s[-1] == pytest.approx(100.0 * (0.9 * 1.0 + 0.1 * 300.0))
+    # The first one holds what is needed to rebuild the state.
+    assert agents.waits_s[:3] == [LONGEST_WAIT_S, LONGEST_WAIT_S, 100.0 * 10.0]
+    assert agents.waits_s[-1] == pytest.approx(100.0 * (0.9 * 10.0 + 0.1 * 300.0))
 
 
 def test_a_state_that_cannot_be_read_ends_only_its_own_run(
@@ -304,49 +260,6 @@ def test_a_state_that_cannot_be_read_ends_only_its_own_run(
     ]
     assert fleet.open == 0
     assert not any(a.busy for a in fleet.dispatch.workers.agents.values())
-
-
-@pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
-def test_an_advance_that_its_worker_declined_is_repeated(
-    fleet: JobRouter, agents: SentJobs, outcome: Literal["fenced", "cancelled"]
-) -> None:
-    fleet.advance(new_shard(fleet))
-    for now_s in range(1, 7):
-        number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, outcome)]
-        assert fleet.listen(0.0, 10.0 * now_s) == {}
-        fleet.tell(Ticked(10.0 * now_s + 5.0))
-    assert len(agents.sent) == 7
-    clients = [each.client for each in fleet.fenced()]
-    assert clients == [ARENA] * (6 if outcome == "fenced" else 0)
-
-
-def test_a_cancelled_copy_that_is_not_wanted_is_no_fault(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    request(fleet)
-    fleet.leave(CLIENT)
-    number, agent, _ = agents.sent[0]
-    agents.news = [Returned(number, agent, "cancelled")]
-    fleet.listen(0.0, 1.0)
-    assert fleet.faults.counts == ()
-
-
-def test_arenas_of_all_runs_share_the_workers(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    shards = [new_shard(fleet, ARENA), new_shard(fleet, OTHER)]
-    for shard in shards:
-        fleet.advance(shard)
-    assert sorted(agent for _, agent, _ in agents.sent) == ["one", "two"]
-    assert fleet.open == 2
-    number, agent, payload = agents.sent[1]
-    assert payload == b"whole True"
-    agents.news = [Returned(number, agent, "ok", b"answer")]
-    ends = fleet.listen(0.0, 1.0)
-    assert list(ends) == [OTHER]
-    assert ended(*ends[OTHER]) == (shards[1], agent, b"answer", "")
-    assert fleet.open == 1
 
 
 @pytest.mark.parametrize("is_answer", [True, False])
@@ -446,28 +359,6 @@ def test_a_worker_without_the_state_is_given_it(
     payloads = [payload for _, _, payload in agents.sent]
     assert payloads == [b"whole True", b"whole False", b"whole True"]
     assert {agent for _, agent, _ in agents.sent} == {agent}
-
-
-def test_an_advance_that_crashes_three_workers_is_given_up(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    shard = new_shard(fleet)
-    fleet.advance(shard)
-    for name in ("three", "four", "five"):
-        number, agent, payload = agents.sent[-1]
-        fleet.tell(Joined(name, "worker", 1, "p"))
-        fleet.tell(Left(agent))
-        same = fingerprint(payload)
-        for died in (
-            Crash(RunningJob(agent, "another run", 1, number, same), "SIGSEGV"),
-            Crash(RunningJob(f"not {agent}", "arena", 1, number, same), "SIGSEGV"),
-            Crash(RunningJob(agent, "arena", 1, number, EMPTY), "SIGSEGV"),
-        ):
-            fleet.tell(died)
-        assert fleet.listen(0.0, 1.0) == {}
-        fleet.tell(Crash(RunningJob(agent, "arena", 1, number, same), "SIGSEGV"))
-    (end,) = fleet.listen(0.0, 1.0)[ARENA]
-    assert ended(end)[:3] == (shard, agent, None)
 
 
 def test_a_released_arena_leaves_room_for_another(

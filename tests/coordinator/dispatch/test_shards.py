@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import pytest
 
-from coordinator.dispatch.dispatch import MAX_ERRORS, Dispatch
+from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
     AskProgress,
     Assign,
@@ -29,7 +29,6 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.homes import DRIFT_S, LEAST_S
 from coordinator.dispatch.pool import FIRST_S, PATIENCE, REPLY_S
 from schema.errors import UnexpectedEvent
-from schema.wire.messages import Crash, RunningJob
 
 
 class Sent(NamedTuple):
@@ -89,12 +88,6 @@ class Fleet:
         agent = self._agents[number]
         return self.handle(Returned(number, agent, outcome, reason=reason))
 
-    def crashed(self, number: int, agent: str) -> list[Command]:
-        return self.handle(Crash(RunningJob(agent, "", 0, number), "SIGSEGV"))
-
-    def has_lost(self, number: int, agent: str) -> bool:
-        return self._dispatch.has_lost(agent, number)
-
     def _short(self, command: object) -> Command:
         match command:
             case Assign(job, agent, platform, is_whole):
@@ -123,27 +116,23 @@ def fleet(*names: str) -> Fleet:
     return dispatch
 
 
-def test_first_advance_is_whole_and_the_next_goes_on() -> None:
-    dispatch = fleet("b", "a")
-    assert dispatch.request(0) == [Sent(1, 0, "a", "p", is_whole=True)]
-    assert dispatch.returned(1) == [Ended(0, "a")]
-    assert dispatch.request(0) == [Sent(2, 0, "a", "p", is_whole=False)]
-
-
-def test_shard_waits_for_a_worker() -> None:
+def test_only_a_worker_of_the_first_platform_continues_a_shard() -> None:
     dispatch = fleet()
+    dispatch.handle(joined("b", "arm"))
+    dispatch.handle(joined("a", "arm"))
+    assert dispatch.request(0) == [Sent(1, 0, "a", "arm", is_whole=True)]
+    with pytest.raises(UnexpectedEvent, match="requested already"):
+        dispatch.request(0)
+    assert dispatch.returned(1) == [Ended(0, "a")]
+    assert dispatch.request(0) == [Sent(3, 0, "a", "arm", is_whole=False)]
+    dispatch.returned(3)
+    for name in "ab":
+        assert dispatch.handle(Left(name)) == []
+    dispatch.handle(joined("c", "x86"))
     assert dispatch.request(0) == []
-    assert dispatch.waiting == {0: ""}
-    assert dispatch.handle(joined("x", kind="analyzer")) == []
-    assert dispatch.handle(joined("a")) == [Sent(1, 0, "a", "p", is_whole=True)]
-    assert dispatch.waiting == {}
-
-
-def test_shards_spread_over_workers() -> None:
-    dispatch = fleet("a", "b")
-    agents = [dispatch.request(number)[0] for number in range(4)]
-    assert [hand.agent for hand in agents if isinstance(hand, Sent)] == list("abab")
-    assert dispatch.holder(2) == "a"
+    assert dispatch.waiting == {0: "arm"}
+    whole = Sent(4, 0, "d", "arm", is_whole=True)
+    assert dispatch.handle(joined("d", "arm")) == [whole]
 
 
 def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
@@ -156,14 +145,6 @@ def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
     assert dispatch.returned(2) == [Ended(0, "b")]
 
 
-def test_holder_that_dies_between_advances() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    dispatch.returned(1)
-    assert dispatch.handle(Left("a")) == []
-    assert dispatch.request(0) == [Sent(2, 0, "b", "p", is_whole=True)]
-
-
 def test_worker_without_the_state_is_given_it() -> None:
     dispatch = fleet("a", "b")
     dispatch.request(0)
@@ -174,121 +155,10 @@ def test_worker_without_the_state_is_given_it() -> None:
     assert dispatch.returned(3, "stateless") == [Sent(4, 0, "b", "p", is_whole=True)]
 
 
-@pytest.mark.parametrize("outcome", ["error", "lost"])
-def test_failed_advance_goes_to_another_worker(outcome: str) -> None:
-    dispatch = fleet("a", "b")
-    dispatch.handle(Ticked(10.0))
-    dispatch.request(0)
-    assert dispatch.returned(1, outcome, "why") == [  # type: ignore[arg-type]
-        Sent(2, 0, "b", "p", is_whole=True)
-    ]
-
-
-def test_only_worker_gets_the_failed_advance_again_after_its_backoff() -> None:
-    dispatch = fleet("a")
-    dispatch.handle(Ticked(10.0))
-    dispatch.request(0)
-    assert dispatch.returned(1, "lost") == []
-    assert dispatch.handle(Ticked(10.01)) == []
-    assert dispatch.handle(Ticked(10.05)) == [Sent(2, 0, "a", "p", is_whole=True)]
-
-
-def test_advance_that_crashed_three_workers_is_given_up() -> None:
-    dispatch = fleet("a", "b", "c")
-    dispatch.request(0)
-    for number, name, following in ((1, "a", "b"), (2, "b", "c")):
-        hand = Sent(number + 1, 0, following, "p", is_whole=True)
-        assert dispatch.handle(Left(name)) == [hand]
-        assert dispatch.has_lost(number, name)
-        assert dispatch.crashed(number, name) == []
-    assert dispatch.handle(Left("c")) == []
-    reason = f"ended its own process {MAX_ERRORS} times, by SIGSEGV"
-    ended = dispatch.crashed(3, "c")
-    assert ended == [Ended(0, "c", reason)]
-    assert dispatch.handle(joined("d")) == []
-
-
-def test_crashes_of_a_finished_advance_are_forgotten() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    dispatch.handle(Left("a"))
-    assert dispatch.returned(2) == [Ended(0, "b")]
-    assert not dispatch.has_lost(1, "a")
-    assert dispatch.crashed(1, "a") == []
-
-
-def test_errors_of_several_workers_end_an_advance_and_losses_do_not() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    now_s, number = 0.0, 1
-    outcomes: list[Outcome] = ["lost"] * 10
-    for outcome in outcomes + ["error"] * (MAX_ERRORS - 1):
-        hands = dispatch.returned(number, outcome, "no")
-        now_s += 10.0
-        hands += dispatch.handle(Ticked(now_s))
-        (hand,) = hands
-        assert isinstance(hand, Sent)
-        number += 1
-        assert hand.number == number
-    agent = dispatch.holder(0)
-    given_up = dispatch.returned(number, "error", "no")
-    assert given_up == [Ended(0, agent, "no")]
-
-
-def test_any_number_of_malformed_answers_only_lets_the_shard_rest() -> None:
-    dispatch = Fleet()
-    dispatch.handle(joined("a", "x86"))
-    dispatch.request(0)
-    for number in range(1, 1300):
-        assert dispatch.returned(number, "malformed", "no") == []
-        assert len(dispatch.handle(Ticked(10.0 * number))) == 1
-
-
-def test_a_shard_that_may_not_drift_waits_for_its_platform() -> None:
-    dispatch = Fleet(allows_drift=True)
-    dispatch.handle(joined("a", "arm"))
-    dispatch.handle(ShardSeen(0, "x86", may_drift=False))
-    assert dispatch.request(0) == []
-    for now_s in (1.0, 100.0, 1000.0):
-        assert dispatch.handle(Ticked(now_s)) == []
-    assert dispatch.waiting == {0: "x86"}
-
-
-def test_only_a_worker_of_an_equal_platform_continues_a_shard() -> None:
-    dispatch = Fleet()
-    dispatch.handle(joined("a", "arm"))
-    dispatch.handle(joined("b", "x86"))
-    dispatch.handle(ShardSeen(0, "x86"))
-    assert dispatch.request(0) == [Sent(1, 0, "b", "x86", is_whole=True)]
-    assert dispatch.handle(Left("b")) == []
-    assert dispatch.waiting == {0: "x86"}
-    assert dispatch.handle(joined("c", "x86")) == [
-        Sent(2, 0, "c", "x86", is_whole=True)
-    ]
-
-
-def test_first_advance_decides_the_platform() -> None:
-    dispatch = Fleet()
-    dispatch.handle(joined("a", "arm"))
-    dispatch.request(0)
-    dispatch.returned(1)
-    dispatch.handle(Left("a"))
-    dispatch.handle(joined("b", "x86"))
-    assert dispatch.request(0) == []
-    assert dispatch.waiting == {0: "arm"}
-
-
-def test_second_request_for_a_shard_raises() -> None:
-    dispatch = fleet("a")
-    dispatch.request(0)
-    with pytest.raises(UnexpectedEvent, match="requested already"):
-        dispatch.request(0)
-
-
-def drifting(*, allows_drift: bool) -> Fleet:
+def drifting(*, allows_drift: bool = True, may_drift: bool = True) -> Fleet:
     """Return a shard dispatcher whose shard ran on a platform that has left."""
     dispatch = Fleet(allows_drift=allows_drift)
-    dispatch.handle(ShardSeen(0, "theirs"))
+    dispatch.handle(ShardSeen(0, "theirs", may_drift))
     dispatch.handle(joined("b", "ours"))
     dispatch.handle(joined("a", "ours"))
     assert dispatch.request(0) == []
@@ -298,7 +168,7 @@ def drifting(*, allows_drift: bool) -> Fleet:
 
 
 def test_shard_drifts_to_another_platform_after_a_while_if_allowed() -> None:
-    dispatch = drifting(allows_drift=True)
+    dispatch = drifting()
     assert dispatch.wake_s == 100.0 + DRIFT_S
     assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
     whole = Sent(1, 0, "a", "ours", is_whole=True)
@@ -322,7 +192,7 @@ def test_shard_that_may_drift_waits_for_a_worker_and_not_for_a_time() -> None:
 
 
 def test_shard_does_not_drift_if_its_platform_returns_in_time() -> None:
-    dispatch = drifting(allows_drift=True)
+    dispatch = drifting()
     assert dispatch.handle(joined("z", "theirs")) == [
         Sent(1, 0, "z", "theirs", is_whole=True)
     ]
@@ -333,8 +203,9 @@ def test_shard_does_not_drift_if_its_platform_returns_in_time() -> None:
     assert len(dispatch.handle(Ticked(110.0 + DRIFT_S))) == 1
 
 
-def test_shard_does_not_drift_unless_allowed() -> None:
-    dispatch = drifting(allows_drift=False)
+@pytest.mark.parametrize("allows_drift", [True, False])
+def test_shard_does_not_drift_unless_allowed(*, allows_drift: bool) -> None:
+    dispatch = drifting(allows_drift=allows_drift, may_drift=not allows_drift)
     assert dispatch.wake_s is None
     assert dispatch.handle(Ticked(1e9)) == []
 
@@ -342,10 +213,13 @@ def test_shard_does_not_drift_unless_allowed() -> None:
 def test_advances_are_counted_while_they_wait_and_while_a_worker_has_them() -> None:
     dispatch = fleet()
     shards = dispatch.homes
-    dispatch.request(0)
-    dispatch.request(1)
+    for shard in (0, 1):
+        assert dispatch.request(shard) == []
+    assert dispatch.handle(joined("x", kind="analyzer")) == []
+    assert dispatch.waiting == {0: "", 1: ""}
     assert (shards.unassigned, shards.assigned) == (2, 0)
     dispatch.handle(joined("a"))
+    assert dispatch.waiting == {}
     assert (shards.unassigned, shards.assigned) == (0, 2)
     dispatch.returned(1)
     assert (shards.unassigned, shards.assigned) == (0, 1)
@@ -361,35 +235,6 @@ def advance(dispatch: Fleet, shard: int, start_s: float, lasts_s: float) -> None
     dispatch.handle(Ticked(start_s + lasts_s))
     (done, *_) = dispatch.returned(hand.number)
     assert isinstance(done, Ended)
-
-
-def test_silent_worker_loses_its_advance_to_an_idle_one() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    assert dispatch.handle(Ticked(FIRST_S - 1.0)) == []
-    assert dispatch.handle(Ticked(FIRST_S)) == [AskProgress("a")]
-    assert dispatch.handle(Ticked(FIRST_S + REPLY_S - 1.0)) == []
-    assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == [
-        Overdue("a", FIRST_S + REPLY_S, "b"),
-        Cancelled(1, 0, "a"),
-        Sent(2, 0, "b", "p", is_whole=True),
-    ]
-    # The late answer changes nothing, and the next advance stays where it is.
-    assert dispatch.returned(1) == []
-    assert dispatch.returned(2) == [Ended(0, "b")]
-    assert dispatch.request(0) == [Sent(3, 0, "b", "p", is_whole=False)]
-
-
-def test_deadline_follows_the_duration_of_earlier_advances() -> None:
-    for lasts_s, limit_s in ((0.1, LEAST_S), (20.0, PATIENCE * 20.0)):
-        dispatch = fleet("a", "b")
-        # The first one, from nothing, does not count.
-        advance(dispatch, 0, 0.0, 50.0)
-        advance(dispatch, 0, 100.0, lasts_s)
-        dispatch.handle(Ticked(200.0))
-        dispatch.request(0)
-        assert dispatch.handle(Ticked(199.0 + limit_s)) == []
-        assert dispatch.handle(Ticked(200.0 + limit_s)) == [AskProgress("a")]
 
 
 def test_worker_that_reports_progress_keeps_its_advance() -> None:
@@ -491,20 +336,6 @@ def test_silent_worker_keeps_its_advance_while_no_other_is_idle() -> None:
     ]
     assert {type(command) for command in told} == {AskProgress}
     assert [dispatch.holder(0), dispatch.holder(1)] == ["a", "b"]
-
-
-def test_single_worker_never_loses_its_advance() -> None:
-    dispatch = fleet("a")
-    dispatch.request(0)
-    commands = [
-        command
-        for second in range(5000)
-        for command in dispatch.handle(Ticked(float(second)))
-    ]
-    assert [each for each in commands if not isinstance(each, AskProgress)] == [
-        Overdue("a", FIRST_S + REPLY_S)
-    ]
-    assert dispatch.returned(1) == [Ended(0, "a")]
 
 
 def test_all_advances_of_a_silent_worker_move_at_once() -> None:

@@ -1,16 +1,11 @@
-"""Requests about single robots: results of valid and invalid answers."""
+"""Requests about single robots: results of answers, and lies that are refused."""
 
-from collections.abc import Callable
+import math
 
 import pytest
 from msgspec.structs import replace
 
-from coordinator.dispatch.events import (
-    AgentKind,
-    Joined,
-    Left,
-    Returned,
-)
+from coordinator.dispatch.events import AgentKind, Joined, Left, Returned
 from coordinator.islands.events import (
     QUARANTINED,
     Evaluated,
@@ -18,22 +13,38 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from schema.errors import JobRefused
-from schema.experiment.identity import NO_ORIGIN
+from coordinator.run.requests import read_evaluation
+from schema.errors import JobRefused, MalformedMessage
+from schema.experiment.identity import NO_ORIGIN, Origin
+from schema.limits import ANSWER_BYTES, LONGEST_REASON
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
-from schema.wire.codec import fingerprint
-from schema.wire.messages import Crash, Evaluate, RunningJob, Vet
+from schema.wire.codec import encode, fingerprint
+from schema.wire.messages import (
+    Answer,
+    Crash,
+    Evaluate,
+    Failure,
+    Request,
+    Result,
+    RunningJob,
+    StateMissing,
+    Vet,
+)
+from tests.coordinator.reports import CROWDED, VIABLE
 from tests.coordinator.sent_requests import (
     BIRTH,
     EPOCH,
     JUDGED,
     ORIGIN,
     ROBOT,
-    VIABLE,
     SentRequests,
     request_of,
 )
+
+EVALUATE, VET = Evaluate(BIRTH, ROBOT), Vet(BIRTH, 2, ROBOT)
+ASKED = pytest.mark.parametrize("ask", [EVALUATE, VET], ids=["evaluate", "vet"])
+SETTINGS = b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
 
 
 @pytest.fixture
@@ -41,34 +52,30 @@ def sent_requests() -> SentRequests:
     return SentRequests()
 
 
-def test_a_request_carries_the_run_its_settings_and_the_work(
-    sent_requests: SentRequests,
+@pytest.mark.parametrize(
+    ("work", "settings", "plugins", "origin"),
+    [
+        (VET, b'"vetting"', "", NO_ORIGIN),
+        # The plug-in is not here.
+        (Evaluate(BIRTH, ROBOT, 1, 300), SETTINGS, "plugged=", ORIGIN),
+        # Noise depends on the requesting island.
+        (
+            Evaluate(BirthId(3, 9), ROBOT, trial=4, requester=2),
+            SETTINGS,
+            "plugged=",
+            replace(ORIGIN, island=2),
+        ),
+    ],
+)
+def test_a_request_carries_the_run_the_work_and_all_that_it_depends_on(
+    work: Vet | Evaluate, settings: bytes, plugins: str, origin: Origin
 ) -> None:
-    works: tuple[Vet | Evaluate, ...] = (
-        Vet(BIRTH, 2, ROBOT),
-        Evaluate(BIRTH, ROBOT, 1, 300),
-    )
-    for work in works:
-        sent_requests.requests.send(work)
-    agents = [agent for _, agent, _ in sent_requests.sent]
-    assert agents == ["judge", "one"]
-    for (number, _, payload), work, settings in zip(
-        sent_requests.sent, works, (b'"vetting"', b'"evaluation"'), strict=True
-    ):
-        asked = request_of(payload)
-        assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, number)
-        assert (asked.work, asked.settings) == (work, settings)
-
-
-def test_noise_depends_on_the_requesting_island(sent_requests: SentRequests) -> None:
-    for work in (
-        Evaluate(BIRTH, ROBOT),
-        Evaluate(BirthId(3, 9), ROBOT, trial=4, requester=2),
-        Vet(BIRTH, 1, ROBOT),
-    ):
-        sent_requests.requests.send(work)
-    origins = [request_of(payload).origin for _, _, payload in sent_requests.sent]
-    assert origins == [ORIGIN, replace(ORIGIN, island=2), NO_ORIGIN]
+    sent_requests = SentRequests(SETTINGS)
+    sent_requests.requests.send(work)
+    ((number, agent, payload),) = sent_requests.sent
+    assert agent == ("judge" if isinstance(work, Vet) else "one")
+    expected = Request("run", EPOCH, number, work, settings, plugins, origin)
+    assert request_of(payload) == expected
 
 
 def test_both_jobs_of_a_cross_check_have_the_same_noise() -> None:
@@ -79,132 +86,171 @@ def test_both_jobs_of_a_cross_check_have_the_same_noise() -> None:
     assert replace(first, number=second.number) == second
 
 
-def test_evaluation_names_its_worker_and_platform(sent_requests: SentRequests) -> None:
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    (event,) = sent_requests.tell(sent_requests.reply(JUDGED))
-    assert isinstance(event, Evaluated)
-    assert (event.birth, event.evaluation) == (BIRTH, JUDGED)
-    assert event.provenance.agent == "one"
-    assert event.provenance.platform == "platform-one"
-    assert event.provenance.wall_s == 0.5
-
-
-def test_request_names_its_plugins_with_their_digests() -> None:
-    sent_requests = SentRequests(
-        b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
-    )
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    assert request_of(sent_requests.sent[0][2]).plugins == "plugged="  # it is not here
-
-
-@pytest.mark.parametrize("kind", ["evaluate", "vet"])
-def test_robot_that_crashes_three_processes_is_quarantined(
-    sent_requests: SentRequests, kind: str
-) -> None:
-    ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
-    sent_requests.requests.send(ask)
-    (number, first, _) = sent_requests.sent[0]
-    # Three processes lose it; another one still has it.
-    role: AgentKind = "analyzer" if kind == "vet" else "worker"
-    sent_requests.tell(Left(first))
-    for name in ("b", "c", "d"):
-        sent_requests.tell(Joined(name, role, 1, "p"))
-        if name != "d":
-            sent_requests.tell(Left(sent_requests.sent[-1][1]))
-    killed = [agent for _, agent, _ in sent_requests.sent[:3]]
-    _, agent, payload = sent_requests.sent[3]
-    same = fingerprint(payload)
-    of_others = [Crash(RunningJob(killed[0], "another", EPOCH, number, same), "SIGBUS")]
-    of_others += [
-        Crash(RunningJob(killed[0], "run", EPOCH - 1, number, same), "SIGBUS")
-    ]
-    own = [
-        Crash(RunningJob(each, "run", EPOCH, number, same), "SIGSEGV")
-        for each in killed
-    ]
-    told = [sent_requests.tell(event) for event in (*of_others, *own)]
-    assert told[:-1] == [[]] * 4
-    ((event,),) = told[-1:]
-    why = "ended its own process 3 times, by SIGSEGV"
-    if kind == "vet":
-        assert event == VettingFailed(BIRTH, 2, f"the analyzer {why}")
-    else:
-        signed = Provenance(killed[-1])
-        assert event == EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
-    assert sent_requests.cancelled == [(agent, payload)]
-    assert sent_requests.tell(sent_requests.reply(JUDGED)) == []
-
-
-def test_a_failed_simulation_is_a_result(sent_requests: SentRequests) -> None:
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    (event,) = sent_requests.tell(sent_requests.reply("diverged"))
-    assert isinstance(event, EvaluationFailed)
-    assert event.reason == "diverged"
-
-
-def test_a_worker_cannot_report_a_quarantine(sent_requests: SentRequests) -> None:
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    told = f"{QUARANTINED}ended its own process 3 times, by SIGSEGV"
-    (event,) = sent_requests.tell(sent_requests.reply(told))
-    assert isinstance(event, EvaluationFailed)
-    assert event.reason == f"failed: {told}"
-    assert not event.is_quarantined
-
-
-def test_vetting_gives_a_report_or_a_failed_attempt(
-    sent_requests: SentRequests,
-) -> None:
-    sent_requests.requests.send(Vet(BIRTH, 4, ROBOT))
-    assert sent_requests.tell(sent_requests.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
-    sent_requests.requests.send(Vet(BIRTH, 5, ROBOT))
-    failed = VettingFailed(BIRTH, 5, "no box")
-    assert sent_requests.tell(sent_requests.reply("no box")) == [failed]
-
-
-def test_second_answers_and_unknown_answers_change_nothing(
-    sent_requests: SentRequests,
-) -> None:
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    reply = sent_requests.reply(JUDGED)
-    assert len(sent_requests.tell(reply)) == 1
-    assert sent_requests.tell(reply) == []
-    assert sent_requests.tell(Returned(99, "one", "ok", b"")) == []
+SIGNED = Provenance("one", "platform-one", 0.5)
+CLAIM = f"{QUARANTINED}ended its own process 3 times, by SIGSEGV"
+TEXT = "\x1b[2Jgone\r\nsecond\u202e line" + "x" * (ANSWER_BYTES - 200)
+LINE = "?[2Jgone second? line".ljust(LONGEST_REASON - 3, "x") + "..."
 
 
 @pytest.mark.parametrize(
-    "spoil",
+    ("ask", "result", "event"),
     [
-        lambda sent_requests: sent_requests.reply(JUDGED, epoch=EPOCH - 1),
-        lambda sent_requests: sent_requests.reply(JUDGED, number=41),
-        lambda sent_requests: sent_requests.reply(VIABLE),
-        lambda sent_requests: Returned(
-            sent_requests.sent[-1][0], sent_requests.sent[-1][1], "ok", b"\xff"
+        (EVALUATE, JUDGED, Evaluated(BIRTH, JUDGED, SIGNED)),
+        (EVALUATE, Failure("fell"), EvaluationFailed(BIRTH, "fell", SIGNED)),
+        (EVALUATE, Failure(TEXT), EvaluationFailed(BIRTH, LINE, SIGNED)),
+        # Only the coordinator knows of a quarantine.
+        (
+            EVALUATE,
+            Failure(CLAIM),
+            EvaluationFailed(BIRTH, f"failed: {CLAIM}", SIGNED),
+        ),
+        (VET, VIABLE, Vetted(BIRTH, 2, VIABLE)),
+        (VET, CROWDED, Vetted(BIRTH, 2, CROWDED)),
+        (VET, Failure("no box"), VettingFailed(BIRTH, 2, "no box")),
+        (VET, Failure(TEXT), VettingFailed(BIRTH, 2, LINE)),
+        (
+            VET,
+            replace(CROWDED, reason=TEXT),
+            Vetted(BIRTH, 2, replace(CROWDED, reason=LINE)),
         ),
     ],
-    ids=["other epoch", "other job", "a verdict", "no message"],
 )
-def test_malformed_answer_is_counted_and_the_job_goes_to_another_agent(
-    sent_requests: SentRequests, spoil: Callable[[SentRequests], Returned]
+def test_an_answer_gives_an_event(
+    sent_requests: SentRequests, ask: Vet | Evaluate, result: Result, event: object
 ) -> None:
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    assert sent_requests.tell(spoil(sent_requests)) == []
+    sent_requests.requests.send(ask)
+    assert sent_requests.tell(sent_requests.reply(result)) == [event]
+
+
+@ASKED
+def test_robot_that_crashes_three_processes_is_quarantined(
+    sent_requests: SentRequests, ask: Vet | Evaluate
+) -> None:
+    kind: AgentKind = "analyzer" if isinstance(ask, Vet) else "worker"
+    sent_requests.tell(Joined("third", kind, 1, "p"))
+    sent_requests.requests.send(ask)
+    for _ in range(3):
+        sent_requests.tell(Left(sent_requests.sent[-1][1]))
+    killed = [agent for _, agent, _ in sent_requests.sent]
+    number, _, payload = sent_requests.sent[-1]
+    told = [
+        sent_requests.tell(
+            Crash(
+                RunningJob(each, "run", EPOCH, number, fingerprint(payload)), "SIGSEGV"
+            )
+        )
+        for each in killed
+    ]
+    assert told[:-1] == [[], []]
+    why = "ended its own process 3 times, by SIGSEGV"
+    signed = Provenance(killed[-1])
+    assert told[-1] == [
+        VettingFailed(BIRTH, 2, f"the analyzer {why}")
+        if isinstance(ask, Vet)
+        else EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
+    ]
+
+
+EVALUATIONS: dict[str, Result] = {
+    "fitness not a number": replace(JUDGED, fitness=math.nan),
+    "infinite velocity": replace(JUDGED, path_velocity=math.inf),
+    "a measure that is not asked for": replace(JUDGED, measures=(1.0,)),
+    "a report": VIABLE,
+    "the result of another kind of job": StateMissing(),
+}
+REPORTS: dict[str, Result] = {
+    "corner not a number": replace(VIABLE, upper=(1.0, math.nan, 1.0)),
+    "infinite mass": replace(VIABLE, mass=math.inf),
+    "viable with a reason": replace(VIABLE, reason="parts 0 and 1 intersect"),
+    "not viable without a reason": replace(CROWDED, reason=""),
+    "an evaluation": JUDGED,
+}
+
+
+def check_refused(
+    sent_requests: SentRequests, ask: Vet | Evaluate, lie: Returned
+) -> None:
+    """Fail unless a lie is counted, its agent backs off, and another gets the job."""
+    liar, honest = lie.agent, {"one": "two", "judge": "juror"}[lie.agent]
+    assert sent_requests.tell(lie) == []
     assert sent_requests.fleet.faults.total("malformed") == 1
-    assert [agent for _, agent, _ in sent_requests.sent] == ["one", "two"]
-    (event,) = sent_requests.tell(sent_requests.reply(JUDGED))
-    assert isinstance(event, Evaluated)
+    assert [agent for _, agent, _ in sent_requests.sent] == [liar, honest]
+    result = VIABLE if isinstance(ask, Vet) else JUDGED
+    (event,) = sent_requests.tell(sent_requests.reply(result))
+    assert isinstance(event, Vetted | Evaluated)
+    # A new job goes to the honest agent, although the other one is idle, too.
+    sent_requests.requests.send(ask)
+    assert sent_requests.sent[-1][1] == honest
+    sent_requests.tell(sent_requests.reply(result))
+    sent_requests.wait(10.0)
+    sent_requests.requests.send(ask)
+    assert sent_requests.sent[-1][1] == liar
 
 
-def test_lost_job_goes_to_another_agent(sent_requests: SentRequests) -> None:
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
-    assert sent_requests.tell(Left("one")) == []
-    assert [agent for _, agent, _ in sent_requests.sent] == ["one", "two"]
+@pytest.mark.parametrize(
+    ("ask", "lie"),
+    [
+        *((EVALUATE, lie) for lie in EVALUATIONS.values()),
+        *((VET, lie) for lie in REPORTS.values()),
+    ],
+    ids=[*EVALUATIONS, *REPORTS],
+)
+def test_false_result_is_refused(
+    sent_requests: SentRequests, ask: Vet | Evaluate, lie: Result
+) -> None:
+    sent_requests.requests.send(ask)
+    check_refused(sent_requests, ask, sent_requests.reply(lie))
+
+
+@ASKED
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"epoch": EPOCH + 1}, "stale"),
+        ({"number": 77}, "stale"),
+        ({"wall_s": -0.1}, "malformed"),
+        ({"wall_s": math.inf}, "malformed"),
+        ({"wall_s": 1e10}, "malformed"),
+        # Thirteen of them filled a journal.
+        ({"result": Failure("x" * 30_000_000)}, "too large"),
+        ({"result": StateMissing()}, "impossible"),
+    ],
+)
+def test_an_answer_of_no_such_job_is_refused(
+    sent_requests: SentRequests,
+    ask: Vet | Evaluate,
+    changes: dict[str, object],
+    kind: str,
+) -> None:
+    sent_requests.requests.send(ask)
+    result = VIABLE if isinstance(ask, Vet) else JUDGED
+    lie = sent_requests.reply(result, **changes)
+    job = sent_requests.fleet.dispatch.job(lie.number)
+    assert job is not None
+    with pytest.raises(MalformedMessage) as raised:
+        job.read(lie.answer)
+    assert raised.value.kind == kind
+    check_refused(sent_requests, ask, lie)
+
+
+@pytest.mark.parametrize("given", [(), (1.0,), (1.0, 2.0, 3.0), (1.0, math.nan)])
+def test_evaluation_needs_a_finite_number_for_each_measure(
+    given: tuple[float, ...],
+) -> None:
+    def read(measures: tuple[float, ...]) -> Answer:
+        answer = Answer(1, 2, 0.0, replace(JUDGED, measures=measures))
+        return read_evaluation(encode(answer), expected=(1, 2), measures=2)
+
+    assert read((1.0, -2.5)).result == replace(JUDGED, measures=(1.0, -2.5))
+    with pytest.raises(MalformedMessage, match="measures"):
+        read(given)
 
 
 def test_job_that_several_agents_refuse_stops_the_run(
     sent_requests: SentRequests,
 ) -> None:
     sent_requests.tell(Joined("three", "worker", 1, ""))
-    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    sent_requests.requests.send(EVALUATE)
     for _ in range(2):
         number, agent, _ = sent_requests.sent[-1]
         refusal = Returned(number, agent, "error", reason="no such plug-in")
@@ -212,8 +258,3 @@ def test_job_that_several_agents_refuse_stops_the_run(
     number, agent, _ = sent_requests.sent[-1]
     with pytest.raises(JobRefused, match=r"birth 7.*cannot evaluate.*no such plug-in"):
         sent_requests.tell(Returned(number, agent, "error", reason="no such plug-in"))
-    assert sorted(agent for _, agent, _ in sent_requests.sent) == [
-        "one",
-        "three",
-        "two",
-    ]
