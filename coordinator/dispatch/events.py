@@ -41,7 +41,6 @@ class Job:
             its worker.
         paired: number of the same request's other job, which another agent does if
             there is one; -1 if there is no other job.
-        client: the run that requested it.
         subject: the client's own description of the job.
         read: decodes and checks an answer.
         simulated_s: time that it simulates [s]; 0.0 if it is no simulation, None if its
@@ -70,8 +69,6 @@ class Joined:
     """A worker or an analyzer is ready for jobs.
 
     Attributes:
-        agent: its name.
-        kind: of agent.
         slots: jobs that it does at a time.
         platform: on which its results depend.
         shards: arenas whose state it keeps.
@@ -138,8 +135,6 @@ class Returned:
     """A job came back from an agent.
 
     Attributes:
-        number: of the job.
-        agent: that had it.
         outcome: how it came back.
         answer: of an "ok": encoded, decoded once the router has read it.
         reason: of an error, a malformed answer, an unfit agent or an unsent request.
@@ -184,11 +179,9 @@ class ShardSeen:
     """A shard was advanced on a platform, according to the journal.
 
     Attributes:
-        shard: its number.
         platform: empty if it was never advanced.
         may_drift: it may move to another platform, provided that drift is allowed at
             all.
-        client: the run of the arena.
     """
 
     shard: int
@@ -225,8 +218,6 @@ class Assign:
     """Send a job to an agent.
 
     Attributes:
-        job: the job.
-        agent: that gets it.
         platform: of the worker that gets an advance; empty for another job.
         is_whole: the request of the advance includes what is needed to rebuild the
             state.
@@ -243,7 +234,6 @@ class Deliver:
     """A job is done, or given up for a reason.
 
     Attributes:
-        job: that ended.
         agent: that had it last; empty if its request could not be made.
         platform: of the agent; empty for a job that is given up.
         answer: what ``job.read`` returned; None if there is a reason.
@@ -279,7 +269,6 @@ class Overdue:
     """Tell the user that an agent neither answers nor reports progress.
 
     Attributes:
-        agent: its name.
         waited_s: time since it was given its oldest job [s].
         to: an agent that can take its jobs; empty if there is none.
     """

@@ -46,10 +46,8 @@ class PeerFaults:
     def note(self, kind: FaultKind, peer: str, detail: str = "") -> None:
         """Count a fault.
 
-        Args:
-            kind: of the fault.
-            peer: name of the peer; any text.
-            detail: what came, for the line that is written the first time; any text.
+        ``peer``: name of the peer; any text. ``detail``: what came, for the line that
+        is written the first time; any text.
         """
         key = (kind, printable(peer))
         if key not in self._counts:

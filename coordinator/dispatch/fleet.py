@@ -45,11 +45,7 @@ class Agents(Protocol):
     def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
         """Send a job to an agent; ``receive`` returns its outcome.
 
-        Args:
-            number: of the job.
-            agent: that gets it.
-            payload: an encoded request.
-            wait_s: time without a reply after which its outcome is "expired" [s].
+        ``wait_s``: time without a reply after which its outcome is "expired" [s].
         """
 
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
@@ -85,7 +81,6 @@ class JobRouter:
     """Workers and analyzers, the jobs of all runs, and the routing between them.
 
     Attributes:
-        dispatch: assigns jobs to agents.
         faults: counts of what agents sent and nothing used.
     """
 
@@ -99,11 +94,8 @@ class JobRouter:
     ) -> None:
         """Connect to agents.
 
-        Args:
-            agents: the connection to them.
-            allows_drift: an arena may move to another platform if its own is gone.
-            warn: called with each line for the user.
-            faults: counts that the connection shares; None: counts of its own.
+        ``allows_drift``: an arena may move to another platform if its own is gone.
+        ``faults``: counts that the connection shares; None: counts of its own.
         """
         self._warn = warn
         self._numbers = count(1)
@@ -138,11 +130,9 @@ class JobRouter:
     ) -> int:
         """Return a number for an arena's shard.
 
-        Args:
-            client: the run of the arena.
-            encode: returns the request of each advance when it is assigned.
-            platform: on which the shard has been advanced; empty if never.
-            may_drift: it may move to another platform, if arenas may.
+        ``encode``: returns the request of each advance when it is assigned.
+        ``platform``: on which the shard has been advanced; empty if never.
+        ``may_drift``: it may move to another platform, if arenas may.
         """
         shard = next(self._shard_numbers)
         self._shard_clients[shard] = (client, encode)
@@ -175,12 +165,7 @@ class JobRouter:
         self._handle(Released(shard))
 
     def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[Deliver]]:
-        """Return what ended for each client, after waiting for something to end.
-
-        Args:
-            timeout_s: how long to wait for the first event [s].
-            now_s: the time, of a monotonic clock [s].
-        """
+        """Return what ended for each client, after waiting for something to end."""
         if (wake_s := self.dispatch.wake_s) is not None:
             timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
         self.tell(Ticked(now_s))

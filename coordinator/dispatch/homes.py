@@ -28,7 +28,6 @@ class Home:
     """A shard, the worker that keeps it, and its present advance.
 
     Attributes:
-        client: the run of the arena.
         platform: of the last advance; empty before the first.
         may_drift: it may move to another platform, if shards may.
         holder: the worker that is bound to it; empty if none is.
@@ -67,8 +66,6 @@ class Homes:
     """The shards of all runs, and the choice of their workers.
 
     Attributes:
-        now_s: the time [s].
-        shards: by number.
         deadlines: of advances, by shard.
         rebuilt: number of assigned advances that start from a rebuilt state.
     """
@@ -76,9 +73,7 @@ class Homes:
     def __init__(self, workers: Pool, *, allows_drift: bool) -> None:
         """Initialise without shards.
 
-        Args:
-            workers: the workers, whose load includes advances.
-            allows_drift: a shard may move to another platform if its own is gone.
+        ``allows_drift``: a shard may move to another platform if its own is gone.
         """
         self.now_s = 0.0
         self.shards: dict[int, Home] = {}

@@ -54,7 +54,6 @@ class Pending:
     """A job that is not delivered yet.
 
     Attributes:
-        job: the job.
         holders: agents that have it, several if the first is late, in order: time of
             assignment [s], and its place in the queue of a slot (1.0 is first).
         errors: number of agents that could not do it.
@@ -82,7 +81,6 @@ class AgentState:
     """An agent and its jobs.
 
     Attributes:
-        joined: its properties.
         held: its jobs by number, oldest first, delivered ones included.
         advances: its advances of arenas by number, moved ones included.
         busy: slots that these occupy; jobs get the next one, so that they never starve.
@@ -138,7 +136,6 @@ class Pool:
 
     Attributes:
         at_hand: jobs beyond its slots that an agent always holds.
-        agents: by their names.
         free: (load, name, stamp) of each agent that may have jobs, a heap; entries with
             an old stamp are invalid.
         waiting: jobs that no agent has, or silent ones only, by number.
@@ -189,12 +186,9 @@ class Pool:
         An agent is silent if a job is past its deadline and the agent, asked since
         then, has not reported progress in time. A report restarts the deadline.
 
-        Args:
-            name: of the agent.
-            since_s: time at which it was given the job [s].
-            limit_s: how long such a job may take, and how long the agent may take to
-                report, up to ``REPLY_S`` [s].
-            now_s: the time [s].
+        ``since_s``: time at which it was given the job [s]. ``limit_s``: how long such
+        a job may take, and how long the agent may take to report, up to ``REPLY_S``
+        [s].
         """
         agent = self.agents[name]
         due_s = max(since_s, agent.worked_s) + limit_s
@@ -333,9 +327,7 @@ class Pool:
     ) -> Pending | None:
         """Remove and return the first waiting job that an agent may have, if any.
 
-        Args:
-            name: of the agent.
-            avoided: returns the agents that a job avoids if there are others.
+        ``avoided``: returns the agents that a job avoids if there are others.
         """
         self._aside = {group: heap for group, heap in self._aside.items() if heap}
         aside = self._aside.items()

@@ -24,12 +24,8 @@ def ask_coordinators(
 ) -> dict[str, bytes]:
     """Return the replies of the coordinators at an address, by name.
 
-    Args:
-        data: an encoded ``OperatorRequest``.
-        connect: address of the hub.
-        fleet: name of the fleet.
-        tls: files, for a ``tls/`` address.
-        only: name of the coordinator to query; empty queries all.
+    ``data``: an encoded ``OperatorRequest``. ``only``: name of the coordinator to
+    query; empty queries all.
 
     Raises:
         NetworkError: no hub, or no coordinator replies.
@@ -87,14 +83,7 @@ def reply_of(
     data: bytes,
     timeout_s: float = ASK_TIMEOUT_S,
 ) -> bytes | None:
-    """Return a coordinator's own reply; None without one.
-
-    Args:
-        member: the coordinator.
-        session: of this process.
-        data: an encoded ``OperatorRequest``.
-        timeout_s: how long to wait [s].
-    """
+    """Return a coordinator's own reply; None without one."""
     replies = session.get(
         member.command,
         payload=data,

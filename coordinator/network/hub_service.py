@@ -15,11 +15,6 @@ from schema.limits import printable
 def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) -> None:
     """Route messages until stopped.
 
-    Args:
-        config: the hub's configuration (JSON5).
-        addresses: where it listens, for messages.
-        stop: ends the hub.
-
     Raises:
         NetworkError: an address that cannot be listened on.
     """

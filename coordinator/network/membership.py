@@ -41,9 +41,7 @@ class Membership:
     def __init__(self, version: str, faults: PeerFaults | None = None) -> None:
         """Initialise without agents.
 
-        Args:
-            version: that agents must have.
-            faults: counts what is dropped; None: counts of its own.
+        ``faults``: counts what is dropped; None: counts of its own.
         """
         self.joined: dict[str, Member] = {}
         self.refused: dict[str, str] = {}
@@ -119,10 +117,6 @@ class Membership:
     def introduce(self, member: Member, data: bytes) -> list[Crash | Joined]:
         """Take an agent's description of itself and of the processes it replaces.
 
-        Args:
-            member: an agent without properties so far.
-            data: bytes of an ``AgentInfo``.
-
         Returns:
             Deaths that were not known; last, if the agent may join, that it joined.
 
@@ -149,10 +143,6 @@ class Membership:
 
     def progress(self, member: Member, data: bytes) -> Progressed | None:
         """Return the event if an agent that has joined reports progress.
-
-        Args:
-            member: the agent; it may have left.
-            data: bytes of an ``AgentInfo``.
 
         Raises:
             MalformedMessage: as for ``introduce``.
@@ -222,10 +212,7 @@ class InfoQueue:
     def add_again(self, member: Member, silences: int, now_s: float) -> None:
         """Add an agent that is to be asked after a pause.
 
-        Args:
-            member: the agent.
-            silences: how often it was asked without an answer.
-            now_s: the time, of a monotonic clock [s].
+        ``silences``: how often it was asked without an answer.
         """
         pause_s = min(ASK_AGAIN_S * 2.0 ** min(silences - 1, 9), LONGEST_PAUSE_S)
         heappush(self._again, (now_s + pause_s, next(self._order), member))

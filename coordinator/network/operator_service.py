@@ -29,9 +29,7 @@ class Queries:
     def __init__(self, viewers_key: str, faults: PeerFaults) -> None:
         """Initialise without queries.
 
-        Args:
-            viewers_key: the key that viewers query; operators query another one.
-            faults: counts the queries that are dropped.
+        ``viewers_key``: the key that viewers query; operators query another one.
         """
         self._viewers_key = viewers_key
         self._faults = faults

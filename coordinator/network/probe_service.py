@@ -55,9 +55,7 @@ class HubProbe:
 def reach(connect: str, timeout_s: float) -> str:
     """Return why a hub's address accepts no connection; empty if it does.
 
-    Args:
-        connect: address of the hub.
-        timeout_s: how long to wait, for the name's address included [s].
+    ``timeout_s``: how long to wait, for the name's address included [s].
     """
     protocol, host, port = parse_address(connect)
     result = f"no answer within {timeout_s:g} s"
@@ -85,11 +83,7 @@ def reach(connect: str, timeout_s: float) -> str:
 def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
     """Return what a process sees at a hub, within a few seconds.
 
-    Args:
-        connect: address of the hub.
-        fleet: name of the fleet.
-        tls: files, for a ``tls/`` address.
-        name: of the certificate, or of this machine.
+    ``name``: of the certificate, or of this machine.
 
     Raises:
         NetworkError: an address that needs files.

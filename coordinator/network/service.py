@@ -260,11 +260,8 @@ class Network:
     def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
         """Send a job to an agent; ``receive`` returns exactly one ``Returned`` for it.
 
-        Args:
-            number: of the job.
-            agent: that has joined; if it has left since, the job is lost.
-            payload: an encoded request.
-            wait_s: time without a reply after which its outcome is "expired" [s].
+        ``agent``: that has joined; if it has left since, the job is lost. ``wait_s``:
+        time without a reply after which its outcome is "expired" [s].
         """
         if member := self._membership.joined.get(agent):
             asked = _Asked(member, number, self._inbox, wait_s)
@@ -274,12 +271,7 @@ class Network:
             _Asked(gone, number, self._inbox, wait_s).end()
 
     def cancel(self, agent: str, payload: bytes) -> None:
-        """Tell an agent that a job is no longer wanted; it may have started it.
-
-        Args:
-            agent: that was given the job, and may have left.
-            payload: the encoded request.
-        """
+        """Tell an agent that a job is no longer wanted; it may have started it."""
         if member := self._membership.joined.get(agent):
             self._session.put(member.cancelled, fingerprint(payload))
 

@@ -30,7 +30,6 @@ class ExpectedAdvance:
     Attributes:
         from_step, until: steps of the request.
         living: robots that live after the requested changes.
-        experiment: settings of the island.
         wants_snapshot: the result must hold the state at the end.
     """
 

@@ -13,11 +13,6 @@ def archipelago(
 ) -> dict[int, Island | Arena]:
     """Return the islands by number, before their first event.
 
-    Args:
-        experiment: the document.
-        seed: of the experiment's execution.
-        run: number of the repeat, from 0.
-
     Raises:
         ExperimentError: no graph meets the topology.
     """
@@ -42,10 +37,7 @@ def _neighbours(
 ) -> Neighbours:
     """Return the neighbours of an island.
 
-    Args:
-        number: of the island.
-        worlds: settings of all islands that determine their evaluations.
-        edges: along which migrants travel.
+    ``worlds``: settings of all islands that determine their evaluations.
     """
     sources = tuple(source for source, to in edges if to == number)
     return Neighbours(

@@ -55,10 +55,6 @@ class CrossChecks:
     def settle(self, number: int, outcome: Answered) -> list[Answered | Audited]:
         """Return the events that follow from the outcome of a job.
 
-        Args:
-            number: of the job.
-            outcome: its event.
-
         Returns:
             The outcome, if the job is not one of a pair; for a pair nothing at the
             first, and at the second the check and, if it is settled, the outcome.

@@ -16,7 +16,6 @@ class Drift:
     """A shard was continued by a worker of another platform.
 
     Attributes:
-        island: of the shard.
         step: the first one that was reached there.
         before, after: the platforms.
         worker: that continued it.
@@ -52,11 +51,8 @@ def with_losses(
     A rebuilt arena need not hold all robots that lived before the drift, and the
     advance does not report those that are missing.
 
-    Args:
-        advance: made on the new platform.
-        step: at which the advance began.
-        places: of the robots that lived at that step.
-        removals: robots that were removed at that step.
+    ``step``: at which the advance began. ``places``: of the robots that lived at that
+    step. ``removals``: robots that were removed at that step.
     """
     known = {one.birth for one in advance.judgements}
     known.update(one.birth for one in advance.casualties)

@@ -24,11 +24,8 @@ from schema.wire.arena import AdvanceShard, Rebuild
 def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebuild]:
     """Return what a worker needs to re-simulate an arena.
 
-    Args:
-        folder: of a run, finished or not; nothing in it is changed.
-        island: of the arena.
-        from_s: time of interest; the re-simulation starts at the newest snapshot
-            before it [s].
+    ``folder``: of a run, finished or not; nothing in it is changed. ``from_s``: time of
+    interest; the re-simulation starts at the newest snapshot before it [s].
 
     Returns:
         JSON of the arena's settings; a state, and all advances since then.
@@ -61,12 +58,8 @@ def replayed(
 ) -> Loop:
     """Return the islands of a run after a journal, without any effect.
 
-    Args:
-        details: description of the run.
-        context: what all requests have in common.
-        events: content of the journal.
-        store: snapshots on disk, read-only.
-        note: called with each advance and the command that it answers.
+    ``store``: snapshots on disk, read-only. ``note``: called with each advance and the
+    command that it answers.
 
     Raises:
         UnexpectedEvent: the journal of another kind of run.

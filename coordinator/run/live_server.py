@@ -43,11 +43,7 @@ class LiveServer:
         self._sequence, self._pages = -1, list[bytes]()
 
     def serve(self, now_s: float) -> None:
-        """Send the updates and replies that are due.
-
-        Args:
-            now_s: the time, of any clock that only goes forward [s].
-        """
+        """Send the updates and replies that are due."""
         if now_s - self._update_s < _UPDATE_S:
             return
         self._update_s = now_s
@@ -90,13 +86,7 @@ class LiveServer:
 
 
 def open_viewer(address: str, fleet: str, tls: Tls | None) -> None:
-    """Start a viewer as a separate process, which outlives the run.
-
-    Args:
-        address: of the hub.
-        fleet: name of the fleet.
-        tls: files for a ``tls/`` address.
-    """
+    """Start a viewer as a separate process, which outlives the run."""
     words = ["--connect", address, "--fleet", fleet]
     if tls is not None:
         words += ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]

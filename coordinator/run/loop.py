@@ -91,8 +91,6 @@ class Loop:
 
     Attributes:
         islands: the state machines of the islands, by number.
-        context: what all requests have in common.
-        fleet: the agents.
         log: the journal.
         rows: the tables.
         snapshot_store: the snapshots of arenas.
@@ -100,7 +98,6 @@ class Loop:
         checks: cross-checks to make.
         confirm: raises if this process may no longer write to the run.
         watch: called with each row, for viewers; None without any.
-        client: identifies this run to the fleet.
         shard_requests: the advances of the arenas.
     """
 
@@ -134,9 +131,6 @@ class Loop:
     def start(self, history: Iterable[JournalledEvent]) -> None:
         """Start or resume: replay a journal, then send the requests that are open.
 
-        Args:
-            history: the journalled events, oldest first; empty for a new run.
-
         Raises:
             UnexpectedEvent: the history of another kind of run.
             ExperimentError: a learner fails.
@@ -167,10 +161,6 @@ class Loop:
 
     def act(self, now_s: float, ends: Iterable[Deliver] = ()) -> None:
         """Act on the ends of jobs and advances.
-
-        Args:
-            now_s: the time, of a monotonic clock [s].
-            ends: what the fleet returned for this run.
 
         Raises:
             JobRefused: no agent can do a job; the run stops as it is.

@@ -62,9 +62,7 @@ def reply_to(request: OperatorRequest, loop: Loop) -> OperatorReply:
     On return the journal holds the order. A faulty request is refused and changes
     nothing.
 
-    Args:
-        request: for an arena of the run; ``answer_operator`` replies to ``GetStatus``.
-        loop: of the run, started.
+    ``request``: for an arena of the run; ``answer_operator`` replies to ``GetStatus``.
 
     Raises:
         RunFolderError: the disk is full or failed.
@@ -187,13 +185,7 @@ def _list(arena: Arena, island: int) -> str:
 
 
 def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes:
-    """Return the encoded reply to an operator's encoded request.
-
-    Args:
-        scheduler: of all runs of this coordinator.
-        data: of an ``OperatorRequest``.
-        now_s: the time, of any clock that only goes forward [s].
-    """
+    """Return the encoded reply to an operator's encoded request."""
     try:
         request = decode(OperatorRequest, data, OPERATOR_REQUEST_BYTES)
         if isinstance(request.action, GetStatus):

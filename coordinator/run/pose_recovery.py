@@ -60,14 +60,6 @@ class PoseRecovery:
     ) -> None:
         """Find out what is lost; ``start`` requests the first advances.
 
-        Args:
-            details: description of the run.
-            context: what all requests have in common.
-            events: content of the journal.
-            fleet: the workers.
-            recorder: the tables.
-            snapshots: of the run's arenas.
-
         Raises:
             UnexpectedEvent: the journal of another kind of run.
             RunFolderError: the disk failed.
@@ -173,9 +165,7 @@ class PoseRecovery:
 def has_lost_poses(events: Iterable[JournalledEvent], stored: int) -> bool:
     """Return whether rows of poses are missing.
 
-    Args:
-        events: content of the journal.
-        stored: number of rows on disk.
+    ``stored``: number of rows on disk.
     """
     return stored < _rows(events)
 

@@ -58,10 +58,7 @@ class Requests:
     def __init__(self, context: RunContext, fleet: JobRouter, audit: float) -> None:
         """Initialise without requests.
 
-        Args:
-            context: what all requests have in common.
-            fleet: the agents.
-            audit: share of evaluations that are done twice.
+        ``audit``: share of evaluations that are done twice.
         """
         self._cross_checks = CrossChecks(audit) if audit else None
         self._context = context
@@ -139,9 +136,7 @@ def key_of(about: Vet | Evaluate | Ask | Answered) -> Key:
 def read_vetting(data: bytes, *, expected: Expected) -> Answer:
     """Return the decoded answer to a vetting: a report or a failure.
 
-    Args:
-        data: bytes of the answer.
-        expected: epoch and number of the job.
+    ``expected``: epoch and number of the job.
 
     Raises:
         MalformedMessage: not an answer, the answer to another request, or a report
@@ -157,10 +152,7 @@ def read_vetting(data: bytes, *, expected: Expected) -> Answer:
 def read_evaluation(data: bytes, *, expected: Expected, measures: int = 0) -> Answer:
     """Return the decoded answer to an evaluation: an evaluation or a failure.
 
-    Args:
-        data: bytes of the answer.
-        expected: epoch and number of the job.
-        measures: number of measures.
+    ``expected``: epoch and number of the job.
 
     Raises:
         MalformedMessage: not an answer, the answer to another request, or another
@@ -177,11 +169,8 @@ def read_answer(
 ) -> Answer:
     """Return the decoded answer to a job.
 
-    Args:
-        data: bytes of the answer.
-        expected: epoch and number of the job.
-        kind: type of the result, unless it is a failure.
-        most: number of bytes that the answer may have.
+    ``expected``: epoch and number of the job. ``kind``: type of the result, unless it
+    is a failure.
 
     Raises:
         MalformedMessage: not an answer, the answer to another request, or another

@@ -27,7 +27,6 @@ class RunContext:
         vetting: settings for analyzers, as JSON.
         evaluation, arena: settings for workers, as JSON, by island.
         experiments: settings of each island, for checks of answers.
-        space: part types of the bodies that analyzers vet.
     """
 
     client: Client

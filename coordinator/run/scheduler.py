@@ -48,7 +48,6 @@ class RunScheduler:
 
     Attributes:
         planned: all runs in order, finished ones included.
-        fleet: the agents.
         open_run: opens the run of a folder; the flag says whether it is watched.
         most: number of runs that there may be at once.
         conclude: called with each run that is finished.
@@ -91,12 +90,7 @@ class RunScheduler:
         return next((run for run in self._places if run.feed is not None), None)
 
     def turn(self, timeout_s: float, clock: Callable[[], float]) -> None:
-        """Start runs, receive answers, and let the runs act on them.
-
-        Args:
-            timeout_s: how long to wait for the first answer [s].
-            clock: returns the time, monotonic [s].
-        """
+        """Start runs, receive answers, and let the runs act on them."""
         while self._waiting and self._has_room():
             self._begin(*self._waiting.popleft())
         now_s = clock()
@@ -173,11 +167,7 @@ class RunScheduler:
         del self._run_of[run.loop.client]
 
     def do_chores(self, now_s: float) -> None:
-        """Flush all rows to disk; find runs that another coordinator took over.
-
-        Args:
-            now_s: the time, of a monotonic clock [s].
-        """
+        """Flush all rows to disk; find runs that another coordinator took over."""
         # Operators are told a rate even if no progress is shown here.
         self.status(now_s)
         for run in self.active:
@@ -197,11 +187,7 @@ class RunScheduler:
             self._dismiss(run)
 
     def status(self, now_s: float) -> Status:
-        """Return the progress of all runs.
-
-        Args:
-            now_s: the time, of a monotonic clock [s].
-        """
+        """Return the progress of all runs."""
         runs = list(self._known)
         born = sum(run.births for run in runs)
         for run, place in self._places.items():

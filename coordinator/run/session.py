@@ -49,12 +49,7 @@ class RateMeter:
         self._seen: deque[tuple[float, float]] = deque()
 
     def note(self, now_s: float, count: float) -> None:
-        """Note the count at a time.
-
-        Args:
-            now_s: the time, of a monotonic clock [s].
-            count: does not decrease.
-        """
+        """Note the count at a time."""
         self._seen.append((now_s, count))
         while now_s - self._seen[0][0] > RATE_S:
             self._seen.popleft()
@@ -73,7 +68,6 @@ class RunSession:
 
     Attributes:
         held: its folder, which this process has locked.
-        experiment: the document.
         loop: its islands and their connections.
         feed: collects its rows for viewers; None without a network.
         recovery: computes lost poses before the run continues; None: nothing is lost,
@@ -92,13 +86,9 @@ class RunSession:
     ) -> None:
         """Open the files of a run; ``start`` starts it.
 
-        Args:
-            held: the folder; closed with the run, or at once if this fails.
-            fleet: the agents.
-            fsync: survive power loss, too.
-            speed: simulated seconds per second at most, of arenas; None: no limit.
-            is_watched: have a feed.
-            checks: cross-checks to make.
+        ``held``: the folder; closed with the run, or at once if this fails. ``fsync``:
+        survive power loss, too. ``speed``: simulated seconds per second at most, of
+        arenas; None: no limit.
 
         Raises:
             RunFolderError: a damaged journal, or a disk that fails.
@@ -176,9 +166,6 @@ class RunSession:
     def recover(self, ends: Iterable[Deliver]) -> None:
         """Continue the recovery of lost poses; when it is done, start the loop.
 
-        Args:
-            ends: what the fleet returned for this run.
-
         Raises:
             RevolveError: the run cannot continue; see ``PoseRecovery.act`` and
                 ``Loop.start``.
@@ -251,11 +238,7 @@ class RunSession:
         ]
 
     def status(self, now_s: float) -> RunStatus:
-        """Return the progress of the run.
-
-        Args:
-            now_s: the time, of a monotonic clock [s].
-        """
+        """Return the progress of the run."""
         islands = tuple(
             _island_status(island) for _, island in sorted(self.loop.islands.items())
         )

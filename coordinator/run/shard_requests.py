@@ -92,7 +92,6 @@ class Reached:
     """A decoded answer to a request to advance a shard.
 
     Attributes:
-        event: for the arena.
         snapshot: the state that was reached; empty if it was not wanted.
     """
 
@@ -164,10 +163,8 @@ class ShardRequests:
     def send(self, command: AdvanceShard, repeats: Advanced | None = None) -> None:
         """Request an advance.
 
-        Args:
-            command: the advance.
-            repeats: past result of this advance, to be computed again on the same
-                platform; another result is the worker's error.
+        ``repeats``: past result of this advance, to be computed again on the same
+        platform; another result is the worker's error.
         """
         shard = command.island
         past = self._past(shard)
@@ -302,15 +299,9 @@ def _read_answer(
 ) -> Reached | None:
     """Return the decoded answer to a request; None if the worker lacks the state.
 
-    Args:
-        data: bytes of the answer.
-        requested: the arena's command.
-        job: epoch and number of the job.
-        is_whole: the request had what is needed to rebuild the state.
-        repeats: past result that the answer must have; None for a new advance.
-        expected: what a correct result has.
-        provenance: of the answer, but for the time that it took.
-        complete: adds what a drift between platforms lost; None without a drift.
+    ``repeats``: past result that the answer must have; None for a new advance.
+    ``provenance``: of the answer, but for the time that it took. ``complete``: adds
+    what a drift between platforms lost; None without a drift.
 
     Raises:
         MalformedMessage: no answer, the answer to another request, or one that

@@ -18,10 +18,6 @@ def check_stored_genomes(folder: Path, experiment: Experiment) -> None:
     An own encoding may have changed since the run was stopped; its next births would
     not belong to those in the folder. The thesis's encoding is not checked.
 
-    Args:
-        folder: of the run.
-        experiment: of the run.
-
     Raises:
         RunFolderError: it does, or cannot read the genome.
     """

@@ -13,11 +13,7 @@ class RealTimeThrottle:
     """Limit of the speed at which arenas advance."""
 
     def __init__(self, speed: float) -> None:
-        """Initialise the throttle.
-
-        Args:
-            speed: simulated seconds per second; > 0.
-        """
+        """Initialise the throttle."""
         self._speed = speed
         self._last: dict[int, tuple[float, float]] = {}
         self._held_back: list[tuple[float, int, AdvanceShard]] = []
@@ -30,10 +26,8 @@ class RealTimeThrottle:
     def holds_back(self, command: AdvanceShard, begin_s: float, now_s: float) -> bool:
         """Return whether an advance has to wait; if so, ``due`` returns it later.
 
-        Args:
-            command: requests the advance.
-            begin_s: simulated time at which it begins; each is passed once [s].
-            now_s: the time; an arena that is late does not catch up [s].
+        ``begin_s``: simulated time at which it begins; each is passed once [s].
+        ``now_s``: the time; an arena that is late does not catch up [s].
         """
         shard = command.island
         last_begin_s, last_s = self._last.get(shard, (begin_s, now_s))

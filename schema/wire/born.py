@@ -10,10 +10,7 @@ from schema.wire.protobuf import decode_genome, decode_robot
 def robot_of_birth(genome: bytes, robot: bytes | None, experiment: Experiment) -> Robot:
     """Return the robot that was born.
 
-    Args:
-        genome: column of that name.
-        robot: column of that name; null in runs of the encoding ``revolve-angle``.
-        experiment: of the run.
+    ``robot``: column of that name; null in runs of the encoding ``revolve-angle``.
 
     Raises:
         MalformedMessage: invalid bytes.

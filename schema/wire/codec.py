@@ -36,11 +36,6 @@ def decode(kind: UnionType, data: bytes, most: int) -> Any: ...  # noqa: ANN401
 def decode(kind: type[T] | UnionType, data: bytes, most: int) -> T | Any:
     """Return the message of some bytes.
 
-    Args:
-        kind: type of message, or a union of types.
-        data: the bytes.
-        most: number of bytes that such a message may have.
-
     Raises:
         MalformedMessage: not the bytes of such a message, or too many.
     """

@@ -13,9 +13,7 @@ def call_function(call: Call, settings: bytes) -> CallValue | Failure:
 
     An error of the function, or a value that is not plain, is a result: a failure.
 
-    Args:
-        call: argument of the function.
-        settings: JSON of ``CallSettings``.
+    ``settings``: JSON of ``CallSettings``.
 
     Raises:
         MalformedMessage: no such settings or argument.

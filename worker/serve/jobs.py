@@ -50,9 +50,7 @@ def answer_evaluation(request: Request, work: Evaluate) -> Evaluation | Failure:
 
     Diverged physics, a failed sensor and an undefined fitness are results: failures.
 
-    Args:
-        request: ``EvaluationSettings``, and the origin of the noise.
-        work: the robot.
+    ``request``: ``EvaluationSettings``, and the origin of the noise.
 
     Raises:
         ExperimentError: invalid settings, a plug-in that is unknown or breaks its

@@ -85,7 +85,6 @@ class _Held:
     """A shard after its latest advance.
 
     Attributes:
-        world: the arena.
         settings: as in the request.
         digest: of its state; empty before the first advance.
     """
@@ -109,12 +108,9 @@ class Shards:
     ) -> None:
         """Initialise without shards.
 
-        Args:
-            world: class of the arenas.
-            most_held: shards to keep; the least recently used is dropped first.
-            threads: that step clusters of an arena; results do not depend on it.
-            outlet: publishes each advance for live viewers.
-            key_of: returns the key of a shard's advances.
+        ``most_held``: shards to keep; the least recently used is dropped first.
+        ``threads``: that step clusters of an arena; results do not depend on it.
+        ``key_of``: returns the key of a shard's advances.
         """
         self._world = world
         self._most_held = most_held
@@ -127,10 +123,6 @@ class Shards:
 
         A function of the request, if the state that it starts from is kept or comes
         with it. Otherwise the answer asks for the state.
-
-        Args:
-            request: the run, and ``ArenaSettings``.
-            work: the advance.
 
         Raises:
             MalformedMessage: an end before the start.

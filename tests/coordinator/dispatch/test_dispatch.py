@@ -186,35 +186,11 @@ def test_new_agent_gets_no_jobs_ahead_before_its_first_answer() -> None:
     assert dispatch.pause_s == 0.0
 
 
-def test_no_jobs_are_given_ahead_near_the_end() -> None:
-    dispatch, *_ = busy_pair(0.04, 0.04)
-    agents = dispatch._pools["worker"].agents
-    while dispatch.waiting("worker"):
-        name = max(agents, key=lambda each: len(agents[each].held))
-        dispatch.handle(ok(next(iter(agents[name].held)), name))
-    assert [len(agent.held) for agent in agents.values()] == [2, 2]
-    assert dispatch.pause_s == 0.0
-
-
-def test_long_jobs_are_not_given_ahead() -> None:
-    dispatch, first, second = busy_pair(1.0, 1.0)
-    assert (first, second) == ([(4, "a")], [(5, "b")])
-    assert dispatch.pause_s == 0.0
-
-
 def test_least_busy_agent_gets_the_job_and_ties_break_on_its_name() -> None:
     dispatch = told(worker("b"), worker("a"), worker("c", slots=4))
     out = [given_out(dispatch.handle(event)) for event in requests(*range(8))]
     # c has four slots: one job there weighs a quarter.
     assert [agent for ((_, agent),) in out] == ["a", "b", "c", "c", "c", "c", "a", "b"]
-
-
-def test_jobs_of_an_agent_that_left_go_first_to_others() -> None:
-    dispatch = told(worker("a"), *requests(0, 1, 2, 3))
-    dispatch.handle(worker("b"))  # takes 2 and 3
-    assert given_out(dispatch.handle(Left("a"))) == []
-    assert given_out(dispatch.handle(ok(3, "b"))) == [(0, "b")]
-    assert given_out(dispatch.handle(ok(2, "b"))) == [(1, "b")]
 
 
 class Single:
@@ -425,15 +401,6 @@ def test_each_copy_of_a_job_is_timed_from_its_own_assignment(
     assert learned == pytest.approx(job_s)
 
 
-def test_no_agent_gets_a_copy_of_a_job_that_it_has_or_failed_at() -> None:
-    dispatch = late()
-    dispatch.handle(Ticked(9.0))
-    assert given_out(dispatch.handle(lost(1, "b"))) == []
-    assert given_out(dispatch.handle(Ticked(99.0))) == [(2, "b")]
-    assert dispatch.handle(ok(2, "b"))[0] == Deliver(job(2), "b", "p", b"a2")
-    assert given_out(dispatch.handle(Ticked(199.0))) == []
-
-
 def silent(dispatch: Dispatch, now_s: float) -> list[DispatchCommand]:
     """Let agents be asked from a time on, and not answer; return what follows."""
     asked = dispatch.handle(Ticked(now_s))
@@ -610,23 +577,6 @@ def test_agents_that_report_progress_and_never_answer_end_no_run() -> None:
     waits_s = [after - before for before, after in pairwise(at_s)]
     assert waits_s == pytest.approx([1.2, 1.2 * 16.0, 1.2 * 256.0], abs=0.5)
     assert dispatch.silent() == {}
-
-
-def test_slow_agents_that_report_progress_keep_their_jobs() -> None:
-    """Jobs of ten minutes on three workers: one copy each at most, and no line."""
-    dispatch = told(Ticked(0.0), *(worker(name) for name in "abc"))
-    for number in range(3):
-        dispatch.handle(Requested(simulation(number)))
-    copies = 0
-    for second in range(1, 600):
-        for command in dispatch.handle(Ticked(float(second))):
-            assert isinstance(command, AskProgress)
-            copies += len(dispatch.handle(Progressed(command.agent)))
-    assert copies == 0
-    assert dispatch.silent() == {}
-    # They take the next ones as always.
-    assert given_out(dispatch.handle(Requested(simulation(3)))) == [(3, "a")]
-    assert dispatch.handle(ok(1, "b"))[0] == Deliver(simulation(1), "b", "p", b"a1")
 
 
 def test_a_deadline_follows_the_simulated_time() -> None:
@@ -825,6 +775,12 @@ class World:
             for name in names:
                 assert sorted(pool.agents[name].held) == sorted(self.held[name])
             held = [number for name in names for number in self.held[name]]
+            assert (inside.agents(kind), inside.names(kind)) == (
+                len(names),
+                sorted(names),
+            )
+            assert inside.assigned(kind) == len(held)
+            assert inside.waiting(kind) == len(pool.waiting)
             silent = {name for name in names if pool.agents[name].is_silent}
             working = [
                 n for name in names for n in self.held[name] if name not in silent
@@ -981,15 +937,3 @@ def test_same_events_give_the_same_commands() -> None:
             getattr(world, world.random.choice(ACTIONS))()
         stories.append((world.past, world.held, list(world.delivered)))
     assert stories[0] == stories[1]
-
-
-def test_jobs_are_counted_while_they_wait_and_while_agents_hold_them() -> None:
-    dispatch = told(*(Requested(job(number)) for number in range(5)))
-    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (5, 0)
-    dispatch.handle(worker("a"))
-    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (3, 2)
-    dispatch.handle(ok(0, "a"))
-    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (2, 2)
-    dispatch.handle(Left("a"))
-    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (4, 0)
-    assert (dispatch.waiting("analyzer"), dispatch.assigned("analyzer")) == (0, 0)

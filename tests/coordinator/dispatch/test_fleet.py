@@ -430,18 +430,6 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
     assert ended(end) == (0, "two", b"x", "")
 
 
-def test_an_advance_is_timed_from_its_own_assignment(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    """Also the first one of all, of a coordinator that has run for long."""
-    fleet.listen(0.0, 1000.0)
-    fleet.advance(new_shard(fleet))
-    fleet.listen(0.0, 1000.0 + 0.9 * FIRST_S)
-    assert agents.asked == []
-    fleet.listen(0.0, 1000.0 + 1.1 * FIRST_S)
-    assert agents.asked == ["one"]
-
-
 def test_jobs_and_advances_share_one_account_of_load(
     fleet: JobRouter, agents: SentJobs
 ) -> None:

@@ -135,16 +135,6 @@ def test_only_a_worker_of_the_first_platform_continues_a_shard() -> None:
     assert dispatch.handle(joined("d", "arm")) == [whole]
 
 
-def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    assert dispatch.handle(Left("a")) == [Sent(2, 0, "b", "p", is_whole=True)]
-    # Its own end as a job comes late and says nothing new.
-    assert dispatch.returned(1, "lost") == []
-    assert dispatch.returned(1) == []
-    assert dispatch.returned(2) == [Ended(0, "b")]
-
-
 def test_worker_without_the_state_is_given_it() -> None:
     dispatch = fleet("a", "b")
     dispatch.request(0)
@@ -235,22 +225,6 @@ def advance(dispatch: Fleet, shard: int, start_s: float, lasts_s: float) -> None
     dispatch.handle(Ticked(start_s + lasts_s))
     (done, *_) = dispatch.returned(hand.number)
     assert isinstance(done, Ended)
-
-
-def test_worker_that_reports_progress_keeps_its_advance() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    now_s, asked = 0.0, 0
-    while now_s < 100 * FIRST_S:
-        now_s += 1.0
-        commands = dispatch.handle(Ticked(now_s))
-        assert commands in ([], [AskProgress("a")])
-        if commands:
-            asked += 1
-            dispatch.handle(Progressed("a"))
-    # One question for each deadline.
-    assert asked == pytest.approx(100, abs=2)
-    assert dispatch.holder(0) == "a"
 
 
 def test_slow_advance_on_several_silent_workers_ends() -> None:
