@@ -113,8 +113,9 @@ from schema.wire.updates import (
     decode_page,
     pages_of,
 )
+from tests.coordinator.reports import VIABLE
 from tests.coordinator.run.test_honest_worlds import advances, settings_of
-from tests.coordinator.sent_requests import BIRTH, JUDGED, ROBOT, VIABLE
+from tests.coordinator.sent_requests import BIRTH, JUDGED, ROBOT
 from tests.coordinator.storage.test_journal import EVENTS
 from tests.documents import parse_experiment
 from worker.arena.world import World
