@@ -15,11 +15,7 @@ from coordinator.cli.flags import resume_flags
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.kinds import KINDS, brain_kind
-from coordinator.plugins.checks import (
-    check_built_in,
-    refuse_faulty,
-    refuse_faulty_of,
-)
+from coordinator.plugins.checks import check_built_in, refuse_faulty, refuse_faulty_of
 from coordinator.plugins.command import check, check_flags, list_flags, list_plugins
 from coordinator.plugins.cost import cost_line
 from coordinator.run.cross_checks import Checks
@@ -150,11 +146,7 @@ def _resume(options: argparse.Namespace) -> int:
     return _stoppable(folder, deployment, lambda: resume(folder, deployment))
 
 
-def _stoppable(
-    folder: Path,
-    deployment: Deployment,
-    execute: Callable[[], int],
-) -> int:
+def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int]) -> int:
     """Execute a folder's runs; after Ctrl-C say how to resume them."""
     flags = deployment.resume_flags
     try:

@@ -265,10 +265,7 @@ _ACTIVE_HINGE = Shape(
         Box("servo", (0.0245, 0.034, 0.01), (0.0231, 0.0, 0.0), 0.009, 1),
         Box("tail", PLATE, (0.0362, 0.0, 0.0), 0.007, 1),
     ),
-    slots=(
-        Slot((-0.00075, 0.0, 0.0), MINUS_X, Z),
-        Slot((0.03695, 0.0, 0.0), X, Z, 1),
-    ),
+    slots=(Slot((-0.00075, 0.0, 0.0), MINUS_X, Z), Slot((0.03695, 0.0, 0.0), X, Z, 1)),
     joint=Joint((0.01485, 0.0, 0.0), MINUS_Y, math.radians(45)),
 )
 _HINGE = Shape(
@@ -278,10 +275,7 @@ _HINGE = Shape(
         Box("conn_b", (0.0205, 0.002, 0.02), (0.0276, 0.0, 0.0), 0.001, 1),
         Box("tail", PLATE, (0.0387, 0.0, 0.0), 0.002, 1),
     ),
-    slots=(
-        Slot((-0.00075, 0.0, 0.0), MINUS_X, Z),
-        Slot((0.03945, 0.0, 0.0), X, Z, 1),
-    ),
+    slots=(Slot((-0.00075, 0.0, 0.0), MINUS_X, Z), Slot((0.03945, 0.0, 0.0), X, Z, 1)),
     joint=Joint((0.01935, 0.0, 0.0), Z, math.radians(60)),
 )
 _TOUCH = Shape(

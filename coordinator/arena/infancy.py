@@ -58,10 +58,7 @@ class Infancy:
     """
 
     def __init__(
-        self,
-        experiment: Experiment,
-        encoding: IslandEncoding,
-        living: LivingRobots,
+        self, experiment: Experiment, encoding: IslandEncoding, living: LivingRobots
     ) -> None:
         """Initialise without infants.
 

@@ -40,11 +40,7 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
-from coordinator.dispatch.pool import (
-    LOOK_S,
-    AgentState,
-    Pending,
-)
+from coordinator.dispatch.pool import LOOK_S, AgentState, Pending
 from schema.errors import UnexpectedEvent
 from schema.wire.messages import Crash
 

@@ -6,11 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from coordinator.evolution.encodings import (
-    IslandEncoding,
-    encoding_of,
-    outside_limits,
-)
+from coordinator.evolution.encodings import IslandEncoding, encoding_of, outside_limits
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment, Space
 from schema.plugins.contract import broken, repeated

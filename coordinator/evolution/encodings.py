@@ -11,12 +11,7 @@ from coordinator.evolution.cppn.encoding import Cppn
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, one_line
 from schema.experiment.brains import NoParameters, types_of
-from schema.experiment.document import (
-    REVOLVE_ANGLE,
-    Experiment,
-    Space,
-    body_space,
-)
+from schema.experiment.document import REVOLVE_ANGLE, Experiment, Space, body_space
 from schema.limits import ROBOT_BYTES
 from schema.parts import BodySpace
 from schema.plugins.contract import broken

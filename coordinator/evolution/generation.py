@@ -87,10 +87,7 @@ def random_brain(
 
 
 def _random_body(
-    draws: BufferedRng,
-    experiment: Experiment,
-    genes: Iterator[int],
-    brain: BrainGenes,
+    draws: BufferedRng, experiment: Experiment, genes: Iterator[int], brain: BrainGenes
 ) -> MutableGenome:
     """Return a random tree without hidden neurons, possibly without a motor."""
     space, shape = experiment.space, experiment.generation

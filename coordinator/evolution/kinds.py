@@ -18,12 +18,7 @@ from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
-from coordinator.evolution.selection import (
-    PARENT_RULES,
-    SURVIVOR_RULES,
-    Rule,
-    rule_of,
-)
+from coordinator.evolution.selection import PARENT_RULES, SURVIVOR_RULES, Rule, rule_of
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
@@ -125,11 +120,7 @@ def _rules(name: str, experiment: Experiment) -> Iterator[_Ruled]:
             yield _Ruled(selection, experiment.measures.labels)
 
 
-def _selection_kind(
-    name: str,
-    built_in: Mapping[str, object],
-    arguments: int,
-) -> Kind:
+def _selection_kind(name: str, built_in: Mapping[str, object], arguments: int) -> Kind:
     return Kind(
         name,
         f"selection.{name}",

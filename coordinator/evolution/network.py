@@ -128,10 +128,7 @@ def connect(
 
 
 def wire(
-    draws: Draws,
-    sources: Iterable[B],
-    targets: Iterable[B],
-    probability: float,
+    draws: Draws, sources: Iterable[B], targets: Iterable[B], probability: float
 ) -> None:
     """Add connections between neurons of branches, each possible with a probability."""
     ends = endpoints(targets, "output", "hidden")
@@ -173,9 +170,7 @@ def delete_hidden_neurons(
 
 
 def _renumbered(
-    gene: ConnectionGene,
-    owner: Branch,
-    new_offsets: dict[Branch, list[int | None]],
+    gene: ConnectionGene, owner: Branch, new_offsets: dict[Branch, list[int | None]]
 ) -> ConnectionGene | None:
     """Return a connection with new offsets; None if one of its neurons is deleted."""
     if "hidden" not in (gene.source[0], gene.target[0]):
@@ -225,10 +220,7 @@ def vary_neurons(
 
 
 def _varied(
-    draws: Draws,
-    neurons: tuple[NeuronGene, ...],
-    epsilon: float,
-    kinds: NeuronKinds,
+    draws: Draws, neurons: tuple[NeuronGene, ...], epsilon: float, kinds: NeuronKinds
 ) -> tuple[NeuronGene, ...]:
     nearby = draws.nearby
     return tuple(
@@ -267,10 +259,7 @@ def add_hidden_neurons(
 
 
 def add_connections(
-    draws: Draws,
-    branches: Sequence[Branch],
-    before: int,
-    rules: BrainRules,
+    draws: Draws, branches: Sequence[Branch], before: int, rules: BrainRules
 ) -> None:
     """Add as many connections as deletion removes on average, rounded half up.
 

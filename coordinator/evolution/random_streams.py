@@ -103,10 +103,7 @@ class BufferedRng:
         return tuple([p.low + (p.high - p.low) * self.number() for p in parameters])
 
     def nearby(
-        self,
-        parameters: Sequence[Parameter],
-        values: Sequence[float],
-        epsilon: float,
+        self, parameters: Sequence[Parameter], values: Sequence[float], epsilon: float
     ) -> tuple[float, ...]:
         """Return values moved by a share of the way to random ones.
 

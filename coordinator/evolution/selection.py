@@ -225,10 +225,7 @@ SURVIVOR_RULES: dict[str, SurvivorSelection] = {
 
 
 def cull_population(
-    parents: Sequence[S],
-    children: Sequence[S],
-    founders: int,
-    rules: Culling,
+    parents: Sequence[S], children: Sequence[S], founders: int, rules: Culling
 ) -> tuple[S, ...]:
     """Return the next population of varying size, in birth order.
 

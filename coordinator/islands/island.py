@@ -35,11 +35,7 @@ from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.learning import IslandLearning, NewbornLearning
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.reevaluation import Reevaluations, with_durations
-from coordinator.islands.rows import (
-    birth_record,
-    evaluation_record,
-    population_records,
-)
+from coordinator.islands.rows import birth_record, evaluation_record, population_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId

@@ -16,11 +16,7 @@ from schema.wire.messages import Request
 class LocalAgents:
     """One worker and one analyzer that do their jobs during ``receive``."""
 
-    def __init__(
-        self,
-        agents: Mapping[AgentKind, Compute],
-        platform: str,
-    ) -> None:
+    def __init__(self, agents: Mapping[AgentKind, Compute], platform: str) -> None:
         """Initialise agents with the functions that do their work."""
         self._agents = {f"local-{kind}": agents[kind] for kind in sorted(agents)}
         self._asked: deque[tuple[int, str, bytes]] = deque()

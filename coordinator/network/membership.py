@@ -14,12 +14,7 @@ from coordinator.dispatch.events import AgentKind, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
 from schema.agent.topics import Member, member_of, slot_of
 from schema.errors import MalformedMessage
-from schema.limits import (
-    INFO_BYTES,
-    LONGEST_QUIET_S,
-    MOST_MEMBERS,
-    printable,
-)
+from schema.limits import INFO_BYTES, LONGEST_QUIET_S, MOST_MEMBERS, printable
 from schema.wire.codec import decode
 from schema.wire.messages import AgentInfo, Crash
 

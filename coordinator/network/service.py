@@ -47,11 +47,7 @@ from schema.agent.service import (
 )
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
-from schema.limits import (
-    LONGEST_REASON,
-    MOST_ASKED_INFOS,
-    printable,
-)
+from schema.limits import LONGEST_REASON, MOST_ASKED_INFOS, printable
 from schema.wire.codec import fingerprint
 
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
@@ -434,9 +430,7 @@ def _keep_thread_state() -> None:
         ctypes.pythonapi.PyGILState_Ensure()
 
 
-def _outcome(
-    told: str,
-) -> tuple[Literal["fenced", "cancelled", "unfit", "error"], str]:
+def _outcome(told: str) -> tuple[Literal["fenced", "cancelled", "unfit", "error"], str]:
     """Return the outcome of a job without an answer, and the reason for it."""
     if told.startswith(FENCED):
         return "fenced", told

@@ -129,10 +129,7 @@ def list_flags() -> Flags:
         prog="revolve plugins",
         description="List the plug-ins of every kind, built-in or found, with file, "
         "line and digest of the source.",
-        examples=(
-            "revolve plugins",
-            "revolve plugins --plugins my_lab.py --json",
-        ),
+        examples=("revolve plugins", "revolve plugins --plugins my_lab.py --json"),
     )
     flags.add_argument("--json", action="store_true", help="print JSON, one list")
     add_plugins(flags)

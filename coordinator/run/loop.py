@@ -40,12 +40,7 @@ from coordinator.islands.events import (
 from coordinator.islands.island import Island
 from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
 from coordinator.run.learners import Learners
-from coordinator.run.requests import (
-    Key,
-    Requests,
-    island_of,
-    key_of,
-)
+from coordinator.run.requests import Key, Requests, island_of, key_of
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests, SnapshotStore
 from coordinator.run.throttle import RealTimeThrottle

@@ -14,11 +14,7 @@ from msgspec import structs
 from coordinator.dispatch.events import Assign, Deliver, Read
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
-from coordinator.run.advance_checks import (
-    ExpectedAdvance,
-    check_advance,
-    check_poses,
-)
+from coordinator.run.advance_checks import ExpectedAdvance, check_advance, check_poses
 from coordinator.run.drift import Drift, with_losses
 from coordinator.run.requests import Expected, impossible, read_answer
 from coordinator.run.run_context import RunContext

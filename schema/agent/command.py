@@ -16,13 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from schema.agent.access import Certificate, read_certificates
-from schema.agent.address import (
-    CONNECT_VARIABLE,
-    FORMS,
-    HUB,
-    hub_of,
-    user_hub,
-)
+from schema.agent.address import CONNECT_VARIABLE, FORMS, HUB, hub_of, user_hub
 from schema.agent.flags import Flags, add_plugins, positive_number, whole_number
 from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config, hub_config

@@ -439,9 +439,7 @@ def _serve_session(
 
 
 def _queue_all(
-    inbox: Inbox[zenoh.Query],
-    turns: FairQueue[zenoh.Query],
-    counts: ReplyCounts,
+    inbox: Inbox[zenoh.Query], turns: FairQueue[zenoh.Query], counts: ReplyCounts
 ) -> bool:
     """Move all queries that arrived to the queue; return whether any waits."""
     try:

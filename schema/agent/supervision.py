@@ -146,9 +146,7 @@ class JobWatch:
     """
 
     def __init__(
-        self,
-        cpu_s: Callable[[], float],
-        now_s: Callable[[], float] = time.monotonic,
+        self, cpu_s: Callable[[], float], now_s: Callable[[], float] = time.monotonic
     ) -> None:
         self.task: RunningJob | None = None
         self._cpu_s, self._now_s = cpu_s, now_s

@@ -25,12 +25,7 @@ from schema.agent.capacity import core_quota
 from schema.agent.import_path import SAFE_PATH, check_graphics
 from schema.agent.log import warn_user
 from schema.agent.stopping import catch_stop_signals
-from schema.agent.supervision import (
-    LAST_DEATHS,
-    CurrentJob,
-    ProcessSlot,
-    crash_cause,
-)
+from schema.agent.supervision import LAST_DEATHS, CurrentJob, ProcessSlot, crash_cause
 from schema.errors import shown
 from schema.wire.messages import Crash
 

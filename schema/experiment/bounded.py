@@ -8,13 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from schema.errors import (
-    ExperimentError,
-    RevolveError,
-    check_most,
-    nearest,
-    unreadable,
-)
+from schema.errors import ExperimentError, RevolveError, check_most, nearest, unreadable
 from schema.limits import (
     MOST_BRACKETS,
     MOST_DEPTH,

@@ -47,10 +47,7 @@ def island_problems(experiment: Experiment) -> Iterator[str]:
 
 
 def _limits_problems(experiment: Experiment) -> Iterator[str]:
-    pairs = [
-        ("space.min_parts", "space.max_parts"),
-        ("selection.population", "births"),
-    ]
+    pairs = [("space.min_parts", "space.max_parts"), ("selection.population", "births")]
     if experiment.selection.window is not None:
         pairs.append(("selection.window", "selection.children"))
     if not experiment.selection.keep_parents:
@@ -164,10 +161,7 @@ def _learning_problems(experiment: Experiment) -> Iterator[str]:
 def _scenery_problems(experiment: Experiment) -> Iterator[str]:
     if scenery := experiment.environment.scenery:
         # MuJoCo is imported only if needed: it is slow to load.
-        from schema.experiment.scenery import (  # noqa: PLC0415
-            refuse_objects,
-            scenery_model,
-        )
+        from schema.experiment.scenery import refuse_objects, scenery_model  # noqa: PLC0415
 
         try:
             scenery_model(scenery, experiment.simulation)

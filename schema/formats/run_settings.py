@@ -9,13 +9,7 @@ from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, island_experiment, island_experiments
 from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.formats.files import (
-    BEST,
-    MJCF_ENDING,
-    check_file,
-    read_robot,
-    settings_of,
-)
+from schema.formats.files import BEST, MJCF_ENDING, check_file, read_robot, settings_of
 from schema.robot.robot import Robot
 from schema.tables.description import DETAILS, allow_plugins_of, read_description
 from schema.tables.last_populations import best_of, last_populations

@@ -205,9 +205,7 @@ def add_ground(
     Rough ground becomes the geom ``rough``, scenery ``scenery/{k}``.
     """
     spec.worldbody.add_geom(
-        name="ground",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=(0.0, 0.0, 1.0),
+        name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0.0, 0.0, 1.0)
     )
     if environment.roughness_m:
         _add_relief(spec, environment)
@@ -222,9 +220,7 @@ def _add_relief(spec: mujoco.MjSpec, environment: Environment) -> None:
     field.size = (extent, extent, environment.roughness_m, _BELOW_M)
     field.userdata = shares.ravel()
     spec.worldbody.add_geom(
-        name="rough",
-        type=mujoco.mjtGeom.mjGEOM_HFIELD,
-        hfieldname="rough",
+        name="rough", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="rough"
     )
 
 

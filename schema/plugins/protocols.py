@@ -153,11 +153,7 @@ class SensorView(Protocol):
         """
 
     def distance(
-        self,
-        box: str,
-        direction: Vector,
-        reach: float,
-        start: Vector = (0.0, 0.0, 0.0),
+        self, box: str, direction: Vector, reach: float, start: Vector = (0.0, 0.0, 0.0)
     ) -> float:
         """Return how far a ray gets [m].
 
@@ -257,10 +253,7 @@ class Draws(Protocol):
         """Return one value for each parameter, uniform in its range."""
 
     def nearby(
-        self,
-        parameters: Sequence[Parameter],
-        values: Sequence[float],
-        epsilon: float,
+        self, parameters: Sequence[Parameter], values: Sequence[float], epsilon: float
     ) -> tuple[float, ...]:
         """Return values moved by the share ``epsilon`` of the way to random ones."""
 

@@ -51,11 +51,7 @@ class HandMadeView:
         return self.is_touched
 
     def distance(
-        self,
-        box: str,
-        direction: Vector,
-        reach: float,
-        start: Vector = (0.0, 0.0, 0.0),
+        self, box: str, direction: Vector, reach: float, start: Vector = (0.0, 0.0, 0.0)
     ) -> float:
         """Return the distance of the obstacle, or ``reach``."""
         self._box(box)

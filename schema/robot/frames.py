@@ -87,9 +87,7 @@ def attach(parent: Slot, child: Slot, orientation: int) -> tuple[Floats, Floats]
     return rotation, position
 
 
-def _attached(
-    ends: Sequence[tuple[Slot, Slot, int]],
-) -> tuple[Floats, Floats]:
+def _attached(ends: Sequence[tuple[Slot, Slot, int]]) -> tuple[Floats, Floats]:
     """Return rotations (K, 3, 3) and positions (K, 3) as ``attach`` for each pair."""
     rows = [
         (parent.normal + parent.tangent + parent.position)

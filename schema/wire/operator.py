@@ -6,12 +6,7 @@ from typing import Annotated
 from msgspec import Meta
 from msgspec.structs import replace
 
-from schema.limits import (
-    LONGEST_NAME,
-    OPERATOR_REPLY_BYTES,
-    Finite,
-    printable_lines,
-)
+from schema.limits import LONGEST_NAME, OPERATOR_REPLY_BYTES, Finite, printable_lines
 from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.robot import Robot
 from schema.wire.codec import Message, decode

@@ -99,9 +99,7 @@ class PoseArrays(NamedTuple):
             self.times_s,
             *self.cores.T,
             pa.ListArray.from_arrays(
-                pa.array(ends),
-                pa.array(self.angles),
-                type=_SCHEMA.field("angles").type,
+                pa.array(ends), pa.array(self.angles), type=_SCHEMA.field("angles").type
             ),
         ]
         return pa.Table.from_arrays(columns, schema=_SCHEMA)

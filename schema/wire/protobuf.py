@@ -12,13 +12,7 @@ from google.protobuf.message import DecodeError
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.limits import MOST_CONNECTIONS, MOST_NEURONS, MOST_PARTS, ROBOT_BYTES
 from schema.robot.brain import Brain, Connection, Layer, Neuron, check_brain
-from schema.robot.genome import (
-    ConnectionGene,
-    Genes,
-    Genome,
-    NeuronGene,
-    assemble,
-)
+from schema.robot.genome import ConnectionGene, Genes, Genome, NeuronGene, assemble
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
 

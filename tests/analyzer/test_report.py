@@ -106,10 +106,7 @@ EXPERIMENT = Experiment(name="test")
 SETTINGS = vetting_settings(EXPERIMENT)
 INPUTS = tuple(Neuron("input", "Input", 0) for _ in range(6))
 MOTOR = Neuron("output", "Simple", 1, (0.0, 0.5))
-ROBOT = Robot(
-    (CORE, Part("ActiveHinge", 0, 2, 0, 90, GREY)),
-    Brain((*INPUTS, MOTOR)),
-)
+ROBOT = Robot((CORE, Part("ActiveHinge", 0, 2, 0, 90, GREY)), Brain((*INPUTS, MOTOR)))
 
 
 def request_for(robot: Robot, settings: bytes = SETTINGS) -> Request:

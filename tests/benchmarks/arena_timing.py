@@ -159,10 +159,7 @@ class RecordedArena:
             rewind_cluster(cluster, moment)
 
         self.world.apply(changes)
-        with (
-            patch.object(Cluster, "run", run),
-            patch.object(Cluster, "rewind", rewind),
-        ):
+        with patch.object(Cluster, "run", run), patch.object(Cluster, "rewind", rewind):
             self.world.advance(until)
 
     def replay(self, clock: Clock) -> float:

@@ -123,9 +123,7 @@ class Stream:
 
 
 @contextmanager
-def real_fleet(
-    bodies: dict[AgentKind, tuple[Body, int]],
-) -> Iterator[JobRouter]:
+def real_fleet(bodies: dict[AgentKind, tuple[Body, int]]) -> Iterator[JobRouter]:
     """Start a fleet of processes on this machine and wait until all have joined.
 
     Args:

@@ -136,10 +136,7 @@ def test_utilisation_of_two_workers_of_a_campaign(tmp_path: Path) -> None:
 
 
 def test_rate_and_cpu_time_of_null_evaluations() -> None:
-    best = max(
-        (null_rate(3.0) for _ in range(3)),
-        key=lambda rate: rate.per_s,
-    )
+    best = max((null_rate(3.0) for _ in range(3)), key=lambda rate: rate.per_s)
     print(f"\n{best.per_s:.0f} null evaluations/s, {1e3 * best.cpu_s:.3f} ms CPU each")
     assert best.cpu_s <= MOST_NULL_CPU_S
     assert best.per_s >= LEAST_NULL_PER_S

@@ -11,9 +11,7 @@ from worker.bench.command import LEAST_RATIO, Timing, time_evaluations
 
 EXPERIMENT = Experiment(name="test")
 SETTINGS = EvaluationSettings(
-    space=EXPERIMENT.space,
-    simulation=EXPERIMENT.simulation,
-    fitness=EXPERIMENT.fitness,
+    space=EXPERIMENT.space, simulation=EXPERIMENT.simulation, fitness=EXPERIMENT.fitness
 )
 
 

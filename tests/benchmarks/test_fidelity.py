@@ -10,11 +10,7 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Islands, Simulation
 from schema.robot.brain import Brain
 from schema.robot.robot import Robot
-from tests.benchmarks.fidelity import (
-    main,
-    read_population,
-    sample_thirds,
-)
+from tests.benchmarks.fidelity import main, read_population, sample_thirds
 from tests.benchmarks.run_folder import write_run
 from tests.worker.conftest import random_robot
 
@@ -56,8 +52,7 @@ def test_robots_have_the_settings_of_their_islands(tmp_path: Path) -> None:
 
 
 def test_random_robots_agree_with_finer_steps(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A small version of the benchmark."""
     experiment = Experiment(name="test", simulation=Simulation(window_steps=1200))

@@ -157,10 +157,7 @@ def constraints(folder: Path, libraries: str, wheel: Path) -> list[str]:
 @pytest.mark.parametrize("libraries", ["oldest", "newest"])
 @pytest.mark.parametrize("version", PYTHONS)
 def test_wheel_works_outside_the_tree(
-    made: Callable[[str], Environment],
-    wheel: Path,
-    version: str,
-    libraries: str,
+    made: Callable[[str], Environment], wheel: Path, version: str, libraries: str
 ) -> None:
     its = made(version)
     limits = constraints(its.folder, libraries, wheel)
@@ -183,10 +180,7 @@ def test_wheel_works_outside_the_tree(
     its.install(*limits, f"{wheel}[all]")
 
 
-def _runs_in_processes(
-    its: Environment,
-    words: tuple[str, ...],
-) -> None:
+def _runs_in_processes(its: Environment, words: tuple[str, ...]) -> None:
     """Run a coordinator with a worker and an analyzer in other processes."""
     words = (*words, "two", "--listen", "tcp/127.0.0.1:0")
     run = its.start("revolve", "coordinator", *words)
@@ -194,8 +188,7 @@ def _runs_in_processes(
     others: list[subprocess.Popen[str]] = []
     try:
         wait_until(
-            lambda: place.exists() or run.poll() is not None,
-            "the coordinator listens",
+            lambda: place.exists() or run.poll() is not None, "the coordinator listens"
         )
         assert run.poll() is None, run.communicate()
         address = place.read_text().split()[0]

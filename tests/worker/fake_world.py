@@ -81,9 +81,7 @@ class FakeWorld:
             casualties=tuple(Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in lost),
             touches=(),
             poses=poses(
-                living,
-                *(one * POSE_STEPS * DT for one in samples),
-                joints=self.joints,
+                living, *(one * POSE_STEPS * DT for one in samples), joints=self.joints
             ).message(),
         )
 

@@ -45,11 +45,7 @@ def insertions(
 
 
 def time_arena(
-    settings: ArenaSettings,
-    robots: Sequence[Insertion],
-    *,
-    seconds: int,
-    threads: int,
+    settings: ArenaSettings, robots: Sequence[Insertion], *, seconds: int, threads: int
 ) -> tuple[float, float]:
     """Return the simulated time of an arena and the time that it takes [s].
 

@@ -23,9 +23,7 @@ from schema.errors import (
     counted,
 )
 from schema.experiment.document import body_space
-from schema.experiment.file import (
-    read_experiment,
-)
+from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
 from schema.robot.robot import Robot

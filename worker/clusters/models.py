@@ -21,13 +21,7 @@ from schema.experiment.document import body_space
 from schema.experiment.scenery import refuse_objects
 from schema.experiment.settings import ArenaSettings
 from schema.mjcf.footing import footprint, standing_height
-from schema.mjcf.model import (
-    add_walls,
-    ring_wall,
-    robot_spec,
-    shared_model,
-    solo_spec,
-)
+from schema.mjcf.model import add_walls, ring_wall, robot_spec, shared_model, solo_spec
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats

@@ -142,9 +142,7 @@ def load_controls(brain: BrainSection, space: Space, tick_s: float) -> Controls:
 
 
 def pack(
-    brain: Brain,
-    width: Widths,
-    types: Mapping[str, NeuronType] = BUILT_IN_NEURONS,
+    brain: Brain, width: Widths, types: Mapping[str, NeuronType] = BUILT_IN_NEURONS
 ) -> PackedNetwork:
     """Return a brain as arrays of fixed width."""
     first = {"input": 0, "output": width.inputs, "hidden": width.inputs + width.outputs}

@@ -43,11 +43,7 @@ class Sensors:
     """
 
     def __init__(
-        self,
-        placed: PlacedRobot,
-        *,
-        width: int,
-        has_light: bool = False,
+        self, placed: PlacedRobot, *, width: int, has_light: bool = False
     ) -> None:
         """Find the sensors.
 

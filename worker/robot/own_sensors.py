@@ -115,11 +115,7 @@ class PartView:
         return self._geoms[box] in self.around.touched
 
     def distance(
-        self,
-        box: str,
-        direction: Vector,
-        reach: float,
-        start: Vector = (0.0, 0.0, 0.0),
+        self, box: str, direction: Vector, reach: float, start: Vector = (0.0, 0.0, 0.0)
     ) -> float:
         """Return how far a ray gets [m]; see ``SensorView``."""
         ray_problem(direction, reach, start)
@@ -137,9 +133,7 @@ class OwnSensors:
     """Own sensors of one robot in a model."""
 
     def __init__(
-        self,
-        sensors: Sequence[tuple[int, str, OwnSensor, int]],
-        placed: PlacedRobot,
+        self, sensors: Sequence[tuple[int, str, OwnSensor, int]], placed: PlacedRobot
     ) -> None:
         """Find the parts of the sensors.
 

@@ -96,11 +96,7 @@ class Channels:
         return row
 
     def trace(
-        self,
-        robot: Robot,
-        interval_s: float,
-        positions: Floats,
-        rows: Iterable[Floats],
+        self, robot: Robot, interval_s: float, positions: Floats, rows: Iterable[Floats]
     ) -> Trace:
         """Return the trace of some samples."""
         constants = self._constants | {"robot": robot}

@@ -19,14 +19,7 @@ from schema.experiment.brains import types_of
 from schema.experiment.settings import ArenaSettings, read_arena_settings
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
-from schema.wire.arena import (
-    Advance,
-    AdvanceShard,
-    Changes,
-    Live,
-    PastAdvance,
-    Rebuild,
-)
+from schema.wire.arena import Advance, AdvanceShard, Changes, Live, PastAdvance, Rebuild
 from schema.wire.codec import encode
 from schema.wire.messages import Request, StateMissing
 from worker.arena.changes import possible

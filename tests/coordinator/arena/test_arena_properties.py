@@ -6,18 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.arena.arena import Arena
-from coordinator.islands.events import (
-    Record,
-    Started,
-)
+from coordinator.islands.events import Record, Started
 from schema.robot.ids import BirthId
-from tests.coordinator.arena_world import (
-    DT,
-    ArenaRun,
-    World,
-    experiment,
-    reject_some,
-)
+from tests.coordinator.arena_world import DT, ArenaRun, World, experiment, reject_some
 
 fixed = settings(max_examples=12, derandomize=True, database=None, deadline=None)
 

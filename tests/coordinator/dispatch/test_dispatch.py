@@ -231,8 +231,7 @@ ALIKE = pytest.mark.parametrize("shard", [-1, 0], ids=["job", "advance"])
 
 @ALIKE
 @pytest.mark.parametrize(
-    "outcome",
-    ["error", "malformed", "unfit", "lost", "fenced", "cancelled", "left"],
+    "outcome", ["error", "malformed", "unfit", "lost", "fenced", "cancelled", "left"]
 )
 def test_a_job_goes_to_another_agent(shard: int, outcome: Any) -> None:  # noqa: ANN401
     single = Single(shard, "a", "b")

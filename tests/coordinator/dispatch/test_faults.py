@@ -16,9 +16,7 @@ def test_faults_are_counted_and_told_once_but_for_late_answers() -> None:
     )
     assert (faults.total("late"), faults.total("refused")) == (3, 0)
     lines = faults.lines()
-    assert [line.split(": ")[:2] for line in lines] == [
-        ["malformed", "a"],
-    ]
+    assert [line.split(": ")[:2] for line in lines] == [["malformed", "a"]]
     assert "(job 7)" in lines[0]
     faults.note("malformed", "a")
     assert faults.lines() == []

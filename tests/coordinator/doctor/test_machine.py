@@ -8,11 +8,7 @@ import pytest
 from coordinator.doctor import command, machine
 from coordinator.doctor.finding import Finding
 from coordinator.doctor.machine import GIB, MIB
-from coordinator.doctor.system import (
-    available_bytes,
-    end_rendering,
-    start_rendering,
-)
+from coordinator.doctor.system import available_bytes, end_rendering, start_rendering
 
 V3 = (
     "cx16 lahf_lm popcnt pni sse4_1 sse4_2 ssse3 abm avx avx2 bmi1 bmi2 f16c fma movbe "

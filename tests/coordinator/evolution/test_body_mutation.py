@@ -26,10 +26,7 @@ from coordinator.evolution.revolve_angle import (
     swap_subtrees,
     vary_parts,
 )
-from schema.experiment.document import (
-    Experiment,
-    Generation,
-)
+from schema.experiment.document import Experiment, Generation
 from schema.robot.genome import Genome, walk
 from schema.robot.ids import BirthId
 from tests.coordinator.genomes import TYPES, draws, experiment, node
@@ -113,11 +110,7 @@ def test_swapping_exchanges_places_and_keeps_own_slots() -> None:
         ) == sorted(str(one.slot) + one.kind for one, _, _ in walk(CHAIN))
     # The sensor may change places with each part of the other arm; whichever of
     # the arm is drawn first has the sensor alone to change with.
-    assert sorted(found) == [
-        "C(1F(1H(1T)) 2A)",
-        "C(1F(1T) 2H(1A))",
-        "C(1T 2F(1H(1A)))",
-    ]
+    assert sorted(found) == ["C(1F(1H(1T)) 2A)", "C(1F(1T) 2H(1A))", "C(1T 2F(1H(1A)))"]
     assert all(is_near(n, N / 3) for n in found.values())
 
 

@@ -209,8 +209,7 @@ def test_an_encoding_that_never_keeps_the_limits_stops_the_run(
 ) -> None:
     experiment = replace(own_encoding(), space=Space(max_parts=4, min_parts=4))
     experiment = replace(
-        experiment,
-        encoding=replace(experiment.encoding, parameters={"most_joints": 1}),
+        experiment, encoding=replace(experiment.encoding, parameters={"most_joints": 1})
     )
     broken = own_encoding(("count = int(", "count = 1 + 0 * int("))
     experiment = replace(experiment, encoding=broken.encoding)

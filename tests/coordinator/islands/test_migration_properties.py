@@ -38,10 +38,7 @@ SELECTION = SelectionSection(population=5, children=3, tournament_size=2)
 def document(*islands: Islands, **migration: Any) -> Experiment:  # noqa: ANN401
     wanted = {"topology": "fully-connected", "epoch": 6, **migration}
     return Experiment(
-        name="test",
-        selection=SELECTION,
-        islands=islands,
-        migration=Migration(**wanted),
+        name="test", selection=SELECTION, islands=islands, migration=Migration(**wanted)
     )
 
 
@@ -53,12 +50,7 @@ def shuffled(seed: int) -> Iterator[int]:
 
 @pytest.mark.parametrize(
     "islands",
-    [
-        (OFF_LINE, OFF_LINE),
-        (ON_LINE, ON_LINE),
-        (OFF_LINE, ON_LINE),
-        (ON_LINE, INFANTS),
-    ],
+    [(OFF_LINE, OFF_LINE), (ON_LINE, ON_LINE), (OFF_LINE, ON_LINE), (ON_LINE, INFANTS)],
 )
 @pytest.mark.parametrize("handling", ["preserve", "evict"])
 def test_the_order_of_answers_changes_no_row(

@@ -80,12 +80,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
     ],
 )
 def test_a_process_says_that_the_hub_drops_what_it_sends(
-    lab: Lab,
-    monkeypatch: pytest.MonkeyPatch,
-    name: str,
-    role: Role,
-    *,
-    is_denied: bool,
+    lab: Lab, monkeypatch: pytest.MonkeyPatch, name: str, role: Role, *, is_denied: bool
 ) -> None:
     """Without a coordinator, whose absence is no reason for a warning."""
     if is_denied:

@@ -9,12 +9,7 @@ from msgspec.structs import replace
 
 from coordinator.dispatch.events import Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
-from coordinator.network.membership import (
-    LONGEST_PAUSE_S,
-    SHARE,
-    InfoQueue,
-    Membership,
-)
+from coordinator.network.membership import LONGEST_PAUSE_S, SHARE, InfoQueue, Membership
 from schema.agent.topics import Member
 from schema.errors import MalformedMessage
 from schema.limits import (

@@ -320,9 +320,7 @@ def test_the_memory_of_requests_is_free_after_their_wait(network: Network) -> No
         assert held_kb[-1] - held_kb[2] < 1000
 
 
-def test_cancelled_job_is_not_done(
-    network: Network,
-) -> None:
+def test_cancelled_job_is_not_done(network: Network) -> None:
     with agent(network, "w", "slow") as process:
         until(network, has(1))
         network.send(0, "w", request(0), WAIT_S)

@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject
 from msgspec.structs import replace
 
-from coordinator.dispatch.events import (
-    Client,
-    Deliver,
-    Joined,
-    Read,
-    Returned,
-)
+from coordinator.dispatch.events import Client, Deliver, Joined, Read, Returned
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.run_context import RunContext

@@ -331,10 +331,7 @@ def test_orders_are_repeated_in_a_replay(tmp_path: Path, calm: Path) -> None:
     ("action", "why"),
     [
         (RemoveRobot(BirthId(0, 999)), "birth 999: is not alive"),
-        (
-            InsertRobot(Robot((Part("Barrow", -1, -1, -1, 0, ()),))),
-            "Barrow",
-        ),
+        (InsertRobot(Robot((Part("Barrow", -1, -1, -1, 0, ()),))), "Barrow"),
         (
             InsertRobot(Robot((Part("Core", -1, -1, -1, 0, ()),)), (8, 6)),
             "place: must be inside the wall, < 10 m from the centre, got 8 6",
@@ -352,9 +349,7 @@ def test_invalid_orders_are_refused_and_not_journalled(
         assert (tmp_path / "run" / NAME).stat().st_size == before
 
 
-def test_orders_that_stop_the_run_or_have_no_effect_are_refused(
-    tmp_path: Path,
-) -> None:
+def test_orders_that_stop_the_run_or_have_no_effect_are_refused(tmp_path: Path) -> None:
     """A robot outside ``[space]``, a place too far away, the brain of another body."""
     with ExitStack() as stack:
         one = Run(tmp_path / "run", stack, lambda _: None, document=experiment(30))

@@ -9,11 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.evolution.generation import generate
-from coordinator.run.advance_checks import (
-    ExpectedAdvance,
-    check_advance,
-    check_poses,
-)
+from coordinator.run.advance_checks import ExpectedAdvance, check_advance, check_poses
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings, read_arena_settings

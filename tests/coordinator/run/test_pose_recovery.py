@@ -276,9 +276,7 @@ def test_several_arenas_recover_in_the_order_of_the_journal(tmp_path: Path) -> N
     assert compare(whole, path) == []
 
 
-def test_poses_from_before_and_after_a_drift_are_computed_again(
-    tmp_path: Path,
-) -> None:
+def test_poses_from_before_and_after_a_drift_are_computed_again(tmp_path: Path) -> None:
     path, drifted = tmp_path / "run", tmp_path / "drifted"
     assert not execute(path, 90)
     assert execute(path, platforms=("other",))

@@ -99,11 +99,7 @@ LINE = "?[2Jgone second? line".ljust(LONGEST_REASON - 3, "x") + "..."
         (EVALUATE, Failure("fell"), EvaluationFailed(BIRTH, "fell", SIGNED)),
         (EVALUATE, Failure(TEXT), EvaluationFailed(BIRTH, LINE, SIGNED)),
         # Only the coordinator knows of a quarantine.
-        (
-            EVALUATE,
-            Failure(CLAIM),
-            EvaluationFailed(BIRTH, f"failed: {CLAIM}", SIGNED),
-        ),
+        (EVALUATE, Failure(CLAIM), EvaluationFailed(BIRTH, f"failed: {CLAIM}", SIGNED)),
         (VET, VIABLE, Vetted(BIRTH, 2, VIABLE)),
         (VET, CROWDED, Vetted(BIRTH, 2, CROWDED)),
         (VET, Failure("no box"), VettingFailed(BIRTH, 2, "no box")),

@@ -200,9 +200,7 @@ def never() -> RunFolder:
     raise AssertionError("a finished run was begun")
 
 
-def test_runs_are_started_until_requests_are_twice_the_credits(
-    tmp_path: Path,
-) -> None:
+def test_runs_are_started_until_requests_are_twice_the_credits(tmp_path: Path) -> None:
     one_at_a_time = replace(
         EXPERIMENTS[0], selection=replace(EXPERIMENTS[0].selection, population=5)
     )

@@ -44,10 +44,7 @@ LOOKED_AT_S = 0.05
 @contextmanager
 def opened(path: Path) -> Iterator[tuple[RunFolder, Journal]]:
     """Open a run as its next coordinator does."""
-    with (
-        RunFolder(path) as folder,
-        Journal.open(path, epoch=folder.epoch) as journal,
-    ):
+    with RunFolder(path) as folder, Journal.open(path, epoch=folder.epoch) as journal:
         yield folder, journal
 
 

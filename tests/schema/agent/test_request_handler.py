@@ -12,11 +12,7 @@ from hypothesis import strategies as st
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import LONG_S, Compute, Reply, Server
-from schema.agent.supervision import (
-    CurrentJob,
-    JobWatch,
-    ProcessSlot,
-)
+from schema.agent.supervision import CurrentJob, JobWatch, ProcessSlot
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.limits import (
     ANSWER_BYTES,

@@ -61,9 +61,7 @@ def test_an_agent_says_that_a_coordinator_has_another_version() -> None:
     key = Member("default", "worker", "w").info
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))) as hub:
         thread = threading.Thread(
-            target=serve,
-            args=(compute, agent, stop),
-            kwargs={"warn": lines.append},
+            target=serve, args=(compute, agent, stop), kwargs={"warn": lines.append}
         )
         thread.start()
         try:

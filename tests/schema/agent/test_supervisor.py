@@ -155,9 +155,7 @@ def _own_signals() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("_own_signals")
-def test_second_ctrl_c_at_once_does_not_count(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_second_ctrl_c_at_once_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("schema.agent.supervisor._REPEAT_S", 60.0)
     stop = stop_on_signals()
     for _ in range(2):

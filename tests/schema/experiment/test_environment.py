@@ -160,8 +160,7 @@ def test_attribute_without_effect_is_refused(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "attribute",
-    ['size="1e300 1 1"', "pos='0 -1.1e6 1'", 'fromto = "0 0 0 0 0 2e6"'],
+    "attribute", ['size="1e300 1 1"', "pos='0 -1.1e6 1'", 'fromto = "0 0 0 0 0 2e6"']
 )
 def test_scenery_beyond_the_greatest_length_is_refused(attribute: str) -> None:
     def document(attribute: str) -> str:

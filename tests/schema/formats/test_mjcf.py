@@ -121,10 +121,7 @@ CUSTOM = '<mujoco><custom><text name="revolve_robot" data="{}"/></custom></mujoc
     ("text", "message"),
     [
         ("<mujoco", "^it: not valid MJCF: "),
-        (
-            "<mujoco><asset/></mujoco>",
-            "^it: has no text 'revolve_robot': only MJCF",
-        ),
+        ("<mujoco><asset/></mujoco>", "^it: has no text 'revolve_robot': only MJCF"),
         (CUSTOM.format("?"), "^it: text 'revolve_robot': "),
         (CUSTOM.format(""), "^it: "),
     ],

@@ -28,10 +28,7 @@ def test_wheels_become_continuous_joints_and_cylinders() -> None:
     """Of the driven wheel: radius 60 mm, 3 mm thick, 0.3924 N m, 5.236 rad/s."""
     wheel = (60.0, *GREY)
     space = {**BUILT_IN, "ActiveWheel": ACTIVE_WHEEL, "Wheel": WHEEL}
-    wheels = (
-        Part("ActiveWheel", 0, 2, 0, 0, wheel),
-        Part("Wheel", 0, 3, 0, 0, wheel),
-    )
+    wheels = (Part("ActiveWheel", 0, 2, 0, 0, wheel), Part("Wheel", 0, 3, 0, 0, wheel))
     robot = robot_of(*wheels, space=space)
     root = parse_xml(robot_to_urdf(robot, space, SIMULATION), MOST_MJCF_BYTES)
     driven, free = root.iter("joint")

@@ -14,12 +14,7 @@ from schema.limits import MOST_PLUGIN_BYTES
 from schema.plugins import permission
 from schema.plugins.kept import KeptPlugin, allow_kept, keep, kept_file
 from schema.plugins.load import load_object
-from schema.plugins.permission import (
-    allow,
-    allow_references,
-    allowed,
-    import_allowed,
-)
+from schema.plugins.permission import allow, allow_references, allowed, import_allowed
 from schema.plugins.source import check_plugins, digest_of, forget_digests
 
 Kept = dict[str, KeptPlugin]

@@ -18,11 +18,7 @@ from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Part, Robot, check_robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.genome_bytes import encode_genome
-from schema.wire.protobuf import (
-    decode_genome,
-    decode_robot,
-    encode_robot,
-)
+from schema.wire.protobuf import decode_genome, decode_robot, encode_robot
 
 EMPTY = b"\x0a\x00"
 """Field 1, an empty message."""

@@ -149,9 +149,7 @@ def raises(_track: object, _fitness: object) -> float:
     raise ZeroDivisionError
 
 
-def test_undefined_fitness_removes_the_robot_with_the_reason(
-    turtle: Robot,
-) -> None:
+def test_undefined_fitness_removes_the_robot_with_the_reason(turtle: Robot) -> None:
     fitness = replace(
         SETTINGS.fitness, function="tests.worker.arena.test_changes:raises"
     )

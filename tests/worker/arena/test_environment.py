@@ -71,9 +71,7 @@ def test_imu_at_rest_on_a_slope_reads_the_components_of_gravity(
 
 
 @pytest.mark.parametrize("slope_deg", [5.0, 30.0])
-def test_box_without_friction_accelerates_down_the_slope(
-    slope_deg: float,
-) -> None:
+def test_box_without_friction_accelerates_down_the_slope(slope_deg: float) -> None:
     """It moves by g sin(a) t^2 / 2 towards -x: 2.45 m in a second at 30 degrees."""
     clock = Simulation(friction=0.0, window_steps=400)
     track = simulate(BOX, alone(clock, Environment(slope_deg=slope_deg)))

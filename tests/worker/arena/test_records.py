@@ -9,10 +9,7 @@ from msgspec.structs import replace
 
 from schema.experiment.document import Measures
 from schema.experiment.file import read_experiment
-from schema.experiment.settings import (
-    ArenaSettings,
-    arena_settings_of,
-)
+from schema.experiment.settings import ArenaSettings, arena_settings_of
 from schema.robot.brain import Brain, Connection
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -62,8 +59,7 @@ def test_channels_of_a_lone_robot_equal_those_of_an_evaluation(
     assert judged.is_mature
     together = traces[-1]
     alone = simulate(
-        turtle,
-        with_simulation(own.simulation, space=own.space, measures=own.measures),
+        turtle, with_simulation(own.simulation, space=own.space, measures=own.measures)
     )
     np.testing.assert_array_equal(together.core_position, alone.core_position)
     assert set(together.channels) == set(alone.channels)

@@ -10,10 +10,7 @@ from schema.experiment.document import Fitness, Simulation
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NO_IDENTITY, Origin
-from schema.experiment.settings import (
-    arena_settings,
-    read_arena_settings,
-)
+from schema.experiment.settings import arena_settings, read_arena_settings
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -97,9 +94,7 @@ def test_replay_of_an_arena_in_which_all_robots_die(turtle: Robot) -> None:
     assert scene.motion.num_rows == 0
 
 
-def test_replay_of_a_drift_is_an_approximation_and_says_so(
-    robot_of: Robots,
-) -> None:
+def test_replay_of_a_drift_is_an_approximation_and_says_so(robot_of: Robots) -> None:
     """C died only in the replay; A only in the original, and returned as a migrant."""
     one, other = crowd(robot_of, 2, 0.4)
     swaps = tuple(BrainChange(birth, robot_of(0).brain) for birth in (A, C))

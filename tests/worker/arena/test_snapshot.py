@@ -29,9 +29,7 @@ RECORDING = settings_of(record_touches=True)
 
 
 @pytest.mark.slow
-def test_thirty_robots_continue_after_a_snapshot(
-    robot_of: Robots,
-) -> None:
+def test_thirty_robots_continue_after_a_snapshot(robot_of: Robots) -> None:
     """The snapshot is taken right after merges, with contacts."""
     world = populated(RECORDING, crowd(robot_of, 30, 0.8))
     taken: list[tuple[int, bytes]] = []

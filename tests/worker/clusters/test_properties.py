@@ -213,9 +213,7 @@ def test_nearness_is_symmetric_and_grows_with_the_margins(
 
 @few
 @given(margins=st.lists(st.floats(0.0, 0.3), min_size=6, max_size=6))
-def test_overlaps_are_symmetric_and_hold_whatever_is_near(
-    margins: list[float],
-) -> None:
+def test_overlaps_are_symmetric_and_hold_whatever_is_near(margins: list[float]) -> None:
     world = populated(SETTINGS, crowd(random_robot, 6, 0.5))
     layout = world.population.layout
     bounds = RobotBounds(layout, layout.read()[np.newaxis])

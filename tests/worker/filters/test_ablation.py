@@ -6,12 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import InvalidRobot
-from schema.experiment.document import (
-    Measures,
-    Simulation,
-    Space,
-    body_space,
-)
+from schema.experiment.document import Measures, Simulation, Space, body_space
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import Ablation, EvaluationSettings
 from schema.plugins.needs import needs

@@ -56,10 +56,7 @@ def drawn(identity: Identity, ticks: int = 200) -> Floats:
     return np.array(
         [
             np.hstack(
-                [
-                    noise.readings(tick, zeros[0])[0],
-                    noise.outputs(tick, zeros[1])[0],
-                ]
+                [noise.readings(tick, zeros[0])[0], noise.outputs(tick, zeros[1])[0]]
             )
             for tick in range(ticks)
         ]
@@ -90,8 +87,7 @@ def test_noise_is_independent_of_other_robots_and_order_of_ticks() -> None:
             single = noise.readings(tick, readings[row : row + 1])
             assert np.array_equal(whole[row : row + 1], single)
     assert not np.array_equal(
-        population.readings(0, readings),
-        population.readings(64, readings),
+        population.readings(0, readings), population.readings(64, readings)
     )
 
 

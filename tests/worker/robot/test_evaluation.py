@@ -8,11 +8,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from schema.errors import (
-    ExperimentError,
-    FitnessUndefined,
-    SimulationDiverged,
-)
+from schema.errors import ExperimentError, FitnessUndefined, SimulationDiverged
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.robot.ids import NOBODY
 from schema.robot.robot import Part, Robot
