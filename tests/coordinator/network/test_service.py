@@ -286,6 +286,7 @@ def test_a_long_job_that_is_asked_for_again_is_done_once(
 ) -> None:
     with agent(network, "w", "long") as process:
         until(network, has(1))
+        capfd.readouterr()  # an agent that starts slowly answers an old question
         network.send(0, "w", request(0), 0.5)
         assert line_of(process) == "begun\n"
         (event,) = until(network, has(1))
