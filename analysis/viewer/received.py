@@ -64,6 +64,6 @@ def received_poses(live: Live, scene: Scene) -> pa.Table:
         )
     if not (np.abs(poses.cores[:, :3]) <= GREATEST_COORDINATE).all():
         raise MalformedMessage("poses: x, y and z must be a finite position")
-    if not (np.isfinite(poses.cores).all() and np.isfinite(poses.angles).all()):
+    if not poses.are_finite:
         raise MalformedMessage("poses: attitudes and angles must be finite")
     return poses.rows()

@@ -82,7 +82,7 @@ class Assignment:
 
     def job(self, number: int) -> Job | None:
         """Return a job, also by a number that it had before; None if it has ended."""
-        pending = self._jobs.get(number) or self._earlier.get(number)
+        pending = self._pending(number)
         return pending.job if pending else None
 
     def has(self, agent: str, number: int) -> bool:
@@ -92,8 +92,11 @@ class Assignment:
 
     def has_lost(self, agent: str, number: int) -> bool:
         """Return whether an agent had a job and gave no reply."""
-        pending = self._jobs.get(number) or self._earlier.get(number)
+        pending = self._pending(number)
         return pending is not None and (number, agent) in pending.lost
+
+    def _pending(self, number: int) -> Pending | None:
+        return self._jobs.get(number) or self._earlier.get(number)
 
     def agents(self, kind: AgentKind) -> int:
         """Return the number of agents of a kind."""

@@ -288,7 +288,7 @@ class Dispatch(Assignment):
 
     def _crashed(self, event: Crash) -> Iterator[DispatchCommand]:
         number, agent = event.job.number, event.job.agent
-        pending = self._jobs.get(number) or self._earlier.get(number)
+        pending = self._pending(number)
         # A job crashes only a process that had it.
         if pending is None or (number, agent) not in pending.lost:
             return

@@ -10,8 +10,6 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
 from coordinator.run.requests import check_count, impossible
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
@@ -121,7 +119,7 @@ def check_poses(advance: Advance, expected: ExpectedAdvance) -> int:
             that do not live here, repeated, missing or not finite; too many angles.
     """
     poses = PoseArrays.received(advance.poses)
-    if not (np.isfinite(poses.cores).all() and np.isfinite(poses.angles).all()):
+    if not poses.are_finite:
         raise impossible("poses: must be finite")
     most = expected.experiment.space.max_parts
     if (poses.joints > most).any():

@@ -83,6 +83,11 @@ class PoseArrays(NamedTuple):
         pairs = zip(self.islands.tolist(), self.births.tolist(), strict=True)
         return [BirthId(*pair) for pair in pairs]
 
+    @property
+    def are_finite(self) -> bool:
+        """No number of a core or a joint is infinite or NaN."""
+        return bool(np.isfinite(self.cores).all() and np.isfinite(self.angles).all())
+
     def rows(self, island: int | None = None) -> pa.Table:
         """Return the rows of the poses table, without ``record``.
 

@@ -181,7 +181,7 @@ class HostileClient:
             self._get(key, data, f"{kind} to {member.role}", sender)
 
     def _message(self, kind: str) -> bytes:
-        """Return a mutated message, or a valid one that nobody is waiting for."""
+        """Return a mutated message, or a valid one that no process waits for."""
         draw = self._mutator.random
         heard = list(self._heard[kind]) or _samples()
         if draw.random() < 0.2 and kind == "jobs":

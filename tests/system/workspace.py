@@ -36,7 +36,7 @@ def said(text: str) -> list[str]:
 
 
 def free_address(protocol: str = "tcp") -> str:
-    """Return an address of this machine at which nobody listens."""
+    """Return an address of this machine at which no process listens."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         return f"{protocol}/127.0.0.1:{server.getsockname()[1]}"
 

@@ -39,7 +39,7 @@ def forget() -> None:
 
 
 def imported() -> object:
-    """Return what the module has now; it is imported anew each time."""
+    """Return what the module has now; it is imported again each time."""
     judge: object = import_allowed("kept_lab").judge
     del sys.modules["kept_lab"]
     return judge
