@@ -32,14 +32,25 @@ settings.register_profile("fixed", derandomize=True, database=None, deadline=Non
 settings.load_profile("fixed")
 
 
+_VARIABLES = dict(os.environ)
+
+
+def _reset_environment() -> None:
+    kept = {name for name in os.environ if name.startswith("PYTEST_")}
+    for name in os.environ.keys() - _VARIABLES.keys() - kept:
+        del os.environ[name]
+    os.environ.update(_VARIABLES)
+
+
 @pytest.fixture(autouse=True)
 def _own_environment() -> Iterator[None]:
-    """Undo after each test what a command has set for its process and children."""
-    before = dict(os.environ)
+    """Undo what a command has set for its process and children.
+
+    Both before and after a test, as fixtures of a wider scope run commands, too.
+    """
+    _reset_environment()
     yield
-    for name in os.environ.keys() - before.keys():
-        del os.environ[name]
-    os.environ.update(before)
+    _reset_environment()
 
 
 @pytest.fixture(autouse=True)
