@@ -9,7 +9,13 @@ from pathlib import Path
 
 import schema.experiment.kinds
 from coordinator.cli.deployment import Deployment
-from coordinator.cli.execute import finished_code, resume, start, start_campaign
+from coordinator.cli.execute import (
+    finished_code,
+    lengthen_all,
+    resume,
+    start,
+    start_campaign,
+)
 from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
 from coordinator.dispatch.events import AgentKind
@@ -140,9 +146,14 @@ def plugin_kinds() -> tuple[Kind, ...]:
 def _resume(options: argparse.Namespace) -> int:
     folder = Path(options.folder)
     # First: a finished run needs none of its plug-ins.
-    if (code := finished_code(folder)) is not None:
+    if options.births is None and (code := finished_code(folder)) is not None:
         return code
-    deployment = _deployment(options, refuse_faulty_of(folder), folder)
+    experiments = refuse_faulty_of(folder)
+    if options.births is not None:
+        lengthen_all(folder, options.births)
+        if (code := finished_code(folder)) is not None:
+            return code
+    deployment = _deployment(options, experiments, folder)
     return _stoppable(folder, deployment, lambda: resume(folder, deployment))
 
 

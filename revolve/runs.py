@@ -77,6 +77,9 @@ class Run:
         document = experiment_from_text(details.document, is_own=True)
         self.experiment = Experiment(document)
 
+    def __fspath__(self) -> str:
+        return str(self.folder)
+
     @property
     def state(self) -> str:
         """``finished``, ``stopped``, or ``running`` (also after a kill)."""
@@ -305,8 +308,9 @@ def run(
 
 
 def resume(
-    folder: Folder,
+    folder: Run | Folder,
     *,
+    births: int | None = None,
     workers: int | None = None,
     plugins: Iterable[str] = (),
     progress: bool = False,
@@ -314,7 +318,9 @@ def resume(
     """Continue a run to its end, as ``revolve resume`` does.
 
     Args:
-        folder: of the run.
+        folder: of the run; or the run.
+        births: new number of births on each island, for finished runs, too: the run
+            becomes equal to one that was begun with it; None: as begun.
         workers: as for ``run``.
         plugins: as for ``run``.
         progress: as for ``run``.
@@ -326,6 +332,8 @@ def resume(
     """
     read_description(Path(folder))
     words = _common(workers, plugins, progress=progress)
+    if births is not None:
+        words += ["--births", str(whole_number("births", births, 1))]
     return _done(("resume", str(folder), *words), Path(folder), progress=progress)
 
 

@@ -1,6 +1,7 @@
 """Start and resume runs and campaigns."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from coordinator.cli.campaign_table import outcome_of, show_outcomes
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.main_loop import execute_runs
 from coordinator.cli.summary import Conclusion, conclude, has_evaluated, restore_best
+from coordinator.run.lengthening import lengthen, refuse_fewer
 from coordinator.run.scheduler import Planned
 from coordinator.run.session import RunSession
 from coordinator.storage.campaign import (
@@ -34,11 +36,12 @@ from coordinator.storage.folder_status import (
 )
 from coordinator.storage.hints import command, stopped
 from coordinator.storage.lock import FolderLock
+from coordinator.storage.rewriting import is_rewritten
 from schema.agent.log import tell_error, tell_user, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.experiment.document import Experiment
-from schema.experiment.file import experiment_from_text, experiment_text
+from schema.experiment.file import experiment_from_text, experiment_text, with_births
 from schema.plugins.kept import refuse_other
 from schema.tables.description import STATE, read_description, read_state
 from schema.tables.files import is_sealed
@@ -97,6 +100,33 @@ def resume(folder: Path, deployment: Deployment) -> int:
             planned, failed = _plan(folder, read_campaign(folder))
             return _execute_campaign(folder, planned, failed, deployment)
     return _execute_run(folder, RunFolder(folder), deployment)
+
+
+def lengthen_all(folder: Path, births: int) -> None:
+    """Give a run, or all runs of a campaign, another number of births.
+
+    Their plug-ins must be allowed. All runs are looked at before the first is changed.
+
+    Raises:
+        ExperimentError, RunFolderError: as of ``lengthen``.
+    """
+    if not is_campaign(folder):
+        lengthen(folder, births)
+        return
+    with FolderLock(folder):
+        campaign = read_campaign(folder)
+        experiments = tuple(
+            with_births(experiment_text(each), births, f"{folder}: {each.name}")
+            for each in campaign.experiments
+        )
+        begun = [path for path, _ in campaign.runs(folder) if holds_run(path)]
+        for path in begun:
+            refuse_other_version(path)
+            born = max(each.births for each in folder_status(path).islands)
+            refuse_fewer(path, births, born)
+        for path in begun:
+            lengthen(path, births)
+        write_campaign(folder, replace(campaign, experiments=experiments))
 
 
 def finished_code(folder: Path) -> int | None:
@@ -190,7 +220,12 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
 
 
 def _is_to_be_rewritten(folder: Path) -> bool:
-    """Return whether a run's state or finished tables are damaged; tell the user so."""
+    """Return whether a run's state or finished tables are damaged; tell the user so.
+
+    Those that a rewriting has removed count.
+    """
+    if is_rewritten(folder):
+        return True
     try:
         if read_state(folder) != "finished":
             return False

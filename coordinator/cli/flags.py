@@ -35,9 +35,10 @@ _COMMANDS = {
         ),
     ),
     "resume": (
-        "Resume a run or campaign that was stopped or killed.",
+        "Resume a run or campaign that was stopped or killed, or make it longer.",
         (
             "revolve resume runs/scenario1-seed1",
+            "revolve resume runs/scenario1-seed1 --births 1500",
             "revolve resume runs/thesis-seed1 --workers 2 --quiet",
         ),
     ),
@@ -74,6 +75,13 @@ def parser(command: str) -> Flags:
         return flags
     if command == "resume":
         flags.add_argument("folder", metavar="FOLDER", help="run or campaign folder")
+        add_count(
+            flags,
+            "--births",
+            None,
+            "new number of births; each run, finished or not, becomes equal to one "
+            "begun with it (default: as begun)",
+        )
     else:
         _add_experiments(flags)
     flags.set_defaults(command=command)

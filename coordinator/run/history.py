@@ -64,14 +64,7 @@ def replayed(
     Raises:
         UnexpectedEvent: the journal of another kind of run.
     """
-    loop = Loop(
-        archipelago(experiment_from_text(details.document), details.seed, details.run),
-        context=context,
-        fleet=JobRouter(LocalAgents({}, "")),
-        log=_Nothing(),
-        rows=_Nothing(),
-        snapshot_store=store,
-    )
+    loop = silent_loop(details, context, store)
 
     def noted() -> Iterator[JournalledEvent]:
         for event in events:
@@ -81,6 +74,18 @@ def replayed(
 
     loop.start(noted())
     return loop
+
+
+def silent_loop(details: RunDetails, context: RunContext, store: SnapshotStore) -> Loop:
+    """Return the islands of a run before its start; they act on nothing outside."""
+    return Loop(
+        archipelago(experiment_from_text(details.document), details.seed, details.run),
+        context=context,
+        fleet=JobRouter(LocalAgents({}, "")),
+        log=_Nothing(),
+        rows=_Nothing(),
+        snapshot_store=store,
+    )
 
 
 class _Nothing:

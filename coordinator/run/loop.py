@@ -52,6 +52,9 @@ from schema.wire.messages import Evaluate, Vet
 Request = Vet | Evaluate | AdvanceShard | Ask
 """Commands of islands and arenas that agents or learners carry out."""
 
+Question = Request | tuple[AdvanceShard | None, int]
+"""What an event answers: a request, or for an order an advance and a step."""
+
 Event = Started | ExternalEvent | MigrationEvent
 """Events of islands and arenas."""
 
@@ -117,6 +120,7 @@ class Loop:
         self._learners = Learners(context.experiments, context.origin)
         self._now_s = 0.0
         self._recent: deque[Event | str] = deque(maxlen=_RECENT)
+        self._unanswered: dict[Key, Vet | Evaluate | Ask] = {}
 
     @property
     def is_finished(self) -> bool:
@@ -130,29 +134,57 @@ class Loop:
             UnexpectedEvent: the history of another kind of run.
             ExperimentError: a learner fails.
         """
-        unanswered: dict[Key, Vet | Evaluate | Ask] = {}
-
-        def note(requests: Iterable[Request]) -> None:
-            for request in requests:
-                if isinstance(request, AdvanceShard):
-                    self.shard_requests.note(request)
-                else:
-                    unanswered[key_of(request)] = request
-
-        for number in sorted(self.islands):
-            note(self._tell(number, Started()))
+        self.begin()
         for event in history:
-            if isinstance(event, Answered):
-                unanswered.pop(key_of(event), None)
-            note(self._act_on(event))
+            self.repeat(event)
         asks: list[Ask] = []
-        for request in unanswered.values():
+        for request in self._unanswered.values():
             if isinstance(request, Ask):
                 asks.append(request)
             else:
                 self._requests.send(request)
+        self._unanswered.clear()
         self.shard_requests.send_noted()
         self._take([self._learners.answer(each) for each in asks])
+
+    def begin(self) -> None:
+        """Start the islands; their requests are only noted."""
+        for number in sorted(self.islands):
+            self._note(self._tell(number, Started()))
+
+    def repeat(self, event: JournalledEvent) -> None:
+        """Act on an event of the journal; requests are only noted.
+
+        Raises:
+            UnexpectedEvent: it is of another kind of run.
+        """
+        if isinstance(event, Answered):
+            self._unanswered.pop(key_of(event), None)
+        self._note(self._act_on(event))
+
+    def question(self, event: JournalledEvent) -> Question | None:
+        """Return what an event of the journal answers here; None for nothing.
+
+        An order answers nothing, but its arena must stand at the same decision.
+        """
+        if isinstance(event, Audited):
+            return self._unanswered.get(key_of(event.first))
+        if isinstance(event, Answered):
+            return self._unanswered.get(key_of(event))
+        requested = self.shard_requests.requested(event.island)
+        if isinstance(event, Advanced):
+            is_it = requested is not None and requested.number == event.number
+            return requested if is_it else None
+        arena = self.islands.get(event.island)
+        is_due = isinstance(arena, Arena) and arena.next_step == event.step
+        return (requested, event.step) if is_due else None
+
+    def _note(self, requests: Iterable[Request]) -> None:
+        for request in requests:
+            if isinstance(request, AdvanceShard):
+                self.shard_requests.note(request)
+            else:
+                self._unanswered[key_of(request)] = request
 
     def act(self, now_s: float, ends: Iterable[Deliver] = ()) -> None:
         """Act on the ends of jobs and advances.

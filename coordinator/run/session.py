@@ -97,7 +97,7 @@ class RunSession:
         details = held.details
         with ExitStack() as stack:
             stack.callback(held.close)
-            _check_journal(held.path)
+            check_journal(held.path)
             self._journal = stack.enter_context(
                 Journal.open(held.path, epoch=held.epoch, fsync=fsync)
             )
@@ -260,7 +260,7 @@ class RunSession:
         )
 
 
-def _check_journal(folder: Path) -> None:
+def check_journal(folder: Path) -> None:
     """Raise if a run has lost its journal; call it before any file is changed.
 
     Raises:

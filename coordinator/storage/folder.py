@@ -32,6 +32,7 @@ from coordinator.storage.journal import (
 )
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, FolderLock
+from coordinator.storage.rewriting import complete_rewriting
 from schema.agent.version import VERSION
 from schema.errors import ExperimentError, RunFolderError, unreadable
 from schema.experiment.file import experiment_from_text
@@ -123,6 +124,8 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
                     plugins=keep(path, details.document, replace_bytes),
                 )
                 replace_text(path / DETAILS, description_text(new))
+            else:
+                complete_rewriting(path)
             self.details = read_details(path)
             nonce = read_description(path).nonce
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
@@ -279,24 +282,31 @@ def _refuse_used(path: Path, wanted: RunDetails) -> None:
     silently ignore what was changed since.
     """
     if holds_run(path):
-        which = "a run" if _is_same(path, wanted) else "a run with other settings"
+        which, births = _difference(path, wanted)
         raise RunFolderError(
             f"{path}: already holds {which}; to resume it: "
-            f"{command('resume', path)}; or choose another folder"
+            f"{command('resume', path, *births)}; or choose another folder"
         )
     _refuse_foreign(path)
 
 
-def _is_same(path: Path, wanted: RunDetails) -> bool:
-    """Return whether a folder holds the wanted run, or one that cannot be read."""
+def _difference(path: Path, wanted: RunDetails) -> tuple[str, tuple[str, ...]]:
+    """Return which run a folder holds, and flags to make it the wanted one.
+
+    A run that cannot be read counts as the wanted one.
+    """
     with contextlib.suppress(RunFolderError, ExperimentError):
-        found = read_details(path)
-        if found != replace(wanted, document=found.document):
-            return False
+        known = read_details(path)
         # The text of an older version lacks keys with their defaults.
-        theirs, ours = map(experiment_from_text, (found.document, wanted.document))
-        return theirs == ours
-    return True
+        theirs, ours = map(experiment_from_text, (known.document, wanted.document))
+        births = ours.births
+        if known != replace(wanted, document=known.document) or (
+            structs.replace(theirs, births=births) != ours
+        ):
+            return "a run with other settings", ()
+        if theirs != ours:
+            return f"this run with {theirs.births} births", ("--births", str(births))
+    return "a run", ()
 
 
 def _refuse_foreign(path: Path) -> None:

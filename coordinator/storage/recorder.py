@@ -132,6 +132,14 @@ class Recorder:
         """
         self._poses.restore(event)
 
+    def add_poses(self, rows: pa.Table) -> None:
+        """Write poses of another run's table as one batch, with new record numbers.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
+        self._poses.add(rows)
+
     def flush(self) -> None:
         """Write all buffered rows to disk.
 
@@ -248,8 +256,12 @@ class TableFile:
 
     def restore(self, event: Advanced) -> None:
         """Write the next poses behind those on disk, before any is counted."""
-        rows = PoseArrays.received(event.advance.poses).rows(event.island)
-        columns = {name: rows[name].combine_chunks() for name in rows.column_names}
+        self.add(PoseArrays.received(event.advance.poses).rows(event.island))
+
+    def add(self, rows: pa.Table) -> None:
+        """Write rows as one batch; columns that are the same in a run are set anew."""
+        own = {name for name in rows.column_names if name in ROWS[self._name].names}
+        columns = {name: rows[name].combine_chunks() for name in own}
         self._write(self._numbered(columns, rows.num_rows))
 
     def keep(self, rows: int) -> None:

@@ -187,6 +187,25 @@ def experiment_from_text(
     return experiment
 
 
+def with_births(text: str, births: int, where: str) -> Experiment:
+    """Return the experiment of a run with another number of births on each island.
+
+    Args:
+        text: of its run folder.
+        births: of ``--births``.
+        where: the folder, for messages.
+
+    Raises:
+        ExperimentError: the number is not allowed, or a sweep changes it.
+    """
+    tables = _with_births(msgspec.json.decode(text.encode()), births)
+    experiment = _stored(msgspec.json.encode(tables).decode(), is_resumed=True)
+    if experiment.sweep is not None and "births" in experiment.sweep.settings:
+        raise ExperimentError(f"{where}: --births: the sweep changes births itself")
+    check_experiment(experiment, f"{where} with --births {births}")
+    return experiment
+
+
 @lru_cache(maxsize=256)
 def _stored(text: str, *, is_resumed: bool) -> Experiment:
     try:

@@ -303,17 +303,42 @@ def read_table(
         path = finished_path(folder, table)
         if path is None:
             return rows
+    return _kept(_finished(folder, path, schema), schema, where)
+
+
+def rows_of_island(folder: Path, table: str, island: int) -> Iterator[pa.Table]:
+    """Yield all rows of an island in their repeatable order, no group empty.
+
+    Rows of a run that is not finished end at the first gap. About ``GROUP_BYTES`` are
+    in memory at a time.
+
+    Raises:
+        RunFolderError: as of ``read_table``.
+    """
+    path = finished_path(folder, table)
+    groups = (
+        in_groups(batches_by_island(folder, table))
+        if path is None
+        else _finished(folder, path, TABLES[table])
+    )
+    own = (group.filter(pc.field("island") == island) for group in groups)
+    yield from filter(len, own)
+
+
+def _finished(folder: Path, path: Path, schema: pa.Schema) -> Iterator[pa.Table]:
+    """Yield the columns of a schema from a Parquet file, row group by row group.
+
+    Raises:
+        RunFolderError: it cannot be read.
+    """
     of_run = run_columns(folder)
     try:
         with ParquetFile(path, page_checksum_verification=True) as file:
             stored = [each for each in schema.names if each in file.schema_arrow.names]
-            groups = (
+            for number in range(file.num_row_groups):
                 # More threads would keep memory of their own.
-                file.read_row_group(number, stored, use_threads=False)
-                for number in range(file.num_row_groups)
-            )
-            whole = (completed(group, schema, of_run) for group in groups)
-            return _kept(whole, schema, where)
+                group = file.read_row_group(number, stored, use_threads=False)
+                yield completed(group, schema, of_run)
     except (ValueError, OSError) as error:
         raise RunFolderError(f"{path}: cannot be read: {error}") from None
 

@@ -30,7 +30,7 @@ def write_new(path: Path, write: Callable[[Path], object]) -> None:
     """
     with _removed_on_error(new_path(path)) as temporary:
         write(temporary)
-        _sync(temporary, os.O_RDONLY)
+        sync_file(temporary)
 
 
 def install_new(path: Path) -> None:
@@ -47,6 +47,11 @@ def install_new(path: Path) -> None:
 def new_path(path: Path) -> Path:
     """Return where the new content of a file is written."""
     return path.with_name(f".{path.name}.new")
+
+
+def sync_file(file: Path) -> None:
+    """Make the content of a file durable, if its file system can."""
+    _sync(file, os.O_RDONLY)
 
 
 def sync_folder(folder: Path) -> None:

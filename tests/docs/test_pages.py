@@ -60,9 +60,10 @@ def test_tutorial_runs(name: str, tmp_path: Path) -> None:
     _run(TUTORIALS / f"{name}.md", tmp_path)
 
 
-def test_commands_of_the_gallery_run(tmp_path: Path) -> None:
+@pytest.mark.parametrize("page", ["gallery/README.md", "growing.md"])
+def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
     (tmp_path / "docs").symlink_to(DOCS)
-    _run(DOCS / "gallery" / "README.md", tmp_path)
+    _run(DOCS / page, tmp_path)
 
 
 def test_every_tutorial_is_in_the_list_of_tutorials() -> None:

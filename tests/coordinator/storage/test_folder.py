@@ -169,7 +169,7 @@ def test_a_used_folder_is_refused_with_the_hint_of_other_settings(
     with pytest.raises(RunFolderError, match="already holds a run; to resume it"):
         RunFolder(tmp_path / "run", details)
     other = replace(details, document=experiment_text(structs.replace(first, births=9)))
-    with pytest.raises(RunFolderError, match="already holds a run with other settings"):
+    with pytest.raises(RunFolderError, match="this run with 3000 births; to resume it"):
         RunFolder(tmp_path / "run", other)
 
 
