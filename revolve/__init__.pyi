@@ -1,3 +1,4 @@
+from revolve.arena import Arena as Arena
 from revolve.command import main as main
 from revolve.evaluation import Result as Result
 from revolve.evaluation import evaluate as evaluate
@@ -59,9 +60,13 @@ from schema.robot.genome import ConnectionGene as ConnectionGene
 from schema.robot.genome import NeuronGene as NeuronGene
 from schema.robot.neurons import Tick as Tick
 from schema.robot.robot import Part as Part
+from schema.wire.operator import ArenaListing as ArenaListing
+from schema.wire.operator import ListedRobot as ListedRobot
 
 __all__ = [
     "Analysis",
+    "Arena",
+    "ArenaListing",
     "Bank",
     "Box",
     "Brain",
@@ -84,6 +89,7 @@ __all__ = [
     "JobRefused",
     "Joint",
     "Learner",
+    "ListedRobot",
     "MeasureFunction",
     "Motor",
     "NetworkError",

@@ -45,8 +45,6 @@ from coordinator.islands.events import (
 from coordinator.islands.migration import MigrationEpochs
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, steps_of
-from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
 from schema.wire.arena import AdvanceShard
 
 
@@ -124,14 +122,14 @@ class Arena:
         return tuple(one.individual for one in self._living)
 
     @property
+    def living(self) -> LivingRobots:
+        """Its living robots; only the arena changes them."""
+        return self._living
+
+    @property
     def judged(self) -> tuple[Individual, ...]:
         """Living individuals whose fitness counts: the mature."""
         return self._living.mature()
-
-    def robot(self, birth: BirthId) -> Robot | None:
-        """Return the living robot with a birth id, None if it is not alive."""
-        living = self._living.get(birth)
-        return living.robot if living else None
 
     @property
     def is_paused(self) -> bool:

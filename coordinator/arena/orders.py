@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from coordinator.arena.infancy import Infancy
 from coordinator.arena.living import LivingRobots, Moment, death_record
-from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from coordinator.islands.events import (
     Commanded,
@@ -133,7 +133,7 @@ def check_order(order: Order, experiment: Experiment) -> None:
 
 
 def inserted(order: Insert, birth: BirthId, encoding: IslandEncoding) -> Candidate:
-    """Return the candidate, without parents, that an order inserts.
+    """Return the candidate that an order inserts.
 
     Raises:
         InvalidRobot: not a genome of this encoding, or its robot does not fit the
@@ -142,4 +142,8 @@ def inserted(order: Insert, birth: BirthId, encoding: IslandEncoding) -> Candida
     genome = encoding.from_bytes(order.genome)
     robot = encoding.develop(genome)
     encoding.check(robot)
-    return Candidate(birth, 0, None, genome, robot)
+    couple = tuple(
+        Individual(parent, None, fitness=0.0, rank=order.rank - 1, generation=None)
+        for parent in order.parents
+    )
+    return Candidate(birth, 0, couple or None, genome, robot)

@@ -79,7 +79,7 @@ def parser(command: str) -> Flags:
             flags,
             "--births",
             None,
-            "new number of births; each run, finished or not, becomes equal to one "
+            "number of births; each run, finished or not, becomes equal to one "
             "begun with it (default: as begun)",
         )
     else:

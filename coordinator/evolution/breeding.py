@@ -108,7 +108,7 @@ def failed_last(individuals: Iterable[Individual]) -> list[Individual]:
     return [replace(one, fitness=least) if one.has_failed else one for one in given]
 
 
-Couple = tuple[Individual, Individual]
+Couple = tuple[Individual, ...]
 """Two parents; the first gives the root of the child."""
 
 

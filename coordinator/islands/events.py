@@ -151,15 +151,19 @@ class Resume(Message, frozen=True, tag=True):
 
 
 class Insert(Message, frozen=True, tag=True):
-    """Insert a robot: a birth without parents that may mate like any other robot.
+    """Insert a robot: a birth that no couple led to; it may mate like any other robot.
 
     Attributes:
         genome: bytes of its genome, in the encoding of the experiment.
         place: point of the ground plane [m]; drawn as for any birth if None.
+        parents: robots that count as its parents.
+        rank: in ancestry, of the robot.
     """
 
     genome: bytes
     place: tuple[Finite, Finite] | None = None
+    parents: tuple[BirthId, ...] = ()
+    rank: int = 1
 
 
 class Remove(Message, frozen=True, tag=True):

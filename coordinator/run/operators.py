@@ -11,6 +11,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coordinator.arena.arena import Arena
+from coordinator.arena.living import LivingRobot
 from coordinator.arena.orders import check_order
 from coordinator.evolution.encodings import outside_limits
 from coordinator.islands.events import (
@@ -32,8 +33,10 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.codec import decode, encode
 from schema.wire.operator import (
+    ArenaListing,
     GetStatus,
     InsertRobot,
+    ListedRobot,
     ListRobots,
     OperatorReply,
     OperatorRequest,
@@ -42,6 +45,7 @@ from schema.wire.operator import (
     ResumeArena,
     SaveSnapshot,
     SetBrain,
+    birth_name,
     selected_names,
 )
 
@@ -72,7 +76,7 @@ def reply_to(request: OperatorRequest, loop: Loop) -> OperatorReply:
     try:
         arena = _arena(loop, island)
         if isinstance(action, ListRobots):
-            return OperatorReply(_list(arena, island))
+            return OperatorReply("", arena=_listing(arena))
         if isinstance(action, SaveSnapshot):
             loop.shard_requests.request_snapshot(island)
             return OperatorReply("the state is saved at the end of the next advance")
@@ -80,7 +84,8 @@ def reply_to(request: OperatorRequest, loop: Loop) -> OperatorReply:
     except RevolveError as error:
         return OperatorReply(str(error), is_refused=True)
     loop.order(Commanded(island, request.request_id, step, order))
-    return OperatorReply(f"takes effect at {arena.clock.seconds(step):g} s")
+    effect_s = arena.clock.seconds(step)
+    return OperatorReply(f"takes effect at {effect_s:g} s", effect_s=effect_s)
 
 
 def _arena(loop: Loop, number: int) -> Arena:
@@ -116,21 +121,33 @@ def _order(
             encoding = arena.encoding
             _check_robot(robot, arena)
             genome = encoding.to_bytes(encoding.from_robot(robot))
-            insert = Insert(genome, action.place)
+            parents = [_living(birth, arena, island) for birth in action.parents]
+            rank = 1 + max((parent.individual.rank for parent in parents), default=0)
+            insert = Insert(genome, action.place, action.parents, rank)
             check_order(insert, arena.experiment)
             return insert
-    living = arena.robot(action.birth)
-    if living is None:
-        alive = [_birth_name(one.birth, island) for one in arena.population]
-        raise Refused(
-            f"birth {_birth_name(action.birth, island)}: is not alive; alive are "
-            f"{', '.join(alive) or 'none'}"
-        )
+    living = _living(action.birth, arena, island)
     if isinstance(action, RemoveRobot):
         return Remove(action.birth)
     brain = action.robot.brain
-    _check_robot(replace(living, brain=brain), arena)
+    _check_robot(replace(living.robot, brain=brain), arena)
     return ReplaceBrain(action.birth, brain)
+
+
+def _living(birth: BirthId, arena: Arena, island: int) -> LivingRobot:
+    """Return a living robot of an arena.
+
+    Raises:
+        Refused: it is not alive.
+    """
+    living = arena.living.get(birth)
+    if living is None:
+        alive = [birth_name(one.birth, island) for one in arena.living]
+        raise Refused(
+            f"birth {birth_name(birth, island)}: is not alive; alive are "
+            f"{', '.join(alive) or 'none'}"
+        )
+    return living
 
 
 def _check_robot(robot: Robot, arena: Arena) -> None:
@@ -162,26 +179,25 @@ def _check_place(place: tuple[float, float] | None, experiment: Experiment) -> N
         )
 
 
-def _birth_name(birth: BirthId, island: int) -> str:
-    """Return the name of an arena's robot: that of an immigrant has its island."""
-    return str(birth.number) if birth.island == island else birth.name
-
-
-def _list(arena: Arena, island: int) -> str:
-    """Return a line about the arena and one about each living robot."""
-    state = "paused" if arena.is_paused else "running"
-    now_s, wanted = arena.clock.seconds(arena.step), arena.experiment.births
-    about = f"{arena.births} of {wanted} born, {len(arena.population)} alive"
-    names = [_birth_name(one.birth, island) for one in arena.population]
-    width = max(map(len, ["birth", *names]))
-    lines = [f"{state} at {now_s:g} s, {about}", f"{'birth':>{width}}  rank  fitness"]
-    mature = {one.birth for one in arena.judged}
-    lines += [
-        f"{name:>{width}}  {one.rank:4}  {one.fitness:7.4f}"
-        f"{'' if one.birth in mature else '  immature'}"
-        for name, one in zip(names, arena.population, strict=True)
-    ]
-    return "\n".join(lines)
+def _listing(arena: Arena) -> ArenaListing:
+    """Return the living robots of an arena."""
+    return ArenaListing(
+        arena.clock.seconds(arena.step),
+        arena.is_paused,
+        arena.births,
+        arena.experiment.births,
+        tuple(
+            ListedRobot(
+                each.birth,
+                each.individual.rank,
+                each.individual.parents,
+                each.position[:2],
+                each.judgement.age_s if each.judgement else 0.0,
+                each.known_fitness,
+            )
+            for each in arena.living
+        ),
+    )
 
 
 def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes:

@@ -12,6 +12,8 @@ from schema.robot.robot import Robot
 from schema.wire.codec import Message, decode
 from schema.wire.status import Status
 
+MOST_PARENTS = 2
+
 
 class ListRobots(Message, frozen=True, tag="list"):
     """List the living robots of the arena."""
@@ -39,10 +41,12 @@ class InsertRobot(Message, frozen=True, tag="insert"):
     Attributes:
         robot: body and brain.
         place: of the core in the ground plane, world frame [m]; drawn if None.
+        parents: living robots that count as its parents.
     """
 
     robot: Robot
     place: tuple[Finite, Finite] | None = None
+    parents: Annotated[tuple[BirthId, ...], Meta(max_length=MOST_PARENTS)] = ()
 
 
 class RemoveRobot(Message, frozen=True, tag="remove"):
@@ -96,20 +100,67 @@ class OperatorRequest(Message, frozen=True):
     run: Annotated[str, Meta(max_length=LONGEST_NAME)] = ""
 
 
+class ListedRobot(Message, frozen=True):
+    """A living robot of an arena, at its last decision.
+
+    Attributes:
+        birth: its id.
+        rank: in ancestry; 1 without parents, else 1 + the greatest of theirs.
+        parents: birth ids of its parents; they may be dead.
+        place: of its core in the ground plane, world frame [m].
+        age_s: simulated time since its birth [s]; 0 before its first advance.
+        fitness: of its last window; None while it is immature.
+    """
+
+    birth: BirthId
+    rank: int
+    parents: tuple[BirthId, ...]
+    place: tuple[Finite, Finite]
+    age_s: Finite
+    fitness: Finite | None
+
+
+class ArenaListing(Message, frozen=True):
+    """The living robots of an arena.
+
+    Attributes:
+        sim_time_s: simulated time of its last decision [s].
+        is_paused: an operator has paused it.
+        births: number of births so far.
+        wanted: number of births of the experiment.
+        robots: by birth id.
+    """
+
+    sim_time_s: Finite
+    is_paused: bool
+    births: int
+    wanted: int
+    robots: tuple[ListedRobot, ...]
+
+
 class OperatorReply(Message, frozen=True):
-    """What was done or why not, as text; the status if it was requested.
+    """What was done or why not, as text; what was requested.
 
     Attributes:
         text: for the operator.
         is_refused: nothing was done.
+        arena: the living robots, if they were requested.
+        effect_s: simulated time at which an order takes effect [s].
         status: of all runs, if it was requested.
         time_s: Unix time of the coordinator's clock, with the status [s].
     """
 
     text: str
     is_refused: bool = False
+    arena: ArenaListing | None = None
+    effect_s: Finite | None = None
     status: Status | None = None
     time_s: Finite | None = None
+
+
+def birth_name(birth: BirthId, island: int) -> str:
+    """Return the name of an arena's robot: that of an immigrant has its island."""
+    return str(birth.number) if birth.island == island else birth.name
 
 
 def selected_names(wanted: str, names: Iterable[str]) -> set[str]:

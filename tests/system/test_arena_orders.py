@@ -1,11 +1,14 @@
 """Tests of orders to a running arena and of its live stream."""
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 import zenoh
+from msgspec import convert
 
+import revolve as rv
 from coordinator.islands.events import Advanced, Commanded
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import Journal
@@ -74,7 +77,8 @@ def test_pause_list_insert_remove_snapshot_resume(
         )
         arena("insert", "guest.pb", "--place", "0.1", "0.2")
         arena("snapshot")
-        assert first not in [line.split()[0] for line in arena("list").splitlines()[2:]]
+        guest = rv.Robot.read(crowded_arena_run / "best.yaml")
+        orders_of_python(rv.Arena(folder), guest, arena("list", "--json"))
         arena("resume")
         wait_until(lambda: coordinator.poll() is not None, "the run ends")
     assert coordinator.returncode == 0, coordinator.communicate()
@@ -83,13 +87,38 @@ def test_pause_list_insert_remove_snapshot_resume(
     with Journal.open(folder) as journal:
         events = journal.replay()
     orders = [type(e.order).__name__ for e in events if isinstance(e, Commanded)]
-    assert orders == ["Pause", "Remove", "Insert", "Resume"]
+    assert orders == ["Pause", "Remove", "Insert", "Insert", "Resume"]
+    births = read_table(folder, "births").to_pylist()
+    (child,) = [row for row in births if (row["x"], row["y"]) == (0.3, -0.3)]
+    parents = [each["birth"] for each in child["parents"]]
+    ranks = [row["rank"] for row in births if row["birth"] in parents]
+    assert (len(parents), child["rank"]) == (2, 1 + max(ranks))
     # Live advances equal those of the journal and the tables.
     known = {e.advance.step: e for e in events if isinstance(e, Advanced)}
     for live in received:
         event = known[live.advance.step]
         assert live.advance.digest == event.advance.digest
         assert len(PoseArrays.received(live.advance.poses).births) == event.pose_rows
+
+
+def orders_of_python(arena: rv.Arena, guest: rv.Robot, document: str) -> None:
+    """Compare the listing with that of the command; insert a child of two robots."""
+    listing = arena.listing()
+    listed = json.loads(document.partition("arena of")[0])
+    assert convert(listed["robots"], tuple[rv.ListedRobot, ...]) == listing.robots
+    assert (listing.is_paused, listing.wanted) == (True, 25)
+    first, second = listing.robots[:2]
+    for robot, parents, why in (
+        (guest, (999,), "birth 999: is not alive; alive are "),
+        (guest, (first, second, first), "length <= 2"),
+        ("guest.yaml", (), "Robot.read reads a file"),
+    ):
+        with pytest.raises(rv.RevolveError, match=why):
+            arena.insert(robot, parents=parents)  # type: ignore[arg-type]
+    effect_s = arena.insert(guest, (0.3, -0.3), (first, second.birth.number))
+    assert effect_s == listing.sim_time_s
+    child = arena.robots()[-1]
+    assert (child.parents, child.place) == ((first.birth, second.birth), (0.3, -0.3))
 
 
 def test_robot_with_its_own_part_types_is_inserted(workspace: Workspace) -> None:

@@ -137,14 +137,23 @@ def test_an_immigrant_is_listed_and_removed_by_its_whole_name() -> None:
     names = [
         f"0:{one.number}" if one.island == 0 else str(one.number) for one in births
     ]
-    _, _, *lines = ask(ListRobots()).text.splitlines()
-    assert [line.split()[0] for line in lines] == names
+    listing = ask(ListRobots()).arena
+    assert listing is not None
+    assert [one.birth for one in listing.robots] == births
+    rows = {(row["island"], row["birth"]): row for row in lived.rows("births")}
+    for one in listing.robots:
+        row = rows[one.birth]
+        parents = [(each["island"], each["birth"]) for each in row["parents"]]
+        assert (one.rank, [*one.parents]) == (row["rank"], parents)
+    mature = {one.birth for one in arena.judged}
+    assert {one.birth for one in listing.robots if one.fitness is not None} == mature
     refused = ask(RemoveRobot(BirthId(0, 99)))
     assert refused.text == (f"birth 0:99: is not alive; alive are {', '.join(names)}")
     assert ask(RemoveRobot(BirthId(1, 99))).text.startswith("birth 99: is not alive")
     immigrant = next(one for one in births if one.island == 0)
-    robot = arena.robot(immigrant)
-    assert robot is not None
+    living = arena.living.get(immigrant)
+    assert living is not None
+    robot = living.robot
     assert not ask(SetBrain(immigrant, robot)).is_refused
     assert not ask(RemoveRobot(immigrant)).is_refused
     wanted = [ReplaceBrain(immigrant, robot.brain), Remove(immigrant)]
