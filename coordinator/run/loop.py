@@ -312,6 +312,7 @@ class Loop:
                     case Emigrate(island, to, epoch, migrants):
                         events.append((to, Immigrated(to, island, epoch, migrants)))
                     case Finish(island, neighbours):
+                        self.shard_requests.keep_snapshots()
                         for to in neighbours:
                             events.append((to, NeighbourClosed(to, island)))
         return requests

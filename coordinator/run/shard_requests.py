@@ -47,8 +47,8 @@ class SnapshotStore(Protocol):
     def read(self, shard: int, step: int) -> bytes:
         """Return the state of a shard at a step."""
 
-    def drop_before(self, shard: int, step: int) -> None:
-        """Remove the snapshots before a step."""
+    def drop_before(self, shard: int, step: int, kept: int = 0) -> None:
+        """Remove the snapshots before a step, but that of a step to be kept."""
 
 
 @dataclass(slots=True)
@@ -56,16 +56,18 @@ class _Past:
     """What has happened to a shard.
 
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
-    arena), after ``history``. ``platform`` is that of the last advance, empty before
-    the first; ``places`` are those of the robots that lived after it. The requested
-    advance may have a snapshot in the store if ``may_be_kept``, as in any replay. It
-    must have the result of ``repeats``, if there is one.
+    arena), after ``history``; the snapshot at ``kept`` stays, too. ``platform`` is that
+    of the last advance, empty before the first; ``places`` are those of the robots that
+    lived after it. The requested advance may have a snapshot in the store if
+    ``may_be_kept``, as in any replay. It must have the result of ``repeats``, if there
+    is one.
     """
 
     step: int = 0
     platform: str = ""
     digest: bytes = b""
     base: int = 0
+    kept: int = 0
     history: list[PastAdvance] = field(default_factory=list)
     places: dict[BirthId, Vector] = field(default_factory=dict)
     requested: AdvanceShard | None = None
@@ -180,6 +182,14 @@ class ShardRequests:
         simulated_s = (command.until - past.step) * timestep_s
         self._fleet.advance(self._numbers[shard], simulated_s)
 
+    def keep_snapshots(self) -> None:
+        """Keep the newest snapshot of each shard, unless an earlier one is kept.
+
+        A longer run begins there if what comes now is not part of it.
+        """
+        for past in self._pasts.values():
+            past.kept = past.kept or past.base
+
     def request_snapshot(self, shard: int) -> None:
         """Request a snapshot at the end of the next advance that is assigned."""
         self._past(shard).wants_snapshot = True
@@ -212,7 +222,7 @@ class ShardRequests:
         store, may_be_kept = self._snapshot_store, past.may_be_kept
         if may_be_kept and store.has(event.island, past.step, past.digest):
             past.base, past.history = past.step, []
-            store.drop_before(event.island, past.step)
+            store.drop_before(event.island, past.step, past.kept)
         past.may_be_kept = True
         return drift
 

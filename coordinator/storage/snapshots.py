@@ -1,5 +1,7 @@
 """Snapshots of arenas in a run folder; the newest of each shard is kept.
 
+In an archipelago that of before the first end of an island is kept, too.
+
 ``snapshots/island-N-STEP.bin`` is complete or absent. A snapshot is written before the
 journal record of its step; the previous snapshot is removed after that record. A
 snapshot whose step is not in the journal (the process was killed between the two
@@ -74,8 +76,10 @@ class Snapshots:
                 "its state is computed again"
             ) from None
 
-    def drop_before(self, shard: int, step: int) -> None:
-        """Remove a shard's snapshots that are older than a step, unless only reading.
+    def drop_before(self, shard: int, step: int, kept: int = 0) -> None:
+        """Remove a shard's snapshots before a step, unless only reading.
+
+        The one of the step ``kept`` stays.
 
         Raises:
             RunFolderError: the disk fails.
@@ -85,7 +89,7 @@ class Snapshots:
         with storage_errors(self._folder):
             for path in self._folder.glob(f"island-{shard}-*.bin"):
                 match = _NAME.fullmatch(path.name)
-                if match and int(match[1]) < step:
+                if match and int(match[1]) < step and int(match[1]) != kept:
                     path.unlink(missing_ok=True)
 
     def _path(self, shard: int, step: int) -> Path:

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from coordinator.run.history import arena_history
+from coordinator.run.lengthening import lengthen
 from coordinator.storage.compare import compare
 from schema.tables.description import read_description
 from tests.system.documents import (
@@ -75,6 +77,17 @@ def test_stopped_run_is_lengthened_without_computing_anything_again(
     assert compare(wanted, longer) == []
     told = workspace.run("resume", "longer", "--births", "40", *ALONE)
     assert "already finished" in told
+
+
+def test_an_arena_keeps_its_state_from_before_an_island_has_closed(
+    workspace: Workspace,
+) -> None:
+    often = "record_touches = true\nsnapshot_interval_s = 5.0"
+    document = MIXED.replace("record_touches = true", often)
+    run = begin(workspace, document, 21, "a")
+    lengthen(run, 26)
+    _, rebuild = arena_history(run, 1, from_s=1e6)
+    assert rebuild.snapshot
 
 
 def test_campaign_and_its_runs_get_longer(workspace: Workspace) -> None:

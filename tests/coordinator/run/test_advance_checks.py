@@ -75,8 +75,8 @@ class Kept:
     def read(self, shard: int, step: int) -> bytes:
         return self.data[shard, step]
 
-    def drop_before(self, shard: int, step: int) -> None:
-        del shard, step
+    def drop_before(self, shard: int, step: int, kept: int = 0) -> None:
+        del shard, step, kept
 
 
 class Two(SentJobs):
