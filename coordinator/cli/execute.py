@@ -72,7 +72,7 @@ def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> 
         NetworkError: the address cannot be listened on, or no hub answers.
     """
     with FolderLock(folder):
-        refuse_used(folder)
+        refuse_used(folder, campaign)
         planned, failed = _plan(folder, campaign)
         begun = _count_begun(folder, campaign)
         write_campaign(folder, campaign)

@@ -5,9 +5,11 @@ alone is enough to resume it. Each run has an ordinary run folder below it, name
 experiment and repeat; a run that was made separately is used as it is.
 """
 
+import dataclasses
 import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib import resources
@@ -166,21 +168,35 @@ def _check_distinct(experiments: Sequence[Experiment]) -> None:
             )
 
 
-def refuse_used(folder: Path) -> None:
+def refuse_used(folder: Path, wanted: Campaign) -> None:
     """Raise if a folder already holds a campaign or a single run.
 
     Raises:
-        RunFolderError: it holds one.
+        RunFolderError: it holds one; the message says if only its number of births is
+            another than the wanted one.
     """
     if is_campaign(folder):
+        which, flags = _difference(folder, wanted)
         raise RunFolderError(
-            f"{folder}: already holds a campaign; to resume it: "
-            f"{command('resume', folder)}; or choose another folder"
+            f"{folder}: already holds {which}; to resume it: "
+            f"{command('resume', folder, *flags)}; or choose another folder"
         )
     if holds_run(folder):
         raise RunFolderError(
             f"{folder}: already holds a run; choose another folder for a campaign"
         )
+
+
+def _difference(folder: Path, wanted: Campaign) -> tuple[str, tuple[str, ...]]:
+    """Return which campaign a folder holds, and flags to make it the wanted one."""
+    births = min(each.births for each in wanted.experiments)
+    with suppress(RunFolderError):
+        held = read_campaign(folder)
+        longer = tuple(replace(each, births=births) for each in held.experiments)
+        if held != wanted and dataclasses.replace(held, experiments=longer) == wanted:
+            theirs = " or ".join({str(each.births): 0 for each in held.experiments})
+            return f"this campaign with {theirs} births", ("--births", str(births))
+    return "a campaign", ()
 
 
 def write_campaign(folder: Path, campaign: Campaign) -> None:

@@ -97,6 +97,8 @@ def test_campaign_and_its_runs_get_longer(workspace: Workspace) -> None:
     workspace.run(*words, "--births", "26", "--out", "wanted")
     refused = workspace.run("resume", "longer", "--births", "17", *ALONE, code=2)
     assert "longer/singles-0: --births: must be >= 18, the births that the" in refused
+    again = workspace.run(*words, "--births", "26", "--out", "longer", code=2)
+    assert "this campaign with 18 births; to resume it: revolve resume longer" in again
     workspace.run("resume", "longer", "--births", "26", *ALONE)
     assert compare(workspace.folder / "longer", workspace.folder / "wanted") == []
     told = workspace.run("resume", "longer", *ALONE)

@@ -96,14 +96,14 @@ def test_a_campaign_from_the_first_repeat_is_written_as_before(tmp_path: Path) -
 
 
 def test_a_used_folder_is_refused(tmp_path: Path) -> None:
-    refuse_used(tmp_path)
+    refuse_used(tmp_path, CAMPAIGN)
     write_campaign(tmp_path, CAMPAIGN)
     with pytest.raises(RunFolderError, match="revolve resume"):
-        refuse_used(tmp_path)
+        refuse_used(tmp_path, CAMPAIGN)
     with RunFolder(tmp_path / "run", RunDetails("a", 0, 1, "{}")):
         pass
     with pytest.raises(RunFolderError, match="already holds a run"):
-        refuse_used(tmp_path / "run")
+        refuse_used(tmp_path / "run", CAMPAIGN)
 
 
 def test_a_second_coordinator_is_refused(tmp_path: Path) -> None:
