@@ -17,7 +17,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from analysis.measures.population_table import Numbers
-from analysis.measures.trees import Integers
+from schema.robot.trees import Integers
 
 ALPHA = 0.05
 """Probability to call experiments alike that differ by the margin."""

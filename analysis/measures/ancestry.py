@@ -11,8 +11,8 @@ from analysis.measures.population_table import (
     individual_ids,
     rows_of,
 )
-from analysis.measures.trees import Integers
 from schema.errors import RunFolderError
+from schema.robot.trees import Integers
 
 
 def parents_of(births: pa.Table) -> list[list[int]]:

@@ -13,7 +13,7 @@ from analysis.measures.population_table import (
     residence_ids,
 )
 from analysis.measures.run_tables import RunTables
-from analysis.measures.trees import Integers
+from schema.robot.trees import Integers
 
 
 def interactions(run: RunTables) -> pa.Table:

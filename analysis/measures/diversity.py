@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.measures.population_table import Numbers, PopulationTable
-from analysis.measures.trees import Integers, Trees
+from schema.robot.trees import Integers, Trees
 
 _BLOCK = 2_000_000
 """Pairs that are held in memory at a time."""
@@ -35,7 +35,7 @@ def diversity(table: PopulationTable, trees: Trees) -> Numbers:
 def distances_of(trees: Trees, first: Integers, second: Integers) -> Integers:
     """Return ``tree_distances`` of pairs, (P,); equal pairs are computed once."""
     # Numba takes 110 MB, which only the processes that measure need.
-    from analysis.measures.distance import tree_distances  # noqa: PLC0415
+    from schema.robot.body_distance import tree_distances  # noqa: PLC0415
 
     count = len(trees.starts)
     keys = np.minimum(first, second) * count + np.maximum(first, second)

@@ -11,7 +11,7 @@ from analysis.measures.ancestry import parents_of
 from analysis.measures.diversity import distances_of
 from analysis.measures.outputs import run_schema
 from analysis.measures.run_tables import RunTables
-from analysis.measures.trees import Integers, Trees
+from schema.robot.trees import Integers, Trees
 
 LEVELS = 5
 """Levels of reproduction of a family, the robot's own included."""

@@ -6,7 +6,7 @@ import pyarrow.compute as pc
 
 from analysis.measures.population_table import Numbers, individual_ids, rows_of
 from analysis.measures.run_tables import RunTables
-from analysis.measures.trees import Integers
+from schema.robot.trees import Integers
 
 _QUARTILES = (0.25, 0.5, 0.75)
 

@@ -30,9 +30,9 @@ from analysis.measures.population_table import (
 )
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import Problems, RunTables
-from analysis.measures.trees import Integers
 from schema.errors import RevolveError
 from schema.experiment.document import Experiment
+from schema.robot.trees import Integers
 
 
 def robots(run: RunTables) -> pa.Table:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from analysis.measures.trees import Integers
+from schema.robot.trees import Integers
 
 Numbers = npt.NDArray[np.float64]
 Booleans = npt.NDArray[np.bool_]

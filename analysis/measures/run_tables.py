@@ -13,8 +13,9 @@ from analysis.measures.population_table import (
     PopulationTable,
     population_table,
 )
-from analysis.measures.trees import SlotRule, Trees, encode
+from analysis.measures.trees import SlotRule, encode
 from schema.experiment.document import Experiment
+from schema.robot.trees import Trees
 
 Problems = dict[str, str]
 """Reasons why measures were left out, by the name of the measure."""

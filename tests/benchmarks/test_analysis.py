@@ -12,8 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.measures.distance import tree_distances
 from analysis.measures.trees import encode
+from schema.robot.body_distance import tree_distances
 from schema.tables.columns import BIRTHS
 from tests.analysis.bodies import column, random_body
 from tests.analysis.campaign import BROODS, random_bodies, write_run

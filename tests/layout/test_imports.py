@@ -34,7 +34,7 @@ PERMITTED = {
     "rerun": ("analysis/viewer/*.py",),
     "plotnine": ("analysis/figures/*.py",),
     "scipy": ("analysis/comparison/*.py",),
-    "numba": ("analysis/measures/distance.py",),
+    "numba": ("schema/robot/body_distance.py",),
     "matplotlib": ("analysis/figures/*.py", "analysis/report/plots.py"),
     "networkx": ("coordinator/islands/topology.py",),
     "cmaes": ("coordinator/evolution/learners/cma_es.py",),

@@ -10,9 +10,9 @@ import pyarrow as pa
 from analysis.measures.brains.controllers import Controller, Name, controllers
 from analysis.measures.diversity import distances_of
 from analysis.measures.population_table import Numbers
-from analysis.measures.trees import Trees
 from schema.robot.brain import NEURON_TYPES
 from schema.robot.cpg import BUILT_IN_KINDS
+from schema.robot.trees import Trees
 
 _DEAF = "Oscillator"
 """Type of neurons that ignore their inputs."""

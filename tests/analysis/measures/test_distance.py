@@ -9,10 +9,11 @@ import zss
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.measures import distance as module
-from analysis.measures.distance import tree_distances
 from analysis.measures.trees import SlotRule, encode
 from schema.errors import InvalidRobot
+from schema.robot import body_distance as module
+from schema.robot.body_distance import body_distances, tree_distances
+from schema.robot.robot import Part, Robot
 from tests.analysis.bodies import Body, column, part, random_body
 
 PAIRS = 10_000
@@ -61,6 +62,23 @@ def test_own_slot_rule_compares_the_slot_of_the_part() -> None:
     moved = [*CORE, part(1, 0, 3, "FixedBrick", own=0)]
     assert [distance(BRICK, turned, rule) for rule in ("parent", "own")] == [0, 1]
     assert [distance(BRICK, moved, rule) for rule in ("parent", "own")] == [1, 0]
+
+
+def test_distances_of_robots_equal_those_of_rows() -> None:
+    rng = np.random.default_rng(3)
+    bodies = [random_body(rng, size) for size in (9, 1, 9, 14, 30)]
+    robots = [
+        Robot(
+            tuple(
+                Part(row["kind"], row["parent"], row["parent_slot"], 0, 0, ())
+                for row in body
+            )
+        )
+        for body in bodies
+    ]
+    found = body_distances(robots[0], robots).tolist()
+    assert found == [distance(bodies[0], body) for body in bodies]
+    assert found[0] == 0 < min(found[1:])
 
 
 def test_equal_trees_are_stored_once() -> None:

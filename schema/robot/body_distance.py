@@ -7,12 +7,36 @@ because only cores have no parent and no other part is a core.
 The functions are compiled at the first call and cached on disk.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numba
 import numpy as np
 
-from analysis.measures.trees import Integers, Trees
+from schema.robot.robot import Robot
+from schema.robot.trees import Integers, Trees, trees_of
+
+
+def body_distances(robot: Robot, others: Sequence[Robot]) -> Integers:
+    """Return the edit distances, (N,), of a robot's body to those of others, (N,).
+
+    A part's label is its parent's slot; parameters and brains are ignored.
+
+    Raises:
+        InvalidRobot: as of ``trees_of``.
+    """
+    bodies = [robot.parts, *(other.parts for other in others)]
+    kinds = dict.fromkeys(part.kind for body in bodies for part in body)
+    numbers = {kind: number for number, kind in enumerate(kinds)}
+    columns = [
+        (part.parent, numbers[part.kind], part.parent_slot, part.parent_slot)
+        for body in bodies
+        for part in body
+    ]
+    sizes = np.array([len(body) for body in bodies], np.int64)
+    trees = trees_of(np.array(columns, np.int64), sizes)
+    first, *rest = trees.tree_of
+    return tree_distances(trees, np.full(len(rest), first), np.array(rest, np.int64))
 
 
 def tree_distances(trees: Trees, first: Integers, second: Integers) -> Integers:
