@@ -71,6 +71,7 @@ _HOMES = {
     "Learner": "schema.plugins.protocols",
     "ParentSelection": "schema.plugins.protocols",
     "SurvivorSelection": "schema.plugins.protocols",
+    "StatefulSelection": "schema.plugins.protocols",
     "FitnessFunction": "schema.plugins.protocols",
     "MeasureFunction": "schema.plugins.protocols",
     "RevolveError": "schema.errors",

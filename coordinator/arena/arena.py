@@ -21,7 +21,7 @@ from coordinator.arena.living import (
     touch_records,
 )
 from coordinator.arena.orders import Orders, inserted
-from coordinator.evolution.breeding import Candidate, Individual
+from coordinator.evolution.breeding import Breeder, Candidate, Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.selection import select_culled
 from coordinator.islands.events import (
@@ -87,7 +87,8 @@ class Arena:
         self.encoding = encoding_of(experiment)
         self._parents_needed = experiment.selection.parents_needed
         self._number = number
-        self._vetting_queue = VettingQueue(experiment, seed, run, number)
+        self._breeder = Breeder(experiment, seed, run)
+        self._vetting_queue = VettingQueue(experiment, self._breeder, number)
         self._living = LivingRobots(
             rules, experiment.measures.labels, seed=seed, run=run
         )
@@ -98,8 +99,11 @@ class Arena:
             else None
         )
         self._orders = Orders(experiment, self._living, self._infancy)
+        emigrants = self._breeder.rules.emigrants
         self._migration = (
-            None if epochs is None else ArenaMigration(experiment, epochs, self._living)
+            ArenaMigration(experiment, epochs, self._living, emigrants)
+            if epochs
+            else None
         )
         self._founders: list[Candidate] = []
         self._advances = 0
@@ -231,6 +235,8 @@ class Arena:
             if self.step % self.clock.founder == 0:
                 commands += self._insert(self._founders.pop())
             return commands + self._conclude()
+        if matured := self._living.take_matured(self._number):
+            self._breeder.update(self._living.mature(), matured)
         if self.step % self.clock.sample == 0:
             commands += self._living.sample(self._moment)
         if self.step % self.clock.birth == 0:

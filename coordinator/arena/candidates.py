@@ -18,10 +18,8 @@ class VettingQueue:
     counted on at the next birth, so that each attempt has its own stream.
     """
 
-    def __init__(
-        self, experiment: Experiment, seed: int, run: int, island: int
-    ) -> None:
-        self._breeder = Breeder(experiment, seed, run)
+    def __init__(self, experiment: Experiment, breeder: Breeder, island: int) -> None:
+        self._breeder = breeder
         self._island = island
         self._attempts = experiment.selection.max_mating_attempts
         self._viable: dict[int, Candidate] = {}

@@ -63,6 +63,7 @@ class LivingRobot:
         inserted_at: place where it was inserted [m].
         judgement: the last report; None before the first advance.
         is_infant: it learns, and does not count as mature.
+        has_matured: rules of selection know that it is mature.
     """
 
     individual: Individual
@@ -70,6 +71,7 @@ class LivingRobot:
     inserted_at: Place
     judgement: Judgement | None = None
     is_infant: bool = False
+    has_matured: bool = False
 
     @property
     def birth(self) -> BirthId:
@@ -129,6 +131,17 @@ class LivingRobots:
     def mature(self) -> tuple[Individual, ...]:
         """Return the individuals that may mate."""
         return tuple(one.individual for one in self if one.is_mature)
+
+    def take_matured(self, island: int) -> list[Individual]:
+        """Return the mature that were born on an island, each at one call only."""
+        matured = [
+            one
+            for one in self
+            if one.is_mature and not one.has_matured and one.birth.island == island
+        ]
+        for one in matured:
+            one.has_matured = True
+        return [one.individual for one in matured]
 
     def random_place(self, name: BirthId, purpose: Purpose) -> Place:
         """Return a random place away from the living; the name is that of a stream."""

@@ -15,12 +15,8 @@ from msgspec.structs import replace
 
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.selection import (
-    cull_population,
-    rule_of,
-    select_parents,
-    select_survivors,
-)
+from coordinator.evolution.rules import IslandRules, select_parents, select_survivors
+from coordinator.evolution.selection import cull_population
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
@@ -147,14 +143,17 @@ class Candidate(Struct, frozen=True):
 
 
 class Breeder:
-    """Source of candidates and selector of survivors for one run of an experiment."""
+    """Source of candidates and selector of survivors for one island and run.
+
+    Attributes:
+        rules: of selection; those that are classes have a memory.
+    """
 
     def __init__(self, experiment: Experiment, seed: int, run: int) -> None:
         self._experiment = experiment
         self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
-        self._parents_rule = rule_of(experiment.selection, "parents")
-        self._survivors_rule = rule_of(experiment.selection, "survivors")
+        self.rules = IslandRules(experiment, self._encoding.develop)
 
     def candidate(
         self,
@@ -220,7 +219,7 @@ class Breeder:
             return None, self._encoding.random(rng, birth)
         if couple is None or attempt % selection.max_mating_attempts == 0:
             rng = self._stream(birth, attempt, Purpose.PARENTS)
-            couple = select_parents(population, rng, self._parents_rule)
+            couple = select_parents(population, rng, self.rules.parents)
         rng = self._stream(birth, attempt, Purpose.MATE)
         first, second = couple
         return couple, self._encoding.mate(first.genome, second.genome, rng, birth)
@@ -263,9 +262,23 @@ class Breeder:
             return cull_population(parents, children, founders, selection.culling)
         last = children[-1].birth
         rng = self._stream(last, 0, Purpose.SURVIVORS)
-        rule = self._survivors_rule
+        rule = self.rules.survivors
         with at_birth(last):
             return select_survivors(parents, children, rng, selection, rule)
+
+    def update(
+        self, population: Sequence[Individual], brood: Sequence[Individual]
+    ) -> None:
+        """Let the rules of selection remember a brood, in birth order.
+
+        The population, parents of the brood, are noted as ancestors.
+
+        Raises:
+            ExperimentError: a rule fails.
+        """
+        with at_birth(brood[-1].birth):
+            self.rules.note(population)
+            self.rules.update(failed_last(brood))
 
     def _is_random(self, population: Sequence[Individual]) -> bool:
         return not population or self._experiment.selection.parents == "none"

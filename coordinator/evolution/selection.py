@@ -1,28 +1,31 @@
-"""Selection: the choice of parents and of survivors, and culling.
+"""Built-in rules of selection, of parents and of survivors, and culling.
 
-A rule of selection, built-in or of a user, gets a population and returns places in it;
-``schema.plugins.protocols`` says what. The answer of a rule is checked before it is
-used.
 Source: Hupkes 2016, sections 5.3 and 8.2; the code of the original.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from math import fsum
-from typing import Any, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from msgspec import Struct
 
 from coordinator.evolution.random_streams import BufferedRng
-from schema.errors import ExperimentError, shown
-from schema.experiment.document import ArenaSection, Culling, SelectionSection
-from schema.experiment.selection_rules import own_rule
-from schema.plugins.contract import broken
-from schema.plugins.origin import naming_plugin
+from schema.experiment.document import ArenaSection, Culling
 from schema.plugins.protocols import ParentSelection, Selectable, SurvivorSelection
+from schema.robot.ids import BirthId
 
-S = TypeVar("S", bound=Selectable)
+
+class _Judged(Protocol):
+    """What built-in rules need of an individual."""
+
+    @property
+    def birth(self) -> BirthId: ...
+    @property
+    def fitness(self) -> float: ...
+
+
+S = TypeVar("S", bound=_Judged)
 
 
 def fittest_first(individuals: Sequence[S]) -> list[S]:
@@ -30,128 +33,8 @@ def fittest_first(individuals: Sequence[S]) -> list[S]:
     return sorted(individuals, key=_order)
 
 
-def _order(one: Selectable) -> tuple[float, object]:
+def _order(one: _Judged) -> tuple[float, object]:
     return -one.fitness, one.birth
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """A rule of selection with its parameters.
-
-    Attributes:
-        key: of the experiment, for messages.
-        function: the rule.
-        parameters: its last argument.
-        is_own: of a user, so that its answers are checked.
-    """
-
-    key: str
-    function: Callable[..., Any]
-    parameters: object
-    is_own: bool = True
-
-    def places(
-        self,
-        count: int,
-        population: Sequence[Selectable],
-        *rest: Any,  # noqa: ANN401 - as the rule needs
-    ) -> list[int]:
-        """Return the answer of the rule, checked: different places in the population.
-
-        The rule gets a list of its own. It may sort it or remove from it, as rules of
-        earlier runs do; what it returns are then places in the changed list.
-
-        Raises:
-            ExperimentError: it raises, returns anything else, or puts individuals into
-                its list.
-        """
-        if not self.is_own:
-            return list(self.function(population, *rest, self.parameters))
-        given = list(population)
-        with naming_plugin(self.key, self.function):
-            answer = self.function(given, *rest, self.parameters)
-            place_of = {id(one): place for place, one in enumerate(population)}
-            try:
-                left = [place_of.pop(id(one)) for one in given]
-            except KeyError:
-                raise ExperimentError(
-                    "must not replace individuals of the population"
-                ) from None
-            places = _whole_numbers(answer)
-            if not len(places) == len(set(places)) == count or not (
-                min(places) >= 0 and max(places) < len(left)
-            ):
-                highest = len(left) - 1
-                rule = f"return {count} different whole numbers from 0 to {highest}"
-                raise broken("", rule, came=shown(answer))
-            return [left[at] for at in places]
-
-
-def _whole_numbers(answer: object) -> list[int]:
-    """Return the answer of a rule as plain integers; empty if it is none."""
-    if not isinstance(answer, (Sequence, np.ndarray)):
-        return []
-    kinds = set(map(type, answer))
-    if kinds <= {int}:
-        return list(answer)
-    is_whole = all(issubclass(kind, (int, np.integer)) for kind in kinds)
-    return [int(at) for at in answer] if is_whole else []
-
-
-def rule_of(selection: SelectionSection, name: str) -> Rule:
-    """Return the rule that selects ``parents`` or ``survivors``.
-
-    That of the parents of ``none`` is never called.
-
-    Raises:
-        ExperimentError: as of ``own_rule``.
-    """
-    key, path = f"selection.{name}", getattr(selection, name)
-    if own := own_rule(selection, name):
-        return Rule(key, *own)
-    if name == "survivors":
-        return Rule(key, SURVIVOR_RULES[path], None, is_own=False)
-    size = Tournament(selection.tournament_size) if path == "tournament" else None
-    rule = random_parents if path == "none" else PARENT_RULES[path]
-    return Rule(key, rule, size, is_own=False)
-
-
-def select_parents(
-    population: Sequence[S], rng: np.random.Generator, rule: Rule
-) -> tuple[S, S]:
-    """Return two different parents, the one that gives its root first.
-
-    The population is in a reproducible order.
-
-    Raises:
-        ExperimentError: the rule raises, or returns no two places.
-    """
-    first, second = rule.places(2, population, rng)
-    return population[first], population[second]
-
-
-def select_survivors(
-    parents: Sequence[S],
-    children: Sequence[S],
-    rng: np.random.Generator,
-    selection: SelectionSection,
-    rule: Rule,
-) -> tuple[S, ...]:
-    """Return the next population of constant size, in birth order.
-
-    A brood cut short by the end of the run always competes with its parents, or the
-    population would shrink.
-
-    Raises:
-        ExperimentError: the rule raises, or returns other than that many places.
-    """
-    size = selection.population
-    pool = list(children)
-    if selection.keep_parents or len(pool) < size:
-        pool = [*parents, *pool]
-    if len(pool) > size:
-        pool = [pool[at] for at in rule.places(size, pool, size, rng)]
-    return tuple(sorted(pool, key=lambda one: one.birth))
 
 
 class Tournament(Struct, frozen=True):

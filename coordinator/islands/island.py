@@ -100,7 +100,10 @@ class Island:
         self._learning = (
             IslandLearning(experiment, self._encoding) if experiment.learning else None
         )
-        self._migration = IslandMigration(experiment, epochs) if epochs else None
+        emigrants = self._breeder.rules.emigrants
+        self._migration = (
+            IslandMigration(experiment, epochs, emigrants) if epochs else None
+        )
         self._generation = 0
         self._begun = 0
         # Founders have no parents: all of them are in flight together.
@@ -268,11 +271,15 @@ class Island:
         return [born, evaluation_record(outcome, self._labels), *trials]
 
     def _close_brood(self) -> list[IslandCommand]:
-        """Select the survivors, and end the epoch of migration if it is due."""
+        """Select the survivors, and end the epoch of migration if it is due.
+
+        Rules with a memory take the brood in between.
+        """
         parents, rows = self.population, list[Record]()
         if self._reevaluations is not None:
             parents, rows = self._reevaluations.conclude(parents)
         self.population = self._breeder.survivors(parents, self._brood)
+        self._breeder.update(parents, self._brood)
         self._brood = []
         migration = self._migration
         if (

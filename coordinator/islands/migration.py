@@ -13,6 +13,7 @@ from math import inf
 
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
+from coordinator.evolution.rules import Rule
 from coordinator.evolution.selection import fittest_first
 from coordinator.islands.events import (
     Emigrate,
@@ -96,12 +97,19 @@ class MigrationEpochs:
         )
 
     def send(
-        self, candidates: Sequence[Individual], living: int, spare: int
+        self,
+        candidates: Sequence[Individual],
+        living: int,
+        spare: int,
+        rule: Rule | None = None,
     ) -> tuple[list[Emigrate], list[Individual]]:
         """End the epoch; return the commands, and the individuals that were moved.
 
         The candidates are in a reproducible order; at most ``spare`` of them may be
-        moved away.
+        moved away. The rule is an own one that selects them, None a built-in one.
+
+        Raises:
+            ExperimentError: the rule fails.
         """
         self.is_waiting = True
         targets = [to for to in self.links.targets if to in self._active]
@@ -109,7 +117,14 @@ class MigrationEpochs:
         is_moved = self._migration.handling == "evict"
         if is_moved:
             count = min(count * len(targets), max(0, spare))
-        chosen = self._choose(candidates, min(count, len(candidates)))
+        count = min(count, len(candidates))
+        if rule is not None and count:
+            name = BirthId(self.island, self.epoch)
+            rng = self._stream(name, 0, Purpose.EMIGRANTS)
+            places = rule.places(count, candidates, rng)
+            chosen = [candidates[at] for at in places]
+        else:
+            chosen = self._choose(candidates, count)
         # Each target gets all that are copied, or a share of those that are moved. The
         # first target changes, or a single migrant would always go there.
         step = len(targets) if is_moved else 1

@@ -6,6 +6,7 @@ from math import ceil
 
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.migration import Migration, migrant_count
+from schema.experiment.selection_rules import rule_problems
 
 _UNCONNECTED = """migration.topology: unconnected islands cannot exchange migrants; \
 choose another topology, or remove the other keys of [migration]"""
@@ -70,6 +71,7 @@ def _island_problems(
     for name in ("topology", "degree", "p_rewire", "edges"):
         if getattr(own.migration, name) != getattr(connected, name):
             yield f"migration.{name}: must be the same on all islands"
+    yield from rule_problems(own.migration)
     if connected.topology == "edges" and number not in chain(*connected.edges):
         return
     for problem in _exchange_problems(own, own.migration):

@@ -7,9 +7,15 @@ Source: own; Biscani and Izzo 2020, on pagmo, for the terms.
 
 from typing import Annotated, Literal
 
-from msgspec import Meta
+from msgspec import Meta, field
 
-from schema.experiment.section import AtLeastOne, Positive, Probability, Section
+from schema.experiment.section import (
+    AtLeastOne,
+    Parameters,
+    PluginSection,
+    Positive,
+    Probability,
+)
 from schema.limits import MOST_ISLANDS
 
 _Island = Annotated[int, Meta(ge=0, le=MOST_ISLANDS)]
@@ -23,9 +29,11 @@ Topology = Literal[
     "small-world",
     "edges",
 ]
+EMIGRANTS = ("best", "tournament", "random")
+"""Built-in selections of migrants."""
 
 
-class Migration(Section, frozen=True):
+class Migration(PluginSection, frozen=True):
     """Topology of the islands, and their exchange of migrants.
 
     At the end of an epoch an island sends migrants to each of its neighbours. It
@@ -41,8 +49,9 @@ class Migration(Section, frozen=True):
         epoch: births per epoch, on the island itself.
         epoch_s: simulated time per epoch [s], arenas only; the earlier end counts.
         migrants: number for each neighbour, or share of the population.
-        emigrants: selection of migrants; tournaments have the size of those for
-            parents.
+        emigrants: selection of migrants: the ``best``, winners of a ``tournament`` of
+            the size of those for parents, ``random`` ones, or ``module:attribute``.
+        emigrants_parameters: parameters of an own selection of migrants.
         handling: ``preserve`` copies the same migrants to each neighbour; ``evict``
             moves each migrant to one neighbour.
         replaced: individuals that make room for immigrants; ``none`` requires a
@@ -58,7 +67,8 @@ class Migration(Section, frozen=True):
     epoch: AtLeastOne = 15
     epoch_s: Positive | None = None
     migrants: AtLeastOne | Annotated[float, Meta(gt=0, le=1)] = 1
-    emigrants: Literal["best", "tournament", "random"] = "best"
+    emigrants: str = "best"
+    emigrants_parameters: Parameters = field(default_factory=dict)
     handling: Literal["preserve", "evict"] = "preserve"
     replaced: Literal["worst", "random", "none"] = "worst"
     judge_anew: bool = False

@@ -1,4 +1,4 @@
-"""Own functions that select parents and survivors, and their parameters.
+"""Own rules that select parents, survivors and emigrants, and their parameters.
 
 Built-in rules have short names; ``coordinator.evolution.selection`` holds them.
 """
@@ -7,30 +7,45 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from schema.errors import ExperimentError, shown
+from schema.experiment.brains import NoParameters
 from schema.experiment.document import PARENTS, SURVIVORS, SelectionSection
-from schema.plugins.load import load_function, unknown
+from schema.experiment.migration import EMIGRANTS, Migration
+from schema.plugins.load import load_function, load_object, unknown
 from schema.plugins.origin import where_defined
 from schema.plugins.parameters import parameters_type, read_parameters
 
-_ARGUMENTS = {"parents": 3, "survivors": 4}
-_NAMES = {"parents": PARENTS, "survivors": SURVIVORS}
+RuleSection = SelectionSection | Migration
+METHODS = ("select", "update")
+"""Methods of a rule that is a class."""
+_ARGUMENTS = {"parents": 3, "survivors": 4, "emigrants": 4}
+_NAMES = {"parents": PARENTS, "survivors": SURVIVORS, "emigrants": EMIGRANTS}
 
 
-def own_rule(
-    selection: SelectionSection, name: str
-) -> tuple[Callable[..., Any], Any] | None:
-    """Return an own rule for ``parents`` or ``survivors``, and its parameters.
+def rule_key(name: str) -> str:
+    """Return the key of the experiment that names ``parents``, for example."""
+    return f"{'migration' if name == 'emigrants' else 'selection'}.{name}"
 
-    None is a built-in rule.
+
+def own_rule(section: RuleSection, name: str) -> tuple[Callable[..., Any], Any] | None:
+    """Return an own rule for ``parents``, for example, and its parameters.
+
+    It is a function or a class; None is a built-in rule.
 
     Raises:
-        ExperimentError: no such function, or other parameters than it declares.
+        ExperimentError: no such rule, or other parameters than it declares.
     """
-    path, key = getattr(selection, name), f"selection.{name}"
+    path, key = getattr(section, name), rule_key(name)
     if ":" not in path:
         return None
+    table = getattr(section, f"{name}_parameters")
+    rule: Any = load_object(path, key, {})
+    if isinstance(rule, type):
+        load_object(path, key, {}, METHODS)
+        declared = getattr(rule, "Parameters", None)
+        read = read_parameters(table, declared or NoParameters, f"{key}_parameters")
+        return rule, read if declared else None
     function = load_function(path, key, _ARGUMENTS[name])
-    table, place = getattr(selection, f"{name}_parameters"), where_defined(function)
+    place = where_defined(function)
     kind = parameters_type(function, f"{key}: {place}", position=-1)
     if kind is not None:
         return function, read_parameters(table, kind, f"{key}_parameters")
@@ -41,14 +56,16 @@ def own_rule(
     return function, None
 
 
-def rule_problems(selection: SelectionSection) -> Iterator[str]:
+def rule_problems(section: RuleSection) -> Iterator[str]:
     """Yield what is wrong with the rules of a section."""
     for name, built_in in _NAMES.items():
-        path = getattr(selection, name)
+        path = getattr(section, name, None)
+        if path is None:
+            continue
         if ":" in path:
-            own_rule(selection, name)
+            own_rule(section, name)
         elif path not in built_in:
-            yield str(unknown(path, f"selection.{name}", built_in))
-        elif table := getattr(selection, f"{name}_parameters"):
+            yield str(unknown(path, rule_key(name), built_in))
+        elif table := getattr(section, f"{name}_parameters"):
             why = f"{path!r} has no parameters, got {shown(table)}"
-            yield f"selection.{name}_parameters: {why}"
+            yield f"{rule_key(name)}_parameters: {why}"

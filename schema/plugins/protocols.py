@@ -13,6 +13,7 @@ from schema.robot.ids import BirthId
 from schema.robot.neurons import Tick
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats, Trace
+from schema.robot.trees import Integers
 
 T = TypeVar("T")
 
@@ -452,6 +453,23 @@ class Selectable(Protocol):
     def measures(self) -> Mapping[str, float]:
         """Measures of its evaluation by name; those that the experiment records."""
 
+    @property
+    def robot(self) -> Robot:
+        """Its body and brain, developed when asked for; a learnt brain, if any."""
+
+    def distances(self, others: Sequence[Self], /) -> Integers:
+        """Return the tree edit distances, (N,), of its body to those of others.
+
+        Needs the extra ``analysis``. Each pair is computed once and then known.
+        """
+
+    def ancestors(self, generations: int | None = None, /) -> frozenset[BirthId]:
+        """Return the birth ids of its ancestors, dead or alive.
+
+        ``generations`` limits how far back. Ancestors of an immigrant's parents are not
+        known.
+        """
+
 
 class ParentSelection(Protocol):
     """Selection of two parents, ``selection.parents``; runs in the coordinator.
@@ -489,6 +507,9 @@ class ParentSelection(Protocol):
 class SurvivorSelection(Protocol):
     """Selection of the survivors of a brood, ``selection.survivors``; off-line only.
 
+    A function that selects emigrants, ``migration.emigrants``, gets and returns the
+    same: of the living (on-line, of the mature) those that migrate, in order of choice.
+
     It runs in the coordinator; else as ``ParentSelection``, with the table
     ``[selection.survivors_parameters]``. It is not called while the population is not
     larger than ``count``.
@@ -513,6 +534,48 @@ class SurvivorSelection(Protocol):
 
         Returns:
             ``count`` different places in ``population``, from 0, in any order.
+        """
+
+
+class StatefulSelection(Protocol):
+    """Selection with a memory: of parents, survivors or emigrants, as a class.
+
+    The experiment names a class in place of a function. It is called once for each
+    island of each run, as ``Class(parameters)``: an instance of the msgspec Struct that
+    the class has as its attribute ``Parameters``, read from the same table as those of
+    a function; None without it.
+
+    All memory is in the object, and `update` alone changes it: the class and its module
+    are shared by all islands and runs of a process. A run that is resumed makes a new
+    object and calls both methods as before. The memory of an island stays there;
+    migrants carry nothing of it.
+    """
+
+    def select(
+        self, population: Sequence[Selectable], count: int, rng: np.random.Generator, /
+    ) -> Sequence[int]:
+        """Return ``count`` different places in the population, from 0.
+
+        It changes nothing: couples are selected when bodies have been vetted, in any
+        order.
+
+        Args:
+            population: as of ``ParentSelection`` or ``SurvivorSelection``.
+            count: 2 for parents; the child gets its root part from the first.
+            rng: stream of this selection.
+        """
+
+    def update(self, brood: Sequence[Selectable], /) -> None:
+        """Change the memory.
+
+        Off-line it is called after each brood, the founders included, when survivors
+        have been selected; all births of the next brood select with this memory.
+        On-line it is called at a decision, before its birth, if robots are mature for
+        the first time.
+
+        Args:
+            brood: individuals born on the island, in birth order, each at one call
+                only, with the fitness that it has then.
         """
 
 

@@ -1,0 +1,104 @@
+"""Members of a population as own rules of selection see them.
+
+Robots, distances of bodies and ancestors are computed when a rule asks for them.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from schema.errors import ExperimentError
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from schema.robot.trees import Integers
+
+_MOST_DISTANCES = 250_000
+"""Number of distances that are kept at most, some 50 MB."""
+
+
+class Relatives:
+    """Parents of all individuals that lived on an island, and distances of bodies.
+
+    Attributes:
+        parents: birth ids of the parents of each individual.
+        develop: returns the robot of a genome.
+    """
+
+    def __init__(self, develop: Callable[[Any], Robot]) -> None:
+        self.parents: dict[BirthId, tuple[BirthId, ...]] = {}
+        self.develop = develop
+        self._distances: dict[tuple[BirthId, BirthId], int] = {}
+
+    def members(self, individuals: Iterable[Any]) -> list["Member"]:
+        """Return individuals as rules see them; their parents are noted."""
+        members = [Member(one, self) for one in individuals]
+        self.parents.update((one.birth, one.parents) for one in members)
+        return members
+
+    def distances(self, first: "Member", others: Sequence["Member"]) -> Integers:
+        """Return the distances, (N,), of a body to those of others, (N,)."""
+        if len(self._distances) > _MOST_DISTANCES:
+            self._distances.clear()
+        known, births = self._distances, [other.birth for other in others]
+        pairs = [(min(first.birth, to), max(first.birth, to)) for to in births]
+        unknown = {
+            pair: other
+            for pair, other in zip(pairs, others, strict=True)
+            if pair not in known
+        }
+        if unknown:
+            try:
+                # Numba takes 110 MB, and is an extra.
+                from schema.robot.body_distance import (  # noqa: PLC0415
+                    body_distances,
+                )
+            except ImportError as error:
+                needs = f"distances of bodies need {error.name}"
+                install = "pip install 'revolve-islands[analysis]'"
+                raise ExperimentError(f"{needs}: {install}") from None
+            robots = [other.robot for other in unknown.values()]
+            found = body_distances(first.robot, robots).tolist()
+            known.update(zip(unknown, found, strict=True))
+        return np.array([known[pair] for pair in pairs], np.int64)
+
+
+class Member:
+    """Member of a population; it has all attributes of ``Individual``, too."""
+
+    __slots__ = ("_individual", "_relatives", "_robot")
+
+    def __init__(
+        self,
+        individual: Any,  # noqa: ANN401 - ``Individual``, which needs this module
+        relatives: Relatives,
+    ) -> None:
+        self._individual = individual
+        self._relatives = relatives
+        self._robot: Robot | None = None
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute
+        """Return an attribute of the individual."""
+        return getattr(self._individual, name)
+
+    @property
+    def robot(self) -> Robot:
+        """Its body and brain; the brain that it has learnt, if it has learnt one."""
+        if self._robot is None:
+            one = self._individual
+            self._robot = one.learnt or self._relatives.develop(one.genome)
+        return self._robot
+
+    def distances(self, others: Sequence["Member"]) -> Integers:
+        """Return the distances of its body to those of others, (N,)."""
+        return self._relatives.distances(self, others)
+
+    def ancestors(self, generations: int | None = None) -> frozenset[BirthId]:
+        """Return its ancestors' birth ids, up to some generations back if given."""
+        ancestors, line = set[BirthId](), set(self._individual.parents)
+        while line and (generations is None or generations > 0):
+            ancestors |= line
+            parents = (self._relatives.parents.get(birth, ()) for birth in line)
+            line = set[BirthId]().union(*parents) - ancestors
+            generations = generations and generations - 1
+        return frozenset(ancestors)
