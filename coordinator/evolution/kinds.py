@@ -1,25 +1,23 @@
 """Kinds of plug-ins that the coordinator runs: selection, encoding, brain, learner."""
 
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from types import MappingProxyType
 from typing import NamedTuple
 
-import numpy as np
 from msgspec.structs import replace as replace_struct
 
 from coordinator.evolution.brains import BUILT_IN as BRAINS
-from coordinator.evolution.breeding import Individual, failed_last
 from coordinator.evolution.check_encoding import check_encoding
+from coordinator.evolution.check_rule import Labels, check_rule, example_robot
 from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
 from coordinator.evolution.encodings import METHODS, WHERE
 from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
-from coordinator.evolution.selection import PARENT_RULES, SURVIVOR_RULES, Rule, rule_of
-from schema.errors import ExperimentError
+from coordinator.evolution.members import Relatives
+from coordinator.evolution.rules import rule_of
+from coordinator.evolution.selection import PARENT_RULES, SURVIVOR_RULES
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     BrainSection,
@@ -30,109 +28,49 @@ from schema.experiment.document import (
 )
 from schema.experiment.kinds import Kind, is_class, sections_of, takes
 from schema.experiment.learning import Learning
-from schema.plugins.contract import repeated
+from schema.experiment.migration import Migration
+from schema.experiment.selection_rules import METHODS as RULE_METHODS
+from schema.experiment.selection_rules import RuleSection, own_rule, rule_key
 from schema.plugins.load import load_object
-from schema.plugins.origin import where_defined
-from schema.robot.ids import BirthId
-
-Labels = tuple[str, ...] | None
-"""Measures that an experiment records; None: every one that a rule may ask for."""
-
-_CHILDREN = 15
-_FAILED = 4
-"""One of so many robots of a population has failed."""
-_ASKED: Mapping[str, tuple[int, int, tuple[int, ...]]] = {
-    "selection.parents": (2, 2, ()),
-    "selection.survivors": (_CHILDREN + 1, _CHILDREN, (_CHILDREN,)),
-}
-"""Least size of a population for a rule, number of places, and further arguments."""
-
-
-def _example(number: int, fitness: float, labels: Labels) -> Individual:
-    parents = (BirthId(0, number // 2), BirthId(0, number // 3)) if number else ()
-    measures: Mapping[str, float] = defaultdict(lambda: number / 7)
-    if labels is not None:
-        measures = dict.fromkeys(labels, number / 7)
-    return Individual(
-        BirthId(0, number),
-        genome=None,
-        fitness=fitness,
-        rank=1 + number // 4,
-        generation=0,
-        parents=parents,
-        size=3 + number % 5,
-        measures=MappingProxyType(measures),
-    )
-
-
-def _populations(least: int, labels: Labels) -> Iterator[list[Individual]]:
-    """Yield populations: small, of equals, varied, in part without fitness."""
-    for count, fitness in (
-        (least, float),
-        (30, lambda _: 0.0),
-        (30, lambda number: (number * 7 % 30) / 10),
-        (30, lambda number: float(number) if number % 3 else -1.0),
-    ):
-        yield [_example(number, fitness(number), labels) for number in range(count)]
-
-
-def check_rule(rule: Rule, labels: Labels = None) -> str:
-    """Raise unless a rule of selection keeps its contract on simple populations.
-
-    Returns:
-        A warning: what it raises for a population with failed robots, which is no
-        error, as a run in which no robot fails goes on; or an empty text.
-
-    Raises:
-        ExperimentError: it raises, returns other than as many different places as it
-            must, or different ones for the same population and stream.
-    """
-    least, count, rest = _ASKED[rule.key]
-
-    def places(population: Sequence[Individual]) -> list[int]:
-        return rule.places(count, population, *rest, np.random.default_rng(1))
-
-    population: list[Individual] = []
-    for population in _populations(least, labels):
-        repeated("", partial(places, population))
-    mixed = [
-        individual if number % _FAILED else individual.evaluated(None, ())
-        for number, individual in enumerate(population)
-    ]
-    try:
-        places(failed_last(mixed))
-    except ExperimentError as error:
-        why = str(error).removeprefix(f"{rule.key}: {where_defined(rule.function)}: ")
-        return f"of a population with failed robots (fitness 0, no measures): {why}"
-    return ""
 
 
 class _Ruled(NamedTuple):
-    """A section of selection, and the measures that the experiment records."""
+    """A section that names a rule, and the measures that the experiment records."""
 
-    selection: SelectionSection
+    section: RuleSection
     labels: Labels
 
 
 def _rules(name: str, experiment: Experiment) -> Iterator[_Ruled]:
-    for selection in sections_of(experiment, "selection"):
-        if ":" in getattr(selection, name):
-            yield _Ruled(selection, experiment.measures.labels)
+    for section in sections_of(experiment, rule_key(name).partition(".")[0]):
+        if ":" in getattr(section, name):
+            yield _Ruled(section, experiment.measures.labels)
+
+
+def _load_rule(name: str, ruled: _Ruled) -> object:
+    own = own_rule(ruled.section, name)
+    return own and own[0]
+
+
+def _check_rule(name: str, ruled: _Ruled) -> str:
+    relatives = Relatives(example_robot)
+    return check_rule(partial(rule_of, ruled.section, name, relatives), ruled.labels)
 
 
 def _selection_kind(name: str, built_in: Mapping[str, object], arguments: int) -> Kind:
+    section = Migration() if name == "emigrants" else SelectionSection()
     return Kind(
         name,
-        f"selection.{name}",
+        rule_key(name),
         built_in,
-        is_one=partial(takes, arguments),
-        section=lambda path: _Ruled(
-            replace_struct(SelectionSection(), **{name: path}), None
+        is_one=lambda plugin: (
+            takes(arguments, plugin) or is_class(RULE_METHODS, plugin)
         ),
+        section=lambda path: _Ruled(replace_struct(section, **{name: path}), None),
         sections=partial(_rules, name),
-        path=lambda ruled: str(getattr(ruled.selection, name)),
-        load=lambda ruled: rule_of(ruled.selection, name).function,
-        check=lambda ruled: check_rule(rule_of(ruled.selection, name), ruled.labels),
+        path=lambda ruled: str(getattr(ruled.section, name)),
+        load=partial(_load_rule, name),
+        check=partial(_check_rule, name),
     )
 
 
@@ -189,6 +127,7 @@ KINDS = (
     ENCODING,
     _selection_kind("parents", PARENT_RULES, 3),
     _selection_kind("survivors", SURVIVOR_RULES, 4),
+    _selection_kind("emigrants", {}, 4),
     Kind(
         "learner",
         LEARNER,

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 
 from coordinator.evolution.breeding import Individual
+from coordinator.evolution.check_rule import example_robot
+from coordinator.evolution.members import Relatives
+from coordinator.evolution.rules import rule_of, select_parents, select_survivors
 from coordinator.evolution.selection import (
     cull_population,
     fittest_first,
-    rule_of,
     select_culled,
-    select_parents,
-    select_survivors,
 )
 from schema.experiment.document import ArenaSection, Culling, SelectionSection
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 
+RELATIVES = Relatives(example_robot)
 CORE = Node("Core", -1, 0, (0.5, 0.5, 0.5))
 N = 4000
 
@@ -37,7 +38,7 @@ def numbers(chosen: Any) -> list[int]:  # noqa: ANN401 - any individuals
 
 def couples(population: list[Individual], **settings: Any) -> list[list[int]]:  # noqa: ANN401 - any setting
     selection = SelectionSection(**settings)
-    rng, rule = np.random.default_rng(2), rule_of(selection, "parents")
+    rng, rule = np.random.default_rng(2), rule_of(selection, "parents", RELATIVES)
     return [numbers(select_parents(population, rng, rule)) for _ in range(N)]
 
 
@@ -87,7 +88,7 @@ def survivors(
     **settings: Any,  # noqa: ANN401 - any setting
 ) -> list[int]:
     rng, selection = np.random.default_rng(seed), SelectionSection(**settings)
-    rule = rule_of(selection, "survivors")
+    rule = rule_of(selection, "survivors", RELATIVES)
     return numbers(select_survivors(parents, children, rng, selection, rule))
 
 

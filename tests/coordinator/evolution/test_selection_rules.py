@@ -1,25 +1,27 @@
 """Own rules of selection: what they get, and how bad answers are refused."""
 
 import re
+import sys
 from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from coordinator.evolution import rules as island_rules
 from coordinator.evolution.breeding import Individual
-from coordinator.evolution.kinds import check_rule
-from coordinator.evolution.selection import (
-    PARENT_RULES,
-    SURVIVOR_RULES,
-    Rule,
-    Tournament,
-    rule_of,
-    select_parents,
-    select_survivors,
-)
+from coordinator.evolution.check_rule import check_rule, example_robot
+from coordinator.evolution.members import Relatives
+from coordinator.evolution.rules import Rule, select_parents, select_survivors
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import PARENTS, SURVIVORS, SelectionSection
+from schema.experiment.migration import Migration
+from schema.experiment.selection_rules import RuleSection
 from schema.plugins import permission
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
@@ -48,6 +50,18 @@ def smallest(population, count, rng, parameters):
 
 def text(population, rng, parameters: Any):
     return "ab"
+
+
+class Forgetful:
+    def select(self, population, count, rng):
+        return range(count)
+
+
+class Mindful(Forgetful):
+    Parameters = Ends
+
+    def update(self, brood):
+        pass
 """
 
 ANSWERS = {
@@ -61,7 +75,9 @@ ANSWERS = {
     "return population[5], 1": r"raised IndexError: .* \(NAME.py:3\)",
     "return rng.choice(2, 2) + open('no').read()": "raised FileNotFoundError",
     "population[0].measures['height'] = 1.0; return 0, 1": "raised TypeError: .* item",
-    "COUNT[0] += 1; return COUNT[0] % 2, 1 - COUNT[0] % 2": "must return the same",
+    "COUNT[0] += 1; return COUNT[0] % 2, 1 - COUNT[0] % 2": (
+        r"must keep nothing .* but changes NAME\.COUNT"
+    ),
 }
 
 
@@ -86,14 +102,19 @@ def population(*sizes: int) -> list[Individual]:
     ]
 
 
-def test_built_in_rules_keep_their_contract() -> None:
+def rule_of(section: RuleSection, name: str) -> Rule:
+    return island_rules.rule_of(section, name, Relatives(example_robot))
+
+
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [*(("parents", at) for at in PARENTS), *(("survivors", at) for at in SURVIVORS)],
+)
+def test_built_in_rules_keep_their_contract(name: str, rule: str) -> None:
     # A tournament of one draws from any population.
-    check_rule(Rule("selection.parents", PARENT_RULES["tournament"], Tournament(1)))
-    check_rule(Rule("selection.parents", PARENT_RULES["random"], None))
-    for survivors in SURVIVOR_RULES.values():
-        check_rule(Rule("selection.survivors", survivors, None))
-    assert {*PARENT_RULES, "none"} == {*PARENTS}
-    assert {*SURVIVOR_RULES} == {*SURVIVORS}
+    section = SelectionSection(**{name: rule}, tournament_size=1)
+    built_in = rule_of(section, name)
+    check_rule(lambda: replace(built_in, relatives=Relatives(example_robot)))
 
 
 def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
@@ -159,8 +180,8 @@ def test_rule_that_replaces_individuals_is_refused(lab: Callable[[str], str]) ->
     parents, survivors = rules(lab, "population[0] = population[-1]")
     everybody, rng = population(9, 5, 7, 4), np.random.default_rng(0)
     for call in (
-        lambda: check_rule(parents),
-        lambda: check_rule(survivors),
+        lambda: check_rule(lambda: parents),
+        lambda: check_rule(lambda: survivors),
         lambda: select_parents(everybody, rng, parents),
         lambda: select_survivors(
             everybody[:2], everybody[2:], rng, SelectionSection(population=2), survivors
@@ -174,8 +195,8 @@ def test_rule_that_sorts_its_list_chooses_from_the_sorted_one(
     lab: Callable[[str], str],
 ) -> None:
     parents, survivors = rules(lab, "population.sort(key=lambda one: one.size)")
-    check_rule(parents)
-    check_rule(survivors)
+    check_rule(lambda: parents)
+    check_rule(lambda: survivors)
     everybody, rng = tuple(population(9, 5, 7, 4)), np.random.default_rng(0)
     # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
     couple = select_parents(everybody, rng, parents)
@@ -193,7 +214,7 @@ def test_bad_rule_is_refused_with_file_and_line(
     rule = rule_of(SelectionSection(parents=f"{name}:rule"), "parents")
     expected = ANSWERS[answer].replace("NAME", name)
     with pytest.raises(ExperimentError) as caught:
-        check_rule(rule)
+        check_rule(lambda: rule)
     message = str(caught.value)
     assert re.search(expected, message), message
 
@@ -203,7 +224,7 @@ def test_survivors_of_wrong_number_are_refused(lab: Callable[[str], str]) -> Non
     rule = rule_of(SelectionSection(survivors=f"{name}:few"), "survivors")
     expected = rf"survivors: {name}\.py:1: must return 15 different .* 0 to 15, got \[0"
     with pytest.raises(ExperimentError, match=expected):
-        check_rule(rule)
+        check_rule(lambda: rule)
 
 
 @pytest.mark.parametrize(
@@ -221,6 +242,18 @@ def test_survivors_of_wrong_number_are_refused(lab: Callable[[str], str]) -> Non
             r"NAME\.py:20: must annotate its last argument with a msgspec Struct",
         ),
         ("parents_parameters = {a = 1}", "'tournament' has no parameters"),
+        (
+            'parents = "NAME:Forgetful"',
+            r"NAME\.py:24: 'NAME:Forgetful' has no 'update'",
+        ),
+        (
+            'parents = "NAME:Mindful"\nparents_parameters = {frist = 1}',
+            r"parents_parameters\.frist: no such key; did you mean 'first'",
+        ),
+        (
+            'survivors = "NAME:Mindful"\nsurvivors_parameters = {first = "a"}',
+            r"survivors_parameters\.first: must be an integer, got 'a'",
+        ),
         ('survivors = "bets"', "'bets'; did you mean 'best'"),
     ],
 )
@@ -236,3 +269,178 @@ def test_experiment_with_a_bad_rule_is_refused(
 def test_module_that_is_not_allowed_is_refused() -> None:
     with pytest.raises(UnknownPlugin, match="is not allowed"):
         rule_of(SelectionSection(parents="no_lab:rule"), "parents")
+
+
+NOVELTY = """
+ARCHIVE = []
+SIZES = {"least": 0}
+
+
+class Novelty:
+    shared = []
+
+    def __init__(self, parameters):
+        self.archive = []
+
+    def select(self, population, count, rng):
+        order = sorted(range(len(population)), key=lambda at: self.far(population[at]))
+        SELECT
+        return order[-count:]
+
+    def far(self, one):
+        return min((abs(one.fitness - at) for at in self.archive), default=one.fitness)
+
+    def update(self, brood):
+        UPDATE
+
+
+def novel(population, count, rng, parameters, seen=[]):
+    order = sorted(range(len(population)), key=lambda at: population[at].fitness)
+    SELECT
+    return order[-count:]
+"""
+KEEPS = "self.archive += [one.fitness for one in brood]"
+
+
+def novelty(lab: Callable[[str], str], select: str, update: str, rule: str) -> str:
+    """Return the fault of a rule that does something in its methods, or nothing."""
+    text = NOVELTY.replace("SELECT", select).replace("UPDATE", update)
+    section = SelectionSection(survivors=f"{lab(text)}:{rule}")
+    try:
+        check_rule(lambda: rule_of(section, "survivors"))
+    except ExperimentError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize(
+    ("select", "update", "fault"),
+    [
+        ("pass", KEEPS, ""),
+        ("population[0].robot, population[0].ancestors()", KEEPS, ""),
+        (KEEPS.replace("brood", "population"), "pass", r"in select.* self\.archive$"),
+        ("self.last = population", KEEPS, r"in select, .* but changes self\.last$"),
+        ("pass", "ARCHIVE.extend(brood)", r"in its object.* but changes \w+\.ARCHIVE$"),
+        ("pass", "SIZES['least'] += 1", r"in its object.* but changes \w+\.SIZES$"),
+        ("pass", "self.shared.append(1)", r"its object.* but changes \w+\.Novelty$"),
+        ("pass", "self.archive.extend(brod)", r"raised NameError: .* \(\w+\.py:\d+\)$"),
+    ],
+)
+def test_memory_is_in_the_object_and_only_update_writes(
+    lab: Callable[[str], str], select: str, update: str, fault: str
+) -> None:
+    found = novelty(lab, select, update, "Novelty")
+    assert re.search(fault or "^$", found)
+    assert "\n" not in found
+
+
+@pytest.mark.parametrize(
+    ("select", "changed"),
+    [
+        ("ARCHIVE.append(population[0])", "ARCHIVE"),
+        ("SIZES['least'] = len(population)", "SIZES"),
+        ("seen.append(1)", "novel"),
+    ],
+)
+def test_function_that_remembers_is_refused(
+    lab: Callable[[str], str], select: str, changed: str
+) -> None:
+    found = novelty(lab, select, "pass", "novel")
+    assert re.search(rf"must keep nothing .* but changes \w+\.{changed}$", found)
+
+
+HIDDEN = """
+import not_allowed as elsewhere
+
+class Rule:
+    def __init__(self, parameters):
+        self.count = 0
+    def select(self, population, count, rng):
+        first = ({select}) % (len(population) - count + 1)
+        return range(first, first + count)
+    def update(self, brood):
+        self.count += {update}
+"""
+
+
+@pytest.mark.parametrize(
+    ("select", "update", "fault"),
+    [
+        ("next(elsewhere.hidden)", "1", "must return the same twice"),
+        ("self.count", "next(elsewhere.hidden)", "as if there were no other"),
+        ("self.count", "len(brood)", ""),
+    ],
+)
+def test_memory_that_is_hidden_in_another_package_shows_in_the_answers(
+    lab: Callable[[str], str],
+    monkeypatch: pytest.MonkeyPatch,
+    select: str,
+    update: str,
+    fault: str,
+) -> None:
+    elsewhere = ModuleType("not_allowed")
+    vars(elsewhere).update(hidden=count())
+    monkeypatch.setitem(sys.modules, "not_allowed", elsewhere)
+    text = HIDDEN.format(select=select, update=update)
+    section = SelectionSection(parents=f"{lab(text)}:Rule")
+    with pytest.raises(ExperimentError, match=fault) if fault else nullcontext():
+        check_rule(lambda: rule_of(section, "parents"))
+
+
+ARCHIVIST = """
+from msgspec import Struct
+
+
+class Archivist:
+    class Parameters(Struct):
+        most: int = 2
+
+    def __init__(self, parameters):
+        self.archive, self.parameters = [], parameters
+
+    def select(self, population, count, rng):
+        order = range(len(population))
+        far = [one.distances(self.archive).sum() for one in population]
+        return sorted(order, key=far.__getitem__)[-count:]
+
+    def update(self, brood):
+        self.archive = (self.archive + list(brood))[-self.parameters.most:]
+"""
+
+
+@pytest.mark.parametrize("name", ["parents", "survivors", "emigrants"])
+def test_one_class_selects_all_by_distance_of_bodies(
+    lab: Callable[[str], str], name: str
+) -> None:
+    section: RuleSection = Migration() if name == "emigrants" else SelectionSection()
+    section = structs.replace(section, **{name: f"{lab(ARCHIVIST)}:Archivist"})
+    assert not check_rule(lambda: rule_of(section, name))
+    # Chains of 3 to 7 parts; to the last two, of 4 and 3, those of 7 are farthest.
+    rule = rule_of(section, name)
+    sizes = [3, 7, 5, 7, 4, 3]
+    everybody = [
+        structs.replace(one, genome=one.size, parents=(BirthId(9, one.size),))
+        for one in population(*sizes)
+    ]
+    rule.update(everybody[:4])
+    rule.update(everybody)
+    assert rule.places(2, everybody, np.random.default_rng(0)) == [1, 3]
+
+
+def test_ancestors_of_those_that_have_lived_on_the_island() -> None:
+    relatives = Relatives(example_robot)
+    births = [BirthId(0, number) for number in range(5)]
+    # 0 and 1 are founders; 9:9 is an immigrant, whose parent never lived here.
+    stranger, unknown = BirthId(9, 9), BirthId(9, 1)
+    parents = [(), (), tuple(births[:2]), (births[2], stranger), (births[3], births[0])]
+    living = [
+        Individual(birth, 3, 0.0, 1, 0, parents=known)
+        for birth, known in [*zip(births, parents, strict=True), (stranger, (unknown,))]
+    ]
+    last = relatives.members(living)[4]
+    assert last.ancestors(1) == {births[3], births[0]}
+    assert last.ancestors(2) == {births[3], births[0], births[2], stranger}
+    assert last.ancestors() == {*births[:4], stranger, unknown}
+    assert not last.ancestors(0)
+    with pytest.raises(AttributeError):
+        last.fitness = 1.0
