@@ -99,12 +99,11 @@ class Arena:
             else None
         )
         self._orders = Orders(experiment, self._living, self._infancy)
-        emigrants = self._breeder.rules.emigrants
         self._migration = (
-            ArenaMigration(experiment, epochs, self._living, emigrants)
-            if epochs
-            else None
+            None if epochs is None else ArenaMigration(experiment, epochs, self._living)
         )
+        if epochs:
+            epochs.emigrants = self._breeder.emigrants
         self._founders: list[Candidate] = []
         self._advances = 0
         self._awaited: AdvanceShard | None = None

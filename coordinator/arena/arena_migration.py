@@ -6,7 +6,6 @@ from coordinator.arena.living import LivingRobots, Moment, death_record
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose
-from coordinator.evolution.rules import Rule
 from coordinator.islands.events import Emigrate, Record
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import migration_records
@@ -27,13 +26,8 @@ class ArenaMigration:
     """
 
     def __init__(
-        self,
-        experiment: Experiment,
-        epochs: MigrationEpochs,
-        living: LivingRobots,
-        emigrants: Rule | None,
+        self, experiment: Experiment, epochs: MigrationEpochs, living: LivingRobots
     ) -> None:
-        """Initialise; ``emigrants`` is the own rule that selects them, if any."""
         assert experiment.arena is not None
         self.epochs = epochs
         self.is_starving = self.is_extinct = False
@@ -42,7 +36,6 @@ class ArenaMigration:
         self._develop = encoding_of(experiment).develop
         self._floor = experiment.arena.population_floor
         self._living = living
-        self._emigrants = emigrants
         self._queue: list[Individual] = []
         self._settled = 0
         self._vacancies = 0
@@ -71,8 +64,7 @@ class ArenaMigration:
         """End the epoch; return rows and migrants."""
         mature = self._living.mature()
         spare = len(mature) - self._stay
-        living = len(self._living)
-        sent, moved = self.epochs.send(mature, living, spare, self._emigrants)
+        sent, moved = self.epochs.send(mature, len(self._living), spare)
         self._vacancies += len(moved)
         return [
             *migration_records(sent, moment.births, moment.sim_time_s),

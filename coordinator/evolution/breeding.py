@@ -14,8 +14,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.members import Relatives
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.rules import IslandRules, select_parents, select_survivors
+from coordinator.evolution.rules import Rule, rule_of, select_parents, select_survivors
 from coordinator.evolution.selection import cull_population
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment
@@ -146,14 +147,22 @@ class Breeder:
     """Source of candidates and selector of survivors for one island and run.
 
     Attributes:
-        rules: of selection; those that are classes have a memory.
+        emigrants: own rule that selects them; None for a built-in one.
     """
 
     def __init__(self, experiment: Experiment, seed: int, run: int) -> None:
         self._experiment = experiment
         self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
-        self.rules = IslandRules(experiment, self._encoding.develop)
+        self._relatives = relatives = Relatives(self._encoding.develop)
+        self._parents_rule = rule_of(experiment.selection, "parents", relatives)
+        self._survivors_rule = rule_of(experiment.selection, "survivors", relatives)
+        self.emigrants: Rule | None = None
+        migration = experiment.migration
+        if migration is not None and ":" in migration.emigrants:
+            self.emigrants = rule_of(migration, "emigrants", relatives)
+        rules = (self._parents_rule, self._survivors_rule, self.emigrants)
+        self._own = [rule for rule in rules if rule is not None and rule.relatives]
 
     def candidate(
         self,
@@ -219,7 +228,7 @@ class Breeder:
             return None, self._encoding.random(rng, birth)
         if couple is None or attempt % selection.max_mating_attempts == 0:
             rng = self._stream(birth, attempt, Purpose.PARENTS)
-            couple = select_parents(population, rng, self.rules.parents)
+            couple = select_parents(population, rng, self._parents_rule)
         rng = self._stream(birth, attempt, Purpose.MATE)
         first, second = couple
         return couple, self._encoding.mate(first.genome, second.genome, rng, birth)
@@ -262,23 +271,24 @@ class Breeder:
             return cull_population(parents, children, founders, selection.culling)
         last = children[-1].birth
         rng = self._stream(last, 0, Purpose.SURVIVORS)
-        rule = self.rules.survivors
+        rule = self._survivors_rule
         with at_birth(last):
             return select_survivors(parents, children, rng, selection, rule)
 
     def update(
         self, population: Sequence[Individual], brood: Sequence[Individual]
     ) -> None:
-        """Let the rules of selection remember a brood, in birth order.
-
-        The population, parents of the brood, are noted as ancestors.
+        """Let the rules of selection remember a brood of a population, in birth order.
 
         Raises:
             ExperimentError: a rule fails.
         """
-        with at_birth(brood[-1].birth):
-            self.rules.note(population)
-            self.rules.update(failed_last(brood))
+        if self._own:
+            # As ancestors of later individuals.
+            self._relatives.members([*population, *brood])
+        for rule in self._own:
+            with at_birth(brood[-1].birth):
+                rule.update(failed_last(brood))
 
     def _is_random(self, population: Sequence[Individual]) -> bool:
         return not population or self._experiment.selection.parents == "none"

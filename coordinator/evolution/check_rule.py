@@ -6,12 +6,11 @@ The rule must depend on its arguments alone or, if it is a class, on the broods 
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from functools import partial
 from types import MappingProxyType
 
 import numpy as np
-from msgspec import Struct
 
 from coordinator.evolution.breeding import Individual, failed_last
 from coordinator.evolution.rules import Rule
@@ -24,9 +23,10 @@ from schema.robot.robot import Part, Robot
 
 Labels = tuple[str, ...] | None
 """Measures that an experiment records; None: every one that a rule may ask for."""
-Answers = dict[tuple[int, int], list[int]]
-"""Places by number of the brood and of the population."""
 
+_IN_UPDATE = "keep its memory in self, as islands share modules and classes"
+_IN_SELECT = "not write in select, as update alone changes the memory"
+_IN_FUNCTION = "keep nothing from one call to the next (a class may, in update)"
 _CHILDREN = 15
 _BROODS = 2
 _FAILED = 4
@@ -80,71 +80,48 @@ def _populations(least: int, labels: Labels, island: int) -> Iterator[list[Indiv
         ]
 
 
-class _Island(Struct):
-    """A rule and what it is asked.
+def _live(
+    rules: Mapping[int, Rule],
+    labels: Labels,
+    modules: Sequence[str] | None = None,
+    *,
+    is_backward: bool = False,
+) -> dict[int, dict[tuple[int, int], list[int]]]:
+    """Return what rules of islands that take turns select, by brood and population.
 
-    Attributes:
-        rule: of the island.
-        populations: to select from.
-        count: number of places.
-        modules: names of users' modules, which must not change; None if that has been
-            checked.
-        answers: those so far.
+    Modules and, in ``select``, objects must not change if modules are given.
     """
-
-    rule: Rule
-    populations: list[list[Individual]]
-    count: int
-    modules: list[str] | None
-    answers: Answers
-
-    def update(self, number: int) -> None:
-        """Update the memory with a brood."""
-        first = number * _CHILDREN
-        brood = self.populations[2][first : first + _CHILDREN]
-        with self._unchanged("keep its memory in its object, as islands share others"):
-            self.rule.update(brood)
-
-    def select(self, brood: int, number: int) -> None:
-        """Select from a population, at first twice; note the answer."""
-        places = partial(self.rule.places, self.count, self.populations[number])
-        must = "not write in select, as update alone changes the memory"
-        if self.rule.memory is None:
-            must = "keep nothing from one call to the next (a class may, in update)"
-        with self._unchanged(must, self.rule.memory):
-            answer = places(np.random.default_rng(brood))
-        if self.modules is not None and not brood:
-            answer = repeated("", lambda: places(np.random.default_rng(brood)))
-        self.answers[brood, number] = answer
-
-    def _unchanged(
-        self, must: str, plugin: object = None
-    ) -> AbstractContextManager[None]:
-        if self.modules is None:
-            return nullcontext()
-        return unchanged(must, self.modules, plugin)
-
-
-def _live(islands: Sequence[_Island], *, is_backward: bool = False) -> list[Answers]:
-    """Return the answers of rules that take turns."""
+    least, count = _ASKED[next(iter(rules.values())).key]
+    samples = {island: list(_populations(least, labels, island)) for island in rules}
+    answers: dict[int, dict[tuple[int, int], list[int]]] = {at: {} for at in rules}
     for brood in range(_BROODS):
-        for island in islands:
-            island.update(brood)
-        numbers = range(len(islands[0].populations))
+        for island, rule in rules.items():
+            with nullcontext() if modules is None else unchanged(_IN_UPDATE, modules):
+                children = slice(brood * _CHILDREN, (brood + 1) * _CHILDREN)
+                rule.update(samples[island][2][children])
+        numbers = range(len(samples[min(rules)]))
         for number in reversed(numbers) if is_backward else numbers:
-            for island in islands:
-                island.select(brood, number)
-    return [island.answers for island in islands]
+            for island, rule in rules.items():
+                places = partial(_places, rule, count, samples[island][number], brood)
+                if modules is not None:
+                    must = _IN_FUNCTION if rule.memory is None else _IN_SELECT
+                    with unchanged(must, modules, rule.memory):
+                        places()
+                answers[island][brood, number] = repeated("", places)
+    return answers
+
+
+def _places(
+    rule: Rule, count: int, population: Sequence[Individual], seed: int
+) -> list[int]:
+    return rule.places(count, population, np.random.default_rng(seed))
 
 
 def check_rule(make: Callable[[], Rule], labels: Labels = None) -> str:
     """Raise unless a rule of selection keeps its contract on simple populations.
 
     Two islands are alone, then take turns; one of them selects in another order, too.
-
-    Args:
-        make: returns a new rule.
-        labels: measures of the experiment.
+    ``make`` returns a new rule.
 
     Returns:
         A warning: what it raises for a population with failed robots, which is no
@@ -155,31 +132,29 @@ def check_rule(make: Callable[[], Rule], labels: Labels = None) -> str:
             must, or different ones for the same population, stream and memory; or it
             changes a module, or its object in ``select``.
     """
-    # The first call imports its module.
-    least, count = _ASKED[make().key]
+    last = make()
+    # Its module is imported now.
     modules = own_modules()
-
-    def island(number: int, watched: list[str] | None = None) -> _Island:
-        populations = list(_populations(least, labels, number))
-        return _Island(make(), populations, count, watched, {})
-
-    alone = [_live([island(number, modules)])[0] for number in range(2)]
-    if _live([island(0), island(1)]) != alone:
+    alone = {
+        **_live({0: make()}, labels, modules),
+        **_live({1: make()}, labels, modules),
+    }
+    if _live({0: make(), 1: make()}, labels) != alone:
         must = "select on an island as if there were no other"
         raise broken("", must, came="other places when two islands take turns")
-    if _live([island(0)], is_backward=True)[0] != alone[0]:
+    if _live({0: make()}, labels, is_backward=True)[0] != alone[0]:
         must = "select the same whatever was selected before"
         raise broken("", must, came="other places in another order")
-    last = island(0)
+    least, count = _ASKED[last.key]
+    *_, population = _populations(least, labels, 0)
     failed = failed_last(
         individual if number % _FAILED else individual.evaluated(None, ())
-        for number, individual in enumerate(last.populations[-1])
+        for number, individual in enumerate(population)
     )
     try:
-        last.rule.update(failed)
-        last.rule.places(last.count, failed, np.random.default_rng(1))
+        last.update(failed)
+        _places(last, count, failed, 1)
     except ExperimentError as error:
-        defined = where_defined(last.rule.plugin)
-        why = str(error).removeprefix(f"{last.rule.key}: {defined}: ")
+        why = str(error).removeprefix(f"{last.key}: {where_defined(last.plugin)}: ")
         return f"of a population with failed robots (fitness 0, no measures): {why}"
     return ""

@@ -18,17 +18,18 @@ _MOST_DISTANCES = 250_000
 
 
 class Relatives:
-    """Parents of all individuals that lived on an island, and distances of bodies.
+    """What the individuals of an island know of each other.
 
     Attributes:
-        parents: birth ids of the parents of each individual.
         develop: returns the robot of a genome.
+        parents: birth ids of the parents of each individual that lived on the island.
+        distances: of bodies, by pairs of birth ids in order.
     """
 
     def __init__(self, develop: Callable[[Any], Robot]) -> None:
-        self.parents: dict[BirthId, tuple[BirthId, ...]] = {}
         self.develop = develop
-        self._distances: dict[tuple[BirthId, BirthId], int] = {}
+        self.parents: dict[BirthId, tuple[BirthId, ...]] = {}
+        self.distances: dict[tuple[BirthId, BirthId], int] = {}
 
     def members(self, individuals: Iterable[Any]) -> list["Member"]:
         """Return individuals as rules see them; their parents are noted."""
@@ -36,49 +37,21 @@ class Relatives:
         self.parents.update((one.birth, one.parents) for one in members)
         return members
 
-    def distances(self, first: "Member", others: Sequence["Member"]) -> Integers:
-        """Return the distances, (N,), of a body to those of others, (N,)."""
-        if len(self._distances) > _MOST_DISTANCES:
-            self._distances.clear()
-        known, births = self._distances, [other.birth for other in others]
-        pairs = [(min(first.birth, to), max(first.birth, to)) for to in births]
-        unknown = {
-            pair: other
-            for pair, other in zip(pairs, others, strict=True)
-            if pair not in known
-        }
-        if unknown:
-            try:
-                # Numba takes 110 MB, and is an extra.
-                from schema.robot.body_distance import (  # noqa: PLC0415
-                    body_distances,
-                )
-            except ImportError as error:
-                needs = f"distances of bodies need {error.name}"
-                install = "pip install 'revolve-islands[analysis]'"
-                raise ExperimentError(f"{needs}: {install}") from None
-            robots = [other.robot for other in unknown.values()]
-            found = body_distances(first.robot, robots).tolist()
-            known.update(zip(unknown, found, strict=True))
-        return np.array([known[pair] for pair in pairs], np.int64)
-
 
 class Member:
     """Member of a population; it has all attributes of ``Individual``, too."""
 
     __slots__ = ("_individual", "_relatives", "_robot")
 
-    def __init__(
-        self,
-        individual: Any,  # noqa: ANN401 - ``Individual``, which needs this module
-        relatives: Relatives,
-    ) -> None:
+    def __init__(self, individual: Any, relatives: Relatives) -> None:  # noqa: ANN401 - ``Individual`` needs this module
         self._individual = individual
         self._relatives = relatives
         self._robot: Robot | None = None
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute
         """Return an attribute of the individual."""
+        if name.startswith("_"):  # of a copy that is being made
+            raise AttributeError(name)
         return getattr(self._individual, name)
 
     @property
@@ -90,8 +63,29 @@ class Member:
         return self._robot
 
     def distances(self, others: Sequence["Member"]) -> Integers:
-        """Return the distances of its body to those of others, (N,)."""
-        return self._relatives.distances(self, others)
+        """Return the distances of its body to those of others, (N,).
+
+        Raises:
+            ExperimentError: Numba is not installed.
+        """
+        try:
+            # Numba takes 110 MB, and is an extra.
+            from schema.robot import body_distance  # noqa: PLC0415
+        except ImportError as error:
+            needs = f"distances of bodies need {error.name}"
+            install = "pip install 'revolve-islands[analysis]'"
+            raise ExperimentError(f"{needs}: {install}") from None
+        known = self._relatives.distances
+        if len(known) > _MOST_DISTANCES:
+            known.clear()
+        births = [other.birth for other in others]
+        pairs = [(min(self.birth, to), max(self.birth, to)) for to in births]
+        new = {at: to for at, to in zip(pairs, others, strict=True) if at not in known}
+        if new:
+            robots = [other.robot for other in new.values()]
+            found = body_distance.body_distances(self.robot, robots).tolist()
+            known.update(zip(new, found, strict=True))
+        return np.array([known[pair] for pair in pairs], np.int64)
 
     def ancestors(self, generations: int | None = None) -> frozenset[BirthId]:
         """Return its ancestors' birth ids, up to some generations back if given."""

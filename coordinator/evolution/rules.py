@@ -20,11 +20,10 @@ from coordinator.evolution.selection import (
     random_parents,
 )
 from schema.errors import ExperimentError, shown
-from schema.experiment.document import Experiment, SelectionSection
+from schema.experiment.document import SelectionSection
 from schema.experiment.selection_rules import RuleSection, own_rule, rule_key
 from schema.plugins.contract import broken
 from schema.plugins.origin import naming_plugin
-from schema.robot.robot import Robot
 
 Select = Callable[[Any, int, np.random.Generator], Any]
 """Gets a population, a number and a stream; returns as many places."""
@@ -108,8 +107,7 @@ def _whole_numbers(answer: object) -> list[int]:
 def rule_of(section: RuleSection, name: str, relatives: Relatives) -> Rule:
     """Return a new rule that selects ``parents``, ``survivors`` or ``emigrants``.
 
-    That of the parents of ``none`` is never called. Migration has its own code for
-    built-in emigrants.
+    That of the parents of ``none`` is never called. Built-in emigrants have no rule.
 
     Raises:
         ExperimentError: as of ``own_rule``, or its class raises.
@@ -140,47 +138,6 @@ def _with_parameters(
     if name == "parents":
         return lambda population, _, rng: function(population, rng, parameters)
     return lambda population, count, rng: function(population, count, rng, parameters)
-
-
-class IslandRules:
-    """All rules of selection of one island and run.
-
-    Attributes:
-        parents, survivors: rules of parents and of survivors.
-        emigrants: own rule of emigrants; None for a built-in one.
-    """
-
-    def __init__(self, experiment: Experiment, develop: Callable[[Any], Robot]) -> None:
-        """Make the rules; ``develop`` returns the robot of a genome.
-
-        Raises:
-            ExperimentError: as of ``rule_of``.
-        """
-        self._relatives = relatives = Relatives(develop)
-        self.parents = rule_of(experiment.selection, "parents", relatives)
-        self.survivors = rule_of(experiment.selection, "survivors", relatives)
-        migration = experiment.migration
-        self.emigrants = (
-            rule_of(migration, "emigrants", relatives)
-            if migration is not None and ":" in migration.emigrants
-            else None
-        )
-        rules = (self.parents, self.survivors, self.emigrants)
-        self._own = [rule for rule in rules if rule is not None and rule.relatives]
-
-    def note(self, individuals: Sequence[S]) -> None:
-        """Note the parents of individuals, which are ancestors of later ones."""
-        if self._own:
-            self._relatives.members(individuals)
-
-    def update(self, brood: Sequence[S]) -> None:
-        """Let the rules remember a brood.
-
-        Raises:
-            ExperimentError: a rule raises.
-        """
-        for rule in self._own:
-            rule.update(brood)
 
 
 def select_parents(

@@ -100,10 +100,9 @@ class Island:
         self._learning = (
             IslandLearning(experiment, self._encoding) if experiment.learning else None
         )
-        emigrants = self._breeder.rules.emigrants
-        self._migration = (
-            IslandMigration(experiment, epochs, emigrants) if epochs else None
-        )
+        self._migration = IslandMigration(experiment, epochs) if epochs else None
+        if epochs:
+            epochs.emigrants = self._breeder.emigrants
         self._generation = 0
         self._begun = 0
         # Founders have no parents: all of them are in flight together.

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 
 from coordinator.evolution.breeding import Individual, failed_last
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.rules import Rule
 from coordinator.islands.events import Emigrate, MigrationEvent, Outcome, Record
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
@@ -25,13 +24,9 @@ class IslandMigration:
         epochs: when the island sends migrants, and what its neighbours sent.
     """
 
-    def __init__(
-        self, experiment: Experiment, epochs: MigrationEpochs, emigrants: Rule | None
-    ) -> None:
-        """Initialise; ``emigrants`` is the own rule that selects them, if any."""
+    def __init__(self, experiment: Experiment, epochs: MigrationEpochs) -> None:
         selection = experiment.selection
         self.epochs = epochs
-        self._emigrants = emigrants
         self._labels = experiment.measures.labels
         self._develop = encoding_of(experiment).develop
         rules = selection.culling
@@ -46,8 +41,7 @@ class IslandMigration:
     ) -> tuple[list[Record | Emigrate], tuple[Individual, ...]]:
         """End the epoch; return rows and migrants, and the remaining population."""
         living = len(population)
-        spare = living - self._stay
-        sent, moved = self.epochs.send(population, living, spare, self._emigrants)
+        sent, moved = self.epochs.send(population, living, living - self._stay)
         rows = migration_records(sent, births)
         return [*rows, *sent], tuple(one for one in population if one not in moved)
 

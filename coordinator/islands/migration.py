@@ -55,6 +55,7 @@ class MigrationEpochs:
         links: its neighbours.
         epoch: number of the epoch, from 0.
         is_waiting: it has sent its migrants and awaits those of its neighbours.
+        emigrants: own rule that selects them, which its island makes, if any.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class MigrationEpochs:
         self.links = links
         self.epoch = 0
         self.is_waiting = False
+        self.emigrants: Rule | None = None
         assert experiment.migration is not None
         self._migration = migration = experiment.migration
         self._tournament_size = experiment.selection.tournament_size
@@ -97,19 +99,15 @@ class MigrationEpochs:
         )
 
     def send(
-        self,
-        candidates: Sequence[Individual],
-        living: int,
-        spare: int,
-        rule: Rule | None = None,
+        self, candidates: Sequence[Individual], living: int, spare: int
     ) -> tuple[list[Emigrate], list[Individual]]:
         """End the epoch; return the commands, and the individuals that were moved.
 
         The candidates are in a reproducible order; at most ``spare`` of them may be
-        moved away. The rule is an own one that selects them, None a built-in one.
+        moved away.
 
         Raises:
-            ExperimentError: the rule fails.
+            ExperimentError: an own rule that selects them fails.
         """
         self.is_waiting = True
         targets = [to for to in self.links.targets if to in self._active]
@@ -117,14 +115,7 @@ class MigrationEpochs:
         is_moved = self._migration.handling == "evict"
         if is_moved:
             count = min(count * len(targets), max(0, spare))
-        count = min(count, len(candidates))
-        if rule is not None and count:
-            name = BirthId(self.island, self.epoch)
-            rng = self._stream(name, 0, Purpose.EMIGRANTS)
-            places = rule.places(count, candidates, rng)
-            chosen = [candidates[at] for at in places]
-        else:
-            chosen = self._choose(candidates, count)
+        chosen = self._choose(candidates, min(count, len(candidates)))
         # Each target gets all that are copied, or a share of those that are moved. The
         # first target changes, or a single migrant would always go there.
         step = len(targets) if is_moved else 1
@@ -214,6 +205,11 @@ class MigrationEpochs:
 
     def _choose(self, candidates: Sequence[Individual], count: int) -> list[Individual]:
         """Return the emigrants in the order of choice."""
+        if self.emigrants is not None and count:
+            name = BirthId(self.island, self.epoch)
+            rng = self._stream(name, 0, Purpose.EMIGRANTS)
+            places = self.emigrants.places(count, candidates, rng)
+            return [candidates[at] for at in places]
         if self._migration.emigrants == "best":
             return fittest_first(candidates)[:count]
         draws = self._draws(self.epoch, Purpose.EMIGRANTS)

@@ -458,16 +458,12 @@ class Selectable(Protocol):
         """Its body and brain, developed when asked for; a learnt brain, if any."""
 
     def distances(self, others: Sequence[Self], /) -> Integers:
-        """Return the tree edit distances, (N,), of its body to those of others.
-
-        Needs the extra ``analysis``. Each pair is computed once and then known.
-        """
+        """Return the tree edit distances of bodies, (N,); of the extra ``analysis``."""
 
     def ancestors(self, generations: int | None = None, /) -> frozenset[BirthId]:
-        """Return the birth ids of its ancestors, dead or alive.
+        """Return the birth ids of its ancestors, of so many generations or of all.
 
-        ``generations`` limits how far back. Ancestors of an immigrant's parents are not
-        known.
+        Those of an immigrant's parents are not known.
         """
 
 
@@ -540,10 +536,9 @@ class SurvivorSelection(Protocol):
 class StatefulSelection(Protocol):
     """Selection with a memory: of parents, survivors or emigrants, as a class.
 
-    The experiment names a class in place of a function. It is called once for each
-    island of each run, as ``Class(parameters)``: an instance of the msgspec Struct that
-    the class has as its attribute ``Parameters``, read from the same table as those of
-    a function; None without it.
+    The class is called once for each island of each run, as ``Class(parameters)``: an
+    instance of the msgspec Struct that it has as its attribute ``Parameters``, read
+    from the same table as those of a function; None without it.
 
     All memory is in the object, and `update` alone changes it: the class and its module
     are shared by all islands and runs of a process. A run that is resumed makes a new

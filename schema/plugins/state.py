@@ -1,4 +1,4 @@
-"""State of users' modules and objects: what a plug-in changes when it is called."""
+"""What a plug-in changes when it is called: users' modules, and its object."""
 
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -14,77 +14,55 @@ from schema.errors import ExperimentError
 from schema.plugins.contract import content_of
 from schema.plugins.permission import is_allowed, is_own
 
-State = dict[str, object]
-"""Content of each name, comparable by ``==``."""
-
 
 def own_modules() -> list[str]:
     """Return the names of users' modules that this process has loaded."""
     return [name for name in [*sys.modules] if is_own(f"{name}:") and is_allowed(name)]
 
 
-def state_of_modules(names: Collection[str]) -> State:
-    """Return the content of all global names of some modules."""
-    reader = _Reader(names)
-    return {
-        f"{module}.{name}": reader.content(value)
-        for module in names
-        for name, value in vars(sys.modules[module]).items()
-        if not name.startswith("__")
-    }
-
-
-def state_of_object(plugin: object, modules: Collection[str]) -> State:
-    """Return the content of all attributes of an object of users' modules."""
-    reader = _Reader(modules)
-    return {name: reader.content(value) for name, value in _attributes(plugin)}
-
-
 @contextmanager
 def unchanged(
     rule: str, modules: Collection[str], plugin: object = None
 ) -> Iterator[None]:
-    """Raise if a block changes users' modules, or an object.
+    """Raise if a block changes a name of users' modules, or of an object.
 
-    Args:
-        rule: what the plug-in must do instead; begins the message.
-        modules: names of users' modules.
-        plugin: object that must not change, either.
+    ``rule`` says what the plug-in must do.
 
     Raises:
-        ExperimentError: it changes one of their names; or as of the block.
+        ExperimentError: it does; or as of the block.
     """
+    owners = {"self": plugin, **{name: sys.modules[name] for name in modules}}
 
-    def state() -> State:
-        own = state_of_object(plugin, modules) if plugin is not None else {}
-        names = {f"self.{name}": content for name, content in own.items()}
-        return {**state_of_modules(modules), **names}
+    def state() -> dict[str, object]:
+        content = _Reader(modules).content
+        return {
+            f"{owner}.{name}": content(value)
+            for owner, thing in owners.items()
+            for name, value in _attributes(thing)
+        }
 
     before = state()
     yield
     after = state()
-    for name in dict.fromkeys([*before, *after]):
-        if name not in before or name not in after or before[name] != after[name]:
+    for name in [*before, *after]:
+        if (name in before, before.get(name)) != (name in after, after.get(name)):
             raise ExperimentError(f"must {rule}, but changes {name}")
 
 
-def _attributes(plugin: object) -> Iterator[tuple[str, Any]]:
-    """Yield the attributes of an object, in slots or not, or of a class."""
-    for name, value in getattr(plugin, "__dict__", {}).items():
+def _attributes(thing: object) -> Iterator[tuple[str, Any]]:
+    """Yield the attributes of a module, class or object, in slots or not."""
+    for name, value in getattr(thing, "__dict__", {}).items():
         if not name.startswith("__"):
             yield name, value
-    for kind in type(plugin).__mro__:
+    for kind in type(thing).__mro__:
         slots = kind.__dict__.get("__slots__", ())
         for name in (slots,) if isinstance(slots, str) else slots:
-            if hasattr(plugin, name):
-                yield name, getattr(plugin, name)
+            if name != "__dict__" and hasattr(thing, name):
+                yield name, getattr(thing, name)
 
 
 class _Reader:
-    """Reads the content of values, of each object once.
-
-    Objects of other packages count as what they print.
-    """
+    """Reads the content of values; objects of other packages are what they print."""
 
     def __init__(self, modules: Collection[str]) -> None:
         self._modules = modules
@@ -100,10 +78,8 @@ class _Reader:
         self._seen[id(value)] = len(self._seen), value
         if isinstance(value, np.ndarray) and value.dtype != object:
             return content_of(value)
-        return type(value), [
-            (self.content(name), self.content(inner))
-            for name, inner in self._inside(value)
-        ]
+        inside = self._inside(value)
+        return type(value), [(self.content(at), self.content(it)) for at, it in inside]
 
     def _inside(self, value: Any) -> Iterable[tuple[object, Any]]:  # noqa: ANN401
         """Return what a value consists of, with names."""

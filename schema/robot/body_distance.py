@@ -26,12 +26,11 @@ def body_distances(robot: Robot, others: Sequence[Robot]) -> Integers:
         InvalidRobot: as of ``trees_of``.
     """
     bodies = [robot.parts, *(other.parts for other in others)]
-    kinds = dict.fromkeys(part.kind for body in bodies for part in body)
-    numbers = {kind: number for number, kind in enumerate(kinds)}
+    every = [part for body in bodies for part in body]
+    numbers = {name: at for at, name in enumerate({part.kind for part in every})}
     columns = [
-        (part.parent, numbers[part.kind], part.parent_slot, part.parent_slot)
-        for body in bodies
-        for part in body
+        (one.parent, numbers[one.kind], one.parent_slot, one.parent_slot)
+        for one in every
     ]
     sizes = np.array([len(body) for body in bodies], np.int64)
     trees = trees_of(np.array(columns, np.int64), sizes)

@@ -15,7 +15,7 @@ from schema.parts import ACTIVE_HINGE, PartType
 from tests.docs.page_runner import blocks_of
 from tests.documents import parse_experiment
 from tests.own_brains import write_module
-from tests.system.workspace import Workspace
+from tests.system.workspace import Workspace, wait_until
 from worker.kinds import check_fitness
 from worker.measures import BUILT_IN, measures_of
 
@@ -23,6 +23,9 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 TOP = Path(__file__).parents[2]
 PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
+
+
+NOVELTY = ("novelty.py", "novelty.toml")
 
 
 def _write(workspace: Workspace, files: Mapping[str, str]) -> Path:
@@ -61,10 +64,10 @@ def test_code_of_pages_about_tables_runs(
 def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
     """Two workers give the births of one process; the run needs its folder alone."""
     page = TOP / "docs" / "selection.md"
-    (module,) = blocks_of(page, "python")
-    (document,) = blocks_of(page, "toml")
+    module, _ = blocks_of(page, "python")
+    document, _ = blocks_of(page, "toml")
     folder = _write(workspace, {"crowding.py": module, "crowding.toml": document})
-    (block,) = blocks_of(page, "sh")
+    block, _ = blocks_of(page, "sh")
     check, run = (line.split()[1:] for line in block.strip().splitlines())
     workspace.environment |= {
         "XDG_STATE_HOME": str(folder / "state"),
@@ -83,6 +86,41 @@ def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
     (folder / "crowding.py").unlink()
     workspace.run("resume", "two", "--in-process", "--quiet")
     assert compare(folder / "calm", folder / "two") == []
+
+
+def test_rule_of_the_selection_page_remembers_per_island_and_run(
+    workspace: Workspace,
+) -> None:
+    """Equal alone, after another run in one process, and on two workers with a kill."""
+    page, examples = TOP / "docs" / "selection.md", TOP / "docs" / "examples"
+    files = {name: (examples / name).read_text() for name in NOVELTY}
+    assert [blocks_of(page, kind)[1] for kind in ("python", "toml")] == [
+        *files.values()
+    ]
+    folder = _write(workspace, files)
+    block = blocks_of(page, "sh")[1]
+    check, run = (line.split()[1:] for line in block.strip().splitlines())
+    assert workspace.run(*check).count("in order") == 3
+    run += ["--births", "45", "--quiet"]
+    workspace.run(*run, "--repeats", "2", "--in-process", "--out", "both")
+    words = ("--repeats", "1", "--first-repeat", "1", "--workers", "1")
+    workspace.run(*run, *words, "--out", "second")
+    runs = [folder / "both" / f"novelty-{repeat}" for repeat in range(2)]
+    assert compare(runs[1], folder / "second" / "novelty-1") == []
+    killed = workspace.start(*run, "--workers", "2", "--out", "killed")
+    journal = folder / "killed" / "journal.bin"
+    half = (runs[0] / "journal.bin").stat().st_size // 2
+    wait_until(lambda: journal.exists() and journal.stat().st_size > half, "half")
+    killed.kill()
+    killed.communicate()
+    workspace.run("resume", "killed", "--workers", "1", "--quiet")
+    assert compare(runs[0], folder / "killed") == []
+    shared = files["novelty.py"].replace("\n\nclass", "\nARCHIVE = []\n\n\nclass", 1)
+    text = "self.archive: list[rv.Selectable] = []"
+    _write(workspace, {"novelty.py": shared.replace(text, "self.archive = ARCHIVE")})
+    told = workspace.run(*run, "--in-process", "--out", "shared", code=2)
+    assert told == f"{_quoted(page, 'selection.parents:')}\n"
+    assert not (folder / "shared").exists()
 
 
 @pytest.mark.slow

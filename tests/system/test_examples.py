@@ -11,8 +11,8 @@ from tests.system.workspace import Workspace
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 MOST_LINES = 40
-PICTURES = Path(__file__).with_name("test_view_picture.py")
-"""Runs the script that needs a Vulkan driver."""
+OTHERS = ("test_view_picture.py", "test_docs.py")
+"""Run the script that needs a Vulkan driver, and that which is a plug-in of a page."""
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -63,10 +63,10 @@ def test_analysis_with_polars_prints_its_tables(workspace: Workspace) -> None:
     assert "parents.birth" in told
 
 
-def test_every_script_is_run_here_or_with_the_pictures() -> None:
+def test_every_script_is_run_here_or_in_other_tests() -> None:
     texts = {
         node.value.removesuffix(".py")
-        for file in (Path(__file__), PICTURES)
+        for file in (Path(__file__), *map(Path(__file__).with_name, OTHERS))
         for node in ast.walk(ast.parse(file.read_text("utf-8")))
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     }
