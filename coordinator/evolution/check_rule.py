@@ -9,17 +9,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from coordinator.evolution.breeding import Individual, failed_last
+from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.members import Relatives
 from coordinator.evolution.rules import Rule
 from schema.errors import ExperimentError
+from schema.experiment.document import Experiment
 from schema.plugins.contract import broken, repeated
 from schema.plugins.origin import where_defined
 from schema.plugins.state import own_modules, unchanged
 from schema.robot.ids import BirthId
-from schema.robot.robot import Part, Robot
 
 Labels = tuple[str, ...] | None
 """Measures that an experiment records; None: every one that a rule may ask for."""
@@ -27,7 +30,8 @@ Labels = tuple[str, ...] | None
 _IN_UPDATE = "keep its memory in self, as islands share modules and classes"
 _IN_SELECT = "not write in select, as update alone changes the memory"
 _IN_FUNCTION = "keep nothing from one call to the next (a class may, in update)"
-_CHILDREN = 15
+_CHILDREN, _MOST = 15, 30
+"""Sizes of broods, and of populations."""
 _BROODS = 2
 _FAILED = 4
 """One of so many robots of a population has failed."""
@@ -39,50 +43,54 @@ _ASKED = {
 """Least size of a population for a rule, and number of places."""
 
 
-def example_robot(genome: object) -> Robot:
-    """Return a chain of as many parts as the genome of an example says."""
-    assert isinstance(genome, int)
-    links = (
-        Part(("ActiveHinge", "FixedBrick")[number % 2], number, number and 1, 0, 0, ())
-        for number in range(genome - 1)
-    )
-    return Robot((Part("Core", -1, -1, -1, 0, ()), *links))
+class Sample(NamedTuple):
+    """What populations of samples are made of.
+
+    Attributes:
+        genomes: of random robots.
+        sizes: numbers of parts of the robots.
+        labels: as of ``Labels``.
+    """
+
+    genomes: Sequence[object]
+    sizes: Sequence[int]
+    labels: Labels
 
 
-def _example(number: int, fitness: float, labels: Labels, island: int) -> Individual:
+def _example(number: int, fitness: float, sample: Sample, island: int) -> Individual:
     parents = (BirthId(island, number // 2), BirthId(island, number // 3))
     measures: Mapping[str, float] = defaultdict(lambda: number / 7)
-    if labels is not None:
-        measures = dict.fromkeys(labels, number / 7)
+    if sample.labels is not None:
+        measures = dict.fromkeys(sample.labels, number / 7)
     return Individual(
         BirthId(island, number),
-        genome=3 + number % 5,
-        fitness=fitness,
+        sample.genomes[number],
+        fitness,
         rank=1 + number // 4,
         generation=0,
         parents=parents if number else (),
-        size=3 + number % 5,
+        size=sample.sizes[number],
         measures=MappingProxyType(measures),
     )
 
 
-def _populations(least: int, labels: Labels, island: int) -> Iterator[list[Individual]]:
+def _populations(least: int, sample: Sample, island: int) -> Iterator[list[Individual]]:
     """Yield populations: small, of equals, varied, in part without fitness."""
     step = 7 + 4 * island
     for count, fitness in (
         (least, float),
-        (30, lambda _: 0.0),
-        (30, lambda number: (number * step % 30) / 10),
-        (30, lambda number: float(number) if number % 3 else -1.0),
+        (_MOST, lambda _: 0.0),
+        (_MOST, lambda number: (number * step % _MOST) / 10),
+        (_MOST, lambda number: float(number) if number % 3 else -1.0),
     ):
         yield [
-            _example(number, fitness(number), labels, island) for number in range(count)
+            _example(number, fitness(number), sample, island) for number in range(count)
         ]
 
 
 def _live(
     rules: Mapping[int, Rule],
-    labels: Labels,
+    sample: Sample,
     modules: Sequence[str] | None = None,
     *,
     is_backward: bool = False,
@@ -92,7 +100,7 @@ def _live(
     Modules and, in ``select``, objects must not change if modules are given.
     """
     least, count = _ASKED[next(iter(rules.values())).key]
-    samples = {island: list(_populations(least, labels, island)) for island in rules}
+    samples = {island: list(_populations(least, sample, island)) for island in rules}
     answers: dict[int, dict[tuple[int, int], list[int]]] = {at: {} for at in rules}
     for brood in range(_BROODS):
         for island, rule in rules.items():
@@ -117,11 +125,13 @@ def _places(
     return rule.places(count, population, np.random.default_rng(seed))
 
 
-def check_rule(make: Callable[[], Rule], labels: Labels = None) -> str:
+def check_rule(
+    make: Callable[[Relatives], Rule], experiment: Experiment, labels: Labels = None
+) -> str:
     """Raise unless a rule of selection keeps its contract on simple populations.
 
     Two islands are alone, then take turns; one of them selects in another order, too.
-    ``make`` returns a new rule.
+    Robots are random ones of an island's settings. ``make`` returns a new rule.
 
     Returns:
         A warning: what it raises for a population with failed robots, which is no
@@ -132,21 +142,27 @@ def check_rule(make: Callable[[], Rule], labels: Labels = None) -> str:
             must, or different ones for the same population, stream and memory; or it
             changes a module, or its object in ``select``.
     """
-    last = make()
+    encoding = encoding_of(experiment)
+    births = [BirthId(0, number) for number in range(_MOST)]
+    genomes = [encoding.random(np.random.default_rng(at), at) for at in births]
+    sizes = [len(encoding.develop(genome).parts) for genome in genomes]
+    sample = Sample(genomes, sizes, labels)
+    new = partial(make, Relatives(encoding.develop))
+    last = new()
     # Its module is imported now.
     modules = own_modules()
     alone = {
-        **_live({0: make()}, labels, modules),
-        **_live({1: make()}, labels, modules),
+        **_live({0: new()}, sample, modules),
+        **_live({1: new()}, sample, modules),
     }
-    if _live({0: make(), 1: make()}, labels) != alone:
+    if _live({0: new(), 1: new()}, sample) != alone:
         must = "select on an island as if there were no other"
         raise broken("", must, came="other places when two islands take turns")
-    if _live({0: make()}, labels, is_backward=True)[0] != alone[0]:
+    if _live({0: new()}, sample, is_backward=True)[0] != alone[0]:
         must = "select the same whatever was selected before"
         raise broken("", must, came="other places in another order")
     least, count = _ASKED[last.key]
-    *_, population = _populations(least, labels, 0)
+    *_, population = _populations(least, sample, 0)
     failed = failed_last(
         individual if number % _FAILED else individual.evaluated(None, ())
         for number, individual in enumerate(population)

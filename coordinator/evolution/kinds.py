@@ -2,20 +2,20 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from operator import attrgetter
 from typing import NamedTuple
 
 from msgspec.structs import replace as replace_struct
 
 from coordinator.evolution.brains import BUILT_IN as BRAINS
 from coordinator.evolution.check_encoding import check_encoding
-from coordinator.evolution.check_rule import Labels, check_rule, example_robot
+from coordinator.evolution.check_rule import Labels, check_rule
 from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
 from coordinator.evolution.encodings import METHODS, WHERE
 from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
-from coordinator.evolution.members import Relatives
 from coordinator.evolution.rules import rule_of
 from coordinator.evolution.selection import PARENT_RULES, SURVIVOR_RULES
 from schema.experiment.check import check_experiment
@@ -30,47 +30,50 @@ from schema.experiment.kinds import Kind, is_class, sections_of, takes
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.experiment.selection_rules import METHODS as RULE_METHODS
-from schema.experiment.selection_rules import RuleSection, own_rule, rule_key
+from schema.experiment.selection_rules import own_rule, rule_key
 from schema.plugins.load import load_object
 
 
 class _Ruled(NamedTuple):
-    """A section that names a rule, and the measures that the experiment records."""
+    """Settings of an island with a rule, and the measures that it may ask for."""
 
-    section: RuleSection
+    island: Experiment
     labels: Labels
 
 
-def _rules(name: str, experiment: Experiment) -> Iterator[_Ruled]:
-    for section in sections_of(experiment, rule_key(name).partition(".")[0]):
-        if ":" in getattr(section, name):
-            yield _Ruled(section, experiment.measures.labels)
-
-
-def _load_rule(name: str, ruled: _Ruled) -> object:
-    own = own_rule(ruled.section, name)
-    return own and own[0]
-
-
-def _check_rule(name: str, ruled: _Ruled) -> str:
-    relatives = Relatives(example_robot)
-    return check_rule(partial(rule_of, ruled.section, name, relatives), ruled.labels)
-
-
 def _selection_kind(name: str, built_in: Mapping[str, object], arguments: int) -> Kind:
-    section = Migration() if name == "emigrants" else SelectionSection()
+    key = rule_key(name)
+    part = key.partition(".")[0]
+    of_key = attrgetter(key)
+    empty = Migration() if name == "emigrants" else SelectionSection()
+
+    def rules(whole: Experiment) -> Iterator[_Ruled]:
+        for at in island_experiments(whole):
+            if getattr(at, part) is not None and ":" in of_key(at):
+                yield _Ruled(at, at.measures.labels)
+
+    def load(ruled: _Ruled) -> object:
+        own = own_rule(getattr(ruled.island, part), name)
+        return own and own[0]
+
+    def by_hand(path: str) -> _Ruled:
+        section = replace_struct(empty, **{name: path})
+        return _Ruled(replace_struct(Experiment("by hand"), **{part: section}), None)
+
     return Kind(
         name,
-        rule_key(name),
+        key,
         built_in,
         is_one=lambda plugin: (
             takes(arguments, plugin) or is_class(RULE_METHODS, plugin)
         ),
-        section=lambda path: _Ruled(replace_struct(section, **{name: path}), None),
-        sections=partial(_rules, name),
-        path=lambda ruled: str(getattr(ruled.section, name)),
-        load=partial(_load_rule, name),
-        check=partial(_check_rule, name),
+        section=by_hand,
+        sections=rules,
+        path=lambda ruled: str(of_key(ruled.island)),
+        load=load,
+        check=lambda ruled: check_rule(
+            partial(rule_of, getattr(ruled.island, part), name), *ruled
+        ),
     )
 
 

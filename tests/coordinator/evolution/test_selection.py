@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from coordinator.evolution.breeding import Individual
-from coordinator.evolution.check_rule import example_robot
 from coordinator.evolution.members import Relatives
 from coordinator.evolution.rules import rule_of, select_parents, select_survivors
 from coordinator.evolution.selection import (
@@ -19,8 +18,9 @@ from coordinator.evolution.selection import (
 from schema.experiment.document import ArenaSection, Culling, SelectionSection
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
 
-RELATIVES = Relatives(example_robot)
+RELATIVES = Relatives(Robot)
 CORE = Node("Core", -1, 0, (0.5, 0.5, 0.5))
 N = 4000
 
