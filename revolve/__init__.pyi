@@ -51,6 +51,7 @@ from schema.plugins.protocols import ParentSelection as ParentSelection
 from schema.plugins.protocols import Selectable as Selectable
 from schema.plugins.protocols import SensorType as SensorType
 from schema.plugins.protocols import SensorView as SensorView
+from schema.plugins.protocols import StatefulSelection as StatefulSelection
 from schema.plugins.protocols import SurvivorSelection as SurvivorSelection
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
@@ -113,6 +114,7 @@ __all__ = [
     "Shape",
     "SimulationDiverged",
     "Slot",
+    "StatefulSelection",
     "SurvivorSelection",
     "Tick",
     "Trace",

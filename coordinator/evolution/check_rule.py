@@ -5,16 +5,16 @@ The rule must depend on its arguments alone or, if it is a class, on the broods 
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from coordinator.evolution.breeding import Individual, failed_last
-from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from coordinator.evolution.members import Relatives
 from coordinator.evolution.rules import Rule
 from schema.errors import ExperimentError
@@ -43,54 +43,49 @@ _ASKED = {
 """Least size of a population for a rule, and number of places."""
 
 
-class Sample(NamedTuple):
-    """What populations of samples are made of.
-
-    Attributes:
-        genomes: of random robots.
-        sizes: numbers of parts of the robots.
-        labels: as of ``Labels``.
-    """
-
-    genomes: Sequence[object]
-    sizes: Sequence[int]
-    labels: Labels
-
-
-def _example(number: int, fitness: float, sample: Sample, island: int) -> Individual:
-    parents = (BirthId(island, number // 2), BirthId(island, number // 3))
-    measures: Mapping[str, float] = defaultdict(lambda: number / 7)
-    if sample.labels is not None:
-        measures = dict.fromkeys(sample.labels, number / 7)
-    return Individual(
-        BirthId(island, number),
-        sample.genomes[number],
-        fitness,
-        rank=1 + number // 4,
-        generation=0,
-        parents=parents if number else (),
-        size=sample.sizes[number],
-        measures=MappingProxyType(measures),
-    )
+def _examples(encoding: IslandEncoding, labels: Labels) -> list[Individual]:
+    """Return individuals with random robots and without fitness."""
+    examples: list[Individual] = []
+    for number in range(_MOST):
+        birth = BirthId(0, number)
+        genome = encoding.random(np.random.default_rng(number), birth)
+        measures: Mapping[str, float] = defaultdict(partial(float, number / 7))
+        if labels is not None:
+            measures = dict.fromkeys(labels, number / 7)
+        one = Individual(birth, genome, 0.0, rank=1 + number // 4, generation=0)
+        size = len(encoding.develop(genome).parts)
+        examples.append(replace(one, size=size, measures=MappingProxyType(measures)))
+    return examples
 
 
-def _populations(least: int, sample: Sample, island: int) -> Iterator[list[Individual]]:
-    """Yield populations: small, of equals, varied, in part without fitness."""
+def _populations(
+    least: int, examples: Sequence[Individual], island: int
+) -> list[list[Individual]]:
+    """Return populations: small, of equals, varied, in part without fitness."""
+
+    def born(one: Individual, fitness: float) -> Individual:
+        number = one.birth.number
+        parents = (BirthId(island, number // 2), BirthId(island, number // 3))
+        birth = BirthId(island, number)
+        return replace(
+            one, birth=birth, fitness=fitness, parents=parents if number else ()
+        )
+
     step = 7 + 4 * island
-    for count, fitness in (
-        (least, float),
-        (_MOST, lambda _: 0.0),
-        (_MOST, lambda number: (number * step % _MOST) / 10),
-        (_MOST, lambda number: float(number) if number % 3 else -1.0),
-    ):
-        yield [
-            _example(number, fitness(number), sample, island) for number in range(count)
-        ]
+    return [
+        [born(one, fitness(one.birth.number)) for one in examples[:count]]
+        for count, fitness in (
+            (least, float),
+            (_MOST, lambda _: 0.0),
+            (_MOST, lambda number: (number * step % _MOST) / 10),
+            (_MOST, lambda number: float(number) if number % 3 else -1.0),
+        )
+    ]
 
 
 def _live(
     rules: Mapping[int, Rule],
-    sample: Sample,
+    examples: Sequence[Individual],
     modules: Sequence[str] | None = None,
     *,
     is_backward: bool = False,
@@ -100,7 +95,7 @@ def _live(
     Modules and, in ``select``, objects must not change if modules are given.
     """
     least, count = _ASKED[next(iter(rules.values())).key]
-    samples = {island: list(_populations(least, sample, island)) for island in rules}
+    samples = {island: _populations(least, examples, island) for island in rules}
     answers: dict[int, dict[tuple[int, int], list[int]]] = {at: {} for at in rules}
     for brood in range(_BROODS):
         for island, rule in rules.items():
@@ -143,26 +138,23 @@ def check_rule(
             changes a module, or its object in ``select``.
     """
     encoding = encoding_of(experiment)
-    births = [BirthId(0, number) for number in range(_MOST)]
-    genomes = [encoding.random(np.random.default_rng(at), at) for at in births]
-    sizes = [len(encoding.develop(genome).parts) for genome in genomes]
-    sample = Sample(genomes, sizes, labels)
+    examples = _examples(encoding, labels)
     new = partial(make, Relatives(encoding.develop))
     last = new()
     # Its module is imported now.
     modules = own_modules()
     alone = {
-        **_live({0: new()}, sample, modules),
-        **_live({1: new()}, sample, modules),
+        **_live({0: new()}, examples, modules),
+        **_live({1: new()}, examples, modules),
     }
-    if _live({0: new(), 1: new()}, sample) != alone:
+    if _live({0: new(), 1: new()}, examples) != alone:
         must = "select on an island as if there were no other"
         raise broken("", must, came="other places when two islands take turns")
-    if _live({0: new()}, sample, is_backward=True)[0] != alone[0]:
+    if _live({0: new()}, examples, is_backward=True)[0] != alone[0]:
         must = "select the same whatever was selected before"
         raise broken("", must, came="other places in another order")
     least, count = _ASKED[last.key]
-    *_, population = _populations(least, sample, 0)
+    population = _populations(least, examples, 0)[-1]
     failed = failed_last(
         individual if number % _FAILED else individual.evaluated(None, ())
         for number, individual in enumerate(population)

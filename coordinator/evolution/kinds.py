@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from msgspec.structs import replace as replace_struct
+from msgspec.structs import replace
 
 from coordinator.evolution.brains import BUILT_IN as BRAINS
 from coordinator.evolution.check_encoding import check_encoding
@@ -50,15 +50,18 @@ def _selection_kind(name: str, built_in: Mapping[str, object], arguments: int) -
     def rules(whole: Experiment) -> Iterator[_Ruled]:
         for at in island_experiments(whole):
             if getattr(at, part) is not None and ":" in of_key(at):
-                yield _Ruled(at, at.measures.labels)
+                # Islands that differ in nothing else are checked once.
+                names = ("space", "generation", "brain", "encoding", part)
+                meant = {name: getattr(at, name) for name in names}
+                yield _Ruled(Experiment("rules", **meant), at.measures.labels)
 
     def load(ruled: _Ruled) -> object:
         own = own_rule(getattr(ruled.island, part), name)
         return own and own[0]
 
     def by_hand(path: str) -> _Ruled:
-        section = replace_struct(empty, **{name: path})
-        return _Ruled(replace_struct(Experiment("by hand"), **{part: section}), None)
+        section: Any = replace(empty, **{name: path})
+        return _Ruled(Experiment("by hand", **{part: section}), None)
 
     return Kind(
         name,

@@ -63,11 +63,7 @@ class Member:
         return self._robot
 
     def distances(self, others: Sequence["Member"]) -> Integers:
-        """Return the distances of its body to those of others, (N,).
-
-        Raises:
-            ExperimentError: Numba is not installed.
-        """
+        """Return the distances of its body to those of others, (N,)."""
         try:
             # Numba takes 110 MB, and is an extra.
             from schema.robot import body_distance  # noqa: PLC0415

@@ -549,28 +549,19 @@ class StatefulSelection(Protocol):
     def select(
         self, population: Sequence[Selectable], count: int, rng: np.random.Generator, /
     ) -> Sequence[int]:
-        """Return ``count`` different places in the population, from 0.
+        """Return ``count`` different places in the population, from 0; change nothing.
 
-        It changes nothing: couples are selected when bodies have been vetted, in any
-        order.
-
-        Args:
-            population: as of ``ParentSelection`` or ``SurvivorSelection``.
-            count: 2 for parents; the child gets its root part from the first.
-            rng: stream of this selection.
+        Population and stream are those of a function. For parents ``count`` is 2, and
+        the child gets its root part from the first.
         """
 
     def update(self, brood: Sequence[Selectable], /) -> None:
         """Change the memory.
 
         Off-line it is called after each brood, the founders included, when survivors
-        have been selected; all births of the next brood select with this memory.
-        On-line it is called at a decision, before its birth, if robots are mature for
-        the first time.
-
-        Args:
-            brood: individuals born on the island, in birth order, each at one call
-                only, with the fitness that it has then.
+        have been selected; on-line at a decision, before its birth, with robots that
+        are mature for the first time. A brood holds individuals born on the island, in
+        birth order, each at one call only, with the fitness that it has then.
         """
 
 

@@ -21,9 +21,6 @@ def body_distances(robot: Robot, others: Sequence[Robot]) -> Integers:
     """Return the edit distances, (N,), of a robot's body to those of others, (N,).
 
     A part's label is its parent's slot; parameters and brains are ignored.
-
-    Raises:
-        InvalidRobot: as of ``trees_of``.
     """
     bodies = [robot.parts, *(other.parts for other in others)]
     every = [part for body in bodies for part in body]
