@@ -284,8 +284,7 @@ class Breeder:
             ExperimentError: a rule fails.
         """
         if self._own:
-            # As ancestors of later individuals.
-            self._relatives.members([*population, *brood])
+            self._relatives.members([*population, *brood])  # later ancestors
         for rule in self._own:
             with at_birth(brood[-1].birth):
                 rule.update(failed_last(brood))

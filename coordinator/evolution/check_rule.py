@@ -140,8 +140,7 @@ def check_rule(
     encoding = encoding_of(experiment)
     examples = _examples(encoding, labels)
     new = partial(make, Relatives(encoding.develop))
-    last = new()
-    # Its module is imported now.
+    last = new()  # imports its module
     modules = own_modules()
     alone = {
         **_live({0: new()}, examples, modules),

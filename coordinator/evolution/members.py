@@ -54,6 +54,14 @@ class Member:
             raise AttributeError(name)
         return getattr(self._individual, name)
 
+    def __eq__(self, other: object) -> bool:
+        """Return whether another one is the same individual."""
+        return isinstance(other, Member) and self.birth == other.birth
+
+    def __hash__(self) -> int:
+        """Return the hash of the birth id."""
+        return hash(self.birth)
+
     @property
     def robot(self) -> Robot:
         """Its body and brain; the brain that it has learnt, if it has learnt one."""

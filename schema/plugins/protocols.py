@@ -423,7 +423,7 @@ class BrainType(BrainGenes, BrainControl, Protocol):
 class Selectable(Protocol):
     """Individual of a population, as selection sees it; nothing of it can be changed.
 
-    Further attributes are no part of this protocol.
+    Two are equal if their births are. Further attributes are no part of this protocol.
     """
 
     @property
@@ -461,10 +461,7 @@ class Selectable(Protocol):
         """Return the tree edit distances of bodies, (N,); of the extra ``analysis``."""
 
     def ancestors(self, generations: int | None = None, /) -> frozenset[BirthId]:
-        """Return the birth ids of its ancestors, of so many generations or of all.
-
-        Those of an immigrant's parents are not known.
-        """
+        """Return the birth ids of its ancestors on the island, so far back or all."""
 
 
 class ParentSelection(Protocol):

@@ -461,4 +461,5 @@ def test_ancestors_of_those_that_have_lived_on_the_island() -> None:
     assert last.ancestors(2) == {births[3], births[0], births[2], stranger}
     assert last.ancestors() == {*births[:4], stranger, unknown}
     assert not last.ancestors(0)
+    assert relatives.members(living).index(last) == 4
     assert not hasattr(last, "__dict__")  # so nothing of it can be set
