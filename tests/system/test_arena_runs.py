@@ -3,6 +3,7 @@
 test_many_kills.py kills the coordinators of arenas, and random workers.
 """
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,13 @@ import pytest
 from coordinator.storage.compare import compare
 from schema.tables.columns import TABLES
 from schema.tables.files import read_table
+from tests.system.documents import SMALL_ARENA
 from tests.system.fleet import Fleet, holders, size
-from tests.system.workspace import Workspace
+from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 WORDS = ("crowd.toml", "--seed", "4", "--quiet")
 
 
@@ -28,6 +31,26 @@ def test_number_of_threads_does_not_change_an_arena(
     assert compare(crowded_arena_run, crowded_arena_workspace.folder / "run") == []
     filled = {name for name in TABLES if read_table(crowded_arena_run, name).num_rows}
     assert filled >= {"births", "fitness", "poses", "population", "touches", "deaths"}
+
+
+def test_rule_that_remembers_is_repeatable_in_two_arenas_with_a_kill(
+    workspace: Workspace,
+) -> None:
+    folder, rule = workspace.folder, '"novelty:Novelty"'
+    shutil.copy(EXAMPLES / "novelty.py", folder)
+    small = SMALL_ARENA.replace("= 5\n", f"= 5\nparents = {rule}\n", 1)
+    islands = "[[islands]]\n[[islands]]\n[migration]\ntopology = 'ring'\nepoch = 7\n"
+    (folder / "two.toml").write_text(f"{small}{islands}emigrants = {rule}\n")
+    words = ("run", "two.toml", "--seed", "4", "--quiet", "--out")
+    workspace.run(*words, "calm", "--in-process")
+    killed = workspace.start(*words, "killed", "--workers", "2")
+    journal, half = folder / "killed" / "journal.bin", size(folder / "calm") // 2
+    wait_until(lambda: journal.exists() and journal.stat().st_size > half, "half")
+    killed.kill()
+    killed.communicate()
+    workspace.run("resume", "killed", "--workers", "1", "--quiet")
+    assert compare(folder / "calm", folder / "killed") == []
+    assert read_table(folder / "calm", "migrations").num_rows
 
 
 @pytest.mark.long
