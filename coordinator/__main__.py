@@ -18,6 +18,7 @@ from coordinator.cli.execute import (
 )
 from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
+from coordinator.cli.founders import with_founders
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.kinds import KINDS, brain_kind
@@ -61,6 +62,7 @@ from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow
 from schema.tables.arrow import skip_pandas
+from schema.tables.description import KeptFounder
 
 # Flags that --in-process excludes.
 _OF_NETWORK = (
@@ -95,7 +97,7 @@ def main(arguments: list[str]) -> int:
         check_load(flags, "--workers", options.workers or 0, options)
     if command == "resume":
         return _resume(options)
-    experiments = _experiments(options)
+    experiments, founders = _experiments(options)
     is_campaign_wanted = len(experiments) > 1 or _is_repeated(options)
     is_shipped = is_campaign_wanted and options.experiments[0] in shipped_campaigns()
     name = "+".join(options.experiments) if is_shipped else joined_name(experiments)
@@ -105,13 +107,13 @@ def main(arguments: list[str]) -> int:
         return _stoppable(
             folder,
             deployment,
-            lambda: start(folder, experiments[0], options.seed, deployment),
+            lambda: start(folder, experiments[0], options.seed, deployment, founders),
         )
     repeats, first = options.repeats or 1, options.first_repeat or 0
     if (count := first + repeats) > MOST_REPEATS:
         also = " with those before --first-repeat" if first else ""
         flags.error(f"--repeats: must be <= {MOST_REPEATS}{also}, got {count}")
-    campaign = Campaign(experiments, repeats, options.seed, first)
+    campaign = Campaign(experiments, repeats, options.seed, first, founders)
     return _stoppable(
         folder, deployment, lambda: start_campaign(folder, campaign, deployment)
     )
@@ -172,18 +174,21 @@ def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int])
         return STOPPED
 
 
-def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
-    """Return the experiments to run, checked; imports package ``worker``."""
+def _experiments(
+    options: argparse.Namespace,
+) -> tuple[tuple[Experiment, ...], dict[str, KeptFounder]]:
+    """Return checked experiments and their founders; imports worker and analyzer."""
+    import analyzer.report
     import worker.kinds
 
-    drafts = read_drafts(options.experiments, options.births)
+    drafts = read_drafts(options.experiments, options.births, options.founders)
     refuse_faulty(drafts, options.births)
     check = partial(check_built_in, kinds=worker.kinds.KINDS)
     found = checked_experiments(drafts, check)
     islands = (own for each in found for own in island_experiments(each))
     for line in dict.fromkeys(filter(None, map(cost_line, islands))):
         warn_user(line)
-    return found
+    return with_founders(found, analyzer.report.analyze)
 
 
 def _deployment(

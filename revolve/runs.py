@@ -8,10 +8,10 @@ from typing import Any
 
 import pyarrow as pa
 
-from revolve.arguments import whole_number
+from revolve.arguments import in_order, whole_number
 from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
-from revolve.robot import Robot, of_plain
+from revolve.robot import Robot, as_experiment, of_plain, plain
 from schema.agent.supervisor import most_processes
 from schema.errors import RevolveError, RunFolderError, nearest, rounded, shown
 from schema.experiment.document import island_experiment, island_experiments
@@ -36,6 +36,7 @@ from schema.tables.last_populations import (
 )
 from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
+from schema.wire.protobuf import encode_robot
 from schema.wire.updates import individual
 
 Folder = str | Path
@@ -264,6 +265,7 @@ def run(
     *,
     seed: int = 0,
     births: int | None = None,
+    founders: Run | Folder | Iterable[Robot | Folder] | None = None,
     out: Folder | None = None,
     workers: int | None = None,
     connect: str | None = None,
@@ -276,6 +278,8 @@ def run(
         experiment: shipped name, path of a TOML file, or ``Experiment``.
         seed: random seed.
         births: number of births on each island; None: the experiment's.
+        founders: a run, or its folder, whose last population the run starts from; or
+            robots and robot files, in order; None: those of the experiment.
         out: run folder; None: ``runs/NAME-seedSEED``.
         workers: worker processes; None: one per core, or none with ``connect``. No
             result depends on it.
@@ -299,12 +303,32 @@ def run(
     for flag, value in (("--births", births), ("--connect", connect)):
         words += [] if value is None else [flag, str(value)]
     words += _common(workers, (*allowed(is_new=True), *plugins), progress=progress)
-    if not isinstance(experiment, Experiment):
-        return _done(("run", str(experiment), *words), folder, progress=progress)
     with tempfile.TemporaryDirectory() as place:
-        file = Path(place) / "experiment.toml"
-        file.write_text(experiment.to_toml(), encoding="utf-8")
-        return _done(("run", str(file), *words), folder, progress=progress)
+        if founders is not None:
+            given = _given(founders, Path(place))
+            experiment = as_experiment(experiment).replace(founders=given)
+        source = experiment
+        if isinstance(experiment, Experiment):
+            source = Path(place) / "experiment.toml"
+            source.write_text(experiment.to_toml(), encoding="utf-8")
+        return _done(("run", str(source), *words), folder, progress=progress)
+
+
+def _given(
+    founders: Run | Folder | Iterable[Robot | Folder], place: Path
+) -> dict[str, Any]:
+    """Return the keys of ``[founders]``; robots are written to files in a folder."""
+    keys: dict[str, Any] = dict.fromkeys(("files", "run", "genomes"))
+    if isinstance(founders, Run | str | Path):
+        return keys | {"run": str(getattr(founders, "folder", founders))}
+    files: list[str] = []
+    for number, each in enumerate(in_order("founders", founders)):
+        file = each
+        if not isinstance(file, str | Path):
+            file = place / f"founder-{number}.pb"
+            file.write_bytes(encode_robot(plain(each)))
+        files.append(str(file))
+    return keys | {"files": files}
 
 
 def resume(

@@ -109,6 +109,8 @@ LONGEST_QUIET_S = 5.0
 
 MOST_DESCRIPTION = 1 << 24
 """Bytes of ``run.json`` or ``campaign.toml``, which hold experiments with scenery."""
+MOST_FOUNDER_BYTES = 8 * MIB
+"""Genomes of given founders, which ``run.json`` and ``campaign.toml`` hold."""
 MOST_MARK = 1000
 """Bytes of the files ``state`` and ``epoch``."""
 MOST_NAME = 1000

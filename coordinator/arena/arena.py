@@ -7,7 +7,7 @@ one, in reverse order of their generation. Source: Hupkes 2016, section 5.3.3; t
 of the original.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from coordinator.arena.arena_migration import ArenaMigration
@@ -23,6 +23,7 @@ from coordinator.arena.living import (
 from coordinator.arena.orders import Orders, inserted
 from coordinator.evolution.breeding import Breeder, Candidate, Individual
 from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.founders import Founder
 from coordinator.evolution.selection import select_culled
 from coordinator.islands.events import (
     Advanced,
@@ -69,6 +70,7 @@ class Arena:
         number: int = 0,
         *,
         epochs: MigrationEpochs | None = None,
+        given: Sequence[Founder] = (),
     ) -> None:
         """Initialise an arena before its first event; arguments as in ``Island``.
 
@@ -87,7 +89,7 @@ class Arena:
         self.encoding = encoding_of(experiment)
         self._parents_needed = experiment.selection.parents_needed
         self._number = number
-        self._breeder = Breeder(experiment, seed, run)
+        self._breeder = Breeder(experiment, seed, run, given)
         self._vetting_queue = VettingQueue(experiment, self._breeder, number)
         self._living = LivingRobots(
             rules, experiment.measures.labels, seed=seed, run=run

@@ -1,6 +1,6 @@
 """Start and resume runs and campaigns."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -43,22 +43,29 @@ from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text, with_births
 from schema.plugins.kept import refuse_other
-from schema.tables.description import STATE, read_description, read_state
+from schema.tables.description import STATE, KeptFounder, read_description, read_state
 from schema.tables.files import is_sealed
 from schema.wire.status import RunStatus
 
 
 def start(
-    folder: Path, experiment: Experiment, seed: int, deployment: Deployment
+    folder: Path,
+    experiment: Experiment,
+    seed: int,
+    deployment: Deployment,
+    founders: Mapping[str, KeptFounder],
 ) -> int:
     """Run an experiment in a new folder; return the exit code.
+
+    ``founders``: the given ones that it names, by digest.
 
     Raises:
         RunFolderError: the folder is used or locked, or the disk fails.
         NetworkError: the address cannot be listened on, or no hub answers.
         ExperimentError: no robot meets the experiment's restrictions.
     """
-    details = RunDetails(experiment.name, 0, seed, experiment_text(experiment))
+    text = experiment_text(experiment)
+    details = RunDetails(experiment.name, 0, seed, text, founders)
     return _execute_run(folder, RunFolder(folder, details), deployment)
 
 

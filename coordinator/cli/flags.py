@@ -24,6 +24,7 @@ _COMMANDS = {
             "revolve run mine.toml --births 100 --out runs/first --workers 2",
             "revolve run scenario1 no-selection --repeats 5    # a campaign",
             "revolve run scenario3 --births 60 --view",
+            "revolve run mine.toml --from runs/first --out runs/second",
         ),
     ),
     "coordinator": (
@@ -145,6 +146,13 @@ def _add_experiments(flags: argparse.ArgumentParser) -> None:
         least=0,
     )
     add_count(flags, "--births", None, "number of births (default: the experiment's)")
+    flags.add_argument(
+        "--from",
+        dest="founders",
+        metavar="RUN",
+        help="run folder whose last population are the founders; the document's "
+        "[founders] may say which (default: random robots, or those of [founders])",
+    )
     flags.add_argument(
         "--out",
         metavar="FOLDER",

@@ -14,6 +14,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.founders import Founder
 from coordinator.evolution.members import Relatives
 from coordinator.evolution.random_streams import Purpose, stream
 from coordinator.evolution.rules import Rule, rule_of, select_parents, select_survivors
@@ -119,6 +120,7 @@ class Candidate(Struct, frozen=True):
         genome: what it inherits.
         robot: the robot that develops from the genome.
         learnt: as of ``Individual``.
+        origin: the given founder that it is, if it is one.
     """
 
     birth: BirthId
@@ -127,6 +129,7 @@ class Candidate(Struct, frozen=True):
     genome: object
     robot: Robot
     learnt: Robot | None = None
+    origin: Founder | None = None
 
     def individual(self, generation: int | None) -> Individual:
         """Return the individual, before any evaluation."""
@@ -150,8 +153,12 @@ class Breeder:
         emigrants: own rule that selects them; None for a built-in one.
     """
 
-    def __init__(self, experiment: Experiment, seed: int, run: int) -> None:
+    def __init__(
+        self, experiment: Experiment, seed: int, run: int, given: Sequence[Founder] = ()
+    ) -> None:
+        """Initialise; ``given`` are the founders of the first births."""
         self._experiment = experiment
+        self._founders = given
         self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
         self._relatives = relatives = Relatives(self._encoding.develop)
@@ -192,6 +199,8 @@ class Breeder:
                 encoding's own code fails.
         """
         with at_birth(birth):
+            if birth.number < len(self._founders):
+                return self._given(birth, attempt, why)
             while attempt < end:
                 self.check_attempts(attempt, population, why)
                 couple, genome = self.conceive(birth, attempt, population, couple)
@@ -205,6 +214,15 @@ class Breeder:
                         return Candidate(birth, attempt, couple, genome, robot)
                 attempt += 1
         return None
+
+    def _given(self, birth: BirthId, attempt: int, why: str) -> Candidate:
+        """Return the given founder of a birth, at its only attempt."""
+        if attempt:
+            raise ExperimentError(f"the given founder is not viable: {why}")
+        founder = self._founders[birth.number]
+        genome = self._encoding.from_bytes(founder[1].genome)
+        robot = self._encoding.develop(genome)
+        return Candidate(birth, 0, None, genome, robot, origin=founder)
 
     def conceive(
         self,

@@ -6,13 +6,14 @@ are committed in birth order, whatever the order of their answers.
 Source: Hupkes 2016, section 5.3; the code of the original.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
 from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.founders import Founder
 from coordinator.islands.events import (
     Answered,
     Asked,
@@ -76,6 +77,7 @@ class Island:
         number: int = 0,
         *,
         epochs: MigrationEpochs | None = None,
+        given: Sequence[Founder] = (),
     ) -> None:
         """Initialise an island before its first event.
 
@@ -85,6 +87,7 @@ class Island:
             run: number of the repeat, from 0.
             number: number of this island.
             epochs: its migration; None without neighbours.
+            given: founders of the first births; the others are random.
         """
         selection = experiment.selection
         self.births = 0
@@ -93,7 +96,7 @@ class Island:
         self._labels = experiment.measures.labels
         self._seed, self._run, self._number = seed, run, number
         self._encoding = encoding_of(experiment)
-        self._breeder = Breeder(experiment, seed, run)
+        self._breeder = Breeder(experiment, seed, run, given)
         self._reevaluations = (
             Reevaluations(experiment, number) if selection.reevaluation else None
         )

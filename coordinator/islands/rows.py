@@ -5,6 +5,7 @@ from typing import Any
 
 from coordinator.evolution.breeding import Candidate, Individual, at_birth
 from coordinator.evolution.encodings import IslandEncoding
+from coordinator.evolution.founders import Founder
 from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.parts import BodySpace
 from schema.robot.genome import Node, walk
@@ -57,8 +58,21 @@ def birth_record(
         "x": place and place[0],
         "y": place and place[1],
         "robot": stored and encode_robot(stored),
+        **origin_columns(candidate.origin),
     }
     return Record("births", row)
+
+
+def origin_columns(founder: Founder | None) -> dict[str, Any]:
+    """Return the columns of a births row that say where a given founder is from."""
+    named, kept = founder or (None, None)
+    return {
+        "origin_digest": named and named.digest,
+        "origin_island": named and named.island,
+        "origin_birth": named and named.birth,
+        "origin_run": (kept and kept.run) or None,
+        "origin_file": (kept and kept.file) or None,
+    }
 
 
 def body_rows(robot: Robot) -> list[Row]:

@@ -1,20 +1,29 @@
 """Islands of an experiment, each with its settings and its neighbours."""
 
+from collections.abc import Mapping
+
 from coordinator.arena.arena import Arena
+from coordinator.evolution.founders import founders_of
 from coordinator.islands.island import Island
 from coordinator.islands.migration import MigrationEpochs, Neighbours
 from coordinator.islands.topology import Edge, connections
 from schema.experiment.document import Experiment, island_experiments
 from schema.experiment.settings import evaluation_settings
+from schema.tables.description import KeptFounder
 
 
 def archipelago(
-    experiment: Experiment, seed: int, run: int
+    experiment: Experiment,
+    seed: int,
+    run: int,
+    founders: Mapping[str, KeptFounder] | None = None,
 ) -> dict[int, Island | Arena]:
     """Return the islands by number, before their first event.
 
+    ``founders``: the given ones that the experiment names, by digest.
+
     Raises:
-        ExperimentError: no graph meets the topology.
+        ExperimentError: no graph meets the topology, or a founder is missing.
     """
     owns = island_experiments(experiment)
     edges: tuple[Edge, ...] = ()
@@ -28,7 +37,8 @@ def archipelago(
         if own.migration is not None and links.neighbours:
             epochs = MigrationEpochs(own, number, links, seed, run)
         machine = Island if own.arena is None else Arena
-        islands[number] = machine(own, seed, run, number, epochs=epochs)
+        given = founders_of(own, founders or {})
+        islands[number] = machine(own, seed, run, number, epochs=epochs, given=given)
     return islands
 
 

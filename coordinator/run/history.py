@@ -78,8 +78,9 @@ def replayed(
 
 def silent_loop(details: RunDetails, context: RunContext, store: SnapshotStore) -> Loop:
     """Return the islands of a run before its start; they act on nothing outside."""
+    experiment = experiment_from_text(details.document)
     return Loop(
-        archipelago(experiment_from_text(details.document), details.seed, details.run),
+        archipelago(experiment, details.seed, details.run, details.founders),
         context=context,
         fleet=JobRouter(LocalAgents({}, "")),
         log=_Nothing(),

@@ -117,7 +117,9 @@ class RunSession:
                 held.name, held.epoch, self.experiment, details.origin
             )
             self.loop = Loop(
-                archipelago(self.experiment, details.seed, details.run),
+                archipelago(
+                    self.experiment, details.seed, details.run, details.founders
+                ),
                 context=self._context,
                 fleet=fleet,
                 log=self._journal,
@@ -291,8 +293,10 @@ def _runs_row(held: RunFolder) -> Record:
     began = (held.path / DETAILS).stat().st_mtime
     versions = {name: metadata.version(name) for name in _LIBRARIES}
     versions["revolve-islands"] = VERSION
+    details = asdict(held.details)
+    del details["founders"]
     row = {
-        **asdict(held.details),
+        **details,
         "state": "finished",
         "versions": json.dumps(versions),
         "platform": platform_tag(),

@@ -10,7 +10,7 @@ import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from importlib import resources
 from pathlib import Path
@@ -35,7 +35,7 @@ from schema.experiment.file import (
 )
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
 from schema.plugins.kept import KeptPlugin, keep
-from schema.tables.description import read_small
+from schema.tables.description import KeptFounder, read_small
 
 CAMPAIGN = "campaign.toml"
 _LONGEST_NAME = 100
@@ -51,17 +51,21 @@ class Campaign:
         repeats: number of runs of each experiment.
         seed: random seed of all runs; the run number selects the random streams.
         first: number of the first repeat; the others follow it.
+        founders: given founders of all experiments, by digest.
     """
 
     experiments: tuple[Experiment, ...]
     repeats: int
     seed: int
     first: int = 0
+    founders: Mapping[str, KeptFounder] = field(default_factory=dict)
 
     def runs(self, folder: Path) -> list[tuple[Path, RunDetails]]:
         """Return folder and details of each run, repeat by repeat."""
         runs = [
-            RunDetails(each.name, repeat, self.seed, experiment_text(each))
+            RunDetails(
+                each.name, repeat, self.seed, experiment_text(each), self.founders
+            )
             for repeat in range(self.first, self.first + self.repeats)
             for each in self.experiments
         ]
@@ -86,13 +90,14 @@ def shipped_campaigns() -> dict[str, tuple[str, ...]]:
 
 
 def read_drafts(
-    sources: Sequence[str], births: int | None = None
+    sources: Sequence[str], births: int | None = None, run: str | None = None
 ) -> list[tuple[str, Draft]]:
     """Return names and documents; a campaign stands for its experiments.
 
     Args:
         sources: names of shipped experiments or campaigns, or paths to .toml files.
         births: of ``--births``, in place of those of the documents.
+        run: of ``--from``, as of ``read_draft``.
 
     Raises:
         ExperimentError: there is no such experiment, or its document is invalid.
@@ -101,7 +106,7 @@ def read_drafts(
     for source in sources:
         check_source(source, [*shipped_experiments(), *shipped])
     words = [word for source in sources for word in shipped.get(source, (source,))]
-    return [(word, read_draft(word, births)) for word in words]
+    return [(word, read_draft(word, births, run=run)) for word in words]
 
 
 def checked_experiments(
@@ -214,7 +219,7 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
     for document in documents:
         plugins |= keep(folder, document, replace_bytes)
     numbers = (campaign.seed, campaign.repeats, campaign.first)
-    digest = _digest(numbers, documents, plugins)
+    digest = _digest(numbers, documents, plugins, campaign.founders)
     lines = [
         f"# To resume it:  {printable_line(command('resume', folder))}",
         f'digest = "{digest}"',
@@ -223,10 +228,14 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
     ]
     if campaign.first:
         lines.append(f"first = {campaign.first}")
-    for name, note in plugins.items():
-        lines += ["", f"[plugins.{name}]"]
+    tables: dict[str, KeptPlugin | KeptFounder] = {
+        **{f"plugins.{name}": note for name, note in plugins.items()},
+        **{f"founders.{key}": kept for key, kept in campaign.founders.items()},
+    }
+    for name, table in tables.items():
+        lines += ["", f"[{name}]"]
         # A text of JSON without other characters is one of TOML.
-        entries = msgspec.to_builtins(note).items()
+        entries = msgspec.to_builtins(table).items()
         lines += [f"{key} = {json.dumps(value)}" for key, value in entries]
     for document in documents:
         lines += ["", "[[experiments]]", f"document = '''\n{document}'''"]
@@ -247,7 +256,7 @@ def read_campaign(folder: Path) -> Campaign:
         _check_distinct(experiments)
     except ExperimentError as error:
         raise _damaged(folder, str(error)) from None
-    return Campaign(experiments, found.repeats, found.seed, found.first)
+    return Campaign(experiments, found.repeats, found.seed, found.first, found.founders)
 
 
 def campaign_plugins(folder: Path) -> dict[str, KeptPlugin]:
@@ -274,7 +283,7 @@ def _read(folder: Path) -> "_Document":
         )
     documents = [each.document for each in found.experiments]
     numbers = (found.seed, found.repeats, found.first)
-    digest = _digest(numbers, documents, found.plugins)
+    digest = _digest(numbers, documents, found.plugins, found.founders)
     if found.digest not in ("", digest):
         raise _damaged(folder, "its digest is not that of its content")
     return found
@@ -300,12 +309,14 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
     digest: str = ""
     plugins: dict[str, KeptPlugin] = {}
     first: Annotated[int, msgspec.Meta(ge=0, le=MOST_REPEATS)] = 0
+    founders: dict[str, KeptFounder] = {}
 
 
 def _digest(
     numbers: tuple[int, int, int],
     documents: Sequence[str],
     plugins: Mapping[str, KeptPlugin],
+    founders: Mapping[str, KeptFounder],
 ) -> str:
     """Return the SHA-256 of a campaign.
 
@@ -314,11 +325,14 @@ def _digest(
             is not 0: older campaigns have none.
         documents: of its experiments.
         plugins: by name.
+        founders: by digest.
     """
     seed, repeats, first = map(str, numbers)
     parts = [seed, repeats, *([first] if first != "0" else []), *documents]
     for name, note in sorted(plugins.items()):
         parts += [name, *msgspec.structs.astuple(note)]
+    for key, kept in sorted(founders.items()):
+        parts += [key, kept.genome.hex(), kept.run, kept.file]
     return sha256("\n".join(parts).encode()).hexdigest()
 
 

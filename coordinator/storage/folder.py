@@ -12,7 +12,7 @@ import secrets
 import shutil
 import socket
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from msgspec import structs
@@ -43,6 +43,7 @@ from schema.tables.description import (
     DETAILS,
     STATE,
     Description,
+    KeptFounder,
     State,
     description_text,
     make_folder,
@@ -71,12 +72,14 @@ class RunDetails:
         run: number of the repeat, from 0.
         seed: random seed of the run or campaign.
         document: the experiment as JSON, with all defaults.
+        founders: given founders, by the digests that the document holds.
     """
 
     name: str
     run: int
     seed: int
     document: str
+    founders: Mapping[str, KeptFounder] = field(default_factory=dict)
 
     @property
     def origin(self) -> Origin:
@@ -233,7 +236,7 @@ def read_details(path: Path) -> RunDetails:
         RunFolderError: there is no run, or its description is damaged.
     """
     found = read_description(path)
-    return RunDetails(found.name, found.run, found.seed, found.document)
+    return RunDetails(found.name, found.run, found.seed, found.document, found.founders)
 
 
 def refuse_other_version(path: Path) -> None:

@@ -4,11 +4,13 @@ from collections.abc import Iterator
 from math import lcm
 from operator import attrgetter
 
-from schema.errors import ExperimentError, shown
+from schema.errors import ExperimentError, nearest, shown
 from schema.experiment.document import (
+    FOUNDERS,
     ArenaSection,
     Culling,
     Experiment,
+    Founders,
     SelectionSection,
     light_of,
     steps_of,
@@ -40,6 +42,8 @@ def island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _light_problems(experiment)
     yield from range_problems(experiment.robust)
     yield from _learning_problems(experiment)
+    if (founders := experiment.founders) is not None:
+        yield from _founders_problems(founders, experiment.selection.population)
     if arena is not None:
         yield from arena_problems(experiment)
         yield from _death_problems(experiment, "arena", arena, 0)
@@ -156,6 +160,26 @@ def _learning_problems(experiment: Experiment) -> Iterator[str]:
         why = "no pattern can be made of a given brain"
         rule = "must be 'darwinian' with encoding.type = 'cppn'"
         yield f"learning.inherit: {rule}: {why}"
+
+
+def _founders_problems(founders: Founders, population: int) -> Iterator[str]:
+    """Yield what is wrong with the founders of an island of so many."""
+    sources = {key: getattr(founders, key) for key in ("files", "run", "genomes")}
+    named = [f"founders.{key}" for key, value in sources.items() if value]
+    if not named:
+        yield "founders: must name files or a run"
+    if len(named) > 1:
+        yield f"{named[1]}: cannot be combined with {named[0]}; remove one"
+    given, rule = founders.population, f"selection.population = {population}"
+    if not founders.run and (founders.island, given) != (None, "last"):
+        yield "founders: island and population need founders.run"
+    if not isinstance(given, str) and not 1 <= len(given) <= population:
+        yield f"founders.population: must be 1 to {rule} births, got {len(given)}"
+    if isinstance(given, str) and given not in FOUNDERS:
+        got = f"got {shown(given)}{nearest(given, FOUNDERS)}"
+        yield f"founders.population: must be 'last', 'best' or a list of births, {got}"
+    if len(founders.files) > population:
+        yield f"founders.files: must be <= {rule}, got {len(founders.files)}"
 
 
 def _scenery_problems(experiment: Experiment) -> Iterator[str]:

@@ -20,6 +20,7 @@ from schema.experiment.robust import Calibration, NoiseLevel, Robust
 from schema.experiment.section import (
     Angle,
     AtLeastOne,
+    Count,
     Extent,
     Length,
     Limit,
@@ -208,6 +209,8 @@ class Reevaluation(Section, frozen=True):
 PARENTS = ("tournament", "random", "none")
 SURVIVORS = ("best", "random")
 """Names of the built-in rules of selection."""
+FOUNDERS = ("last", "best")
+"""Names of the populations of another run that may be founders."""
 
 
 class SelectionSection(PluginSection, frozen=True):
@@ -247,6 +250,43 @@ class SelectionSection(PluginSection, frozen=True):
         """Least population to choose two parents from; 0 if none are chosen."""
         needs = {"tournament": self.tournament_size + 1, "none": 0}
         return needs.get(self.parents, 2)
+
+
+class FounderGenome(Section, frozen=True):
+    """Content of a given founder, whatever path it came from.
+
+    Attributes:
+        digest: SHA-256 of the bytes of its genome, in hexadecimal.
+        island: island of its birth in another run; None: of a file.
+        birth: number of that birth.
+    """
+
+    digest: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+    island: Count | None = None
+    birth: Count | None = None
+
+
+class Founders(Section, frozen=True):
+    """Initial population from robot files or from another run, instead of random.
+
+    Attributes:
+        files: robot files, relative to the document; their encoding must be able to
+            make genomes of robots.
+        run: folder of a run, relative to the document; not together with ``files``.
+        island: of that run; all islands if not given. Numbers of births are those of
+            island 0 then.
+        population: the fittest of the ``last`` population, or the ``best`` ever, both
+            up to ``selection.population``; or numbers of births.
+        repeat: fill up by copies of these in order; otherwise by random robots.
+        genomes: what these keys led to; ``revolve run`` sets it in their place.
+    """
+
+    files: tuple[str, ...] = ()
+    run: str | None = None
+    island: Count | None = None
+    population: str | tuple[Count, ...] = "last"
+    repeat: bool = False
+    genomes: tuple[FounderGenome, ...] = ()
 
 
 class Vetting(Section, frozen=True):
@@ -444,6 +484,7 @@ class Islands(Section, frozen=True):
         migration: exchange of migrants from and to these islands.
         robust: evaluation of these islands' robots under drawn disturbances.
         learning: lifetime learning of these islands' newborns.
+        founders: given founders of each of these islands.
     """
 
     count: Annotated[int, Meta(ge=1, le=MOST_ISLANDS)] = 1
@@ -458,6 +499,7 @@ class Islands(Section, frozen=True):
     migration: Migration | None = None
     robust: Robust | None = None
     learning: Learning | None = None
+    founders: Founders | None = None
 
 
 class Experiment(Section, frozen=True, dict=True, cache_hash=True):
@@ -491,6 +533,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
             settings.
         learning: lifetime learning; without it newborns are evaluated with the brain
             that they inherit.
+        founders: given founders of each island; without them all are random.
     """
 
     name: str
@@ -513,6 +556,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
     calibration: tuple[Calibration, ...] = ()
     sweep: Sweep | None = None
     learning: Learning | None = None
+    founders: Founders | None = None
 
     @cached_property
     def window(self) -> int:

@@ -60,7 +60,10 @@ class Draft(NamedTuple):
 
 
 def read_draft(
-    source: str | Tables, births: int | None = None, where: str = ""
+    source: str | Tables,
+    births: int | None = None,
+    where: str = "",
+    run: str | None = None,
 ) -> Draft:
     """Return the experiments of a document.
 
@@ -69,6 +72,7 @@ def read_draft(
             the tables of a TOML text, which are not changed.
         births: of ``--births``, in place of those of the document.
         where: path of the text whose tables are given.
+        run: of ``--from``, in place of those that the document's founders come from.
 
     Raises:
         ExperimentError: no such experiment or file; an unknown key (the nearest is
@@ -83,6 +87,13 @@ def read_draft(
     if births is not None:
         place = f"{where} with --births {births}"
         tables = _with_births(tables, births)
+    if run is not None:
+        known = tables.get("founders")
+        changed = {"files": [], "genomes": [], "run": str(Path(run).absolute())}
+        tables["founders"] = {
+            **(known if isinstance(known, Mapping) else {}),
+            **changed,
+        }
     whole = converted(tables, where)
     if whole.sweep is None:
         return Draft((whole,), place)

@@ -24,7 +24,7 @@ def converted(tables: Tables, where: str) -> Experiment:
     """Return the experiment of tables before the checks across their keys.
 
     Paths of scenery and calibration, relative to that of the document, become what the
-    files hold, in place.
+    files hold, in place; those of founders become absolute.
 
     Raises:
         ExperimentError: an unknown key (the nearest is named); a value of a wrong type
@@ -34,6 +34,7 @@ def converted(tables: Tables, where: str) -> Experiment:
         raise ExperimentError(f"{where}: {problem}")
     _read_calibration(tables, where)
     _read_scenery(tables, where)
+    _anchor_founders(tables, Path(where).parent.absolute())
     experiment = read_parameters(_completed(tables), Experiment, where, ": ")
     count = island_count(experiment)
     check_most(count, MOST_ISLANDS, "islands", where, ExperimentError)
@@ -119,6 +120,19 @@ def _read_scenery(tables: Tables, where: str) -> None:
             if problem := scenery_problem(scenery):
                 raise ExperimentError(f"{place}: {problem}")
             environment["scenery"] = scenery
+
+
+def _anchor_founders(tables: Tables, place: Path) -> None:
+    """Make paths of founders, relative to a place, absolute, in place."""
+    for holder in (tables, *_tables_of(tables.get("islands"))):
+        for founders in _tables_of([holder.get("founders")]):
+            if isinstance(run := founders.get("run"), str):
+                founders["run"] = str(place / run)
+            if isinstance(files := founders.get("files"), list):
+                founders["files"] = [
+                    str(place / each) if isinstance(each, str) else each
+                    for each in files
+                ]
 
 
 def _completed(tables: Tables) -> Tables:

@@ -99,7 +99,8 @@ class OneStepMating(Protocol[Genome]):
 class RobotEncoding(Protocol[Made_co]):
     """Encoding that can describe a given robot.
 
-    Only with such an encoding can an operator insert a robot's file into an arena.
+    Only with such an encoding can robot files be founders, or be inserted into an arena
+    by an operator.
     """
 
     def from_robot(self, robot: Robot) -> Made_co:

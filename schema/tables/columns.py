@@ -253,6 +253,21 @@ BIRTHS = _table(
         is_repeatable=False,
         is_nullable=True,
     ),
+    *(
+        _column(name, kind, f"of a given founder {text}; else null", is_nullable=True)
+        for name, kind, text in (
+            ("origin_digest", pa.string(), "the SHA-256 of its genome, in hexadecimal"),
+            ("origin_island", pa.int32(), "of a run the island of its birth there"),
+            ("origin_birth", pa.int64(), "of a run the number of that birth"),
+        )
+    ),
+    *(
+        _column(name, pa.string(), text, is_repeatable=False, is_nullable=True)
+        for name, text in (
+            ("origin_run", "of a given founder the run_id of its run; else null"),
+            ("origin_file", "of a given founder its robot file; else null"),
+        )
+    ),
 )
 _PROVENANCE = (
     _column(

@@ -26,6 +26,20 @@ _RUN_ID_DIGITS = 12
 """Of ten thousand runs, two have the same one with a probability of 2e-7."""
 
 
+class KeptFounder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Given founder as a run folder keeps it, under the digest of its genome.
+
+    Attributes:
+        genome: bytes of its genome.
+        run: ``run_id`` of the run that it comes from; empty: of a file.
+        file: path of that file.
+    """
+
+    genome: bytes
+    run: str = ""
+    file: str = ""
+
+
 class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Content of ``run.json``; runs of 0.1 have only the first four fields.
 
@@ -40,6 +54,7 @@ class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         plugins: modules of the experiment's plug-ins, by name.
         digest: SHA-256 of the other fields in hexadecimal; empty in runs of 0.1.
         version: of Revolve Islands that began the run; empty in runs of 0.1 and 0.2.
+        founders: given founders, by the digests that the experiment holds.
     """
 
     name: str
@@ -52,6 +67,7 @@ class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     plugins: dict[str, KeptPlugin] = {}
     digest: str = ""
     version: str = ""
+    founders: dict[str, KeptFounder] = {}
 
 
 def description_text(description: Description) -> str:

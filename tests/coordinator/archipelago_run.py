@@ -1,7 +1,7 @@
 """Archipelago in one process, with answers in any order."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,6 +25,7 @@ from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
+from schema.tables.description import KeptFounder
 from schema.wire.arena import AdvanceShard
 from schema.wire.messages import Evaluate, Vet
 from tests.coordinator.arena_world import Verdict, World, distinct_fitness, viable
@@ -55,6 +56,7 @@ class ArchipelagoRun:
     fit: Fit = distinct_on_islands
     verdict: Verdict = viable
     slow: tuple[int, ...] = ()
+    founders: Mapping[str, KeptFounder] | None = None
     islands: dict[int, Island | Arena] = field(default_factory=dict)
     worlds: dict[int, World] = field(default_factory=dict)
     commands: dict[int, list[IslandCommand | ArenaCommand]] = field(
@@ -66,7 +68,7 @@ class ArchipelagoRun:
 
     def __post_init__(self) -> None:
         """Make the islands."""
-        self.islands = archipelago(self.experiment, self.seed, self.run)
+        self.islands = archipelago(self.experiment, self.seed, self.run, self.founders)
         self.worlds = {number: World(distinct_fitness) for number in self.islands}
         self.commands = {number: [] for number in self.islands}
         own = {each: island_experiment(self.experiment, each) for each in self.islands}

@@ -6,6 +6,7 @@ from typing import Any
 import pyarrow as pa
 
 from coordinator.islands.events import Record
+from coordinator.islands.rows import origin_columns
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.tables.columns import TABLES
@@ -42,6 +43,7 @@ def birth_row(number: int) -> dict[str, Any]:
         "hidden": 0,
         "connections": 3,
         **dict.fromkeys(("sim_time_s", "x", "y", "robot")),
+        **origin_columns(None),
     }
 
 

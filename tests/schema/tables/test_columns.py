@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from coordinator.islands.rows import body_rows, sizes
+from coordinator.islands.rows import body_rows, origin_columns, sizes
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, NeuronGene, Node, develop
 from schema.tables.columns import BIRTHS, EVALUATIONS, TABLES, repeatable
@@ -38,6 +38,7 @@ def birth(genome: Genome, record: int) -> dict[str, object]:
         "x": None if record else -1.5,
         "y": None if record else 0.0,
         "robot": encode_robot(robot) if record else None,
+        **origin_columns(None),
         "seed": 7,
         "run_id": "0123456789ab",
     }
@@ -72,7 +73,7 @@ def test_every_column_has_a_description_and_a_unit(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "others"),
     [
-        ("births", {"robot", "run_id"}),
+        ("births", {"robot", "origin_run", "origin_file", "run_id"}),
         ("evaluations", {"wall_s", "worker", "platform", "run_id"}),
         ("population", {"run_id"}),
         ("fitness", {"run_id"}),

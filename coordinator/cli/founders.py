@@ -1,0 +1,168 @@
+"""Given founders of experiments, read from robot files and runs before a run starts."""
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import pyarrow.compute as pc
+from msgspec.structs import replace
+
+from coordinator.evolution.encodings import IslandEncoding, encoding_of, outside_limits
+from coordinator.evolution.founders import digest_of_genome
+from schema.errors import ExperimentError, InvalidRobot, MalformedMessage, check_most
+from schema.experiment.brains import types_of
+from schema.experiment.check import naming
+from schema.experiment.document import (
+    Experiment,
+    FounderGenome,
+    Founders,
+    Vetting,
+    island_experiments,
+)
+from schema.experiment.file import experiment_from_text
+from schema.formats.files import read_robot
+from schema.formats.yaml_reader import OTHER_TYPES
+from schema.limits import MOST_FOUNDER_BYTES
+from schema.parts import BodySpace
+from schema.robot.ids import BirthId
+from schema.robot.results import Report
+from schema.robot.robot import Robot
+from schema.tables.columns import Row
+from schema.tables.description import KeptFounder, read_description, run_columns
+from schema.tables.files import read_table
+from schema.tables.last_populations import best_ever, fittest, last_populations
+from schema.wire.protobuf import decode_robot
+from schema.wire.updates import individual
+
+Kept = dict[str, KeptFounder]
+Vet = Callable[[Robot, BodySpace, Vetting], Report]
+Check = Callable[[Robot], str]
+"""Returns what is wrong with a robot that a genome describes here, or nothing."""
+Read = Iterator[tuple[str, FounderGenome, KeptFounder, Check]]
+"""For each founder where it is, and what the experiment and the run folder hold."""
+
+
+def with_founders(
+    experiments: Iterable[Experiment], vet: Vet
+) -> tuple[tuple[Experiment, ...], Kept]:
+    """Return experiments that name founders by their content, and these by digest.
+
+    Raises:
+        RevolveError: a file, a run or a birth that is missing or damaged; a robot that
+            does not fit the experiment, its encoding or its analyzer.
+    """
+    kept: Kept = {}
+    named = []
+    for each in experiments:
+        with naming(each.name):
+            read = partial(_named, experiment=each, vet=vet, kept=kept)
+            islands = tuple(
+                replace(own, founders=read(own.founders)) for own in each.islands
+            )
+            named.append(replace(each, founders=read(each.founders), islands=islands))
+    size = sum(len(founder.genome) for founder in kept.values())
+    check_most(size, MOST_FOUNDER_BYTES, "bytes", "founders", ExperimentError)
+    return tuple(named), kept
+
+
+def _named(
+    given: Founders | None, experiment: Experiment, vet: Vet, kept: Kept
+) -> Founders | None:
+    """Return a section that names founders by their content; keep these by digest."""
+    if given is None:
+        return None
+    if given.genomes:
+        raise ExperimentError(
+            "founders.genomes: are kept in the folder of the run that had them: name "
+            "it with founders.run, and births with founders.population"
+        )
+    # Encoding, part types and vetting are those of all islands.
+    encoding = encoding_of(island_experiments(experiment)[0])
+    source = _of_files if given.run is None else _of_run
+    genomes = []
+    for where, genome, founder, check in source(given, experiment, encoding):
+        try:
+            robot = encoding.develop(encoding.from_bytes(founder.genome))
+            encoding.check(robot)
+            why = outside_limits(robot, experiment.space, encoding.types) or check(
+                robot
+            )
+            why = why or vet(robot, encoding.types, experiment.vetting).reason
+        except InvalidRobot as error:
+            why = str(error)
+        if why:
+            raise ExperimentError(f"founders: {where}: {why}")
+        kept.setdefault(genome.digest, founder)
+        genomes.append(genome)
+    return Founders(repeat=given.repeat, genomes=tuple(genomes))
+
+
+def _of_files(
+    given: Founders, experiment: Experiment, encoding: IslandEncoding
+) -> Read:
+    for file in given.files:
+        try:
+            robot = read_robot(Path(file), *types_of(experiment))
+            genome = encoding.to_bytes(encoding.from_robot(robot))
+        except (InvalidRobot, MalformedMessage) as error:
+            why = str(error).removeprefix(f"{file}: ").replace(OTHER_TYPES, "")
+            raise ExperimentError(f"founders: {file}: {why}") from error
+        named = FounderGenome(digest=digest_of_genome(genome))
+        yield file, named, KeptFounder(genome, file=file), lambda _: ""
+
+
+def _of_run(given: Founders, experiment: Experiment, encoding: IslandEncoding) -> Read:
+    folder = Path(given.run or "")
+    theirs = experiment_from_text(read_description(folder).document)
+    if theirs.encoding != experiment.encoding:
+        other = f"{theirs.encoding.type!r}, {theirs.encoding.parameters}"
+        what = "another encoding than the experiment, or other parameters of it"
+        raise ExperimentError(f"founders.run: {folder}: has {what}: {other}")
+    run_id = str(run_columns(folder)["run_id"])
+    paths = zip(encoding.types, experiment.space.part_types, strict=True)
+    others = {kind: p for kind, p in paths if p not in theirs.space.part_types}
+    most = max(each.selection.population for each in island_experiments(experiment))
+    for birth, row in _births(folder, given, most):
+        genome = row["genome"]
+        digest = digest_of_genome(genome)
+        named = FounderGenome(digest=digest, island=birth.island, birth=birth.number)
+        where = f"{folder}: birth {birth.name}"
+        check = partial(_difference, stored=row["robot"], others=others)
+        yield where, named, KeptFounder(genome, run=run_id), check
+
+
+def _difference(robot: Robot, stored: bytes | None, others: dict[str, str]) -> str:
+    """Return in what a robot differs from the one that was born, or nothing.
+
+    ``others``: paths of part types that its run did not have, by name.
+    """
+    for kind in sorted(others.keys() & {part.kind for part in robot.parts}):
+        return f"{kind} is {others[kind]} here, another part type there"
+    if stored and decode_robot(stored).parts != robot.parts:
+        return "its genome develops into another body here"
+    return ""
+
+
+def _births(folder: Path, given: Founders, most: int) -> Iterator[tuple[BirthId, Row]]:
+    """Yield the births of a run that are founders, in order, with their rows."""
+    if isinstance(given.population, str):
+        is_last = given.population == "last"
+        rows = fittest(last_populations(folder)) if is_last else best_ever(folder)
+        own = (row for row in rows if given.island in (None, row["island"]))
+        # Copies of a migrant count once.
+        births = list(islice(dict.fromkeys(map(individual, own)), most))
+    else:
+        births = [BirthId(given.island or 0, number) for number in given.population]
+    if not births:
+        place = "" if given.island is None else f" on island {given.island}"
+        raise ExperimentError(f"founders.run: {folder}: no robot has a fitness{place}")
+    is_wanted = pc.field("birth").isin([birth.number for birth in births])
+    columns = ["island", "birth", "genome", "robot"]
+    stored = read_table(folder, "births", columns, is_wanted).to_pylist()
+    by_birth = {individual(row): row for row in stored}
+    for birth in births:
+        if birth not in by_birth:
+            why = f"has no birth {birth.number} on island {birth.island}"
+            raise ExperimentError(f"founders.population: {folder}: {why}")
+        yield birth, by_birth[birth]
