@@ -60,7 +60,7 @@ def test_tutorial_runs(name: str, tmp_path: Path) -> None:
     _run(TUTORIALS / f"{name}.md", tmp_path)
 
 
-@pytest.mark.parametrize("page", ["gallery/README.md", "growing.md"])
+@pytest.mark.parametrize("page", ["gallery/README.md", "growing.md", "founders.md"])
 def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
     (tmp_path / "docs").symlink_to(DOCS)
     _run(DOCS / page, tmp_path)
