@@ -21,6 +21,7 @@ from revolve.strangers import stranger
 
 _HOMES = {
     "Robot": "revolve.robot",
+    "RobotOrigin": "schema.robot.archive",
     "Part": "schema.robot.robot",
     "Brain": "schema.robot.brain",
     "Neuron": "schema.robot.brain",
@@ -33,6 +34,10 @@ _HOMES = {
     "Trace": "revolve.trace",
     "evaluate": "revolve.evaluation",
     "simulate": "revolve.evaluation",
+    "vet": "revolve.bodies",
+    "Report": "schema.robot.results",
+    "body_distance": "revolve.bodies",
+    "allow": "schema.plugins.permission",
     "needs": "schema.plugins.needs",
     "Run": "revolve.runs",
     "run": "revolve.runs",

@@ -1,4 +1,6 @@
 from revolve.arena import Arena as Arena
+from revolve.bodies import body_distance as body_distance
+from revolve.bodies import vet as vet
 from revolve.command import main as main
 from revolve.evaluation import Result as Result
 from revolve.evaluation import evaluate as evaluate
@@ -35,6 +37,7 @@ from schema.parts import Slot as Slot
 from schema.parts import constant_shape as constant_shape
 from schema.parts import cylinder as cylinder
 from schema.plugins.needs import needs as needs
+from schema.plugins.permission import allow as allow
 from schema.plugins.protocols import Bank as Bank
 from schema.plugins.protocols import BrainControl as BrainControl
 from schema.plugins.protocols import BrainGenes as BrainGenes
@@ -53,6 +56,7 @@ from schema.plugins.protocols import SensorType as SensorType
 from schema.plugins.protocols import SensorView as SensorView
 from schema.plugins.protocols import StatefulSelection as StatefulSelection
 from schema.plugins.protocols import SurvivorSelection as SurvivorSelection
+from schema.robot.archive import RobotOrigin as RobotOrigin
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
@@ -60,6 +64,7 @@ from schema.robot.brain import Widths as Widths
 from schema.robot.genome import ConnectionGene as ConnectionGene
 from schema.robot.genome import NeuronGene as NeuronGene
 from schema.robot.neurons import Tick as Tick
+from schema.robot.results import Report as Report
 from schema.robot.robot import Part as Part
 from schema.wire.operator import ArenaListing as ArenaListing
 from schema.wire.operator import ListedRobot as ListedRobot
@@ -101,9 +106,11 @@ __all__ = [
     "ParentSelection",
     "Part",
     "PartType",
+    "Report",
     "Result",
     "RevolveError",
     "Robot",
+    "RobotOrigin",
     "Run",
     "RunFolderError",
     "Selectable",
@@ -120,7 +127,9 @@ __all__ = [
     "Trace",
     "UnknownPlugin",
     "Widths",
+    "allow",
     "analyze",
+    "body_distance",
     "constant_shape",
     "cylinder",
     "evaluate",
@@ -129,4 +138,5 @@ __all__ = [
     "resume",
     "run",
     "simulate",
+    "vet",
 ]

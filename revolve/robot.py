@@ -22,17 +22,21 @@ from schema.errors import (
 )
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment as Document
+from schema.experiment.document import island_experiment
 from schema.experiment.settings import EvaluationSettings
-from schema.formats.files import settings_of, types_for, write_robot
+from schema.formats.files import settings_of, types_for, write_bytes, write_robot
+from schema.formats.packed import packed_robot
 from schema.formats.run_settings import read_with_settings
 from schema.formats.yaml_reader import OTHER_TYPES
 from schema.limits import MOST_PIXELS, MOST_SEED
 from schema.parts import BodySpace
 from schema.plugins.permission import allowed
+from schema.robot.archive import PACKED, RobotOrigin, read_archive
 from schema.robot.brain import Brain, NeuronKinds
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
+from schema.wire.protobuf import encode_robot
 
 DEFAULT = "scenario1"
 """Experiment of a robot that has no other one."""
@@ -55,36 +59,41 @@ class Robot:
         experiment: whose part types and simulation apply; None: files and pictures may
             have all built-in types; ``evaluate`` and ``simulate`` take ``scenario1``,
             which has no light sensor.
+        origin: birth and fitness, of a robot of ``Run.best``, ``Run.robot`` or a packed
+            file; a changed copy has none.
     """
 
     parts: tuple[Part, ...]
     brain: Brain = field(default_factory=Brain)
     experiment: Experiment | None = field(default=None, compare=False)
+    origin: RobotOrigin | None = field(default=None, init=False, compare=False)
 
     @classmethod
     def read(
         cls, path: str | Path, experiment: Experiment | str | Path | None = None
-    ) -> Self:
+    ) -> "Robot":
         """Return the robot of a file.
 
         Args:
-            path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
+            path: ends in .yaml, .yml, .pb, .xml, .robot, .txt or .json.
             experiment: whose part types are allowed, and whose simulation and fitness
                 apply, those of island 0; None, as of the commands: the settings in an
-                MJCF file, else those of the run folder that holds the file, on the
-                island where ``best.yaml`` is the best robot. Elsewhere all built-in
-                types are allowed, and ``evaluate`` and ``simulate`` take ``scenario1``,
-                which has no light sensor.
+                MJCF or packed file, else those of the run folder that holds the file,
+                on the island where ``best.yaml`` is the best robot. Elsewhere all
+                built-in types are allowed, and ``evaluate`` and ``simulate`` take
+                ``scenario1``, which has no light sensor.
 
         Raises:
             InvalidRobot: the file holds no robot that is well formed.
-            ExperimentError: no such experiment; a plug-in of the run is missing.
+            ExperimentError: no such experiment; a plug-in of the run is missing, or one
+                in a packed file is not allowed (``revolve.allow``).
             RunFolderError: the description of the run is damaged.
         """
         named = None if experiment is None else document_of(experiment)
+        file = Path(path)
         try:
             robot, settings, own = read_with_settings(
-                Path(path), named, say=lambda _line: None
+                file, named, say=lambda _line: None
             )
         except InvalidRobot as error:
             text = str(error).replace(OTHER_TYPES, _OTHER_TYPES)
@@ -94,8 +103,10 @@ class Robot:
         if own is None and settings != settings_of(None):
             sections = msgspec.structs.asdict(settings)
             del sections["ablation"]
-            own = Document(name=Path(path).stem, **sections)
-        return cls(robot.parts, robot.brain, None if own is None else Experiment(own))
+            own = Document(name=file.stem, **sections)
+        is_packed = file.suffix.lower() == PACKED and named is None
+        origin = read_archive(file)[0].origin if is_packed else None
+        return of_plain(robot, None if own is None else Experiment(own), origin)
 
     @classmethod
     def random(
@@ -130,13 +141,35 @@ class Robot:
         """Write the robot to a file.
 
         Args:
-            path: ends in .yaml, .yml, .pb, .xml (MJCF) or .urdf.
+            path: ends in .yaml, .yml, .pb, .xml (MJCF), .urdf, or .robot: packed with
+                its experiment, plug-ins, picture and origin.
 
         Raises:
             InvalidRobot: another ending, a robot that is not well formed, or a file
                 that cannot be written.
         """
-        write_robot(plain(self), Path(path), _settings(self.experiment))
+        file, robot = Path(path), plain(self)
+        if file.suffix.lower() == PACKED:
+            document = island_experiment(document_of(self.experiment or DEFAULT), 0)
+            picture = self.picture()
+            write_bytes(file, packed_robot(robot, document, picture, self.origin))
+        else:
+            write_robot(robot, file, _settings(self.experiment))
+
+    def to_mjcf(self) -> str:
+        """Return the text of the .xml file that ``write`` makes; with its errors."""
+        from schema.formats.mjcf import robot_to_mjcf  # noqa: PLC0415 - loads MuJoCo
+
+        return robot_to_mjcf(plain(self), _settings(self.experiment))
+
+    def to_bytes(self) -> bytes:
+        """Return the bytes of the .pb file that ``write`` makes; with its errors."""
+        return encode_robot(checked(self, types_for(_settings(self.experiment))))
+
+    @property
+    def part_types(self) -> BodySpace:
+        """The types that its parts may have, by name: shapes, slots, joints."""
+        return types_for(_settings(self.experiment))[0]
 
     def picture(self, width: int = 640, height: int = 480) -> bytes:
         """Return a picture of the robot in neutral pose, as PNG.
@@ -204,9 +237,14 @@ _encode = msgspec.msgpack.Encoder(enc_hook=_of_numpy).encode
 _ROBOTS = msgspec.msgpack.Decoder(PlainRobot)
 
 
-def of_plain(robot: PlainRobot, experiment: Experiment | None) -> Robot:
+def of_plain(
+    robot: PlainRobot, experiment: Experiment | None, origin: RobotOrigin | None = None
+) -> Robot:
     """Return a robot of the rooms as the Python API has it."""
-    return Robot(robot.parts, robot.brain, experiment)
+    made = Robot(robot.parts, robot.brain, experiment)
+    # No argument of the class: a changed copy is not that robot any more.
+    object.__setattr__(made, "origin", origin)
+    return made
 
 
 def as_experiment(experiment: Experiment | str | Path) -> Experiment:

@@ -18,6 +18,7 @@ from schema.experiment.document import island_experiment, island_experiments
 from schema.experiment.file import experiment_from_text
 from schema.limits import MOST_SEED
 from schema.plugins.permission import allowed
+from schema.robot.archive import RobotOrigin
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
 from schema.tables.description import (
@@ -37,7 +38,7 @@ from schema.tables.last_populations import (
 from schema.tables.learnt import with_learnt
 from schema.wire.born import robot_of_birth
 from schema.wire.protobuf import encode_robot
-from schema.wire.updates import individual
+from schema.wire.updates import individual, read_birth
 
 Folder = str | Path
 
@@ -121,6 +122,8 @@ class Run:
     def robot(self, number: int, island: int = 0) -> Robot:
         """Return the robot of a birth.
 
+        Its ``origin`` has its greatest fitness on the island where it was born.
+
         Args:
             number: of the birth on its island, from 0.
             island: where it was born.
@@ -130,7 +133,16 @@ class Run:
             RevolveError: a number or an island that is no whole number >= 0.
         """
         birth = BirthId(whole_number("island", island), whole_number("number", number))
-        return self.robots(self._birth(birth))[0]
+        judged = next(best_ever(self.folder, birth), {"fitness": None})
+        return self._born(birth, island, judged["fitness"])
+
+    def _born(self, birth: BirthId, home: int, fitness: float | None) -> Robot:
+        """Return the robot of a birth, with its origin and one island's settings."""
+        row = self._birth(birth)
+        (robot,) = self._robots(row, [home])
+        parents = read_birth(row.to_pylist()[0], 0).parents
+        origin = RobotOrigin(str(self.run_id), birth, parents, fitness)
+        return of_plain(plain(robot), robot.experiment, origin)
 
     def _birth(self, birth: BirthId) -> pa.Table:
         """Return the row of a birth."""
@@ -197,14 +209,14 @@ class Run:
     def _first(self, rows: Iterable[Row], count: int) -> list[Robot]:
         """Return the robots of the first rows, each once."""
         most = whole_number("count", count)
-        islands: dict[BirthId, int] = {}
+        chosen: dict[BirthId, Row] = {}
         for row in rows:
-            if len(islands) == most:
+            if len(chosen) == most:
                 break
-            islands.setdefault(individual(row), row["island"])
+            chosen.setdefault(individual(row), row)
         return [
-            self._robots(self._birth(birth), [home])[0]
-            for birth, home in islands.items()
+            self._born(birth, row["island"], row["fitness"])
+            for birth, row in chosen.items()
         ]
 
     def __repr__(self) -> str:

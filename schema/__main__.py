@@ -7,8 +7,10 @@ from schema.errors import counted
 from schema.experiment.document import Vetting
 from schema.formats.files import types_for, write_robot
 from schema.formats.run_settings import read_with_settings
+from schema.limits import printable
 from schema.parts import BodySpace
 from schema.plugins.permission import allow
+from schema.robot.archive import PACKED, read_archive
 from schema.robot.brain import NeuronKinds, neuron_names
 from schema.robot.robot import Robot
 
@@ -17,6 +19,8 @@ def main(arguments: list[str]) -> int:
     """Run ``revolve robot ...`` and return its exit code."""
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
+    if options.command == "show" and options.file.suffix.lower() == PACKED:
+        _show_contents(options.file)  # also if its plug-ins are not allowed
     robot, settings, experiment = read_with_settings(
         options.file, options.experiment, options.island
     )
@@ -40,8 +44,8 @@ def parser(_command: str = "robot") -> Flags:
     flags = Flags(
         prog="revolve robot",
         description="Check, convert or show a robot file. It reads .yaml, .yml, "
-        ".pb, .xml (MJCF), and RoboGen's .txt and .json; it writes .yaml, .yml, .pb, "
-        ".xml and .urdf.",
+        ".pb, .xml (MJCF), .robot (packed), and RoboGen's .txt and .json; it writes "
+        ".yaml, .yml, .pb, .xml and .urdf.",
         examples=(
             "revolve robot check best.yaml",
             "revolve robot show runs/scenario1-seed1/best.yaml",
@@ -71,11 +75,22 @@ def parser(_command: str = "robot") -> Flags:
             )
         add_settings(
             command,
-            "that in an MJCF file, else that of the run folder that holds the file, "
-            "else all built-in part types and the default world",
+            "that in an MJCF or a packed file, else that of the run folder that holds "
+            "the file, else all built-in part types and the default world",
         )
         add_plugins(command)
     return flags
+
+
+def _show_contents(file: Path) -> None:
+    """Print the birth of a packed robot, and the plug-ins that it holds."""
+    contents, _ = read_archive(file)
+    if (origin := contents.origin) is not None:
+        parents = ", ".join(each.name for each in origin.parents) or "none"
+        birth = f"birth {origin.birth.name} of run {printable(origin.run_id)}"
+        print(f"{birth}, parents {parents}, fitness {origin.fitness}")
+    for name, digest in contents.plugins.items():
+        print(f"plug-in {printable(name)}, source digest {printable(digest)}")
 
 
 def _summary(robot: Robot) -> str:

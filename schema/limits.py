@@ -158,6 +158,9 @@ MOST_OBJECTS = 100
 """Objects of scenery that move, replicated ones included."""
 MOST_PLUGIN_BYTES = 4 * MIB
 """Source of a plug-in file, which a run folder keeps."""
+MOST_PACKED_BYTES = 8 * MIB
+MOST_PACKED_MEMBERS = 2000
+"""Size of a packed robot, and files in it, its picture and plug-ins included."""
 MOST_PLUGIN_CHARACTERS = 10_000
 """Length of the list of plug-ins and digests in a request."""
 

@@ -129,8 +129,8 @@ def parser(_command: str = "robot simulate") -> Flags:
     flags.add_argument("file", type=Path, metavar="FILE", help="robot file")
     add_settings(
         flags,
-        "those in an MJCF file, else those of the run folder that holds the file, else "
-        "those of scenario1",
+        "those in an MJCF or a packed file, else those of the run folder that holds "
+        "the file, else those of scenario1",
     )
     flags.add_argument(
         "--robustness",

@@ -51,7 +51,7 @@ def parser(_command: str = "view") -> Flags:
         help="robot that the camera follows, such as 1:17; without ISLAND, island 0",
     )  # fmt: skip
     flags.add_argument(
-        "--robot", action="append", default=[], type=_selected, metavar="ROBOT",
+        "--robot", action="append", default=[], type=selected, metavar="ROBOT",
         help="re-simulate a robot and show its full motion: 'best' (of the last "
         "population), 'best-ever' (evaluated, dead or alive), BIRTH of island 0, or "
         "ISLAND:BIRTH; may be repeated",
@@ -87,5 +87,6 @@ def _robot_name(text: str) -> BirthId:
     return BirthId(int(match[1] or 0), int(match[2]))
 
 
-def _selected(text: str) -> BirthId | str:
+def selected(text: str) -> BirthId | str:
+    """Return the robot of ``--robot``: an individual, or a name such as ``best``."""
     return text if text in (BEST, BEST_EVER) else _robot_name(text)

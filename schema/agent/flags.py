@@ -122,9 +122,9 @@ def add_plugins(flags: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="MODULE|FILE|NAME=PATH",
-        help="allow a module, a .py file, or a module from a file or folder, with "
-        "plug-ins; may be repeated (default: built-in modules, installed entry points "
-        "'revolve.plugins', and modules of a .toml file, if one is given)",
+        help="allow a module, a .py or .robot file, or a module from a file or folder, "
+        "with plug-ins; may be repeated (default: built-in modules, installed entry "
+        "points 'revolve.plugins', and modules of a .toml file, if one is given)",
     )
 
 

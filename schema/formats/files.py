@@ -2,7 +2,8 @@
 
 YAML (.yaml, .yml), Protobuf (.pb) and MJCF (.xml) hold a whole robot and convert
 into each other without loss. URDF (.urdf) holds the body only and is written, not
-read. RoboGen's text (.txt) and JSON (.json) are read, not written.
+read. RoboGen's text (.txt) and JSON (.json) are read, not written. A packed robot
+(.robot) holds its settings, too; ``schema.formats.packed`` writes it.
 """
 
 import os
@@ -21,6 +22,7 @@ from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_reader import Reader
 from schema.limits import MOST_MJCF_BYTES, MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
+from schema.robot.archive import PACKED, PROTOBUF, read_archive
 from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot, check_number, check_robot
@@ -52,7 +54,7 @@ BEST = "best.yaml"
 MJCF_ENDING = ".xml"
 _YAML = (".yaml", ".yml")
 _ROBOGEN = (".txt", ".json")
-_READ = (*_YAML, *_ROBOGEN, ".pb", MJCF_ENDING)
+_READ = (*_YAML, *_ROBOGEN, ".pb", MJCF_ENDING, PACKED)
 _WRITTEN = (".yaml", ".yml", ".pb", MJCF_ENDING, ".urdf")
 _BINARY_DUMP = """a binary RoboGen dump (Protobuf) is not supported: \
 only RoboGen's robot text and JSON are"""
@@ -105,7 +107,7 @@ def read_robot(
     Raises:
         InvalidRobot: another ending, a folder, a file that cannot be read, a text that
             is not a robot, or a robot that is not well formed in this body space.
-        MalformedMessage: a .pb file that does not hold a robot.
+        MalformedMessage: a .pb file, or such bytes in a packed robot, that hold none.
     """
     ending = check_file(path)
     if ending in _YAML:
@@ -123,7 +125,10 @@ def read_robot(
         robot, _ = read_mjcf(path)
     else:
         try:
-            robot = decode_robot(read_bytes(path))
+            is_packed = ending == PACKED
+            robot = decode_robot(
+                read_archive(path)[1][PROTOBUF] if is_packed else read_bytes(path)
+            )
         except MalformedMessage as error:
             raise MalformedMessage(f"{path}: {error}") from None
         except OSError as error:
@@ -168,6 +173,11 @@ def write_robot(
     most = MOST_MJCF_BYTES if ending == MJCF_ENDING else MOST_TEXT_BYTES
     if ending in _READ:
         check_most(len(data), most, "bytes", str(path), InvalidRobot)
+    write_bytes(path, data)
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write the bytes of a robot file, as ``write_robot``."""
     try:
         # Where a link leads: the link itself stays.
         target = Path(os.path.realpath(path))
@@ -202,5 +212,6 @@ def _ending(path: Path, endings: tuple[str, ...]) -> str:
         raise InvalidRobot(f"{path}: {_BINARY_DUMP}")
     if ending not in endings:
         allowed = ", ".join(endings)
-        raise InvalidRobot(f"{path}: must end in one of {allowed}, got {ending!r}")
+        how = " (robot pack writes it)" if ending == PACKED else ""
+        raise InvalidRobot(f"{path}: must end in one of {allowed}, got {ending!r}{how}")
     return ending

@@ -10,6 +10,8 @@ from schema.experiment.document import Experiment, island_experiment, island_exp
 from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.files import BEST, MJCF_ENDING, check_file, read_robot, settings_of
+from schema.formats.packed import packed_experiment
+from schema.robot.archive import PACKED
 from schema.robot.robot import Robot
 from schema.tables.description import DETAILS, allow_plugins_of, read_description
 from schema.tables.last_populations import best_of, last_populations
@@ -75,8 +77,8 @@ def read_with_settings(
 ) -> tuple[Robot, EvaluationSettings, Experiment | None]:
     """Return a file's robot, its evaluation settings and their experiment.
 
-    An MJCF file holds its settings: they apply unless the user names others, also in
-    the folder of a run.
+    An MJCF file and a packed robot hold their settings: they apply unless the user
+    names others, also in the folder of a run.
 
     Args:
         file: robot file that the user named. In a run folder, the experiment is that of
@@ -96,7 +98,8 @@ def read_with_settings(
             island or plug-in; a damaged description or table of the run.
     """
     # First: nothing is said about the settings of a file that is not there.
-    if check_file(file) == MJCF_ENDING and named is None and island is None:
+    ending = check_file(file)
+    if ending == MJCF_ENDING and named is None and island is None:
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 
@@ -105,7 +108,11 @@ def read_with_settings(
         if of_run or tells_default:
             say(f"with the settings in {file}; --experiment names others")
         return robot, settings, None
-    found = experiment_of(file, named, island, tells_default=tells_default, say=say)
+    if ending == PACKED and not named:
+        found: Experiment | None = _of_island(packed_experiment(file), island or 0)
+        say(f"with the settings in {file}; --experiment names others")
+    else:
+        found = experiment_of(file, named, island, tells_default=tells_default, say=say)
     robot = read_robot(file, *(types_of(found) if found else ()))
     return robot, settings_of(found), found
 

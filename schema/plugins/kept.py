@@ -58,17 +58,11 @@ def keep(
         ExperimentError: an unreadable or changed source, or two data files of one name.
     """
     kept: dict[str, KeptPlugin] = {}
-    written: dict[str, bytes] = {}
-    for name in modules_named(document.encode()):
-        if not (sources := source_of(name)):
-            continue
-        files = _files(name, sources[0]) if len(sources) == 1 else {}
+    for name, files in named_files(document).items():
         for path, data in files.items():
-            if written.setdefault(path, data) != data:
-                what = f"its data file {path} differs from that of another plug-in"
-                raise ExperimentError(f"plug-in {name}: {what}: rename it")
             write(folder / PLUGINS / path, data)
-        kept[name] = KeptPlugin(digest_of(name), str(sources[0]) if files else "")
+        source = str(source_of(name)[0]) if files else ""
+        kept[name] = KeptPlugin(digest_of(name), source)
         if files:
             use_copy(name, kept_file(folder, name))
             # Without a state folder, ``--plugins`` is needed to use the copy again.
@@ -78,6 +72,20 @@ def keep(
                 mark.touch()
     refuse_other(folder, kept)
     return kept
+
+
+def named_files(document: str) -> dict[str, dict[str, bytes]]:
+    """Return files of plug-ins of JSON by module and path; errors are ``keep``'s."""
+    found: dict[str, dict[str, bytes]] = {}
+    every: dict[str, bytes] = {}
+    for name in modules_named(document.encode()):
+        if sources := source_of(name):
+            found[name] = _files(name, sources[0]) if len(sources) == 1 else {}
+            for path, data in found[name].items():
+                if every.setdefault(path, data) != data:
+                    what = f"its data file {path} differs from that of another plug-in"
+                    raise ExperimentError(f"plug-in {name}: {what}: rename it")
+    return found
 
 
 def kept_file(folder: Path, name: str) -> Path:

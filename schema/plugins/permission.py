@@ -10,19 +10,23 @@ The list belongs to the process, as ``sys.modules`` does. The commands set it, a
 it to the processes that they start, with the copies of sources that a run uses.
 """
 
+import atexit
 import sys
 from collections.abc import Iterable
 from filecmp import cmp
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module
 from importlib.machinery import FileFinder, SourceFileLoader
 from importlib.metadata import entry_points
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from types import ModuleType
 from typing import Never
 
 from schema.errors import ExperimentError, UnknownPlugin, shown
+from schema.robot.archive import PACKED, SOURCES, read_archive
 
 BUILT_IN = ("schema.parts", "schema.robogen_parts", "worker.fitness", "worker.tasks")
 ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis", "revolve")
@@ -39,15 +43,16 @@ def allow(entries: Iterable[str]) -> None:
     """Allow modules; nothing is imported yet.
 
     Args:
-        entries: names of modules, or paths of Python files; or ``NAME=PATH``: a module,
-            and the file or folder that replaces whatever has the name of its top-level
-            module.
+        entries: one or some: names of modules, or paths of Python files; or
+            ``NAME=PATH``: a module, and the file or folder that replaces whatever has
+            the name of its top-level module; or packed robots, whose plug-ins do so.
 
     Raises:
         ExperimentError: no such module or file; a module of the standard library or of
             Revolve; a file with the name of another module.
+        InvalidRobot: a file that is no packed robot.
     """
-    for entry in entries:
+    for entry in [entries] if isinstance(entries, str) else entries:
         name, is_copy, place = entry.partition("=")
         if is_copy and _may_be_plugin(name):
             copy = Path(place).resolve()
@@ -57,6 +62,10 @@ def allow(entries: Iterable[str]) -> None:
                 raise UnknownPlugin(f"{FLAG}: {entry}: {why}")
             use_copy(_top(name), copy)
             _allowed.setdefault(name, None)
+        elif entry.endswith(PACKED):
+            contents, members = read_archive(Path(entry))
+            files = (each for each in members.items() if each[0].startswith(SOURCES))
+            allow(_copied(tuple(files), tuple(contents.plugins)))
         elif entry.endswith(".py"):
             _allow_file(Path(entry).resolve(), FLAG)
         else:
@@ -67,6 +76,21 @@ def allow(entries: Iterable[str]) -> None:
                     f"{FLAG}: no module {shown(entry)} is installed; {give}"
                 )
             _allowed.setdefault(entry, None)
+
+
+@cache  # The same files have one folder: they are not in use as another source.
+def _copied(files: tuple[tuple[str, bytes], ...], tops: tuple[str, ...]) -> list[str]:
+    """Write modules to a folder that lasts as this process; return their entries."""
+    try:
+        folder = Path(mkdtemp(prefix="revolve-")).resolve()
+        atexit.register(rmtree, folder, ignore_errors=True)
+        for path, data in files:
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(data)
+    except OSError as error:
+        raise ExperimentError(f"{FLAG}: cannot unpack plug-ins: {error}") from None
+    places = [(n, folder / SOURCES / p) for n in tops for p in (n, f"{n}.py")]
+    return [f"{name}={place}" for name, place in places if place.exists()]
 
 
 def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:

@@ -14,7 +14,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from schema.tables.files import read_table
+from schema.robot.ids import BirthId
+from schema.tables.files import born_as, read_table
 
 Row = Mapping[str, Any]
 _AT_ONCE = 100
@@ -39,11 +40,12 @@ def last_populations(folder: Path) -> list[Row]:
     return pa.concat_tables(last).to_pylist() if last else []
 
 
-def best_ever(folder: Path) -> Iterator[Row]:
+def best_ever(folder: Path, only: BirthId | None = None) -> Iterator[Row]:
     """Yield rows of all robots with a fitness, the best ever first.
 
     Robots of arenas count with their samples while they were mature. Arrow sorts the
     rows by fitness; only those that are taken, and equal ones, become Python objects.
+    ``only`` takes the row of one individual on its island of birth.
 
     Yields:
         Island, individual and greatest fitness of each robot on each island.
@@ -53,9 +55,13 @@ def best_ever(folder: Path) -> Iterator[Row]:
     """
     keys = ["island", "birth_island", "birth"]
     columns = [*keys, "fitness"]
-    alone = read_table(folder, "evaluations", columns, pc.field("fitness").is_valid())
+    wanted, home = pc.scalar(True), pc.field("birth_island")
+    if only is not None:
+        wanted = born_as(only) & (home.is_null() | (home == only.island))
+    is_judged = pc.field("fitness").is_valid() & wanted
+    alone = read_table(folder, "evaluations", columns, is_judged)
     columns.append("is_mature")
-    samples = read_table(folder, "fitness", columns, pc.field("is_mature"))
+    samples = read_table(folder, "fitness", columns, pc.field("is_mature") & wanted)
     # The fitness of a sample is never null.
     every = pa.concat_tables([alone, samples], promote_options="default")
     greatest = every.group_by(keys).aggregate([("fitness", "max")])

@@ -232,7 +232,7 @@ def test_commands_of_the_robots_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "robots.md"
     (document,) = blocks_of(page, "toml")
     folder = _write(workspace, {"robogen.toml": document})
-    (block,) = blocks_of(page, "sh")
+    block, packing = blocks_of(page, "sh")
     own = "revolve robot simulate some.yaml --experiment robogen.toml"
     lines = [*block.splitlines(), own]
     told = _follow(workspace, lines)
@@ -245,6 +245,8 @@ def test_commands_of_the_robots_page_run(workspace: Workspace) -> None:
     assert printed[0] == printed[1]
     assert printed[2] != printed[0]
     assert (folder / "some.yaml").read_text() == (folder / "again.yaml").read_text()
+    shown = _follow(workspace, packing.splitlines())[3]
+    assert re.match(r"birth 0:\d+ of run [0-9a-f]{12}, parents 0:", shown)
 
 
 def test_archipelagos_of_the_islands_page_run(workspace: Workspace) -> None:

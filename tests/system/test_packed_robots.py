@@ -1,0 +1,75 @@
+"""A packed robot with a part of a user's file, on a machine that has only that file."""
+
+import shutil
+
+import pytest
+
+from tests.system.test_own_parts import prepared
+from tests.system.workspace import Workspace
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+EVALUATE = """
+import revolve as rv
+try:
+    rv.Robot.read("best.robot")
+except rv.ExperimentError as error:
+    print(error)
+rv.allow("best.robot")
+robot = rv.Robot.read("best.robot")
+print(robot.experiment.name, robot.origin.fitness, rv.evaluate(robot).fitness)
+robot.write("again.robot")
+with rv.Fleet(workers=1) as fleet:
+    print(next(fleet.evaluate([robot], robot.experiment)).fitness)
+"""
+REFUSED = (
+    "plug-in crawlers: is not allowed, but best.robot was made with {}; an import runs "
+    "its code: if you trust it, add --plugins best.robot (in Python: revolve.allow, in "
+    "a new process)"
+)
+
+
+def moved(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    """Return an empty folder, on a machine where no run was, with the packed robot."""
+    away = Workspace(workspace.folder / "away")
+    away.folder.mkdir()
+    monkeypatch.setenv("XDG_STATE_HOME", str(away.folder / "state"))
+    shutil.move(workspace.folder / "best.robot", away.folder)
+    shutil.rmtree(workspace.folder / "run")
+    (workspace.folder / "crawlers.py").unlink()
+    return away
+
+
+def test_a_packed_robot_needs_no_run(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared(workspace, "PISTON")
+    words = ("mine.toml", "--births", "30", "--seed", "3", "--quiet", "--in-process")
+    workspace.run("run", *words, "--out", "run")
+    beside = workspace.run("robot", "simulate", "run/best.yaml")
+    for name in ("best", "same"):
+        workspace.run("robot", "pack", "run", f"{name}.robot")
+    first, second = (workspace.folder / f"{name}.robot" for name in ("best", "same"))
+    assert first.read_bytes() == second.read_bytes()
+    away = moved(workspace, monkeypatch)
+    packed = ("best.robot", "--plugins", "best.robot")
+    told = away.run("robot", "simulate", *packed)
+    numbers = [line for line in beside.splitlines() if line[:8] != "revolve:"]
+    assert told.splitlines()[: len(numbers)] == numbers
+
+    shown = away.run("robot", "show", *packed).splitlines()
+    assert shown[0].startswith("birth 0:")
+    digest = shown[1].removeprefix("plug-in crawlers, source digest ")
+    refused = away.run("robot", "show", "best.robot", code=2).splitlines()
+    assert refused == [*shown[:2], f"revolve: {REFUSED.format(digest)}"]
+    assert "viable" in away.run("robot", "check", *packed)
+    away.run("robot", "convert", "best.robot", "best.xml", *packed[1:])
+    away.run("robot", "render", "best.robot", "best.png", *packed[1:])
+
+    (fitness,) = (line.split()[1] for line in numbers if line[:8] == "fitness:")
+    lines = away.python("-W", "error", "-c", EVALUATE).splitlines()
+    assert lines == [
+        REFUSED.format(digest), f"crawlers {fitness} {fitness}", fitness
+    ]  # fmt: skip
+    again = away.folder / "again.robot"
+    assert again.read_bytes() == (away.folder / "best.robot").read_bytes()
