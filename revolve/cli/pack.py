@@ -30,7 +30,7 @@ def _chosen(options: Namespace) -> Robot:
     """Return the robot that the flags name."""
     source, name = options.source, options.robot or BEST
     if options.experiment if source.is_dir() else options.robot:
-        raise RevolveError("--robot is for a run folder, --experiment for a file")
+        raise RevolveError(f"{source}: --robot is for a run, --experiment for a file")
     if not source.is_dir():
         return Robot.read(source, options.experiment)
     run = Run(source)

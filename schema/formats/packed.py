@@ -70,6 +70,8 @@ def packed_experiment(path: Path) -> Experiment:
             what = f"has source digest {own}" if own else "is not allowed"
             why = f"{what}, but {path} was made with {digest}; an import runs its code"
             how = f"add {FLAG} {path} (in Python: revolve.allow, in a new process)"
+            if not any(each.startswith(archive.SOURCES + name) for each in members):
+                how = f"install that version, which is not in it, and add {FLAG} {name}"
             raise ExperimentError(f"plug-in {name}: {why}: if you trust it, {how}")
     allow_references(references(experiment))
     return experiment

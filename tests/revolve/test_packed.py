@@ -157,8 +157,14 @@ def test_a_file_is_packed_with_the_settings_that_apply_to_it(
         ("gone.yaml out.robot", "gone.yaml: cannot be read: No such file"),
         ("{run} out.robot --robot 2:1", "has no birth 1 on island 2"),
         ("{run} out.robot --robot best-evr", "must be BIRTH or ISLAND:BIRTH"),
-        ("{run} out.robot --experiment scenario1", "--robot is for a run folder, --ex"),
-        ("{run}/best.yaml out.robot --robot 3", "--robot is for a run folder, --exper"),
+        (
+            "{run} out.robot --experiment scenario1",
+            "--robot is for a run, --experi",
+        ),
+        (
+            "{run}/best.yaml out.robot --robot 3",
+            "--robot is for a run, --experi",
+        ),
         ("{run}/best.yaml out.robot --experiment scenaro1", "did you mean 'scenario1'"),
         (". out.robot", ".: no run is there (run.json is missing)"),
         (

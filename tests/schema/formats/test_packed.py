@@ -16,6 +16,7 @@ from schema.experiment.file import read_experiment
 from schema.formats.files import read_robot, settings_of, types_for, write_robot
 from schema.formats.packed import packed_robot
 from schema.formats.run_settings import read_with_settings
+from schema.limits import MOST_PLUGIN_BYTES
 from schema.plugins import permission
 from schema.plugins.permission import allow, import_allowed
 from schema.robot.archive import RobotOrigin, archive_bytes, read_archive
@@ -215,7 +216,7 @@ def judge(trace):
 """
 
 
-def lab(source: Path, number: float, monkeypatch: pytest.MonkeyPatch) -> Path:
+def lab(source: Path, number: object, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a packed robot with a plug-in and its data file, which are gone."""
     source.parent.mkdir(exist_ok=True)
     source.write_text(LAB.format(number))
@@ -247,6 +248,20 @@ def test_code_is_imported_only_if_it_is_allowed(
     allow([str(file)])  # is not in use as another source
     assert read_with_settings(file, None)[2] is not None
     assert import_allowed(name).NUMBERS == "12"
+
+
+def test_a_large_plug_in_is_not_in_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "packed_large.py"
+    file = lab(source, f'"{"x" * MOST_PLUGIN_BYTES}"', monkeypatch)
+    assert [*members(file.read_bytes())] == MEMBERS
+    rule = "install that version, which is not in it, and add --plugins packed_large"
+    with pytest.raises(ExperimentError, match=rule):
+        read_with_settings(file, None)
+    source.write_text(LAB.format(f'"{"x" * MOST_PLUGIN_BYTES}"'))
+    allow([str(source)])
+    assert read_with_settings(file, None)[2] is not None
 
 
 def test_other_code_of_the_same_name_is_not_taken(
