@@ -31,7 +31,7 @@ _HOMES = {
     "Genome": "revolve.genome",
     "Experiment": "revolve.experiment",
     "Result": "revolve.evaluation",
-    "Trace": "revolve.trace",
+    "Trace": "schema.robot.trace",
     "evaluate": "revolve.evaluation",
     "simulate": "revolve.evaluation",
     "vet": "revolve.bodies",

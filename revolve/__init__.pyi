@@ -15,7 +15,6 @@ from revolve.runs import Run as Run
 from revolve.runs import read as read
 from revolve.runs import resume as resume
 from revolve.runs import run as run
-from revolve.trace import Trace as Trace
 from schema.errors import ExperimentError as ExperimentError
 from schema.errors import FitnessUndefined as FitnessUndefined
 from schema.errors import InvalidRobot as InvalidRobot
@@ -66,6 +65,7 @@ from schema.robot.genome import NeuronGene as NeuronGene
 from schema.robot.neurons import Tick as Tick
 from schema.robot.results import Report as Report
 from schema.robot.robot import Part as Part
+from schema.robot.trace import Trace as Trace
 from schema.wire.operator import ArenaListing as ArenaListing
 from schema.wire.operator import ListedRobot as ListedRobot
 

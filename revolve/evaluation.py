@@ -1,18 +1,26 @@
 """Simulation and evaluation of single robots."""
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from msgspec.structs import replace
+
+from revolve.arguments import whole_number
 from revolve.children import SIMULATOR
 from revolve.experiment import Experiment, document_of
 from revolve.robot import DEFAULT, Robot, plain, task_of
-from revolve.trace import Trace, unpack_trace
-from schema.errors import SimulationDiverged
+from schema.errors import ExperimentError, SimulationDiverged, shown
 from schema.experiment.document import island_experiment
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.limits import MOST_TRIAL
+from schema.plugins.needs import check_channels
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
+from schema.robot.trace import Trace
+from schema.wire.trace import unpack_trace
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +34,9 @@ class Result:
         simulated_s: simulated time [s].
         measures: named numbers of the experiment.
         failure: why there is no fitness; empty if there is one.
-        trace: recording of the robot; None from a fleet, or if the simulation failed.
-            With ``[robust]`` it is that of a simulation without disturbances, which
-            did not give the fitness.
+        trace: recording of the robot; None if the simulation failed, or from a fleet
+            that was not asked for it. With ``[robust]`` it is that of a simulation
+            without disturbances, which did not give the fitness.
     """
 
     fitness: float | None = None
@@ -41,7 +49,11 @@ class Result:
 
 
 def evaluate(
-    robot: Robot | PlainRobot, experiment: Experiment | str | Path | None = None
+    robot: Robot | PlainRobot,
+    experiment: Experiment | str | Path | None = None,
+    *,
+    trial: int = 0,
+    record: Sequence[str] = (),
 ) -> Result:
     """Return the evaluation of a robot: a function of the arguments alone.
 
@@ -54,6 +66,11 @@ def evaluate(
         robot: to evaluate.
         experiment: whose simulation and fitness apply, those of island 0; None: the
             robot's own, else ``scenario1``.
+        trial: number of the evaluation, 0 to 1,000,000: each has noise, pushes and
+            disturbances of its own. Without any, all trials are equal.
+        record: names of channels that the trace has beside those that the experiment's
+            functions declare, such as ``"joint_angle"``; see ``Trace``. They change no
+            result.
 
     Returns:
         The result. Diverged physics, an undefined fitness and a crash are results with
@@ -62,10 +79,12 @@ def evaluate(
     Raises:
         InvalidRobot: the robot is not well formed for this experiment.
         ExperimentError: an invalid experiment or plug-in, or a sensor that has no
-            stimulus in its environment.
+            stimulus in its environment; no such channel.
+        RevolveError: another trial.
     """
-    settings = settings_for(robot, experiment)
-    outcome = SIMULATOR.do(task_of(robot, settings, is_judged=True))
+    settings = settings_for(robot, experiment, record)
+    identity = outside_of_runs(trial)
+    outcome = SIMULATOR.do(task_of(robot, settings, identity, is_judged=True))
     trace = unpack_trace(outcome.trace, plain(robot)) if outcome.trace else None
     if outcome.failure:
         return Result(failure=outcome.failure, trace=trace)
@@ -74,38 +93,63 @@ def evaluate(
 
 
 def simulate(
-    robot: Robot | PlainRobot, experiment: Experiment | str | Path | None = None
+    robot: Robot | PlainRobot,
+    experiment: Experiment | str | Path | None = None,
+    *,
+    trial: int = 0,
+    record: Sequence[str] = (),
 ) -> Trace:
     """Return the recording of a robot that starts at the origin, alone.
 
     Args:
         robot: to simulate.
         experiment: as for ``evaluate``; its fitness is not computed.
+        trial: as for ``evaluate``.
+        record: as for ``evaluate``.
 
     Raises:
         SimulationDiverged: the physics diverged, a sensor of a plug-in failed, or the
             process crashed.
         InvalidRobot: as for ``evaluate``.
         ExperimentError: as for ``evaluate``.
+        RevolveError: as for ``evaluate``.
     """
-    settings = settings_for(robot, experiment)
-    outcome = SIMULATOR.do(task_of(robot, settings))
+    settings = settings_for(robot, experiment, record)
+    outcome = SIMULATOR.do(task_of(robot, settings, outside_of_runs(trial)))
     if outcome.trace is None:
         raise SimulationDiverged(outcome.failure)
     return unpack_trace(outcome.trace, plain(robot))
 
 
 def settings_for(
-    robot: Robot | PlainRobot | None, experiment: Experiment | str | Path | None
+    robot: Robot | PlainRobot | None,
+    experiment: Experiment | str | Path | None,
+    record: Sequence[str] = (),
 ) -> EvaluationSettings:
-    """Return the settings of an evaluation.
+    """Return the settings of an evaluation that records some channels.
 
     Raises:
-        ExperimentError: no such experiment or file, or an invalid document.
+        ExperimentError: no such experiment or file, or an invalid document; channels
+            that are not a list of names, or one that does not exist.
     """
+    given: object = record
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        raise ExperimentError(f"record: must be a list of names, got {shown(given)}")
+    check_channels("record", record)
     own = robot.experiment if isinstance(robot, Robot) else None
     document = document_of(experiment or own or DEFAULT)
-    return evaluation_settings_of(island_experiment(document, 0))
+    settings = evaluation_settings_of(island_experiment(document, 0))
+    return replace(settings, record=tuple(record)) if record else settings
+
+
+def outside_of_runs(trial: object) -> Identity:
+    """Return the identity of an evaluation of a robot that was born in no run.
+
+    Raises:
+        RevolveError: no whole number from 0 to ``MOST_TRIAL``.
+    """
+    number = whole_number("trial", trial, most=MOST_TRIAL)
+    return dataclasses.replace(NO_IDENTITY, trial=number)
 
 
 def result_of(

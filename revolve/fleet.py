@@ -6,7 +6,7 @@ import os
 import threading
 from argparse import Namespace
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from functools import lru_cache, partial
 from itertools import islice
@@ -23,7 +23,7 @@ from coordinator.run.requests import Expected, failure_of, read_answer, read_eva
 from revolve.arguments import in_order, naming_arguments, whole_number
 from revolve.children import Workers
 from revolve.engine import Engine, WantedJob
-from revolve.evaluation import Result, result_of, settings_for
+from revolve.evaluation import Result, outside_of_runs, result_of, settings_for
 from revolve.experiment import Experiment
 from revolve.robot import Robot, checked
 from schema.agent.command import connect_of, name_at, tls_of
@@ -41,7 +41,8 @@ from schema.plugins.source import forget_digests
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
 from schema.wire.calls import call_settings, pack_value, unpack_value
-from schema.wire.messages import Answer, Call, CallValue, Evaluate, Failure
+from schema.wire.messages import Answer, Call, CallValue, Evaluate, Failure, Traced
+from schema.wire.trace import unpack_trace
 
 T = TypeVar("T")
 
@@ -166,30 +167,44 @@ class Fleet:
         self,
         robot: Robot | PlainRobot,
         experiment: Experiment | str | Path | None = None,
+        *,
+        trial: int = 0,
+        record: Sequence[str] = (),
+        trace: bool = False,
     ) -> "Future[Result]":
         """Start the evaluation of a robot.
 
         Args:
             robot: to evaluate.
             experiment: as for ``revolve.evaluate``.
+            trial: as for ``revolve.evaluate``.
+            record: as for ``revolve.evaluate``; the result has its trace, then.
+            trace: whether the result has its trace in any case.
 
         Returns:
-            A future of the result, without trace; see ``revolve.evaluate``. A robot
-            that ends its process three times has a result with that failure. The
-            future raises ``RevolveError`` if several workers cannot do such a job, or
-            no worker is left.
+            A future of the result; see ``revolve.evaluate``. A robot that ends its
+            process three times has a result with that failure. The future raises
+            ``RevolveError`` if several workers cannot do such a job, or no worker is
+            left.
 
         Raises:
             InvalidRobot: the robot is not well formed for this experiment.
-            ExperimentError: no such experiment or file, or an invalid document.
-            RevolveError: the fleet is closed or not open.
+            ExperimentError: no such experiment or file, or an invalid document; no such
+                channel.
+            RevolveError: the fleet is closed or not open; another trial.
         """
-        return self._submit(robot, settings_for(robot, experiment))
+        identity = outside_of_runs(trial)
+        settings = settings_for(robot, experiment, record)
+        return self._submit(robot, settings, identity, is_traced=trace)
 
     def evaluate(
         self,
         robots: Iterable[Robot | PlainRobot],
         experiment: Experiment | str | Path | None = None,
+        *,
+        trials: Iterable[int] = (0,),
+        record: Sequence[str] = (),
+        trace: bool = False,
     ) -> Iterator[Result]:
         """Evaluate robots; return their results in the same order.
 
@@ -200,18 +215,29 @@ class Fleet:
         Args:
             robots: to evaluate.
             experiment: as for ``revolve.evaluate``.
+            trials: numbers of the evaluations of each robot, as ``trial`` of
+                ``revolve.evaluate``; the results of one robot follow each other in
+                their order.
+            record: as for ``submit``.
+            trace: as for ``submit``.
 
         Raises:
             InvalidRobot: as for ``submit``; from the iterator, too.
             ExperimentError: as for ``submit``.
-            RevolveError: robots without an order, as a set; as for ``submit`` and its
-                future.
+            RevolveError: robots or trials without an order, as a set; no trial; as for
+                ``submit`` and its future.
         """
         robots = in_order("robots", robots)
-        if experiment is None:
-            return self._in_order(self.submit(robot) for robot in robots)
-        settings = settings_for(None, experiment)
-        return self._in_order(self._submit(robot, settings) for robot in robots)
+        identities = [outside_of_runs(each) for each in in_order("trials", trials)]
+        if not identities:
+            raise RevolveError("trials: must be one or more numbers, got none")
+        named = None if experiment is None else settings_for(None, experiment, record)
+        return self._in_order(
+            self._submit(robot, settings, identity, is_traced=trace)
+            for robot in robots
+            for settings in [named or settings_for(robot, None, record)]
+            for identity in identities
+        )
 
     def map(
         self, function: str | Callable[[Any], Any], items: Iterable[object]
@@ -262,13 +288,16 @@ class Fleet:
         robot: Robot | PlainRobot,
         settings: EvaluationSettings,
         identity: Identity = NO_IDENTITY,
+        *,
+        is_traced: bool = False,
     ) -> "Future[Result]":
         plain = checked(robot, types_of(settings))
-        work = Evaluate(identity.birth, plain, identity.trial)
+        is_traced = bool(is_traced or settings.record)
+        work = Evaluate(identity.birth, plain, identity.trial, is_traced=is_traced)
         data, simulated_s = _job_of(settings)
         measures = len(settings.measures.names)
-        read = partial(read_evaluation, measures=measures)
-        settle = partial(_settle, settings=settings)
+        read = partial(read_evaluation, measures=measures, is_traced=is_traced)
+        settle = partial(_settle, settings=settings, robot=plain)
         return self._order(
             WantedJob(
                 "evaluate", work, data, read, settle, simulated_s, identity.origin
@@ -337,17 +366,22 @@ def _job_of(settings: EvaluationSettings) -> tuple[bytes, float]:
     return msgspec.json.encode(settings), simulated_s
 
 
-def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
+def _settle(end: Deliver, settings: EvaluationSettings, robot: PlainRobot) -> Result:
     """Return the result that the end of an evaluation gives."""
     if end.is_deadly:
         return Result(failure=f"{QUARANTINED}{end.reason}")
     if end.reason:
         raise refusal(end)
     assert isinstance(end.answer, Answer)
-    outcome = end.answer.result
+    outcome: object = end.answer.result
+    trace = None
+    if isinstance(outcome, Traced):
+        if outcome.trace is not None:
+            trace = unpack_trace(outcome.trace, robot)
+        outcome = outcome.outcome
     if isinstance(outcome, Evaluation):
-        return result_of(outcome, settings)
-    return Result(failure=failure_of(outcome))
+        return result_of(outcome, settings, trace)
+    return Result(failure=failure_of(outcome), trace=trace)
 
 
 def _path_of(function: str | Callable[[Any], Any]) -> str:

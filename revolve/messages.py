@@ -3,10 +3,11 @@
 import msgspec
 
 import schema.errors
-from revolve.trace import PackedTrace
 from schema.errors import RevolveError, error_text
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
+from schema.wire.messages import PackedTrace
 
 
 class Problem(msgspec.Struct, frozen=True):
@@ -23,6 +24,7 @@ class Task(msgspec.Struct, frozen=True):
         settings: JSON of ``EvaluationSettings``.
         is_judged: compute the fitness, too.
         size: width and height of a picture [pixels], instead of a simulation.
+        identity: of the evaluation, which noise depends on.
     """
 
     settings: bytes
@@ -30,6 +32,7 @@ class Task(msgspec.Struct, frozen=True):
     plugins: tuple[str, ...]
     is_judged: bool = False
     size: tuple[int, int] | None = None
+    identity: Identity = NO_IDENTITY
 
 
 class Outcome(msgspec.Struct, frozen=True):

@@ -23,6 +23,7 @@ from schema.errors import (
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment as Document
 from schema.experiment.document import island_experiment
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import settings_of, types_for, write_bytes, write_robot
 from schema.formats.packed import packed_robot
@@ -102,7 +103,7 @@ class Robot:
             raise InvalidRobot(str(error)) from None
         if own is None and settings != settings_of(None):
             sections = msgspec.structs.asdict(settings)
-            del sections["ablation"]
+            del sections["ablation"], sections["record"]
             own = Document(name=file.stem, **sections)
         is_packed = file.suffix.lower() == PACKED and named is None
         origin = read_archive(file)[0].origin if is_packed else None
@@ -275,6 +276,7 @@ def checked(
 def task_of(
     robot: Robot | PlainRobot,
     settings: EvaluationSettings,
+    identity: Identity = NO_IDENTITY,
     *,
     is_judged: bool = False,
     size: tuple[int, int] | None = None,
@@ -288,7 +290,7 @@ def task_of(
     types = types_for(settings) if size else types_of(settings)
     plainly = checked(robot, types)
     data = msgspec.json.encode(settings)
-    return Task(data, plainly, allowed(), is_judged, size)
+    return Task(data, plainly, allowed(), is_judged, size, identity)
 
 
 def _settings(experiment: Experiment | None) -> EvaluationSettings:

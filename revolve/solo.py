@@ -7,12 +7,12 @@ import msgspec
 
 from analysis.extras import extra
 from revolve.messages import Outcome, Task, problem_of
-from revolve.trace import pack_trace
-from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
+from schema.errors import SensorFailed, SimulationDiverged
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot, check_types
+from schema.wire.trace import pack_trace
 
 _TASKS = msgspec.msgpack.Decoder(Task)
 
@@ -33,7 +33,7 @@ def _done(task: Task) -> Outcome:
         from analysis.render.stage import choose_engine  # noqa: PLC0415
 
         choose_engine()
-    from worker.robot.evaluation import evaluate, judge, simulate  # noqa: PLC0415
+    from worker.robot.evaluation import evaluate_traced, simulate  # noqa: PLC0415
     from worker.serve.checks import checked_evaluation  # noqa: PLC0415
 
     # Before the robot, whose neurons may be those of a plug-in.
@@ -42,23 +42,18 @@ def _done(task: Task) -> Outcome:
     check_types(robot, body_space(settings.space))
     if task.size is not None:
         return Outcome(picture=_picture(robot, settings, task.size))
-    trace = evaluation = None
-    failure = ""
-    is_disturbed = task.is_judged and settings.robust is not None
-    try:
-        if is_disturbed:
-            evaluation = evaluate(robot, settings)
-        else:
-            trace = simulate(robot, settings)
-            evaluation = judge(trace, settings) if task.is_judged else None
-    except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
-        failure = str(error)
-    if is_disturbed:
-        # The trace has no part in the fitness, and may be of another outcome.
-        with suppress(SimulationDiverged, SensorFailed):
-            trace = simulate(robot, settings)
+    if task.is_judged:
+        outcome, trace = evaluate_traced(robot, settings, task.identity)
+    else:
+        outcome = ""
+        try:
+            trace = simulate(robot, settings, identity=task.identity)
+        except (SimulationDiverged, SensorFailed) as error:
+            outcome, trace = str(error), None
     packed = None if trace is None else pack_trace(trace)
-    return Outcome(packed, evaluation, failure)
+    if isinstance(outcome, str):
+        return Outcome(packed, failure=outcome)
+    return Outcome(packed, outcome)
 
 
 def _picture(

@@ -32,6 +32,8 @@ ADVANCE_REQUEST_BYTES = 256 * MIB
 """A request about an arena; it may contain a snapshot and a history."""
 ANSWER_BYTES = 16 * KIB
 """An answer about one robot, without the intersections of its report."""
+TRACE_BYTES = 256 * MIB
+"""An answer with the trace of a robot."""
 VALUE_BYTES = 1 * MIB
 """The argument or the value of a call of a user's function."""
 PAIR_BYTES = 16
@@ -68,6 +70,8 @@ MOST_TOUCHES = 500_000
 """Pairs of robots that touch in one advance."""
 MOST_MEASURES = 100
 """Measures of an experiment; an answer has the number of each."""
+MOST_TRIAL = 1_000_000
+"""Greatest number of a robot's evaluation that a user may name."""
 MOST_PIXELS = 4096
 """Width or height of a picture of a robot."""
 

@@ -199,4 +199,5 @@ def functions_of(settings: EvaluationSettings | ArenaSettings) -> Functions:
     """
     fitness, measures = load_fitness(settings.fitness), measures_of(settings.measures)
     functions = [fitness.function, *(each.function for each in measures)]
-    return Functions(fitness, measures, channels_of(functions))
+    record = settings.record if isinstance(settings, EvaluationSettings) else ()
+    return Functions(fitness, measures, channels_of(functions, record))

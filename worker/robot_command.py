@@ -1,14 +1,18 @@
 """``revolve robot simulate``: simulate and evaluate the robot of a file."""
 
+import dataclasses
+from functools import partial
 from pathlib import Path
 
 from msgspec.structs import replace
 
-from schema.agent.flags import Flags, add_plugins, add_settings
+from schema.agent.flags import Flags, add_plugins, add_settings, whole_number
 from schema.agent.terminal.progress_line import progress_if_long
 from schema.errors import counted, rounded
+from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.run_settings import read_with_settings, tell
+from schema.limits import MOST_TRIAL
 from schema.plugins.permission import allow
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
@@ -32,7 +36,7 @@ def main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
     robot, settings = _read(options.file, options.experiment, options.island)
-    found = _evaluate(robot, settings)
+    found = _evaluate(robot, settings, options.trial)
     labels = settings.measures.labels
     for name, value, unit in (
         ("fitness", found.fitness, ""),
@@ -47,11 +51,11 @@ def main(arguments: list[str]) -> int:
         # All digits, for comparisons of two runs.
         print(f"{name + ':':19}{value!r}{unit}")
     if options.robustness:
-        _show_robustness(robot, settings, found.fitness)
+        _show_robustness(robot, settings, found.fitness, options.trial)
     return 0
 
 
-def _evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
+def _evaluate(robot: Robot, settings: EvaluationSettings, trial: int) -> Evaluation:
     """Return the evaluation of a robot; show progress if it takes long."""
     clock = settings.simulation
     all_s = f"{clock.evaluation_steps * clock.timestep_s:g} s"
@@ -60,20 +64,22 @@ def _evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
         return evaluate(
             robot,
             settings,
+            dataclasses.replace(NO_IDENTITY, trial=trial),
             watch=lambda data: tell_progress(f"simulated {data.time:.1f} of {all_s}"),
         )
 
 
 def _show_robustness(
-    robot: Robot, settings: EvaluationSettings, fitness: float
+    robot: Robot, settings: EvaluationSettings, fitness: float, trial: int
 ) -> None:
     """Print the robot's fitness under each small change, then one line of all."""
     if settings.robust is not None:
         settings = replace(settings, robust=None)
-        fitness = _evaluate(robot, settings).fitness
+        fitness = _evaluate(robot, settings, trial).fitness
         print(f"{'undisturbed:':26}{rounded(fitness)}")
     kept: list[float | None] = []
-    for change, changed in rejudge(robot, small_changes(settings), _evaluate):
+    again = partial(_evaluate, trial=trial)
+    for change, changed in rejudge(robot, small_changes(settings), again):
         print(f"{change.name + ':':26}{_share(changed, fitness)}", flush=True)
         kept.append(changed)
     print(summary(fitness, kept))
@@ -137,6 +143,14 @@ def parser(_command: str = "robot simulate") -> Flags:
         action="store_true",
         help="evaluate it again with finer time steps, 1 %% less friction and starts "
         "raised by about 0.1 mm, and show how much of its fitness it keeps",
+    )
+    flags.add_argument(
+        "--trial",
+        type=whole_number(0, MOST_TRIAL),
+        default=0,
+        metavar="N",
+        help="number of the evaluation, from 0: each has noise, pushes and "
+        "disturbances of its own (default: 0)",
     )
     add_plugins(flags)
     return flags

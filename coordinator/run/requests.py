@@ -35,13 +35,23 @@ from schema.limits import (
     LONGEST_REASON,
     MOST_PAIRS,
     PAIR_BYTES,
+    TRACE_BYTES,
     printable,
 )
 from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.codec import decode, encode
-from schema.wire.messages import Answer, Evaluate, Failure, Request, Result, Vet
+from schema.wire.messages import (
+    Answer,
+    Evaluate,
+    Failure,
+    Request,
+    Result,
+    Traced,
+    Vet,
+)
+from schema.wire.trace import check_trace
 
 VETTING_BYTES = ANSWER_BYTES + MOST_PAIRS * PAIR_BYTES
 
@@ -149,18 +159,25 @@ def read_vetting(data: bytes, *, expected: Expected) -> Answer:
     return answer
 
 
-def read_evaluation(data: bytes, *, expected: Expected, measures: int = 0) -> Answer:
-    """Return the decoded answer to an evaluation: an evaluation or a failure.
+def read_evaluation(
+    data: bytes, *, expected: Expected, measures: int = 0, is_traced: bool = False
+) -> Answer:
+    """Return the decoded answer to an evaluation, traced if that is wanted.
 
     ``expected``: epoch and number of the job.
 
     Raises:
-        MalformedMessage: not an answer, the answer to another request, or another
-            number of measures.
+        MalformedMessage: not an answer, the answer to another request, another number
+            of measures, or a trace whose arrays do not fit their shapes.
     """
-    answer = read_answer(data, expected, Evaluation, ANSWER_BYTES)
-    if isinstance(answer.result, Evaluation):
-        check_count(answer.result.measures, measures)
+    kind, most = (Traced, TRACE_BYTES) if is_traced else (Evaluation, ANSWER_BYTES)
+    answer = read_answer(data, expected, kind, most)
+    result = answer.result
+    outcome = result.outcome if isinstance(result, Traced) else result
+    if isinstance(result, Traced) and result.trace is not None:
+        check_trace(result.trace)
+    if isinstance(outcome, Evaluation):
+        check_count(outcome.measures, measures)
     return answer
 
 

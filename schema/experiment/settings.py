@@ -83,9 +83,11 @@ class Ablation(Section, frozen=True):
 
 
 class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
-    """Settings of an evaluation request; an experiment has all but ``ablation``.
+    """Settings of an evaluation request.
 
-    The hash is computed once, so that workers can look up what they made of settings.
+    An experiment has all but ``ablation`` and ``record``: channels of the trace beside
+    those that its functions declare. The hash is computed once, so that workers can
+    look up what they made of settings.
     """
 
     space: Space
@@ -97,6 +99,7 @@ class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
     robust: Robust | None = None
     calibration: tuple[Calibration, ...] = ()
     ablation: Ablation | None = None
+    record: tuple[str, ...] = ()
 
     @cached_property
     def light(self) -> Vector | None:

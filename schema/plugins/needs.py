@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from schema.errors import ExperimentError, nearest, shown
-from schema.robot.trace import COMPUTED, CONSTANT, RECORDED
+from schema.robot.trace import COMPUTED, CONSTANT, DERIVED, RECORDED
 
 _Function = TypeVar("_Function", bound=Callable[..., float])
 _ATTRIBUTE = "__revolve_needs__"
@@ -16,11 +16,7 @@ def needs(*channels: str) -> Callable[[_Function], _Function]:
     Raises:
         ExperimentError: no such channel.
     """
-    known = (*RECORDED, *COMPUTED, *CONSTANT)
-    for name in channels:
-        if name not in known:
-            hint = f"{nearest(name, known)}; channels: {', '.join(known)}"
-            raise ExperimentError(f"needs: {shown(name)} is not a channel{hint}")
+    check_channels("needs", channels)
 
     def declare(function: _Function) -> _Function:
         setattr(function, _ATTRIBUTE, channels)
@@ -29,7 +25,28 @@ def needs(*channels: str) -> Callable[[_Function], _Function]:
     return declare
 
 
-def channels_of(functions: Iterable[Callable[..., Any]]) -> tuple[str, ...]:
-    """Return the channels that exist only for some functions, in their fixed order."""
+def check_channels(where: str, names: Iterable[str]) -> None:
+    """Raise unless all names are those of channels.
+
+    Raises:
+        ExperimentError: no such channel; the nearest is named.
+    """
+    known = (*RECORDED, *COMPUTED, *CONSTANT)
+    for name in names:
+        if name not in known:
+            hint = f"{nearest(str(name), known)}; channels: {', '.join(known)}"
+            raise ExperimentError(f"{where}: {shown(name)} is not a channel{hint}")
+
+
+def channels_of(
+    functions: Iterable[Callable[..., Any]], record: Iterable[str] = ()
+) -> tuple[str, ...]:
+    """Return the channels that exist only for some functions, in their fixed order.
+
+    ``record`` names further ones.
+    """
     wanted = {name for each in functions for name in getattr(each, _ATTRIBUTE, ())}
+    wanted.update(record)
+    for name in wanted & DERIVED.keys():
+        wanted.update(DERIVED[name])
     return tuple(name for name in (*RECORDED, *COMPUTED) if name in wanted)

@@ -25,10 +25,14 @@ RECORDED = (
     "contact",
     "readings",
     "neighbours",
+    "outputs",
+    "commands",
 )
 """Channels with a value per sample, which exist only if a function declares them."""
-COMPUTED = ("part_position",)
-"""Channels with one value, which exist only if a function declares them."""
+COMPUTED = ("part_position", "part_poses")
+"""Channels that are computed at the end, if a function declares them."""
+DERIVED = {"part_poses": ("core_attitude", "joint_angle")}
+"""Channels that a channel is computed from: who declares it declares these, too."""
 CONSTANT = ("light", "robot", "mass", "gravity")
 """Channels with one value, which always exist; they may be declared, too."""
 NEIGHBOUR_M = 0.5
@@ -112,6 +116,32 @@ class Trace:
     def neighbours(self) -> Counts:
         """(T,) number of robots whose core is within ``NEIGHBOUR_M``; 0 off-line."""
         return cast("Counts", self._channel("neighbours"))
+
+    @property
+    def outputs(self) -> Floats:
+        """(T, O) outputs of the brain at its last tick, one per motor, in part order.
+
+        Unclipped, without noise; 0 to 1 is a motor's range. Off-line there is no tick
+        at the end: the last sample has the outputs of the tick before.
+        """
+        return cast("Floats", self._channel("outputs"))
+
+    @property
+    def commands(self) -> Floats:
+        """(T, O) commanded velocities of the motors since the last tick [rad/s or m/s].
+
+        After clipping, noise and faults; off-line at the end as ``outputs``.
+        """
+        return cast("Floats", self._channel("commands"))
+
+    @property
+    def part_poses(self) -> Floats:
+        """(T, P, 7) origin x, y, z [m] and quaternion w, x, y, z of each part, world.
+
+        The quaternion is part to world frame. Of a part with a joint it is the pose of
+        the half that is fixed to the parent.
+        """
+        return cast("Floats", self._channel("part_poses"))
 
     @property
     def part_position(self) -> Floats:

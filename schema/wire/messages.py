@@ -3,7 +3,7 @@
 The classes that the state machines handle are those that travel.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -18,7 +18,9 @@ from schema.limits import (
     MOST_SHARDS,
     MOST_SLOTS,
     VALUE_BYTES,
+    Finite,
 )
+from schema.parts import Vector
 from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.results import Evaluation, Report, WallTime
 from schema.robot.robot import Robot
@@ -54,6 +56,7 @@ class Evaluate(Message, frozen=True, tag="evaluate"):
         trial: number of the evaluation of this robot, from 0.
         steps: physics steps to simulate; 0 for the duration of the experiment.
         requester: island that requests it; None for the island of its birth.
+        is_traced: the answer has the trace, too.
     """
 
     birth: BirthId
@@ -61,6 +64,7 @@ class Evaluate(Message, frozen=True, tag="evaluate"):
     trial: Count = 0
     steps: Count = 0
     requester: IslandNumber | None = None
+    is_traced: bool = False
 
 
 class Call(Message, frozen=True, tag="call"):
@@ -122,7 +126,50 @@ class CallValue(Message, frozen=True, tag="value"):
     value: Packed
 
 
-Result = Report | Evaluation | Advance | CallValue | Failure | StateMissing
+class Array(Message, frozen=True):
+    """Array of numbers.
+
+    Attributes:
+        shape: length of each axis.
+        kind: type of the numbers, as NumPy names it.
+        data: the numbers, in row-major order.
+    """
+
+    shape: tuple[Count, ...]
+    kind: Literal["<f8", "<i8", "|b1"]
+    data: bytes
+
+
+class PackedTrace(Message, frozen=True):
+    """Trace without its robot.
+
+    Attributes:
+        interval_s: time between two samples [s].
+        core_position: (T, 3) of the core's centre, world frame [m].
+        arrays: other channels, by name.
+        constants: channels that are a number or a place, by name.
+    """
+
+    interval_s: Finite
+    core_position: Array
+    arrays: dict[str, Array]
+    # Not Finite: with a constraint beside a tuple, msgspec 0.22 crashes.
+    constants: dict[str, float | Vector | None]
+
+
+class Traced(Message, frozen=True, tag="traced"):
+    """Outcome of an evaluation, with its trace.
+
+    Attributes:
+        outcome: evaluation, or why there is none.
+        trace: recording; None if the simulation failed.
+    """
+
+    outcome: Evaluation | Failure
+    trace: PackedTrace | None
+
+
+Result = Report | Evaluation | Traced | Advance | CallValue | Failure | StateMissing
 
 
 class Answer(Message, frozen=True):

@@ -14,7 +14,9 @@ import revolve as rv
 from revolve.children import SIMULATOR
 from revolve.experiment import document_of
 from revolve.robot import plain
+from schema.experiment.identity import NO_ORIGIN, Identity
 from schema.experiment.settings import evaluation_settings_of
+from schema.robot.ids import NOBODY
 from tests.own_brains import write_module
 from tests.system.workspace import Workspace
 from worker.robot.evaluation import evaluate as evaluate_here
@@ -46,11 +48,13 @@ def _wide_robot(experiment: rv.Experiment) -> rv.Robot:
     return rv.Robot(robot.parts, rv.Brain((*kept, *added), edges), experiment)
 
 
-def _by_command(robot: rv.Robot, experiment: rv.Experiment, folder: Path) -> float:
+def _by_command(
+    robot: rv.Robot, experiment: rv.Experiment, folder: Path, *flags: str
+) -> float:
     """Return the fitness that the command prints with all digits."""
     robot.write(folder / "robot.yaml")
     (folder / "mine.toml").write_text(experiment.to_toml())
-    words = ("robot", "simulate", "robot.yaml", "--experiment", "mine.toml")
+    words = ("robot", "simulate", "robot.yaml", "--experiment", "mine.toml", *flags)
     found = re.search(r"^fitness: +(\S+)$", Workspace(folder).run(*words), re.MULTILINE)
     assert found
     return float(found[1])
@@ -84,6 +88,75 @@ def test_trace_gives_the_velocities_of_the_result() -> None:
     assert result.straight_velocity == pytest.approx(straight, rel=1e-12)
     again = rv.simulate(robot, "scenario1")
     assert np.array_equal(again.core_position, trace.core_position)
+
+
+NOISY = rv.Experiment.from_toml(
+    'name = "noisy"\n[simulation]\nwindow_steps = 400\nactuator_noise = 0.2\n'
+)
+
+
+def test_trials_draw_noise_anew_and_the_first_is_that_of_the_command(
+    tmp_path: Path,
+) -> None:
+    robot = rv.Robot.random(NOISY, seed=5)
+    trials = [rv.evaluate(robot, trial=trial) for trial in range(3)]
+    settings = evaluation_settings_of(document_of(NOISY))
+    for trial, result in enumerate(trials):
+        identity = Identity(NO_ORIGIN, NOBODY, trial)
+        assert result.fitness == evaluate_here(plain(robot), settings, identity).fitness
+    assert rv.evaluate(robot) == trials[0]
+    assert len({result.fitness for result in trials}) == 3
+    assert trials[0].fitness == _by_command(robot, NOISY, tmp_path)
+    assert trials[2].fitness == _by_command(robot, NOISY, tmp_path, "--trial", "2")
+    trace = rv.simulate(robot, trial=2)
+    assert np.array_equal(trace.core_position, trials[2].trace.core_position)  # type: ignore[union-attr]
+
+
+def test_channels_are_recorded_on_demand_and_change_nothing() -> None:
+    robot = rv.Robot.random(NOISY, seed=5)
+    names = ["joint_angle", "outputs", "commands", "part_poses"]
+    trace, plain_trace = rv.simulate(robot, record=names), rv.simulate(robot)
+    assert np.array_equal(trace.core_position, plain_trace.core_position)
+    samples, motors = len(trace.core_position), robot.brain.count("output")
+    assert trace.outputs.shape == trace.commands.shape == (samples, motors)
+    assert trace.part_poses.shape == (samples, len(robot.parts), 7)
+    assert np.array_equal(trace.part_poses[:, 0, :3], trace.core_position)
+    with pytest.raises(rv.ExperimentError, match=r"trace\.outputs is not recorded"):
+        _ = plain_trace.outputs
+    judged = rv.evaluate(robot, record=names)
+    assert judged == rv.evaluate(robot)
+    assert judged.trace is not None
+    assert np.array_equal(judged.trace.part_poses, trace.part_poses)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ({"record": "outputs"}, "record: must be a list of names, got 'outputs'"),
+        ({"record": 5}, "record: must be a list of names, got 5"),
+        ({"record": {"outputs"}}, "record: must be a list of names, got {'outputs'}"),
+        (
+            {"record": ["output"]},
+            "record: 'output' is not a channel; did you mean 'out",
+        ),
+        ({"record": ["energy", 3]}, "record: 3 is not a channel; channels: core_att"),
+        ({"trial": -1}, "trial: must be a whole number from 0 to 1000000, got -1"),
+        ({"trial": 2.0}, "trial: must be a whole number from 0 to 1000000, got 2.0"),
+        ({"trial": True}, "trial: must be a whole number from 0 to 1000000, got True"),
+        (
+            {"trial": 10**7},
+            "trial: must be a whole number from 0 to 1000000, got 1000",
+        ),
+        ({"trial": "1"}, "trial: must be a whole number from 0 to 1000000, got '1'"),
+    ],
+)
+def test_mistakes_of_trials_and_channels(words: dict[str, Any], line: str) -> None:
+    robot = rv.Robot.random(NOISY, seed=5)
+    for function in (rv.evaluate, rv.simulate):
+        with pytest.raises(rv.RevolveError) as caught:
+            function(robot, **words)
+        assert str(caught.value).startswith(line)
+        assert "\n" not in str(caught.value)
 
 
 def test_robot_without_experiment_may_have_any_built_in_neuron(tmp_path: Path) -> None:

@@ -59,6 +59,70 @@ def test_results_are_in_order_and_equal_those_of_one_process(fleet: rv.Fleet) ->
     assert future.done()
 
 
+def test_trials_and_traces_equal_those_of_one_process(fleet: rv.Fleet) -> None:
+    noisy = SHORT.replace(
+        simulation={"actuator_noise": 0.2}, measures={"names": ["energy"]}
+    )
+    many = robots(3)
+    flags: dict[str, Any] = {"record": ["outputs", "part_poses", "contact"]}
+    results = fleet.evaluate(many, noisy, trials=[4, 0], trace=True, **flags)
+    for robot in many:
+        for trial in (4, 0):
+            result, alone = (
+                next(results),
+                rv.evaluate(robot, noisy, trial=trial, **flags),
+            )
+            assert result == alone
+            assert result.trace is not None
+            assert alone.trace is not None
+            assert result.trace.robot == alone.trace.robot
+            assert result.trace.channels.keys() == alone.trace.channels.keys()
+            for name in ("energy", *flags["record"]):
+                one, other = result.trace.channels[name], alone.trace.channels[name]
+                assert (one.dtype, one.tolist()) == (other.dtype, other.tolist())
+    assert next(results, None) is None
+    plainly, traced = (
+        fleet.submit(many[0], noisy, trace=each) for each in (False, True)
+    )
+    assert plainly.result(60).trace is None
+    assert traced.result(60).trace is not None
+
+
+def test_failed_evaluation_has_its_trace(fleet: rv.Fleet) -> None:
+    """The cost of transport needs gravity: there is no fitness, but a simulation."""
+    weightless = SHORT.replace(
+        simulation={"gravity": 0.0}, measures={"names": ["cost_of_transport"]}
+    )
+    (result,) = fleet.evaluate(robots(1), weightless, trace=True)
+    assert "needs simulation.gravity > 0" in result.failure
+    assert result.trace is not None
+    assert len(result.trace.core_position) == 11
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ({"trials": []}, "trials: must be one or more numbers, got none"),
+        (
+            {"trials": {1, 2}},
+            "trials: must be a list, or another iterable with an order",
+        ),
+        ({"trials": 5}, "trials: must be a list, or another iterable with an order"),
+        (
+            {"trials": [0, -1]},
+            "trial: must be a whole number from 0 to 1000000, got -1",
+        ),
+        ({"record": ["outputz"]}, "record: 'outputz' is not a channel; did you mean"),
+    ],
+)
+def test_mistakes_of_trials_and_channels(
+    fleet: rv.Fleet, words: dict[str, Any], line: str
+) -> None:
+    with pytest.raises(rv.RevolveError) as caught:
+        fleet.evaluate(robots(1), SHORT, **words)
+    assert str(caught.value).startswith(line)
+
+
 @pytest.mark.parametrize("taken", [0, 1])
 def test_rest_is_dropped_when_the_iterator_is_closed(
     fleet: rv.Fleet, taken: int

@@ -3,6 +3,7 @@
 test_many_kills.py kills more of them; these are processes as a user starts them.
 """
 
+import shutil
 import signal
 from pathlib import Path
 
@@ -24,6 +25,14 @@ actuator_noise = 0.05
 evaluation_s = [12.0, 14.0]
 [selection.reevaluation]
 interval = 5
+"""
+DRIVES = """import numpy as np, revolve as rv
+
+@rv.needs("outputs", "commands", "part_poses")
+def drive(trace):
+    height = trace.part_poses[:, :, 2].mean()
+    changes = np.abs(np.diff(trace.outputs, axis=0)).sum()
+    return float(height + changes + np.abs(trace.commands).sum())
 """
 
 
@@ -58,6 +67,34 @@ def test_killed_coordinator_resumes_to_the_same_births(
     kill_beyond(workspace.start("run", *words), folder, share * size(undisturbed))
     workspace.run("resume", "killed", "--workers", "2", "--quiet")
     assert compare(undisturbed, folder) == []
+
+
+@pytest.mark.parametrize("section", ["", "[arena]\nbirth_interval_s = 2.0\n"])
+def test_new_channels_in_measures_are_the_same_in_every_process(
+    workspace: Workspace, section: str
+) -> None:
+    """Off-line and in an arena, whose second half is done after a stop."""
+    (workspace.folder / "drives.py").write_text(DRIVES)
+    (workspace.folder / "drives.toml").write_text(
+        'name = "drives"\n[simulation]\nactuator_noise = 0.1\nwindow_steps = 200\n'
+        f'{section}[measures]\nnames = ["drives:drive"]\n'
+    )
+    words = ("run", "drives.toml", "--births", "24", "--quiet")
+    workspace.run(*words, "--in-process", "--out", "one")
+    workspace.run(*words, "--workers", "2", "--out", "two")
+    one, two = workspace.folder / "one", workspace.folder / "two"
+    assert compare(one, two) == []
+    table = "fitness" if section else "evaluations"
+    cells = read_table(one, table, ["measures"])["measures"].to_pylist()
+    values = [cell[0][1] for cell in cells if cell]
+    assert len({*values}) > 10
+    # As a kill leaves it: without the end of its journal.
+    journal = two / "journal.bin"
+    journal.write_bytes(journal.read_bytes()[: journal.stat().st_size // 2])
+    (two / "state").write_text("running")
+    shutil.rmtree(two / "tables")
+    workspace.run("resume", "two", "--workers", "2", "--quiet")
+    assert compare(one, two) == []
 
 
 @pytest.mark.long

@@ -79,6 +79,25 @@ def test_drawn_lengths_of_a_run_are_told_from_that_alone(simulated: Simulate) ->
         assert (told in shown.err) is is_told
 
 
+def test_trials_have_noise_of_their_own(simulated: Simulate) -> None:
+    noisy = "[simulation]\nwindow_steps = 400\nactuator_noise = 0.2"
+    words = [(), ("--trial", "0"), ("--trial", "1"), ("--trial", "1", "--robustness")]
+    plain, first, second, changed = (simulated(noisy, *each).out for each in words)
+    assert plain == first != second
+    assert changed.startswith(second)
+
+
+@pytest.mark.parametrize("trial", ["-1", "1.5", "x", "1000001", ""])
+def test_other_trials_are_refused(
+    simulated: Simulate, trial: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        simulated("", f"--trial={trial}")
+    said = capsys.readouterr().err
+    assert f"--trial: must be a whole number in 0..1000000, got {trial!r}" in said
+    assert said.count("\n") == 1
+
+
 def test_robustness_is_shown_by_change_and_in_one_line(simulated: Simulate) -> None:
     short = "[simulation]\nwindow_steps = 400"
     plain = simulated(short).out.splitlines()

@@ -17,6 +17,7 @@ from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.filters.filters import Filter, filtered_outputs, filtered_readings
 from worker.filters.noise import Noise
+from worker.measures import functions_of
 from worker.robot.banks import broken_rows
 from worker.robot.brains import Controls
 from worker.robot.own_sensors import Surroundings
@@ -37,6 +38,7 @@ class BatchedControllers:
         simulation = settings.simulation
         self._settings, self._controls = settings, controls
         self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
+        self._has_outputs = "outputs" in functions_of(settings).channels
         self._tick_steps = simulation.brain_steps
         self.broken: dict[int, str] = {}
         self.gather(())
@@ -60,6 +62,7 @@ class BatchedControllers:
         readings = np.concatenate([np.zeros((0, self._controls.width.inputs)), *rows])
         ages = (step - self._starts) // self._tick_steps
         outputs = self._outputs(self._bank, self._filters, step, readings, ages)
+        self._keep_outputs(robots)
         self.broken = broken_rows(self._bank, outputs)
         return outputs
 
@@ -68,6 +71,7 @@ class BatchedControllers:
         bank, filters = self._rows_of([robot])
         readings = robot.view.sensors.readings
         outputs = self._outputs(bank, filters, step, readings, 0.0)
+        self._keep_outputs([robot])
         robot.view.servos.drive(outputs[0])
         robot.states = bank.states[0]
         return broken_rows(bank, outputs).get(0, "")
@@ -91,7 +95,14 @@ class BatchedControllers:
     ) -> Floats:
         tick = step // self._tick_steps
         received = filtered_readings(filters, tick, readings)
-        return filtered_outputs(filters, tick, bank.step(received, ages))
+        self._unfiltered = bank.step(received, ages)
+        return filtered_outputs(filters, tick, self._unfiltered)
+
+    def _keep_outputs(self, robots: Sequence[ArenaRobot]) -> None:
+        """Note the outputs of brains at the last tick, if a channel records them."""
+        if self._has_outputs:
+            for robot, row in zip(robots, self._unfiltered, strict=True):
+                robot.outputs[:] = row[: len(robot.outputs)]
 
 
 def look(

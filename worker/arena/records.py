@@ -33,7 +33,7 @@ class Samples:
             places = [one.place for one in self._population.robots]
             number = self._population.robot_rows.rows[robot.birth]
             neighbours = self._neighbours(places)[number]
-            row = robot.view.row(robot.body.channels, neighbours)
+            row = robot.view.row(robot.body.channels, neighbours, robot.outputs)
         robot.window.add(step, robot.place, row)
 
     def add(self, step: int, state: Floats) -> None:
@@ -64,6 +64,8 @@ class Samples:
                 probe=probed[cluster.members.index(robot.birth)] if probed else None,
                 readings=robot.view.sensors.readings,
                 neighbours=neighbours[number],
+                outputs=robot.outputs,
+                commands=robot.view.ctrl,
             )
             robot.window.add(step, robot.place, row)
 

@@ -35,6 +35,7 @@ class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     """State of one robot: phenotype, physics, sensors, network, window.
 
     Attributes:
+        states: of its brain, then its outputs at the last tick if they are recorded.
         rows: recorded channels of its window; empty if none is needed.
         probe: numbers of its probe; empty without one.
     """
@@ -118,7 +119,7 @@ def _robot_state(robot: ArenaRobot) -> _RobotState:
         ctrl=_pack(view.ctrl),
         readings=_pack(sensors.readings),
         velocities=_pack(np.array(sensors.velocities)),
-        states=_pack(robot.states),
+        states=_pack(np.concatenate((robot.states, robot.outputs))),
         window=_pack(np.array(robot.window.positions)),
         place=robot.place,
         rows=_pack(np.array(robot.window.rows)),
@@ -146,7 +147,8 @@ def _restored(
     sensors.velocities = [
         (x, y, z) for x, y, z in _unpack(state.velocities, -1, 3).tolist()
     ]
-    robot.states = _unpack(state.states, *robot.states.shape)
+    numbers = _unpack(state.states, robot.states.size + robot.outputs.size)
+    robot.states, robot.outputs = np.split(numbers, [robot.states.size])
     robot.brain_start = state.brain_start
     if width := robot.body.channels.width:
         shape = len(robot.window.positions), width

@@ -38,14 +38,16 @@ class EngineView(PlacedRobot):
         self.qvel: Floats = data.qvel[self.dofs]
         self.ctrl: Floats = data.ctrl[self.servos.actuators]
 
-    def row(self, channels: Channels, neighbours: int) -> Floats:
-        """Return a sample of the present state as a row."""
+    def row(self, channels: Channels, neighbours: int, outputs: Floats) -> Floats:
+        """Return a sample of the present state as a row; outputs are the brain's."""
         return channels.row(
             self.qpos,
             self.qvel,
             probe=None if self.probe is None else self.probe.read(),
             readings=self.sensors.readings,
             neighbours=neighbours,
+            outputs=outputs,
+            commands=self.ctrl,
         )
 
     def copy_from(self, other: "EngineView") -> None:

@@ -86,6 +86,8 @@ class ArenaRobot:
         packed: its brain in the form of its brain type.
         states: (K,) of its brain after the last tick; a row of the batch.
         brain_start: step from which the age of its brain counts.
+        outputs: (O,) of its brain at the last tick, unclipped; (0,) if no channel
+            records them.
     """
 
     def __init__(
@@ -99,6 +101,8 @@ class ArenaRobot:
         """Initialise in its own cluster, with a brain that starts at its birth."""
         self.birth, self.body, self.view = birth, body, body.solo.views[0]
         self.window, self.place = window, place
+        has_outputs = "outputs" in body.channels.names
+        self.outputs = np.zeros(has_outputs * body.robot.brain.count("output"))
         self.set_brain(body.robot.brain, controls, window.born)
 
     def set_brain(self, brain: Brain, controls: Controls, start: int) -> None:

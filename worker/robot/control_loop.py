@@ -108,6 +108,7 @@ class ControlLoop:
         self._positions: list[float] = []
         self._rows: list[Floats] = []
         self._undisturbed: Floats = self._inputs
+        self._outputs: Floats = np.zeros((1, 0))
         self.now, self._next_sample = 0, self._clock.warmup_steps
         self._tick, self._is_unread = 0, True
 
@@ -152,6 +153,7 @@ class ControlLoop:
         """
         self.observe()
         outputs = self._think() if action is None else 0.5 + 0.5 * action[np.newaxis]
+        self._outputs = outputs
         if self._filters:
             outputs = filtered_outputs(self._filters, self._tick, outputs)
         self._servos.drive(outputs[0])
@@ -210,6 +212,8 @@ class ControlLoop:
                 probe=None if self._probe is None else self._probe.read(),
                 readings=self._undisturbed,
                 neighbours=0,
+                outputs=self._outputs[0],
+                commands=self.data.ctrl[self._servos.actuators],
             )
             self._rows.append(row)
 

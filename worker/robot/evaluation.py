@@ -1,10 +1,12 @@
 """Off-line evaluation of one robot, alone in its environment."""
 
+from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
 from msgspec.structs import replace
 
+from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
@@ -41,6 +43,32 @@ def evaluate(
     if settings.robust is None:
         return once(settings, identity)
     return evaluate_disturbed(once, settings, settings.robust, identity)
+
+
+def evaluate_traced(
+    robot: Robot, settings: EvaluationSettings, identity: Identity = NO_IDENTITY
+) -> tuple[Evaluation | str, Trace | None]:
+    """Return the evaluation of a robot, or why it failed, and its trace.
+
+    With the section ``robust`` the trace is that of a simulation without disturbances,
+    which has no part in the fitness. There is none if that simulation fails.
+
+    It raises as ``evaluate``, but for failures.
+    """
+    outcome: Evaluation | str
+    trace: Trace | None = None
+    try:
+        if settings.robust is None:
+            trace = simulate(robot, settings, identity=identity)
+            outcome = judge(trace, settings)
+        else:
+            outcome = evaluate(robot, settings, identity)
+    except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
+        outcome = str(error)
+    if settings.robust is not None:
+        with suppress(SimulationDiverged, SensorFailed):
+            trace = simulate(robot, settings, identity=identity)
+    return outcome, trace
 
 
 def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:

@@ -8,8 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
+from schema.mjcf.model import quaternion
 from schema.parts import BodySpace
+from schema.robot.frames import place_parts, shapes_of
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 FREE, FREE_DOFS = 7, 6
 """Numbers of a free joint's position and orientation, and of its velocity."""
@@ -61,6 +64,42 @@ class PlacedRobot:
             "mass": float(self.model.body_subtreemass[self.root]),
             "gravity": settings.simulation.gravity,
         }
+
+
+def part_poses(
+    placed: PlacedRobot, places: Floats, attitudes: Floats, angles: Floats
+) -> Floats:
+    """Return the poses of all parts, (T, P, 7), as ``Trace.part_poses``.
+
+    The other arguments are ``core_position``, ``core_attitude`` and ``joint_angle``.
+    """
+    model, robot, prefix = placed.model, placed.robot, placed.prefix
+    data, shapes = mujoco.MjData(model), shapes_of(robot, placed.space)
+    # The body beyond a joint has the part's name; the other half is its parent.
+    bodies = [
+        model.geom(f"{prefix}{index}/{shape.boxes[0].name}").bodyid[0]
+        if shape.joint is None
+        else model.body(f"{prefix}body{index}").parentid[0]
+        for index, shape in enumerate(shapes)
+    ]
+    qpos = data.qpos[placed.joints]
+    qpos[:] = 0.0
+    qpos[3] = 1.0
+    mujoco.mj_kinematics(model, data)
+    # At neutral pose all frames of bodies are parallel to the core's.
+    rotations, offsets = place_parts(robot, shapes)
+    offsets -= data.xpos[bodies]
+    turns = [quaternion(rotation) for rotation in rotations]
+    poses = np.empty((len(places), len(bodies), 7))
+    for sample, pose in enumerate(poses):
+        qpos[:3], qpos[3:FREE] = places[sample], attitudes[sample]
+        qpos[FREE:] = angles[sample]
+        mujoco.mj_kinematics(model, data)
+        frames = data.xmat[bodies].reshape(-1, 3, 3)
+        pose[:, :3] = data.xpos[bodies] + (frames * offsets[:, np.newaxis]).sum(axis=2)
+        for part, body, turn in zip(pose, bodies, turns, strict=True):
+            mujoco.mju_mulQuat(part[3:], data.xquat[body], turn)
+    return poses
 
 
 def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:

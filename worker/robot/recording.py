@@ -16,7 +16,13 @@ from schema.robot.frames import place_parts, shapes_of
 from schema.robot.robot import Robot
 from schema.robot.trace import RECORDED, Floats, Trace
 from worker.measures import functions_of
-from worker.robot.placed import FREE, FREE_DOFS, PlacedRobot, contact_reader
+from worker.robot.placed import (
+    FREE,
+    FREE_DOFS,
+    PlacedRobot,
+    contact_reader,
+    part_poses,
+)
 
 Indices = npt.NDArray[np.intp]
 PROBED = ("joint_torque", "energy", "contact")
@@ -42,7 +48,7 @@ class Channels:
     ) -> None:
         robot, wanted = placed.robot, functions_of(settings).channels
         joints = placed.dofs.stop - placed.dofs.start - FREE_DOFS
-        inputs = robot.brain.count("input")
+        inputs, outputs = robot.brain.count("input"), robot.brain.count("output")
         sizes = {
             "core_attitude": 4,
             "joint_angle": joints,
@@ -52,9 +58,12 @@ class Channels:
             "contact": len(robot.parts),
             "readings": inputs,
             "neighbours": 1,
+            "outputs": outputs,
+            "commands": outputs,
         }
         self.names = tuple(name for name in RECORDED if name in wanted)
-        self._joints, self._inputs = joints, inputs
+        self._joints, self._inputs, self._outputs = joints, inputs, outputs
+        self._placed = placed if "part_poses" in wanted else None
         self._spans: dict[str, slice] = {}
         self.width = 0
         for name in self.names:
@@ -73,11 +82,14 @@ class Channels:
         probe: Floats | None,
         readings: Floats,
         neighbours: int,
+        outputs: Floats,
+        commands: Floats,
     ) -> Floats:
         """Return a sample as a row.
 
         Positions are (7 + J,) or more, velocities (6 + J,) or more, readings (1, I')
-        with I' >= I; ``probe`` is ``Probe.numbers``.
+        with I' >= I, outputs (O',) with O' >= O if they are recorded, commands (O,);
+        ``probe`` is ``Probe.numbers``.
         """
         values: dict[str, Floats | int] = {
             "core_attitude": qpos[3:FREE],
@@ -85,6 +97,8 @@ class Channels:
             "joint_velocity": qvel[FREE_DOFS : FREE_DOFS + self._joints],
             "readings": readings[0, : self._inputs],
             "neighbours": neighbours,
+            "outputs": outputs[: self._outputs],
+            "commands": commands,
         }
         if probe is not None:
             first = 1 + self._joints
@@ -110,6 +124,9 @@ class Channels:
             found["contact"] = found["contact"] != 0.0
         if "neighbours" in found:
             found["neighbours"] = found["neighbours"][:, 0].astype(np.int64)
+        if self._placed is not None:
+            state = positions, found["core_attitude"], found["joint_angle"]
+            found["part_poses"] = part_poses(self._placed, *state)
         return Trace(interval_s, positions, found | constants)
 
 

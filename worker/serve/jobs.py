@@ -15,8 +15,9 @@ from schema.robot.brain import check_brain
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_tree, check_types
 from schema.wire.arena import AdvanceShard
-from schema.wire.messages import Call, Evaluate, Failure, Request, Result
-from worker.robot.evaluation import evaluate
+from schema.wire.messages import Call, Evaluate, Failure, Request, Result, Traced
+from schema.wire.trace import pack_trace
+from worker.robot.evaluation import evaluate, evaluate_traced
 from worker.serve.calls import call_function
 from worker.serve.checks import checked_evaluation
 from worker.serve.shards import Shards
@@ -45,7 +46,9 @@ class Jobs:
         raise MalformedMessage("a worker vets no bodies")
 
 
-def answer_evaluation(request: Request, work: Evaluate) -> Evaluation | Failure:
+def answer_evaluation(
+    request: Request, work: Evaluate
+) -> Evaluation | Traced | Failure:
     """Return the outcome of an evaluation.
 
     Diverged physics, a failed sensor and an undefined fitness are results: failures.
@@ -64,8 +67,14 @@ def answer_evaluation(request: Request, work: Evaluate) -> Evaluation | Failure:
     check_types(robot, body_space(settings.space))
     if work.steps:
         settings = lasting(settings, work.steps)
+    identity = Identity(request.origin, work.birth, work.trial)
+    if work.is_traced:
+        outcome, trace = evaluate_traced(robot, settings, identity)
+        return Traced(
+            Failure(outcome) if isinstance(outcome, str) else outcome,
+            None if trace is None else pack_trace(trace),
+        )
     try:
-        identity = Identity(request.origin, work.birth, work.trial)
         return evaluate(robot, settings, identity)
     except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
         return Failure(str(error))

@@ -1,6 +1,8 @@
 """Requests about single robots: results of answers, and lies that are refused."""
 
 import math
+from functools import partial
+from typing import Literal
 
 import pytest
 from msgspec.structs import replace
@@ -22,13 +24,16 @@ from schema.robot.results import Provenance
 from schema.wire.codec import encode, fingerprint
 from schema.wire.messages import (
     Answer,
+    Array,
     Crash,
     Evaluate,
     Failure,
+    PackedTrace,
     Request,
     Result,
     RunningJob,
     StateMissing,
+    Traced,
     Vet,
 )
 from tests.coordinator.reports import CROWDED, VIABLE
@@ -240,6 +245,27 @@ def test_evaluation_needs_a_finite_number_for_each_measure(
     assert read((1.0, -2.5)).result == replace(JUDGED, measures=(1.0, -2.5))
     with pytest.raises(MalformedMessage, match="measures"):
         read(given)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "size", "measures"),
+    [((2, 3), "<f8", 48, 1), ((2, 3), "<f8", 40, 0), ((2, 3), "<f8", 48, 0),
+     ((2, 3), "|b1", 48, 1), ((2**62, 4), "<f8", 48, 1)],
+)  # fmt: skip
+def test_traced_evaluation_has_arrays_of_their_shapes(
+    shape: tuple[int, ...], kind: Literal["<f8", "|b1"], size: int, measures: int
+) -> None:
+    packed = PackedTrace(0.2, Array(shape, kind, bytes(size)), {}, {"light": None})
+    traced = Traced(replace(JUDGED, measures=(1.0,) * measures), packed)
+    data = encode(Answer(1, 2, 0.0, traced))
+    read = partial(read_evaluation, expected=(1, 2), measures=1)
+    with pytest.raises(MalformedMessage, match="Traced, which is no result"):
+        read(data)
+    if (size, kind, measures) == (48, "<f8", 1) and shape == (2, 3):
+        assert read(data, is_traced=True).result == traced
+        return
+    with pytest.raises(MalformedMessage, match=r"bytes, got|measures: must be"):
+        read(data, is_traced=True)
 
 
 def test_job_that_several_agents_refuse_stops_the_run(

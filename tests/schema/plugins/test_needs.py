@@ -23,6 +23,12 @@ def test_needs_of_several_functions_are_joined_in_the_order_of_the_channels() ->
     assert (plain, channels_of([])) == ((), ())
     assert channels_of([second, first]) == ("core_attitude", "energy", "contact")
     assert channels_of([first]) == ("core_attitude", "energy")
+    assert channels_of([first], ("outputs", "light")) == (
+        *channels_of([first]),
+        "outputs",
+    )
+    posed = ("core_attitude", "joint_angle", "part_poses")
+    assert channels_of([needs("part_poses")(lambda _trace: 0.0)]) == posed
 
 
 def test_unknown_channel_is_refused_with_the_nearest_one() -> None:

@@ -57,6 +57,8 @@ def test_shapes_and_states_of_all_channels(
     assert trace.energy.shape == trace.neighbours.shape == (samples,)
     assert trace.contact.shape == (samples, parts)
     assert trace.part_position.shape == (parts, 3)
+    assert trace.outputs.shape == trace.commands.shape == (samples, joints)
+    assert trace.part_poses.shape == (samples, parts, 7)
     assert trace.mass == pytest.approx(model.body_subtreemass[1])
     assert trace.light is None
     assert (trace.gravity, trace.robot) == (9.81, turtle)
@@ -88,6 +90,75 @@ def test_last_readings_are_those_of_the_last_tick(
     assert CLOCK.brain_steps == 25
     np.testing.assert_array_equal(part.readings, whole.readings[:samples])
     assert not np.array_equal(part.readings[0], part.readings[-1])
+
+
+def test_outputs_and_commands_are_those_of_the_last_tick(turtle: Robot) -> None:
+    """Outputs follow the formula of oscillators, commands that of position servos."""
+    names = ("outputs", "commands", "joint_angle")
+    trace = simulate(turtle, replace(PLAIN, simulation=CLOCK, record=names))
+    step, window = CLOCK.timestep_s, np.arange(400 // CLOCK.pose_steps)
+    steps = CLOCK.warmup_steps + CLOCK.pose_steps * window
+    ticked_s = steps // CLOCK.brain_steps * CLOCK.brain_steps * step
+    for motor, phase in enumerate((0.0, 0.25)):
+        angle = 2.0 * np.pi * (ticked_s / 1.5 - phase)
+        expected = 0.5 + 0.5 * np.sin(angle)
+        np.testing.assert_allclose(trace.outputs[:-1, motor], expected, atol=1e-9)
+    motor_type = BUILT_IN["ActiveHinge"].motor
+    limit = BUILT_IN["ActiveHinge"].shape((0.0,) * 3).joint.limit  # type: ignore[union-attr]
+    assert motor_type is not None
+    (on_tick,) = (steps % CLOCK.brain_steps == 0).nonzero()
+    assert len(on_tick) >= 2
+    target = limit * (2.0 * trace.outputs.clip(1e-5, 0.99999) - 1.0)
+    command = motor_type.gain * (target - trace.joint_angle)
+    fastest = motor_type.max_velocity
+    np.testing.assert_allclose(
+        trace.commands[on_tick], command.clip(-fastest, fastest)[on_tick], atol=1e-12
+    )
+
+
+def test_noise_reaches_commands_and_not_outputs(turtle: Robot) -> None:
+    quiet = replace(PLAIN, simulation=CLOCK, record=("outputs", "commands"))
+    noisy = replace(quiet, simulation=replace(CLOCK, actuator_noise=0.2))
+    one, other = simulate(turtle, quiet), simulate(turtle, noisy)
+    np.testing.assert_array_equal(one.outputs, other.outputs)
+    assert (one.commands != other.commands).any(axis=1).all()
+
+
+@pytest.mark.parametrize("start_deg", [(0.0, 0.0, 0.0), (20.0, 5.0, 130.0)])
+def test_part_poses_place_the_boxes_of_the_engine(
+    turtle: Robot, start_deg: tuple[float, float, float]
+) -> None:
+    """Boxes in the half of a part that is fixed to its parent, at each sample."""
+    clock = replace(CLOCK, start_deg=start_deg)
+    settings = replace(PLAIN, simulation=clock, record=("part_poses",))
+    trace, space = simulate(turtle, settings), body_space(PLAIN.space)
+    model = solo_spec(turtle, space, clock, PLAIN.environment).compile()
+    data, checked = mujoco.MjData(model), 0
+    for sample, (place, poses) in enumerate(
+        zip(trace.core_position, trace.part_poses, strict=True)
+    ):
+        np.testing.assert_array_equal(poses[0, :3], place)
+        np.testing.assert_array_equal(poses[0, 3:], trace.core_attitude[sample])
+        data.qpos[:] = [
+            *place,
+            *trace.core_attitude[sample],
+            *trace.joint_angle[sample],
+        ]
+        mujoco.mj_kinematics(model, data)
+        for index, (part, pose) in enumerate(zip(turtle.parts, poses, strict=True)):
+            shape = space[part.kind].shape(part.parameters)
+            near = shape.slots[part.slot].segment if index else 0
+            for box in (each for each in shape.boxes if each.segment == near):
+                centre, frame = np.zeros(3), np.zeros(9)
+                mujoco.mju_rotVecQuat(centre, np.array(box.position), pose[3:])
+                mujoco.mju_quat2Mat(frame, pose[3:])
+                geom = data.geom(f"{index}/{box.name}")
+                np.testing.assert_allclose(pose[:3] + centre, geom.xpos, atol=1e-9)
+                turned = frame.reshape(3, 3) @ np.asarray(box.rotation)
+                np.testing.assert_allclose(turned.ravel(), geom.xmat, atol=1e-6)
+                checked += 1
+    assert checked > 3 * len(trace.core_position)
+    assert np.ptp(trace.joint_angle, axis=0).min() > 0.1
 
 
 def test_recording_changes_no_result(

@@ -1,31 +1,13 @@
-"""Traces of robots, and their form between processes."""
+"""Traces of robots as messages, and back."""
 
-import msgspec
+from math import prod
+
 import numpy as np
 
+from schema.errors import MalformedMessage
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
-
-__all__ = ["PackedTrace", "Trace", "pack_trace", "unpack_trace"]
-
-Constant = float | tuple[float, float, float] | None
-
-
-class Array(msgspec.Struct, frozen=True):
-    """Array of numbers as bytes, in row-major order."""
-
-    shape: tuple[int, ...]
-    kind: str
-    data: bytes
-
-
-class PackedTrace(msgspec.Struct, frozen=True):
-    """Trace as a message, without its robot."""
-
-    interval_s: float
-    core_position: Array
-    arrays: dict[str, Array]
-    constants: dict[str, Constant]
+from schema.wire.messages import Array, PackedTrace
 
 
 def pack_trace(trace: Trace) -> PackedTrace:
@@ -39,6 +21,15 @@ def pack_trace(trace: Trace) -> PackedTrace:
     return PackedTrace(trace.interval_s, _pack(trace.core_position), arrays, constants)
 
 
+def check_trace(packed: PackedTrace) -> None:
+    """Raise ``MalformedMessage`` unless the bytes of all arrays fit their shapes."""
+    for array in (packed.core_position, *packed.arrays.values()):
+        size = prod(array.shape) * np.dtype(array.kind).itemsize
+        if len(array.data) != size:
+            got = f"must have {size} bytes, got {len(array.data)}"
+            raise MalformedMessage(f"trace: an array {got}", "impossible")
+
+
 def unpack_trace(packed: PackedTrace, robot: Robot) -> Trace:
     """Return the trace of a message about a robot."""
     arrays = {name: _unpack(each) for name, each in packed.arrays.items()}
@@ -47,7 +38,7 @@ def unpack_trace(packed: PackedTrace, robot: Robot) -> Trace:
 
 
 def _pack(array: np.ndarray) -> Array:
-    return Array(array.shape, array.dtype.str, array.tobytes())
+    return Array(array.shape, array.dtype.str, array.tobytes())  # type: ignore[arg-type]
 
 
 def _unpack(array: Array) -> np.ndarray:
