@@ -65,6 +65,8 @@ test: compiled
 test-long: test-many bench test-fresh
 
 test-many: compiled $(DOCS_STAMP)
+	@# A reader of phylogenies, 180 MB with what it needs, for one test.
+	$(BIN)/python -m pip install -q -c constraints.txt phyloframe
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m long
 
 # To test one release of Debian only: make SUITES=sid test-fresh.

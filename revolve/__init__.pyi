@@ -1,6 +1,8 @@
 from revolve.arena import Arena as Arena
 from revolve.bodies import body_distance as body_distance
 from revolve.bodies import vet as vet
+from revolve.campaign import Runs as Runs
+from revolve.campaign import read as read
 from revolve.command import main as main
 from revolve.evaluation import Result as Result
 from revolve.evaluation import evaluate as evaluate
@@ -12,7 +14,6 @@ from revolve.reports import Analysis as Analysis
 from revolve.reports import analyze as analyze
 from revolve.robot import Robot as Robot
 from revolve.runs import Run as Run
-from revolve.runs import read as read
 from revolve.runs import resume as resume
 from revolve.runs import run as run
 from schema.errors import ExperimentError as ExperimentError
@@ -113,6 +114,7 @@ __all__ = [
     "RobotOrigin",
     "Run",
     "RunFolderError",
+    "Runs",
     "Selectable",
     "Sensor",
     "SensorFailed",

@@ -114,9 +114,7 @@ class Run:
             RunFolderError: the table is damaged or of another version, or no run has
                 such a table; the nearest is named.
         """
-        if name not in TABLES:
-            near, allowed = nearest(name, TABLES), ", ".join(TABLES)
-            raise RunFolderError(f"no table {shown(name)}{near}; tables: {allowed}")
+        check_table(name)
         return read_table(self.folder, name)
 
     def robot(self, number: int, island: int = 0) -> Robot:
@@ -263,13 +261,11 @@ def _check_births(rows: object) -> None:
         )
 
 
-def read(folder: Folder) -> Run:
-    """Return the run of a folder, finished or not.
-
-    Raises:
-        RunFolderError: there is no run, or its description is damaged.
-    """
-    return Run(folder)
+def check_table(name: str) -> None:
+    """Raise ``RunFolderError`` unless runs have a table; the nearest is named."""
+    if name not in TABLES:
+        near, allowed = nearest(str(name), TABLES), ", ".join(TABLES)
+        raise RunFolderError(f"no table {shown(name)}{near}; tables: {allowed}")
 
 
 def run(

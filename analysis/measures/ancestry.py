@@ -1,5 +1,7 @@
 """Ancestry of individuals, and the descendants of migrants."""
 
+import math
+from bisect import bisect_right
 from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
@@ -101,3 +103,65 @@ def foreign_share(
     pairs = zip(table.members.tolist(), here, strict=True)
     is_foreign = [origins[member] != 1 << island for member, island in pairs]
     return table.mean(np.array(is_foreign, np.float64))
+
+
+def phylogeny(births: pa.Table, population: pa.Table, first: int = 0) -> pa.Table:
+    """Return the individuals of a run as a table of the ALife data standard.
+
+    Parents come before their children. Times count the births on an island: an
+    individual's number there, and the births at the first recorded population without
+    it, the latest of all islands that it lived on; infinite while it lives.
+
+    Args:
+        births: of a run.
+        population: of the run.
+        first: id of the first individual.
+
+    Raises:
+        RunFolderError: a parent's birth is not recorded.
+
+    Source: alife-data-standards, Phylogeny Standard.
+    """
+    keys = [np.asarray(births[name]) for name in ("birth", "island", "rank")]
+    # The rank of a child is above those of its parents.
+    births = births.take(np.lexsort(keys))
+    named = (births["island"].to_pylist(), births["birth"].to_pylist())
+    born = list(zip(*named, strict=True))
+    ancestors = [[str(first + row) for row in rows] for rows in parents_of(births)]
+    ends = _ends(born, population)
+    return pa.table(
+        {
+            "id": pa.array(range(first, first + len(born)), pa.int64()),
+            "ancestor_list": pa.array(
+                [f"[{', '.join(each) or 'none'}]" for each in ancestors], pa.string()
+            ),
+            "origin_time": births["birth"],
+            "destruction_time": pa.array([ends[each] for each in born], pa.float64()),
+            **{name: births[name] for name in ("island", "rank", "sim_time_s")},
+            "run_id": births["run_id"],
+        }
+    )
+
+
+def _ends(
+    born: list[tuple[int, int]], population: pa.Table
+) -> dict[tuple[int, int], float]:
+    """Return the time at which each individual was gone, infinite of the living."""
+    islands = population.group_by("island").aggregate([("births", "distinct")])
+    recorded = {
+        row["island"]: sorted(row["births_distinct"]) for row in islands.to_pylist()
+    }
+
+    def after(island: int, births: int) -> float:
+        times = recorded.get(island, [])
+        place = bisect_right(times, births)
+        return times[place] if place < len(times) else math.inf
+
+    ends: dict[tuple[int, int], float] = {}
+    named = ["island", "birth_island", "birth"]
+    for row in population.group_by(named).aggregate([("births", "max")]).to_pylist():
+        end = after(row["island"], row["births_max"])
+        home = row["island"] if row["birth_island"] is None else row["birth_island"]
+        ends[home, row["birth"]] = max(ends.get((home, row["birth"]), end), end)
+    # Children that were never in a population went with the first one after them.
+    return {each: ends[each] if each in ends else after(*each) for each in born}

@@ -67,14 +67,14 @@ def _differences_of(comparison: Sequence[Row], measure: str, title: str) -> str:
     if not shown:
         return ""
     ends = [row["difference"] for row in shown]
-    ends += [end for row in shown if (both := _interval(row)) for end in both]
+    ends += [end for row in shown if (both := interval(row)) for end in both]
     reach = max(map(abs, ends)) or 1.0
     more = f", {len(shown)} of {len(rows)} pairs" * (len(rows) > len(shown))
     lines = [_difference(row, reach) for row in shown]
     return f"<h3>{title}{more}</h3>{''.join(lines)}"
 
 
-def _interval(row: Row) -> tuple[float, float] | None:
+def interval(row: Row) -> tuple[float, float] | None:
     """Return the interval of a difference; None without two runs of each.
 
     Fewer than ten equal runs have none either.
@@ -88,7 +88,7 @@ def _interval(row: Row) -> tuple[float, float] | None:
 def _difference(row: Row, reach: float) -> str:
     """Return a difference in words and as a bar from ``-reach`` to ``reach``."""
     a, b = (f"<b>{escape(label(row[name]))}</b>" for name in "ab")
-    both = _interval(row)
+    both = interval(row)
     has_two = min(row["runs_a"], row["runs_b"]) >= _SURE
     is_tested = has_two and row["p"] is not None
     p = f"; rank-sum p = {number(row['p'])}" * is_tested
@@ -173,7 +173,7 @@ def all_differences(tables: Tables) -> str:
                  "p", "q")  # fmt: skip
         rows = []
         for row in mine:
-            known = row if _interval(row) else {**row, "difference_low": None,
+            known = row if interval(row) else {**row, "difference_low": None,
                                                 "difference_high": None}  # fmt: skip
             name = row["measure"]
             first = f'<td title="{escape(meaning(name))}">{escape(_words(name))}</td>'

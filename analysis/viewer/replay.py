@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from pyarrow import parquet
 
 from analysis.measures.load import LoadedRun
 from schema.errors import RevolveError, RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.files import campaign, read_table
-from schema.tables.segments import parquet_files
+from schema.tables.files import finished_path, read_table
 from schema.wire.updates import (
     Update,
     arenas_of,
@@ -91,9 +91,11 @@ def read_poses(
     """
     time = pc.field("sim_time_s")
     is_in = (time >= start_s) & (time <= end_s)
-    if parquet_files(folder, "poses"):
+    if path := finished_path(folder, "poses"):
         # Reads no more than needed.
-        poses = campaign(folder, "poses").to_table(filter=is_in)
+        poses = parquet.read_table(
+            path, partitioning=None, filters=is_in, page_checksum_verification=True
+        )
     else:
         poses = read_table(folder, "poses", where=is_in)
     times = poses["sim_time_s"].to_numpy()

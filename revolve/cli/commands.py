@@ -27,6 +27,7 @@ COMMANDS = {
     "robot simulate": ("worker.robot_command", "simulate a robot and show its fitness"),
     "view": ("analysis.__main__", "view a run, live or from its tables"),
     "analyze": ("analysis.__main__", "compute measures, figures and a report"),
+    "export": ("revolve.cli.export", "write the tables of all runs to one file"),
     "robustness": ("revolve.cli.reevaluate", "re-evaluate a run under changes"),
     "ablate": ("revolve.cli.reevaluate", "re-evaluate a run without sensors or motors"),
     "completion": ("revolve.cli.completion", "print a completion script for a shell"),

@@ -9,23 +9,20 @@ partitioning), so that one call reads a campaign, such as DuckDB's
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import reduce
-from operator import and_
 from pathlib import Path
 from typing import NamedTuple
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 
 import pyarrow as pa
 import pyarrow.compute as pc
-from pyarrow.fs import LocalFileSystem
-from pyarrow.parquet import ParquetFile, read_schema
+from pyarrow.parquet import ParquetFile
 
 from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.checksums import digest_of, read_seal
 from schema.tables.columns import TABLES
 from schema.tables.description import read_description, run_columns
-from schema.tables.earlier import absent_value, completed
+from schema.tables.earlier import completed
 from schema.tables.segments import (
     FINISHED,
     Batch,
@@ -350,63 +347,3 @@ def _kept(
     rows = (group.select(schema.names) for group in groups)
     kept = rows if where is None else (group.filter(where) for group in rows)
     return pa.concat_tables([schema.empty_table(), *kept])
-
-
-def campaign(root: Path, table: str) -> "pa.dataset.Dataset":
-    """Return one table of all finished runs below a folder.
-
-    Returns:
-        A dataset with the table's columns, ``experiment`` and ``run``.
-
-    Raises:
-        RunFolderError: no finished run, or a damaged file.
-    """
-    # Imports pandas if that is installed, which takes as long as the start of a run.
-    from pyarrow import dataset  # noqa: PLC0415
-
-    files = sorted(root.glob(f"**/{FINISHED}/*/*/{table}.parquet"))
-    if not files:
-        raise RunFolderError(f"{root}: no finished run in this folder or below")
-    for file in files:
-        finished_path(file.parents[3], table)
-    options = dataset.ParquetFragmentScanOptions(page_checksum_verification=True)
-    reader = dataset.ParquetFileFormat(default_fragment_scan_options=options)
-    disk = LocalFileSystem()
-    # A fragment's expression gives the columns that its file lacks.
-    fragments = [
-        reader.make_fragment(str(file), disk, partition_expression=_lacking(file))
-        for file in files
-    ]
-    return dataset.FileSystemDataset(fragments, _in_campaign(table), reader, disk)
-
-
-def _in_campaign(table: str) -> pa.Schema:
-    """Return the schema of a table with the columns of its folders' names."""
-    schema = TABLES[table]
-    for name, kind in (("experiment", pa.string()), ("run", pa.int32())):
-        if name not in schema.names:
-            schema = schema.append(pa.field(name, kind))
-    return schema
-
-
-def _lacking(file: Path) -> pc.Expression:
-    """Return the values of columns that a finished table lacks.
-
-    They are those of its folders' names, and in runs of earlier versions those of the
-    run.
-    """
-    names = dict(place.partition("=")[::2] for place in file.parts[-3:-1])
-    schema = _in_campaign(file.stem)
-    values = {
-        **{field.name: absent_value(field) for field in TABLES[file.stem]},
-        "experiment": unquote(names["experiment"]),
-        "run": int(names["run"]),
-        **run_columns(file.parents[3]),
-    }
-    stored = read_schema(file).names
-    known = [
-        pc.field(name) == pa.scalar(value, schema.field(name).type)
-        for name, value in values.items()
-        if value is not None and name not in stored
-    ]
-    return reduce(and_, known)

@@ -165,5 +165,6 @@ def _filled(name: str, columns: Columns) -> pa.Table:
     schema = TABLES[name]
     rows = len(columns["birth"])  # type: ignore[arg-type]
     blanks = {field.name: [blank(field)] * rows for field in schema}
+    blanks["seed"] = [1] * rows
     known = {key: values for key, values in columns.items() if values is not None}
     return pa.table({**blanks, "record": range(rows), **known}, schema)

@@ -28,7 +28,7 @@ def test_robots_are_the_founders_of_a_run_of_the_seed(tmp_path: Path) -> None:
     """Of the eight founders of a recorded run, some needed several attempts."""
     with ZipFile(RECORDED / "off-line.zip") as archive:
         archive.extractall(tmp_path)
-    run = rv.read(tmp_path / "undisturbed")
+    run = rv.Run(tmp_path / "undisturbed")
     attempts = run.births["attempts"].to_pylist()[:8]
     assert max(attempts) > 1
     experiment = str(RECORDED / "off-line.toml")

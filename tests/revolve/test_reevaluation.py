@@ -68,7 +68,7 @@ def test_table_has_the_fitness_of_each_robot_under_each_change(
     assert second.startswith("a: the best ever, 0:")
     rows = pq.read_table("out/robustness.parquet").to_pylist()
     assert Path("out/robustness.png").stat().st_size > 10_000
-    run = rv.read("a")
+    run = rv.Run("a")
     changes = all_changes(settings_of(0))
     names = {(row["island"], row["birth"]) for row in rows}
     assert len(rows) == len(names) * len(changes)

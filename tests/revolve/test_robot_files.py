@@ -84,7 +84,7 @@ def test_a_file_of_a_run_has_the_settings_that_the_command_takes(
     assert settings.simulation.friction == 0.5
     assert settings == read_with_settings(best, None)[1]
     assert robot.experiment is not None
-    document = document_of(rv.read(best.parent).experiment)
+    document = document_of(rv.Run(best.parent).experiment)
     assert document_of(robot.experiment) == island_experiment(document, 1)
     assert "settings of two" in repr(robot)
     other = rv.Robot.read(best.rename(best.with_name("mine.yaml")))

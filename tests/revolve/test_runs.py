@@ -88,7 +88,7 @@ def test_wrong_numbers_and_names_are_refused(done: rv.Run) -> None:
 def test_best_robot_ever_of_an_arena_has_the_best_mature_sample(tmp_path: Path) -> None:
     with ZipFile(OLD / "arena.zip") as archive:
         archive.extractall(tmp_path)
-    arena_run = rv.read(tmp_path / "undisturbed")
+    arena_run = rv.Run(tmp_path / "undisturbed")
     samples = arena_run.fitness.filter(pc.field("is_mature"))
     row = samples.take(pc.sort_indices(samples, [("fitness", "descending")])[:1])
     assert arena_run.best_ever() == [arena_run.robot(row["birth"][0].as_py())]
@@ -98,7 +98,7 @@ def test_best_robot_is_that_of_the_file(done: rv.Run, tmp_path: Path) -> None:
     """Also in an arena, where robots that had more fitness before may be dead."""
     with ZipFile(OLD / "arena.zip") as archive:
         archive.extractall(tmp_path)
-    for each in (done, rv.read(tmp_path / "undisturbed")):
+    for each in (done, rv.Run(tmp_path / "undisturbed")):
         kept = rv.Robot.read(each.folder / "best.yaml")
         assert each.best() == [kept]
         assert each.best()[0].experiment == kept.experiment
@@ -120,7 +120,7 @@ def test_notebook_gets_births_of_all_islands_and_the_best_sample(
     if name:
         with ZipFile(OLD / f"{name}.zip") as archive:
             archive.extractall(tmp_path)
-        run = rv.read(tmp_path / "undisturbed")
+        run = rv.Run(tmp_path / "undisturbed")
     shown, births = run._repr_html_(), run.births.num_rows
     assert f"<td>{births} of {births}</td>" in shown
     assert html.escape(str(run.folder)) in shown
@@ -133,12 +133,12 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
 ) -> None:
     with pytest.raises(rv.RunFolderError, match="already holds a run"):
         rv.run("scenario1", births=15, out=done.folder)
-    with pytest.raises(rv.RunFolderError, match="no run is there"):
+    with pytest.raises(rv.RunFolderError, match="no run in or below this folder"):
         rv.read(tmp_path)
     with pytest.raises(rv.RunFolderError, match="missing: no such folder"):
         rv.resume(tmp_path / "missing")
     with pytest.raises(rv.RunFolderError, match="several runs; give one of them, "):
-        rv.read(done.folder.parent)
+        rv.Run(done.folder.parent)
     with pytest.raises(rv.ExperimentError, match="did you mean 'scenario"):
         rv.run("scenario", births=3, out=tmp_path / "x")
 

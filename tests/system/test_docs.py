@@ -259,9 +259,14 @@ def test_archipelagos_of_the_islands_page_run(workspace: Workspace) -> None:
 
 
 def test_campaign_of_the_campaigns_page_runs(workspace: Workspace) -> None:
-    (block,) = blocks_of(TOP / "docs" / "campaigns.md", "sh")
+    page = TOP / "docs" / "campaigns.md"
+    block, export = blocks_of(page, "sh")
     *_, last = _follow(workspace, block.splitlines())
     assert "4 of 4 runs already finished" in last
+    said = _follow(workspace, export.splitlines())
+    assert all("of 4 runs" in each for each in (*said[:2], said[3]))
+    for reader in blocks_of(page, "python"):
+        workspace.python("-W", "error", "-c", reader)
 
 
 def test_every_command_on_the_pages_exists() -> None:

@@ -1,7 +1,6 @@
 """Reading of tables that were written before they got their newest columns."""
 
 import json
-from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from msgspec.structs import replace
 from schema.errors import RunFolderError
 from schema.tables.columns import EVALUATIONS, TABLES
 from schema.tables.description import Description, description_text, run_columns
-from schema.tables.files import campaign, parquet_path, read_table
+from schema.tables.files import parquet_path, read_table
 
 ROW = {
     "record": 0,
@@ -72,23 +71,6 @@ def test_run_columns_are_null_without_a_description(tmp_path: Path) -> None:
     write_parquet(tmp_path, without("seed", "run_id"))
     (row,) = read_table(tmp_path, "evaluations").to_pylist()
     assert row == {**ROW, "seed": None, "run_id": None}
-
-
-@pytest.mark.parametrize("older", ["a", "b"])
-def test_a_campaign_of_older_and_newer_runs_has_all_columns(
-    tmp_path: Path, older: str
-) -> None:
-    new = ["trial", "seed", "run_id"]
-    for name in "ab":
-        folder = tmp_path / name
-        write_parquet(folder, without(*new) if name == older else without())
-        (folder / "run.json").write_text(description_text(DESCRIPTION))
-    rows = campaign(tmp_path, "evaluations").to_table().sort_by("trial")
-    assert [row["experiment"] for row in rows.to_pylist()] == ["old", "old"]
-    assert rows.select(new).to_pylist() == [
-        {"trial": 0, **run_columns(tmp_path / older)},
-        {name: ROW[name] for name in new},
-    ]
 
 
 def test_run_id_is_that_of_one_run(tmp_path: Path) -> None:
@@ -152,19 +134,16 @@ def sealed(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("read", [read_table, campaign])
-def test_every_flipped_byte_of_a_finished_table_is_named(
-    tmp_path: Path, read: Callable[[Path, str], object]
-) -> None:
+def test_every_flipped_byte_of_a_finished_table_is_named(tmp_path: Path) -> None:
     path = sealed(tmp_path)
     data = path.read_bytes()
-    read(tmp_path, "evaluations")
+    read_table(tmp_path, "evaluations")
     for byte in range(0, len(data), 97):
         path.write_bytes(
             data[:byte] + bytes([data[byte] ^ 1 << byte % 8]) + data[byte + 1 :]
         )
         with pytest.raises(RunFolderError, match=r"evaluations\.parquet: damaged"):
-            read(tmp_path, "evaluations")
+            read_table(tmp_path, "evaluations")
 
 
 @pytest.mark.parametrize("content", [b"", b"PAR1", None])
