@@ -24,7 +24,6 @@ from coordinator.storage.campaign import (
 )
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.hints import command
-from coordinator.storage.lock import FolderLock
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.sweep import Sweep
@@ -106,13 +105,6 @@ def test_a_used_folder_is_refused(tmp_path: Path) -> None:
         refuse_used(tmp_path / "run", CAMPAIGN)
 
 
-def test_a_second_coordinator_is_refused(tmp_path: Path) -> None:
-    with FolderLock(tmp_path), pytest.raises(RunFolderError, match="process"):
-        FolderLock(tmp_path)
-    with FolderLock(tmp_path):
-        pass
-
-
 @pytest.mark.parametrize("text", ["", "seed = 1", "seed = ", "experiments = 3"])
 def test_a_damaged_campaign_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "campaign.toml").write_text(text)
@@ -131,18 +123,10 @@ def test_names_must_differ(sources: list[str]) -> None:
 WANTED = RunDetails("scenario1", 1, 5, experiment_text(FIRST))
 
 
-def _made(folder: Path, details: RunDetails) -> Path:
-    with RunFolder(folder / "run", details):
-        return folder / "run"
-
-
-def test_a_separately_made_run_is_adopted(tmp_path: Path) -> None:
-    check_adopted(tmp_path, WANTED, WANTED)
-
-
-def test_a_run_with_another_number_of_births_is_adopted(tmp_path: Path) -> None:
-    short = changed(WANTED, document=experiment_text(replace(FIRST, births=600)))
-    check_adopted(tmp_path, short, WANTED)
+@pytest.mark.parametrize("births", [FIRST.births, 600])
+def test_a_run_of_any_number_of_births_is_adopted(tmp_path: Path, births: int) -> None:
+    document = experiment_text(replace(FIRST, births=births))
+    check_adopted(tmp_path, changed(WANTED, document=document), WANTED)
 
 
 @pytest.mark.parametrize(

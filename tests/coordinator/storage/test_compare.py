@@ -1,19 +1,27 @@
-"""Comparison of two runs, finished or not."""
+"""Comparison of two runs, finished or not, and of campaigns."""
 
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from coordinator.islands.events import Record
+from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
+from schema.experiment.document import Experiment, Simulation
+from schema.experiment.file import experiment_text
 from schema.tables.files import read_table
 from tests.coordinator.records import make_records
 
 DETAILS = RunDetails("test", 0, 1, "{}")
+START = datetime(2026, 1, 1, tzinfo=UTC)
+BIRTH = make_records(1)[0]
 
 
 def written(path: Path, rows: list[Record], *, is_finished: bool = True) -> Path:
@@ -38,6 +46,14 @@ def changed(rows: list[Record], index: int, column: str, value: object) -> list[
     return [*rows[:index], new, *rows[index + 1 :]]
 
 
+def compared(
+    folder: Path, one: list[Record], other: list[Record], *, is_finished: bool = True
+) -> list[str]:
+    """Return the differences of a finished run and another one."""
+    first = written(folder / "a", one)
+    return compare(first, written(folder / "b", other, is_finished=is_finished))
+
+
 @pytest.mark.parametrize("is_finished", [True, False])
 def test_equal_runs_have_no_difference(tmp_path: Path, *, is_finished: bool) -> None:
     first = written(tmp_path / "a", make_records(12))
@@ -50,9 +66,8 @@ def test_equal_runs_have_no_difference(tmp_path: Path, *, is_finished: bool) -> 
 
 
 def test_provenance_is_no_difference(tmp_path: Path) -> None:
-    first = written(tmp_path / "a", make_records(12))
-    second = written(tmp_path / "b", make_records(12, "worker-9", "arm"))
-    assert compare(first, second) == []
+    other = make_records(12, "worker-9", "arm")
+    assert compared(tmp_path, make_records(12), other) == []
 
 
 @pytest.mark.parametrize("is_finished", [True, False])
@@ -64,9 +79,7 @@ def test_the_first_difference_of_a_table_is_named(
     births = [index for index, each in enumerate(rows) if each.table == "births"]
     other = changed(rows, births[3], "genome", b"\x00" * 100)
     other = changed(other, births[7], "birth", 99)
-    first = written(tmp_path / "a", rows)
-    second = written(tmp_path / "b", other, is_finished=is_finished)
-    (line,) = compare(first, second)
+    (line,) = compared(tmp_path, rows, other, is_finished=is_finished)
     assert line.startswith(
         r"births: first at record 3, column genome: b'\x03\x03\x03' against b'\x00\x00"
     )
@@ -75,9 +88,8 @@ def test_the_first_difference_of_a_table_is_named(
 
 def test_the_smallest_change_of_a_number_is_seen(tmp_path: Path) -> None:
     rows = make_records(2)
-    first = written(tmp_path / "a", rows)
-    second = written(tmp_path / "b", changed(rows, 3, "fitness", 0.33333333333333337))
-    (line,) = compare(first, second)
+    other = changed(rows, 3, "fitness", 0.33333333333333337)
+    (line,) = compared(tmp_path, rows, other)
     assert line.endswith("fitness: 0.3333333333333333 against 0.33333333333333337")
 
 
@@ -86,18 +98,14 @@ def test_a_failed_evaluation_differs_from_one_that_is_zero(tmp_path: Path) -> No
     failed = next(
         index for index, each in enumerate(rows) if each.row.get("status") == "failed"
     )
-    first = written(tmp_path / "a", rows)
-    second = written(tmp_path / "b", changed(rows, failed, "fitness", 0.0))
-    assert compare(first, second) == [
+    assert compared(tmp_path, rows, changed(rows, failed, "fitness", 0.0)) == [
         "evaluations: first at record 6, column fitness: None against 0.0"
     ]
 
 
 def test_not_a_number_equals_itself(tmp_path: Path) -> None:
     rows = changed(make_records(2), 3, "fitness", float("nan"))
-    first = written(tmp_path / "a", rows)
-    second = written(tmp_path / "b", rows)
-    assert compare(first, second) == []
+    assert compared(tmp_path, rows, rows) == []
 
 
 def test_missing_rows_are_counted_and_the_common_ones_compared(tmp_path: Path) -> None:
@@ -155,10 +163,8 @@ def test_the_last_smaller_brood_of_a_shorter_run_is_named_and_left_out(
 
 
 def test_different_platforms_are_named_beside_a_difference(tmp_path: Path) -> None:
-    rows = make_records(3, "w", "arm")
-    first = written(tmp_path / "a", make_records(3))
-    second = written(tmp_path / "b", changed(rows, 1, "fitness", 9.0))
-    assert compare(first, second) == [
+    other = changed(make_records(3, "w", "arm"), 1, "fitness", 9.0)
+    assert compared(tmp_path, make_records(3), other) == [
         "evaluations: first at record 0, column fitness: 0.0 against 9.0",
         (
             "platforms differ: linux-x86 against arm; only runs on the same "
@@ -170,9 +176,7 @@ def test_different_platforms_are_named_beside_a_difference(tmp_path: Path) -> No
 def test_a_run_without_a_recorded_platform_differs_from_none(tmp_path: Path) -> None:
     rows = make_records(9)
     births = [each for each in rows if each.table == "births"]
-    first = written(tmp_path / "a", rows)
-    second = written(tmp_path / "b", births, is_finished=False)
-    lines = compare(first, second)
+    lines = compared(tmp_path, rows, births, is_finished=False)
     assert "evaluations: 9 rows against 0" in lines
     assert not any("platform" in line for line in lines)
 
@@ -184,3 +188,79 @@ def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     with pytest.raises(RunFolderError, match="no run is there"):
         compare(first, tmp_path / "empty")
+
+
+def one_birth(birth: Record = BIRTH, **row: Any) -> list[Record]:  # noqa: ANN401 - any value
+    """Return the rows of a finished run of one birth."""
+    whole = {
+        "name": "test", "run": 0, "seed": 1, "state": "finished", "versions": "{}",
+        "document": experiment_text(Experiment(name="test")), "platform": "here",
+        "cpu_flags": "", "start": START, "end": START, **row,
+    }  # fmt: skip
+    return [birth, Record("runs", whole)]
+
+
+def older(experiment: Experiment) -> str:
+    """Return the document of an older version that lacks some keys."""
+    document = msgspec.json.decode(experiment_text(experiment))
+    del document["simulation"]["evaluation_s"]
+    del document["selection"]["culling"]
+    return msgspec.json.encode(document).decode()
+
+
+def test_an_older_document_of_the_same_experiment_is_no_difference(
+    tmp_path: Path,
+) -> None:
+    document = older(Experiment(name="test"))
+    assert document != experiment_text(Experiment(name="test"))
+    other = one_birth(document=document)
+    assert compared(tmp_path, one_birth(), other) == []
+
+
+def test_another_experiment_is_a_difference(tmp_path: Path) -> None:
+    other = Experiment(name="test", simulation=Simulation(friction=0.5))
+    rows = one_birth(document=older(other))
+    (line,) = compared(tmp_path, one_birth(), rows)
+    assert line.startswith("runs: first at record 0, column document:")
+
+
+def test_platforms_of_arenas_are_compared(tmp_path: Path) -> None:
+    other = Record("births", {**BIRTH.row, "rank": 9})
+    rows = one_birth(other, platform="there")
+    _, line = compared(tmp_path, one_birth(), rows)
+    assert line.startswith("platforms differ: here against there; only runs on the ")
+
+
+def campaign(
+    folder: Path, births: dict[str, Record], experiments: str = "ab", repeats: int = 2
+) -> Path:
+    """Write a campaign whose finished runs have one birth each, by name of the run."""
+    documents = tuple(Experiment(name=name) for name in experiments)
+    folder.mkdir()
+    write_campaign(folder, Campaign(documents, repeats, 1))
+    for name, birth in births.items():
+        written(folder / name, one_birth(birth))
+    return folder
+
+
+def test_campaigns_are_compared_run_by_run(tmp_path: Path) -> None:
+    same = dict.fromkeys(("a-0", "b-0", "a-1", "b-1"), BIRTH)
+    first = campaign(tmp_path / "first", same)
+    assert compare(first, campaign(tmp_path / "equal", same)) == []
+    rank, other = BIRTH.row["rank"], Record("births", {**BIRTH.row, "rank": 9})
+    second = campaign(tmp_path / "second", {"a-0": BIRTH, "b-0": other, "b-1": BIRTH})
+    assert compare(first, second) == [
+        f"b-0: births: first at record 0, column rank: {rank} against 9",
+        f"a-1: {second / 'a-1'}: no such folder",
+        "2 of 4 runs differ: b-0, a-1",
+    ]
+
+
+def test_runs_of_only_one_campaign_are_named(tmp_path: Path) -> None:
+    first = campaign(tmp_path / "a", {"a-0": BIRTH}, "a", repeats=1)
+    second = campaign(tmp_path / "b", {"a-0": BIRTH, "b-0": BIRTH}, "ab", repeats=1)
+    for pair in ((first, second), (second, first)):
+        assert compare(*pair) == [
+            f"b-0: {first / 'b-0'}: no such folder",
+            "1 of 2 runs differ: b-0",
+        ]

@@ -106,15 +106,6 @@ def test_a_failed_append_keeps_what_another_process_wrote_after(
         file.close()
 
 
-def test_a_file_is_continued_at_its_end(tmp_path: Path) -> None:
-    (tmp_path / "f").write_bytes(b"one")
-    file = AppendedFile(tmp_path / "f")
-    file.append(b" two")
-    file.close()
-    assert file.size == 7
-    assert (tmp_path / "f").read_bytes() == b"one two"
-
-
 def test_a_missing_folder_is_a_run_folder_error(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="No such file"):
         AppendedFile(tmp_path / "none" / "f")

@@ -12,7 +12,6 @@ from typing import Any, get_args
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from msgspec import inspect
 from msgspec.structs import replace
 
 from coordinator.islands.events import (
@@ -46,6 +45,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.arena import NO_POSES, Advance, Casualty, Judgement, Poses, Touch
 from schema.wire.genome_bytes import encode_genome
+from tests.schema.wire.message_examples import messages_of
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 REFUSED = Report(
@@ -271,43 +271,11 @@ def test_a_file_that_is_no_journal_is_refused_and_unchanged(
     assert (tmp_path / NAME).read_bytes() == data
 
 
-Values = st.SearchStrategy[Any]
-LEAVES: dict[type[inspect.Type], Callable[[Any], Values]] = {
-    inspect.NoneType: lambda _: st.none(),
-    inspect.BoolType: lambda _: st.booleans(),
-    inspect.StrType: lambda _: st.text(max_size=8),
-    inspect.LiteralType: lambda kind: st.sampled_from(kind.values),
-    inspect.FloatType: lambda kind: st.floats(kind.ge, kind.le, allow_nan=False),
-    inspect.IntType: lambda kind: st.integers(
-        -(2**63) if kind.ge is None else kind.ge,
-        2**63 - 1 if kind.le is None else kind.le,
-    ),
-    inspect.BytesType: lambda kind: st.binary(
-        min_size=kind.min_length or 0, max_size=kind.max_length or 32
-    ),
-}
-
-
-def values_of(kind: inspect.Type) -> Values:
-    """Return small values of a type of msgspec."""
-    match kind:
-        case inspect.VarTupleType(item_type=item):
-            return st.lists(values_of(item), max_size=2).map(tuple)
-        case inspect.TupleType(item_types=items):
-            return st.tuples(*map(values_of, items))
-        case inspect.UnionType(types=kinds):
-            return st.one_of(*map(values_of, kinds))
-        case inspect.StructType(cls=made) | inspect.NamedTupleType(cls=made):
-            fields = {field.name: values_of(field.type) for field in kind.fields}
-            return st.builds(made, **fields)
-    return LEAVES[type(kind)](kind)
-
-
 @pytest.mark.parametrize("kind", get_args(JournalledEvent))
 @settings(max_examples=50)
 @given(data=st.data())
 def test_an_event_is_read_as_it_was_written(kind: Any, data: st.DataObject) -> None:  # noqa: ANN401
-    event = data.draw(values_of(inspect.type_info(kind)))
+    event = data.draw(messages_of(kind))
     if isinstance(event, Advanced):
         # They are stored elsewhere.
         bulk = replace(event.advance, poses=Poses(b"bulk"), snapshot=b"bulk")
@@ -323,13 +291,3 @@ def test_any_bytes_are_an_event_or_of_another_version(data: bytes) -> None:
     with suppress(RunFolderError):
         event = decode_record(Path("journal"), data)
         assert decode_record(Path("journal"), encode_event(event)) == event
-
-
-@pytest.mark.parametrize("event", EVENTS)
-def test_events_with_another_byte_decode_or_are_refused(event: JournalledEvent) -> None:
-    written = encode_event(event)
-    for place in range(len(written)):
-        changed = bytearray(written)
-        changed[place] ^= 0x41
-        with suppress(RunFolderError):
-            decode_record(Path("journal"), bytes(changed))

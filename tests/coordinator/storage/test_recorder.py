@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coordinator.islands.events import Record
 from coordinator.storage.recorder import BUFFERED, Recorder
 from schema.errors import RunFolderError
 from schema.tables.columns import POPULATION, TABLES
@@ -100,13 +99,3 @@ def test_a_segment_of_another_version_is_refused(tmp_path: Path) -> None:
     write_segment(path, newer, [])
     with pytest.raises(RunFolderError, match="another version of Revolve"):
         Recorder(tmp_path, DETAILS)
-
-
-def test_a_row_without_a_column_raises_key_error(tmp_path: Path) -> None:
-    row = dict(make_records(1)[0].row)
-    del row["rank"]
-    recorder = Recorder(tmp_path, DETAILS)
-    recorder.write(Record("births", row))
-    with pytest.raises(KeyError, match="rank"):
-        recorder.flush()
-    recorder.close()

@@ -48,6 +48,14 @@ def written(folder: Path, *numbers: int) -> Recorder:
     return recorder
 
 
+def replayed(folder: Path, *numbers: int) -> Recorder:
+    """Return a recorder that counted some bulk rows which are on disk."""
+    recorder = Recorder(folder, DETAILS)
+    for number in numbers:
+        recorder.append(bare(bulk(number)))
+    return recorder
+
+
 def test_bulk_rows_are_on_disk_when_they_are_stored(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, DETAILS)
     recorder.store(bulk(1))
@@ -68,34 +76,21 @@ def test_bulk_rows_may_be_stored_ahead_of_the_count(tmp_path: Path) -> None:
     assert times(tmp_path)[::3] == [1.0, 2.0, 3.0, 4.0]
 
 
-def test_a_replay_skips_stored_rows(tmp_path: Path) -> None:
-    written(tmp_path, 1, 2).close()
-    recorder = Recorder(tmp_path, DETAILS)
-    for number in (1, 2):
-        recorder.append(bare(bulk(number)))
-    recorder.store(bulk(3))
-    recorder.append(bulk(3))
-    assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
-    recorder.finish()
-    assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
-    assert read_table(tmp_path, "poses").schema == POSES
-
-
 @pytest.mark.parametrize("kept", [0, 1, 2, 3])
 def test_rows_without_a_journalled_event_are_removed(tmp_path: Path, kept: int) -> None:
     """Three advances were stored over two segments; the journal has a few of them."""
     written(tmp_path, 1, 2).close()
-    second = Recorder(tmp_path, DETAILS)
-    for number in (1, 2):
-        second.append(bare(bulk(number)))
+    second = replayed(tmp_path, 1, 2)
     second.store(bulk(3))
     second.close()
-    recorder = Recorder(tmp_path, DETAILS)
-    for number in range(1, kept + 1):
-        recorder.append(bare(bulk(number)))
+    recorder = replayed(tmp_path, *range(1, kept + 1))
     recorder.store(bulk(9))
     recorder.append(bulk(9))
-    assert times(tmp_path)[::3] == [*map(float, range(1, kept + 1)), 9.0]
+    expected = [*map(float, range(1, kept + 1)), 9.0]
+    assert times(tmp_path)[::3] == expected
+    recorder.finish()
+    assert times(tmp_path)[::3] == expected
+    assert read_table(tmp_path, "poses").schema == POSES
 
 
 def test_a_cut_segment_reads_on_after_a_kill(tmp_path: Path) -> None:
@@ -103,18 +98,13 @@ def test_a_cut_segment_reads_on_after_a_kill(tmp_path: Path) -> None:
     path = segment_path(tmp_path, "poses", 0)
     data = path.read_bytes()
     path.write_bytes(data[:-20])
-    recorder = Recorder(tmp_path, DETAILS)
-    for number in (1, 2):
-        recorder.append(bare(bulk(number)))
-    recorder.store(bulk(3))
+    replayed(tmp_path, 1, 2).store(bulk(3))
     assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
 
 
 def test_missing_rows_are_refused(tmp_path: Path) -> None:
-    recorder = written(tmp_path, 1)
-    recorder.close()
-    recorder = Recorder(tmp_path, DETAILS)
-    recorder.append(bare(bulk(1)))
+    written(tmp_path, 1).close()
+    recorder = replayed(tmp_path, 1)
     with pytest.raises(RunFolderError, match="poses: rows 3 to 5 are missing"):
         recorder.append(bare(bulk(2)))
 

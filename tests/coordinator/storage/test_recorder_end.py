@@ -1,4 +1,4 @@
-"""The end of a run: segments become Parquet, killed at any step; and its readers."""
+"""The end of a run: segments become Parquet, killed at any step."""
 
 import os
 from collections.abc import Callable
@@ -23,32 +23,23 @@ class Killed(BaseException):
     """Simulated death of the process."""
 
 
-def kill_at(monkeypatch: pytest.MonkeyPatch, step: int) -> list[str]:
-    """Die after the ``step``-th change of the disk; return the names of the steps."""
-    steps: list[str] = []
+def kill_at(monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    """Die after the ``step``-th change of the disk."""
+    done = 0
 
-    def dying(name: str, real: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*arguments: Any) -> Any:  # noqa: ANN401 - whatever the real one takes
-            steps.append(name)
-            if len(steps) > step:
+    def dying(real: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:  # noqa: ANN401 - those of the real one
+            nonlocal done
+            done += 1
+            if done > step:
                 raise Killed
-            return real(*arguments)
+            return real(*arguments, **options)
 
         return call
 
-    monkeypatch.setattr(os, "fsync", dying("fsync", os.fsync))
-    monkeypatch.setattr(Path, "replace", dying("replace", Path.replace))
-
-    def unlink(path: Path, *, missing_ok: bool = False) -> None:
-        del missing_ok
-        steps.append("unlink")
-        if len(steps) > step:
-            raise Killed
-        os.unlink(path)  # noqa: PTH108 - the real one is what stands in its place
-
-    monkeypatch.setattr(Path, "unlink", unlink)
-    monkeypatch.setattr(Path, "rmdir", dying("rmdir", Path.rmdir))
-    return steps
+    monkeypatch.setattr(os, "fsync", dying(os.fsync))
+    for name in ("replace", "unlink", "rmdir"):
+        monkeypatch.setattr(Path, name, dying(getattr(Path, name)))
 
 
 def test_the_end_may_be_interrupted_at_any_step(tmp_path: Path) -> None:
