@@ -5,6 +5,7 @@ import os
 import resource
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -76,9 +77,27 @@ def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def _own_brains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Allow the module of docs/brains.md as the plug-in ``my_brains``."""
+    """Allow the module of docs/brains.md as ``my_brains``, also to be imported."""
+    monkeypatch.syspath_prepend(tmp_path)
     module = {"my_brains": write_module(tmp_path)}
     monkeypatch.setattr(permission, "_allowed", {**permission._allowed, **module})
+
+
+@pytest.fixture
+def own_module(tmp_path: Path) -> Callable[[str], str]:
+    """Return a function that writes and allows a plug-in module; it returns its name.
+
+    Modules stay imported, so that each has a name of its own.
+    """
+    numbers = count()
+
+    def write(text: str) -> str:
+        name = f"{tmp_path.name.replace('-', '_')}_{next(numbers)}"
+        (tmp_path / f"{name}.py").write_text(text)
+        permission.allow([str(tmp_path / f"{name}.py")])
+        return name
+
+    return write
 
 
 @pytest.fixture

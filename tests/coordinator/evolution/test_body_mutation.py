@@ -44,6 +44,23 @@ def is_near(found: int, expected: float) -> bool:
     return abs(found - expected) < 5 * math.sqrt(max(expected, 1.0))
 
 
+def after(
+    step: Any,  # noqa: ANN401 - a step of mutation
+    seed: int,
+    setting: Experiment,
+    genome: Genome,
+) -> Genome:
+    """Return what a step makes of a genome."""
+    root = to_mutable(genome, TYPES)
+    step(draws(seed), root, setting)
+    return to_genome(preorder(root))
+
+
+def shapes(step: Any, setting: Experiment, genome: Genome) -> Counter[str]:  # noqa: ANN401
+    """Return how often a step makes which shape."""
+    return Counter(shape(after(step, seed, setting, genome)) for seed in range(N))
+
+
 CHAIN = node(
     "Core",
     (1, node("FixedBrick", (1, node("Hinge", (1, node("ActiveHinge")))))),
@@ -53,27 +70,17 @@ CHAIN = node(
 
 def test_deletion_keeps_the_least_number_of_parts() -> None:
     setting = experiment({"min_parts": 3}, p_delete_subtree=1.0)
-    found: Counter[str] = Counter()
-    for seed in range(N):
-        root = to_mutable(CHAIN, TYPES)
-        delete_subtree(draws(seed), root, setting)
-        found[shape(to_genome(preorder(root)))] += 1
+    found = shapes(delete_subtree, setting, CHAIN)
     # Without the brick's subtree only two parts would be left.
     assert sorted(found) == ["C(1F 2T)", "C(1F(1H(1A)))", "C(1F(1H) 2T)"]
     assert all(is_near(n, N / 3) for n in found.values())
-    nothing = to_mutable(CHAIN, TYPES)
-    delete_subtree(draws(), nothing, experiment({"min_parts": 5}, p_delete_subtree=1.0))
-    assert to_genome(preorder(nothing)) == CHAIN
+    full = experiment({"min_parts": 5}, p_delete_subtree=1.0)
+    assert after(delete_subtree, 0, full, CHAIN) == CHAIN
 
 
 def test_duplicating_puts_a_copy_on_any_free_slot() -> None:
     small = node("Core", (1, node("Hinge", slot=1)), (2, node("TouchSensor")))
-    setting = experiment(p_duplicate_subtree=1.0)
-    found: Counter[str] = Counter()
-    for seed in range(N):
-        root = to_mutable(small, TYPES)
-        duplicate_subtree(draws(seed), root, setting)
-        found[shape(to_genome(preorder(root)))] += 1
+    found = shapes(duplicate_subtree, experiment(p_duplicate_subtree=1.0), small)
     assert sorted(found) == sorted(
         [
             *("C(0H 1H 2T)", "C(1H 2T 3H)", "C(1H(0H) 2T)"),
@@ -87,23 +94,18 @@ def test_duplicating_keeps_within_every_limit() -> None:
     for limit in ({"max_parts": 6}, {"max_inputs": 9}, {"max_outputs": 1}):
         setting = experiment(limit, p_duplicate_subtree=1.0)
         for seed in range(200):
-            root = to_mutable(CHAIN, TYPES)
-            duplicate_subtree(draws(seed), root, setting)
-            size = size_of(preorder(root))
+            copied = after(duplicate_subtree, seed, setting, CHAIN)
+            size = size_of(to_branches(copied, TYPES))
             assert all(map(le, size, size_limits(setting.space)))
     full = experiment({"max_parts": 5}, p_duplicate_subtree=1.0)
-    root = to_mutable(CHAIN, TYPES)
-    duplicate_subtree(draws(), root, full)
-    assert to_genome(preorder(root)) == CHAIN
+    assert after(duplicate_subtree, 0, full, CHAIN) == CHAIN
 
 
 def test_swapping_exchanges_places_and_keeps_own_slots() -> None:
     setting = experiment(p_swap_subtree=1.0)
     found: Counter[str] = Counter()
     for seed in range(N):
-        root = to_mutable(CHAIN, TYPES)
-        swap_subtrees(draws(seed), root, setting)
-        swapped = to_genome(preorder(root))
+        swapped = after(swap_subtrees, seed, setting, CHAIN)
         found[shape(swapped)] += 1
         assert sorted(
             str(one.slot) + one.kind for one, _, _ in walk(swapped)
@@ -116,10 +118,8 @@ def test_swapping_exchanges_places_and_keeps_own_slots() -> None:
 
 def test_swapping_skips_a_tree_of_one_line() -> None:
     line = node("Core", (0, node("Hinge", (1, node("Hinge")))))
-    root = to_mutable(line, TYPES)
-    for seed in range(20):
-        swap_subtrees(draws(seed), root, experiment(p_swap_subtree=1.0))
-    assert to_genome(preorder(root)) == line
+    setting = experiment(p_swap_subtree=1.0)
+    assert all(after(swap_subtrees, seed, setting, line) == line for seed in range(20))
 
 
 @pytest.mark.parametrize(
@@ -138,12 +138,8 @@ def test_each_step_happens_with_its_probability(
 ) -> None:
     chances: dict[str, Any] = {key: probability}
     setting = experiment(**chances)
-    happened = 0
-    for seed in range(N):
-        root = to_mutable(CHAIN, TYPES)
-        step(draws(seed), root, setting)
-        happened += to_genome(preorder(root)) != CHAIN
-    assert is_near(happened, N * probability)
+    happened = [after(step, seed, setting, CHAIN) != CHAIN for seed in range(N)]
+    assert is_near(sum(happened), N * probability)
 
 
 def test_parameters_of_parts_move_and_colours_stay() -> None:

@@ -1,8 +1,6 @@
 """Errors of plug-ins late in a run: each names its birth and its island."""
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -13,16 +11,10 @@ from coordinator.islands.events import Ask
 from coordinator.islands.rows import birth_record
 from coordinator.run.learners import Learners
 from schema.errors import ExperimentError
-from schema.experiment.document import (
-    BrainSection,
-    EncodingSection,
-    Experiment,
-    SelectionSection,
-)
+from schema.experiment.document import Experiment
 from schema.experiment.identity import Origin
-from schema.experiment.learning import Learning
-from schema.plugins import permission
 from schema.robot.ids import BirthId
+from tests.documents import parse
 
 LAB = """
 import my_brains
@@ -49,17 +41,6 @@ class Asking:
     ask = tell = fails
 """
 BIRTH = BirthId(3, 200)
-
-
-@pytest.fixture
-def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, _own_brains: None) -> str:
-    """Return the name of a module whose plug-ins raise, which is allowed."""
-    name = f"late_{tmp_path.name.replace('-', '_')}"
-    file = tmp_path / f"{name}.py"
-    file.write_text(LAB)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(permission, "_allowed", {**permission._allowed, name: file})
-    return name
 
 
 def living(breeder: Breeder) -> list[Individual]:
@@ -96,56 +77,35 @@ def learner(experiment: Experiment) -> None:
     Learners({3: experiment}, Origin(seed=1, run=0)).answer(ask)
 
 
-Case = tuple[Callable[[Experiment], None], str, str, Callable[[str], Any]]
-# What is done, the key that the error names, the section and its content.
-CASES: dict[str, Case] = {
-    "parents": (
-        parents,
-        "selection.parents",
-        "selection",
-        lambda lab: SelectionSection(parents=f"{lab}:fails"),
-    ),
-    "parents that end": (
-        parents,
-        "selection.parents",
-        "selection",
-        lambda lab: SelectionSection(parents=f"{lab}:ends"),
-    ),
-    "survivors": (
+# What is done, the keys of the document, and the key that the error names.
+CASES = [
+    (parents, 'selection.parents = "LAB:fails"', "selection.parents"),
+    (parents, 'selection.parents = "LAB:ends"', "selection.parents"),
+    (
         survivors,
+        'selection.population = 5\nselection.survivors = "LAB:fails"',
         "selection.survivors",
-        "selection",
-        lambda lab: SelectionSection(population=4, survivors=f"{lab}:fails"),
     ),
-    "encoding": (
-        parents,
-        "encoding.type",
-        "encoding",
-        lambda lab: EncodingSection(type=f"{lab}:Crossing"),
-    ),
-    "genome": (
-        row,
-        "encoding.type",
-        "encoding",
-        lambda lab: EncodingSection(type=f"{lab}:Writing"),
-    ),
-    "brain": (parents, "", "brain", lambda lab: BrainSection(type=f"{lab}:Wave")),
-    "learner": (
-        learner,
-        "learning.learner",
-        "learning",
-        lambda lab: Learning(learner=f"{lab}:Asking", budget=4),
-    ),
-}
+    (parents, 'encoding.type = "LAB:Crossing"', "encoding.type"),
+    (row, 'encoding.type = "LAB:Writing"', "encoding.type"),
+    (parents, 'brain.type = "LAB:Wave"', ""),
+    (learner, '[learning]\nlearner = "LAB:Asking"\nbudget = 4', "learning.learner"),
+]
 
 
-@pytest.mark.parametrize("name", list(CASES))
-def test_an_error_names_birth_and_island(name: str, lab: str) -> None:
-    act, key, section, content = CASES[name]
+@pytest.mark.usefixtures("_own_brains")
+@pytest.mark.parametrize(("act", "text", "key"), CASES)
+def test_an_error_names_birth_and_island(
+    act: Callable[[Experiment], None],
+    text: str,
+    key: str,
+    own_module: Callable[[str], str],
+) -> None:
+    lab = own_module(LAB)
     with pytest.raises(ExperimentError) as caught:
-        act(Experiment(name="x", **{section: content(lab)}))
+        act(parse(text.replace("LAB", lab)))
     message = str(caught.value)
     assert message.startswith(f"birth 200 of island 3: {key}")
     assert f"{lab}.py" in message
-    assert ("SystemExit: 3" if "end" in name else "LookupError") in message
+    assert ("SystemExit: 3" if "ends" in text else "LookupError") in message
     assert "\n" not in message

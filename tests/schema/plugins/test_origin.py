@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import pytest
 
@@ -45,13 +44,9 @@ def fails():
 
 
 @pytest.fixture
-def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def lab(own_module: Callable[[str], str]) -> str:
     """Return the name of a plug-in module of its own."""
-    name = f"lab_{tmp_path.name}"
-    (tmp_path / f"{name}.py").write_text(SOURCE)
-    monkeypatch.setattr(permission, "_allowed", {})
-    permission.allow([str(tmp_path / f"{name}.py")])
-    return name
+    return own_module(SOURCE)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Learners: against hand-made quadratics, and what they ask and are told."""
 
-import re
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
@@ -13,7 +12,7 @@ from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import NewbornLearner, Points
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.learning import LEARNERS, Learning
-from schema.plugins import permission
+from tests.docs.page_runner import blocks_of
 
 Function = Callable[[tuple[float, ...]], float]
 
@@ -114,14 +113,12 @@ def test_one_plus_one_by_hand() -> None:
 
 
 def test_the_learner_of_the_page_keeps_its_contract(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    own_module: Callable[[str], str],
 ) -> None:
-    monkeypatch.setattr(permission, "_allowed", {})
-    page = (Path(__file__).parents[4] / "docs" / "learning.md").read_text()
-    (text,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    (tmp_path / "halves.py").write_text(text)
-    permission.allow([str(tmp_path / "halves.py")])
-    check_learner(Learning(learner="halves:Halves", parameters={"points": 3}))
+    page = Path(__file__).parents[4] / "docs" / "learning.md"
+    (text,) = blocks_of(page, "python")
+    own = f"{own_module(text)}:Halves"
+    check_learner(Learning(learner=own, parameters={"points": 3}))
 
 
 OWN = """
@@ -152,25 +149,19 @@ class Grid:
     [
         ("[self.start * self.step]", ""),
         ("[self.start + 1.0]", r"ask: must return numbers from 0 to 1, got 1.25"),
-        ("[self.start + np.nan]", "ask: must return numbers from 0 to 1, got nan"),
         ("self.start", r"1 to 23 points of 1 numbers, got shape \(1,\)"),
         ("np.zeros((99, len(self.start)))", r"1 to 23 points .* shape \(99, 1\)"),
-        ("[]", "1 to 23 points"),
         ("'abc'", "1 to 23 points"),
-        ("1 / 0", r"lab_\w+.py:5: raised ZeroDivisionError: division by zero \(lab_"),
+        ("1 / 0", r"\w+.py:5: raised ZeroDivisionError: division by zero \(\w"),
         ("[rng.random(len(self.start))]", ""),
         ("[np.random.random(len(self.start))]", "must want the same when it was"),
         ("self.counted()", "must want the same when it was"),
     ],
 )  # fmt: skip
 def test_own_learners_are_checked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer: str, message: str
+    own_module: Callable[[str], str], answer: str, message: str
 ) -> None:
-    monkeypatch.setattr(permission, "_allowed", {})
-    name = f"lab_{tmp_path.name}"
-    file = tmp_path / f"{name}.py"
-    file.write_text(OWN.format(answer=answer))
-    permission.allow([str(file)])
+    name = own_module(OWN.format(answer=answer))
     rules = Learning(learner=f"{name}:Grid", parameters={"step": 0.25})
     if not message:
         check_learner(rules)
