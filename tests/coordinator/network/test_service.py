@@ -10,29 +10,22 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
 import zenoh
 
-from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
-    AskProgress,
-    Assign,
-    Crowded,
-    Deliver,
+    Client,
     DispatchEvent,
     Job,
     Joined,
     Left,
-    Overdue,
     Progressed,
-    Requested,
     Returned,
-    Ticked,
 )
+from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.client_service import ask_coordinators
 from coordinator.network.operator_service import OperatorQuery
 from coordinator.network.service import Network
@@ -60,6 +53,7 @@ WAIT_S = 3600.0
 """Longer than any job here [s]."""
 
 
+CLIENT = Client("r", 1)
 WORK = Evaluate(BirthId(0, 0), Robot((Part("Core", -1, -1, -1, 0, ()),)))
 
 
@@ -126,47 +120,28 @@ def go_on(process: subprocess.Popen[str], jobs: int = 1) -> None:
     process.stdin.flush()
 
 
-class Driver:
-    """Dispatch and network without the rest of a coordinator."""
+def ask(fleet: JobRouter, count: int) -> list[int]:
+    """Request jobs; return their numbers."""
+    numbers = [fleet.new_number() for _ in range(count)]
+    for number in numbers:
+        payload = request(number)
+        fleet.request(Job(number, "evaluate", payload, client=CLIENT, read=read_answer))
+    return numbers
 
-    def __init__(self, network: Network) -> None:
-        self.network = network
-        self.dispatch = Dispatch()
-        self.delivered: dict[int, str] = {}
-        self.took_s: list[float | None] = []
 
-    def tell(self, event: DispatchEvent) -> None:
-        if isinstance(event, Returned) and (job := self.dispatch.job(event.number)):
-            answer = job.read(event.answer) if event.outcome == "ok" else None
-            event = replace(event, answer=answer)
-        for command in self.dispatch.handle(event):
-            if isinstance(command, AskProgress | Overdue | Crowded):
-                continue
-            job = command.job
-            if isinstance(command, Assign):
-                self.network.send(job.number, command.agent, job.payload, WAIT_S)
-            elif isinstance(command, Deliver):
-                assert job.number not in self.delivered
-                assert isinstance(command.answer, Answer)
-                assert command.answer.number == job.number
-                self.delivered[job.number] = command.agent
-
-    def ask(self, *numbers: int) -> None:
-        for number in numbers:
-            payload = request(number)
-            job = Job(number, "evaluate", payload, read=read_answer)
-            self.tell(Requested(job))
-
-    def run(self, is_enough: Callable[[], bool]) -> None:
-        end_s = time.monotonic() + PATIENCE_S
-        while not is_enough():
-            now_s = time.monotonic()
-            assert now_s < end_s, self.delivered
-            self.tell(Ticked(now_s))
-            for event in self.network.receive(0.05):
-                if isinstance(event, Returned) and event.outcome == "ok":
-                    self.took_s.append(event.took_s)
-                self.tell(event)
+def listen(fleet: JobRouter, is_enough: Callable[[], bool]) -> dict[int, str]:
+    """Return the agents of all jobs that are delivered until a condition holds."""
+    agents: dict[int, str] = {}
+    end_s = time.monotonic() + PATIENCE_S
+    while not is_enough():
+        now_s = time.monotonic()
+        assert now_s < end_s, agents
+        for end in fleet.listen(0.05, now_s).get(CLIENT, ()):
+            assert end.job.number not in agents
+            assert isinstance(end.answer, Answer)
+            assert end.answer.number == end.job.number
+            agents[end.job.number] = end.agent
+    return agents
 
 
 def test_agent_joins_with_its_properties_and_leaves(network: Network) -> None:
@@ -186,30 +161,27 @@ def test_each_job_is_delivered_once_by_two_workers(
     )
     # An earlier test may have kept the states of the engine's threads.
     monkeypatch.setattr("coordinator.network.service._THREAD", threading.local())
-    driver = Driver(network)
+    fleet = JobRouter(network)
     with agent(network, "a"), agent(network, "b"):
-        driver.run(lambda: driver.dispatch.agents("worker") == 2)
-        began_s = time.monotonic()
-        driver.ask(*range(500))
-        driver.run(lambda: not driver.dispatch.pending)
-        all_s = time.monotonic() - began_s
-    assert sorted(driver.delivered) == list(range(500))
-    assert set(driver.delivered.values()) == {"a", "b"}
-    assert all(took_s is not None and 0.0 < took_s < all_s for took_s in driver.took_s)
+        listen(fleet, lambda: fleet.dispatch.agents("worker") == 2)
+        numbers = ask(fleet, 500)
+        agents = listen(fleet, lambda: not fleet.open)
+    assert sorted(agents) == numbers
+    assert set(agents.values()) == {"a", "b"}
     # Once for each thread of the engine, not for each answer.
     assert 1 <= len(kept) < 50
 
 
 def test_jobs_of_a_killed_worker_are_done_by_another(network: Network) -> None:
-    driver = Driver(network)
-    driver.ask(0, 1, 2)
+    fleet = JobRouter(network)
+    numbers = ask(fleet, 3)
     with agent(network, "a", "stuck") as process:
-        driver.run(lambda: driver.dispatch.waiting("worker") == 1)
+        listen(fleet, lambda: fleet.dispatch.waiting("worker") == 1)
         assert line_of(process) == "begun\n"
         process.send_signal(signal.SIGKILL)
         with agent(network, "b"):
-            driver.run(lambda: not driver.dispatch.pending)
-    assert driver.delivered == {0: "b", 1: "b", 2: "b"}
+            agents = listen(fleet, lambda: not fleet.open)
+    assert agents == dict.fromkeys(numbers, "b")
 
 
 def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
@@ -457,6 +429,8 @@ def test_two_coordinators_share_a_hub_and_its_workers(network: Network) -> None:
             (returned,) = until(coordinator, has(1))
             assert isinstance(returned, Returned)
             assert returned.outcome == "ok"
+            assert returned.took_s is not None
+            assert 0.0 < returned.took_s < PATIENCE_S
 
 
 @pytest.mark.parametrize("end", ["stat$*", "*", "comman$*", "c$*"])
