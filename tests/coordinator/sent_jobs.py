@@ -1,6 +1,8 @@
 """Agents whose jobs are recorded, for tests that answer them by hand."""
 
-from coordinator.dispatch.events import DispatchEvent
+from typing import Any
+
+from coordinator.dispatch.events import DispatchEvent, Outcome, Returned
 
 
 class SentJobs:
@@ -32,6 +34,12 @@ class SentJobs:
 
     def ask(self, agent: str, /) -> None:
         self.asked.append(agent)
+
+    def answer(self, outcome: Outcome = "ok", data: bytes = b"x", **other: Any) -> str:  # noqa: ANN401 - any field
+        """Let the agent of the newest job answer next; return its name."""
+        number, agent, _ = self.sent[-1]
+        self.news = [Returned(number, agent, outcome, data, **other)]
+        return agent
 
     def receive(
         self, _timeout_s: float, pause_s: float = 0.0, /

@@ -279,9 +279,3 @@ def test_every_command_on_the_pages_exists() -> None:
     }
     assert len(named) >= 6
     assert named <= set(COMMANDS)
-
-
-def test_every_link_has_a_target() -> None:
-    for page in PAGES:
-        for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
-            assert (page.parent / target).exists(), f"{page.name}: {target}"

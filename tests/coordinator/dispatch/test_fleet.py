@@ -163,8 +163,7 @@ def test_a_job_that_its_agent_declined_is_given_to_another(
     """Nobody's word about epochs ends a job, and it never counts as an error."""
     client = begin(fleet, is_arena=is_arena)
     for now_s in range(1, 7):
-        number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, outcome, reason="epoch 9 has begun")]
+        agents.answer(outcome, b"", reason="epoch 9 has begun")
         assert fleet.listen(0.0, 10.0 * now_s) == {}
         fleet.tell(Ticked(10.0 * now_s + 5.0))
     assert len(agents.sent) == 7
@@ -200,14 +199,12 @@ def test_a_job_that_was_sent_again_took_all_the_time(
     fleet: JobRouter, agents: SentJobs
 ) -> None:
     request(fleet)
-    ((number, agent, _),) = agents.sent
-    agents.news = [Returned(number, agent, "ok", b"x", took_s=2.0)]
+    agents.answer(took_s=2.0)
     fleet.listen(0.0, 2.0)
     request(fleet)
-    number, agent, _ = agents.sent[-1]
-    agents.news = [Returned(number, agent, "expired", took_s=300.0)]
+    agents.answer("expired", b"", took_s=300.0)
     fleet.listen(0.0, 302.0)
-    agents.news = [Returned(number, agent, "ok", b"x", took_s=1.0)]
+    agent = agents.answer(took_s=1.0)
     assert len(fleet.listen(0.0, 303.0)) == 1
     typical_s = 0.9 * 2.0 + 0.1 * 301.0
     assert fleet.dispatch.workers.agents[agent].job_s == pytest.approx(typical_s)
@@ -221,8 +218,7 @@ def test_advances_after_one_that_expired_wait_longer(
     shard = new_shard(fleet)
     for now_s in (10.0, 20.0):
         fleet.advance(shard)
-        number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, "ok", b"x")]
+        agents.answer()
         fleet.listen(0.0, now_s)
     fleet.advance(shard)
     number, agent, payload = agents.sent[-1]
@@ -231,9 +227,8 @@ def test_advances_after_one_that_expired_wait_longer(
     assert agents.sent[-1] == (number, agent, payload)
     # Another worker ends it: nothing is learned from an advance that is rebuilt.
     fleet.tell(Left(agent))
-    number, agent, payload = agents.sent[-1]
-    assert payload == b"whole True"
-    agents.news = [Returned(number, agent, "ok", b"x")]
+    assert agents.sent[-1][2] == b"whole True"
+    agents.answer()
     fleet.listen(0.0, 321.0)
     fleet.advance(shard)
     # The first one holds what is needed to rebuild the state.
@@ -251,8 +246,7 @@ def test_a_state_that_cannot_be_read_ends_only_its_own_run(
     for shard in shards:
         fleet.advance(shard)
     fleet.tell(Left("two"))
-    ((number, agent, _),) = agents.sent[-1:]
-    agents.news = [Returned(number, agent, "ok", b"x")]
+    agent = agents.answer()
     ends = fleet.listen(0.0, 1.0)
     assert [ended(end) for end in (*ends[CLIENT], *ends[ARENA])] == [
         (shards[0], "", None, "island-0-5.bin: is missing"),
@@ -270,13 +264,11 @@ def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
     fleet.advance(shard)
     tried = []
     for now_s in range(1, 4):
-        number, agent, _ = agents.sent[-1]
+        if is_answer:
+            agent = agents.answer(data=b"bad")
+        else:
+            agent = agents.answer("error", b"", reason="no such plug-in")
         tried.append(agent)
-        agents.news = [
-            Returned(number, agent, "ok", b"bad")
-            if is_answer
-            else Returned(number, agent, "error", reason="no such plug-in")
-        ]
         ends = fleet.listen(0.0, float(10 * now_s))
         assert fleet.faults.total("malformed") == (now_s if is_answer else 0)
         fleet.tell(Ticked(10 * now_s + 5.0))
@@ -285,8 +277,7 @@ def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
         assert ended(*ends[ARENA]) == (shard, agent, None, "no such plug-in")
         return
     assert ends == {}
-    number, agent, _ = agents.sent[-1]
-    agents.news = [Returned(number, agent, "ok", b"answer")]
+    agent = agents.answer(data=b"answer")
     (end,) = fleet.listen(0.0, 50.0)[ARENA]
     assert ended(end) == (shard, agent, b"answer", "")
 
@@ -297,8 +288,7 @@ def test_an_unfit_worker_gets_jobs_of_other_clients_only(
     """Jobs, and an arena, of a client; an agent that joins again is tried again."""
     shard = new_shard(fleet, CLIENT)
     fleet.advance(shard)
-    number, unfit, _ = agents.sent[0]
-    agents.news = [Returned(number, unfit, "unfit", reason="has no plug-in 'x'")]
+    unfit = agents.answer("unfit", b"", reason="has no plug-in 'x'")
     assert fleet.listen(0.0, 1.0) == {}
     (other,) = fleet.dispatch.fit("worker", CLIENT)
     assert (unfit, other) == ("one", "two")
@@ -317,48 +307,41 @@ def test_an_unfit_worker_gets_jobs_of_other_clients_only(
     fleet.tell(Left(unfit))
     fleet.tell(Joined(unfit, "worker", 1, "p"))
     assert len(agents.sent) > count + 1
+    agents.answer("unfit", b"", reason="has no plug-in 'x'")
+    fleet.listen(0.0, 2.0)
+    assert agents.sent[-1][1] not in fleet.dispatch.fit("worker", CLIENT)
+    fleet.leave(CLIENT)
+    assert fleet.dispatch.fit("worker", CLIENT) == {"one"}
+    assert fleet.dispatch.unfit() == {}
 
 
 @pytest.mark.parametrize("is_late", [False, True])
 def test_an_unfit_worker_gets_no_copy_of_an_overdue_job(
     fleet: JobRouter, agents: SentJobs, *, is_late: bool
 ) -> None:
-    first = request(fleet)
-    agents.news = [Returned(first, agents.sent[0][1], "unfit", reason="no plug-in")]
+    request(fleet)
+    agents.answer("unfit", b"", reason="no plug-in")
     fleet.listen(0.0, 1.0)
     assert agents.sent[1][1] != agents.sent[0][1]
     fleet.tell(Ticked(1.5 if not is_late else 100.0 * FIRST_S))
     assert len(agents.sent) == 2
-    agents.news = [Returned(first, agents.sent[1][1], "ok", b"x")]
+    agents.answer()
     assert [type(end) for end in fleet.listen(0.0, 1e6)[CLIENT]] == [Deliver]
-
-
-def test_a_worker_is_fit_again_for_a_client_that_has_ended(
-    fleet: JobRouter, agents: SentJobs
-) -> None:
-    number = request(fleet)
-    agent = agents.sent[0][1]
-    agents.news = [Returned(number, agent, "unfit", reason="has no plug-in 'x'")]
-    fleet.listen(0.0, 1.0)
-    assert agent not in fleet.dispatch.fit("worker", CLIENT)
-    assert fleet.dispatch.unfit() == {agent: "has no plug-in 'x'"}
-    fleet.leave(CLIENT)
-    assert agent in fleet.dispatch.fit("worker", CLIENT)
-    assert fleet.dispatch.unfit() == {}
 
 
 def test_a_worker_without_the_state_is_given_it(
     fleet: JobRouter, agents: SentJobs
 ) -> None:
     shard = new_shard(fleet)
-    for data in (b"answer", b"stateless"):
+    for answers in ([b"answer"], [b"stateless", b"stateless"]):
         fleet.advance(shard)
-        number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, "ok", data)]
-        fleet.listen(0.0, 1.0)
+        for data in answers:
+            agents.answer(data=data)
+            fleet.listen(0.0, 1.0)
     payloads = [payload for _, _, payload in agents.sent]
-    assert payloads == [b"whole True", b"whole False", b"whole True"]
-    assert {agent for _, agent, _ in agents.sent} == {agent}
+    assert payloads == [b"whole True", b"whole False", *[b"whole True"] * 2]
+    # Asking again is an error.
+    assert [agent for _, agent, _ in agents.sent] == ["one"] * 3 + ["two"]
 
 
 def test_a_released_arena_leaves_room_for_another(
@@ -366,13 +349,14 @@ def test_a_released_arena_leaves_room_for_another(
 ) -> None:
     fleet.advance(new_shard(fleet, ARENA))
     fleet.advance(new_shard(fleet, OTHER))
-    freed = agents.sent[1][1]
+    number, freed, payload = agents.sent[1]
     fleet.leave(OTHER)
     assert fleet.open == 1
+    assert agents.cancelled == [(freed, payload)]
     fleet.advance(new_shard(fleet, CLIENT))
     assert agents.sent[2][1] == freed
     # The answer to the released arena's request is dropped.
-    agents.news = [Returned(agents.sent[1][0], freed, "ok", b"")]
+    agents.news = [Returned(number, freed, "ok", b"")]
     assert fleet.listen(0.0, 1.0) == {}
 
 

@@ -20,7 +20,6 @@ from coordinator.dispatch.events import (
     Outcome,
     Overdue,
     Progressed,
-    Released,
     Requested,
     Returned,
     ShardSeen,
@@ -76,6 +75,12 @@ class Fleet:
 
     def handle(self, event: DispatchEvent) -> list[Command]:
         return [self._short(command) for command in self._dispatch.handle(event)]
+
+    def assign(self, shard: int) -> Sent:
+        """Request an advance, which is assigned; return it."""
+        (sent,) = self.request(shard)
+        assert isinstance(sent, Sent)
+        return sent
 
     def request(self, shard: int, simulated_s: float | None = None) -> list[Command]:
         number = next(self._numbers)
@@ -133,16 +138,6 @@ def test_only_a_worker_of_the_first_platform_continues_a_shard() -> None:
     assert dispatch.waiting == {0: "arm"}
     whole = Sent(4, 0, "d", "arm", is_whole=True)
     assert dispatch.handle(joined("d", "arm")) == [whole]
-
-
-def test_worker_without_the_state_is_given_it() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    dispatch.returned(1)
-    dispatch.request(0)
-    assert dispatch.returned(2, "stateless") == [Sent(3, 0, "a", "p", is_whole=True)]
-    # Asking again is an error.
-    assert dispatch.returned(3, "stateless") == [Sent(4, 0, "b", "p", is_whole=True)]
 
 
 def drifting(*, allows_drift: bool = True, may_drift: bool = True) -> Fleet:
@@ -220,8 +215,7 @@ def test_advances_are_counted_while_they_wait_and_while_a_worker_has_them() -> N
 def advance(dispatch: Fleet, shard: int, start_s: float, lasts_s: float) -> None:
     """Make one advance of a shard."""
     dispatch.handle(Ticked(start_s))
-    (hand,) = dispatch.request(shard)
-    assert isinstance(hand, Sent)
+    hand = dispatch.assign(shard)
     dispatch.handle(Ticked(start_s + lasts_s))
     (done, *_) = dispatch.returned(hand.number)
     assert isinstance(done, Ended)
@@ -322,13 +316,9 @@ def test_all_advances_of_a_silent_worker_move_at_once() -> None:
     dispatch.handle(Ticked(FIRST_S + REPLY_S))
     assert [dispatch.holder(shard) for shard in range(4)] == ["b"] * 4
     # A new shard avoids the silent worker until it gives a sign of life.
-    (hand,) = dispatch.request(4)
-    assert isinstance(hand, Sent)
-    assert hand.agent == "b"
+    assert dispatch.assign(4).agent == "b"
     dispatch.handle(Progressed("a"))
-    (hand,) = dispatch.request(5)
-    assert isinstance(hand, Sent)
-    assert hand.agent == "a"
+    assert dispatch.assign(5).agent == "a"
 
 
 def spread(dispatch: Fleet, shards: int) -> Counter[str]:
@@ -341,12 +331,12 @@ def test_full_worker_gets_a_shard_only_if_all_are_full() -> None:
     dispatch.handle(Joined("a", "worker", 1, "p", shards=2))
     dispatch.handle(Joined("b", "worker", 1, "p", shards=5))
     for shard in range(7):
-        assert len(dispatch.request(shard)) == 1
+        dispatch.assign(shard)
     assert spread(dispatch, 7) == {"a": 2, "b": 5}
     (told, hand) = dispatch.request(7)
     assert told == Crowded(8, 7)
     assert isinstance(hand, Sent)
-    assert len(dispatch.request(8)) == 1
+    dispatch.assign(8)
 
 
 def test_shards_spread_by_cores() -> None:
@@ -362,13 +352,12 @@ def test_forty_shards_on_two_workers_are_never_rebuilt() -> None:
     dispatch = Fleet()
     for name in ("a", "b"):
         dispatch.handle(Joined(name, "worker", 1, "p", shards=20))
-    hands = [dispatch.request(shard)[0] for shard in range(40)]
+    hands = [dispatch.assign(shard) for shard in range(40)]
     for _ in range(10):
         following = []
         for hand in hands:
-            assert isinstance(hand, Sent)
             dispatch.returned(hand.number)
-            following += dispatch.request(hand.shard)
+            following.append(dispatch.assign(hand.shard))
         hands = following
     assert spread(dispatch, 40) == {"a": 20, "b": 20}
     assert dispatch.homes.rebuilt == 0
@@ -378,9 +367,7 @@ def test_forty_shards_on_two_workers_are_never_rebuilt() -> None:
 
 def test_worker_that_joins_late_takes_over_its_share() -> None:
     dispatch = fleet("a")
-    (first, *_) = [dispatch.request(shard)[0] for shard in range(5)]
-    dispatch.request(5)
-    assert isinstance(first, Sent)
+    (first, *_) = [dispatch.assign(shard) for shard in range(6)]
     dispatch.returned(first.number)
     commands = dispatch.handle(joined("b"))
     # Those that wait in the queue of the other; none of them has a state yet.
@@ -395,18 +382,8 @@ def test_shard_with_a_state_moves_after_its_present_advance() -> None:
     dispatch = fleet("a")
     for shard in (0, 1):
         advance(dispatch, shard, shard, 0.5)
-    (hand,) = dispatch.request(1)
+    hand = dispatch.assign(1)
     assert dispatch.handle(joined("b")) == []
-    assert isinstance(hand, Sent)
     assert dispatch.returned(hand.number) == [Ended(1, "a")]
-    (hand,) = dispatch.request(1)
-    assert hand == Sent(4, 1, "b", "p", is_whole=True)
+    assert dispatch.assign(1) == Sent(4, 1, "b", "p", is_whole=True)
     assert dispatch.homes.rebuilt == 1
-
-
-def test_released_shard_is_forgotten() -> None:
-    dispatch = fleet("a", "b")
-    dispatch.request(0)
-    assert dispatch.handle(Released(0)) == [Cancelled(1, 0, "a")]
-    assert dispatch.returned(1) == []
-    assert dispatch.handle(Ticked(100 * FIRST_S)) == []

@@ -69,12 +69,6 @@ def test_ties_in_a_tournament_break_on_the_birth() -> None:
     assert found == {(0, 1), (1, 0)}
 
 
-@pytest.mark.parametrize("parents", ["tournament", "random"])
-def test_no_individual_mates_with_itself(parents: str) -> None:
-    found = couples(individuals(*range(6)), parents=parents)
-    assert all(first != second for first, second in found)
-
-
 def test_random_parents_are_uniform_whatever_their_fitness() -> None:
     found = Counter(map(tuple, couples(individuals(9.0, 1.0, 0.0), parents="random")))
     assert len(found) == 6

@@ -23,7 +23,7 @@ from schema.wire.arena import Advance, Casualty, Judgement
 from schema.wire.codec import decode, encode
 from schema.wire.messages import Answer, CallValue, Result
 from tests.coordinator.reports import VIABLE
-from tests.coordinator.run.test_arena_resume import Run, run
+from tests.coordinator.run.test_arena_resume import Run
 from tests.coordinator.sent_requests import JUDGED
 
 Lie = Callable[[Answer], Answer | bytes]
@@ -93,14 +93,6 @@ def journalled(path: Path) -> list[JournalledEvent]:
             for each in journal.replay()
         ]
     return sorted(events, key=repr)
-
-
-@pytest.fixture(scope="module")
-def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of an undisturbed run."""
-    path = tmp_path_factory.mktemp("calm") / "run"
-    assert run(path)
-    return path
 
 
 LIES: dict[str, tuple[AgentKind, Lie]] = {

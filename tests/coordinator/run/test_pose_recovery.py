@@ -188,33 +188,30 @@ def test_recovery_may_be_interrupted(copy: Path, finished: Path) -> None:
     assert compare(finished, copy) == []
 
 
-@pytest.mark.parametrize("table", ["poses", "births", "fitness", "runs"])
+@pytest.mark.parametrize(
+    ("table", "problem"),
+    [
+        ("poses", "is lost"),
+        *((name, "damaged") for name in ("births", "fitness", "poses", "runs")),
+    ],
+)
 def test_damaged_table_of_a_finished_run_is_written_again(
-    tmp_path: Path, finished: Path, table: str
+    tmp_path: Path, finished: Path, table: str, problem: str
 ) -> None:
     path = tmp_path / "run"
     shutil.copytree(finished, path)
     assert table_damages(path) == []
     file = parquet_path(path, ARENA.name, 0, table)
-    flip(file, 0.4)
+    if problem == "damaged":
+        flip(file, 0.4)
+    else:
+        file.unlink()
     (damage,) = table_damages(path)
-    assert f"{table}.parquet: damaged" in damage
+    assert f"{table}.parquet: {problem}" in damage
     assert execute(path)
     assert table_damages(path) == []
     assert compare(finished, path) == []
     assert [each.suffix for each in file.parent.iterdir()] == [".parquet"] * len(TABLES)
-
-
-def test_lost_poses_of_a_finished_run_are_computed_again(
-    tmp_path: Path, finished: Path
-) -> None:
-    path = tmp_path / "run"
-    shutil.copytree(finished, path)
-    parquet_path(path, ARENA.name, 0, "poses").unlink()
-    (damage,) = table_damages(path)
-    assert "poses.parquet: is lost" in damage
-    assert execute(path)
-    assert compare(finished, path) == []
 
 
 def test_recovery_waits_for_a_worker_of_the_platform(

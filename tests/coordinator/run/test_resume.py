@@ -12,19 +12,13 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-import analyzer.report
-from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Ask, Asked, EvaluationFailed
-from coordinator.islands.island import Island
-from coordinator.network.local import LocalAgents
 from coordinator.run.history import replayed
 from coordinator.run.learners import Learners
-from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunDetails
 from coordinator.storage.journal import NAME, Journal
-from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, SelectionSection
@@ -36,6 +30,8 @@ from schema.tables.files import read_table
 from schema.wire.messages import Evaluate, Failure, Request
 from schema.wire.protobuf import encode_robot
 from tests.coordinator.reports import PROVENANCE
+from tests.coordinator.run.test_arena_resume import Killed
+from tests.coordinator.run.test_arena_resume import run as conduct
 
 EXPERIMENT = Experiment(
     name="resume", births=40, selection=SelectionSection(population=8, children=6)
@@ -46,10 +42,6 @@ LEARNING = structs.replace(
     learning=Learning(budget=7, inherit="lamarckian", parameters={"population": 4}),
 )
 DETAILS = RunDetails("resume", 0, 3, experiment_text(EXPERIMENT))
-
-
-class Killed(BaseException):
-    """Simulated death of the coordinator."""
 
 
 @dataclass
@@ -76,33 +68,8 @@ def run(
 ) -> int:
     """Start or resume until the end or N evaluations; return their number."""
     worker = Worker(answers)
-    text = experiment_text(experiment)
-    details = None if (path / NAME).exists() else replace(DETAILS, document=text)
-    with RunFolder(path, details) as folder, Journal.open(path) as journal:
-        rows = Recorder(path, DETAILS)
-        fleet = JobRouter(
-            LocalAgents(
-                {"analyzer": analyzer.report.answer, "worker": worker.answer}, "any"
-            )
-        )
-        loop = Loop(
-            {0: Island(experiment, DETAILS.seed, DETAILS.run)},
-            context=RunContext.of("resume", folder.epoch, experiment, DETAILS.origin),
-            fleet=fleet,
-            log=journal,
-            rows=rows,
-            snapshot_store=Snapshots(path),
-        )
-        try:
-            loop.start(journal.replay())
-            while not loop.is_finished:
-                loop.act(0.0, fleet.listen(0.0, 0.0).get(loop.client, ()))
-                rows.flush()
-        except Killed:
-            rows.close()
-            return worker.asked - 1
-        rows.finish()
-    return worker.asked
+    has_ended = conduct(path, document=experiment, worker=worker.answer)
+    return worker.asked - (not has_ended)
 
 
 @pytest.fixture(scope="module")

@@ -34,9 +34,9 @@ CLOCK = partial(next, map(float, count()))
 CAMPAIGN = Campaign(EXPERIMENTS, 2, 3)
 
 
-def local() -> LocalAgents:
+def local(kind: type[LocalAgents] = LocalAgents) -> LocalAgents:
     answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
-    return LocalAgents(answers, "any")  # type: ignore[arg-type]
+    return kind(answers, "any")  # type: ignore[arg-type]
 
 
 def plan(folder: Path) -> list[Planned]:
@@ -111,8 +111,7 @@ def test_stopped_runs_resume_and_finished_ones_are_not_started(
     conduct(scheduler_of(plan(tmp_path), local()))
     for path, _ in CAMPAIGN.runs(alone):
         assert compare(path, tmp_path / path.name) == []
-    finished = [replaced(each) for each in plan(tmp_path)]
-    assert scheduler_of(finished, local()).is_finished
+    assert scheduler_of(plan(tmp_path), local()).is_finished
 
 
 def test_rate_is_known_at_the_first_query(tmp_path: Path) -> None:
@@ -155,15 +154,10 @@ class Fencing(LocalAgents):
         return events
 
 
-def fencing() -> Fencing:
-    answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
-    return Fencing(answers, "any")  # type: ignore[arg-type]
-
-
 def test_a_run_goes_on_if_agents_say_without_reason_that_it_was_taken_over(
     tmp_path: Path, alone: Path
 ) -> None:
-    scheduler = scheduler_of(plan(tmp_path)[:1], fencing())
+    scheduler = scheduler_of(plan(tmp_path)[:1], local(Fencing))
     conduct(scheduler)
     assert scheduler.failed == []
     ((path, _), *_) = CAMPAIGN.runs(alone)
@@ -176,7 +170,7 @@ def test_a_run_goes_on_if_agents_say_without_reason_that_it_was_taken_over(
 def test_a_run_stops_at_once_if_agents_say_so_and_its_folder_too(
     tmp_path: Path,
 ) -> None:
-    scheduler = scheduler_of(plan(tmp_path)[:1], fencing())
+    scheduler = scheduler_of(plan(tmp_path)[:1], local(Fencing))
     scheduler.turn(0.0, CLOCK)
     (run,) = scheduler.active
     (run.held.path / LOCK).unlink()
@@ -189,15 +183,6 @@ def test_a_run_stops_at_once_if_agents_say_so_and_its_folder_too(
 
 def broken() -> None:
     raise RunFolderError("finished with 15 rows, and more came")
-
-
-def replaced(planned: Planned) -> Planned:
-    """Return a planned run that raises if it is started."""
-    return Planned(planned.status, never)
-
-
-def never() -> RunFolder:
-    raise AssertionError("a finished run was begun")
 
 
 def test_runs_are_started_until_requests_are_twice_the_credits(tmp_path: Path) -> None:
