@@ -7,13 +7,36 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 from msgspec.structs import replace
 
-from schema.parts import BUILT_IN, BodySpace, Parameter
+from schema.parts import (
+    BUILT_IN,
+    BodySpace,
+    Box,
+    Joint,
+    Matrix,
+    Parameter,
+    Shape,
+    Slot,
+    cylinder,
+)
 from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Layer, Neuron
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop
 from schema.robot.robot import ORIENTATIONS, Part, Robot
 
 GREY = (0.5, 0.5, 0.5)
 CORE = Part("Core", -1, -1, -1, 0, GREY)
+ON_SIDE: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
+SLIDE = Shape(
+    boxes=(
+        Box("rail", (0.02, 0.02, 0.02), (0.01, 0.0, 0.0), 0.02),
+        cylinder("rod", 0.005, 0.04, (0.04, 0.0, 0.0), 0.01, segment=1,
+                 rotation=ON_SIDE),
+    ),
+    slots=(
+        Slot((0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Slot((0.06, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1),
+    ),
+    joint=Joint((0.03, 0.0, 0.0), (1.0, 0.0, 0.0), 0.015, "prismatic"),
+)  # fmt: skip
 
 
 def robot_of(*parts: Part, space: BodySpace = BUILT_IN) -> Robot:

@@ -20,7 +20,7 @@ from analysis.comparison.findings import (
 )
 from analysis.comparison.outcomes import outcome
 from analysis.measures.load import LoadedRun
-from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
+from analysis.measures.outputs import OUTCOME, OUTPUTS
 from analysis.measures.study import MeasuredRun
 from schema.experiment.document import (
     ArenaSection,
@@ -28,6 +28,7 @@ from schema.experiment.document import (
     Reevaluation,
     SelectionSection,
 )
+from tests.analysis.drawn import table
 
 Level = Mapping[str, float | None]
 ROBOT = dict.fromkeys(OUTPUTS["robots"], 0) | {
@@ -41,15 +42,14 @@ def tables(
     levels: Sequence[Level], robots: Sequence[Level] = ()
 ) -> dict[str, pa.Table]:
     """Return measured tables: rows of populations, and of robots."""
-    blank = dict.fromkeys(OUTPUTS["populations"])
-    rows = [{**blank, "island": 0, "judged": 1, **level} for level in levels]
+    rows = [{"island": 0, "judged": 1, **level} for level in levels]
     named = [
         {**ROBOT, "is_last": False, "birth": number, **robot}
         for number, robot in enumerate(robots)
     ]
     return {
-        "populations": pa.Table.from_pylist(rows, schema("populations")),
-        "robots": pa.Table.from_pylist(named, schema("robots")),
+        "populations": table("populations", rows),
+        "robots": table("robots", named),
     }
 
 
@@ -85,7 +85,7 @@ def test_measures_of_the_experiments_are_compared() -> None:
                     (0, 130, 99.0),
                 )
             ] * bool(energies)  # fmt: skip
-            named = pa.Table.from_pylist(rows, schema("named_measures"))
+            named = table("named_measures", rows)
             run = replace(one.run, number=number, folder=Path(f"{name}{number}"))
             every.append(
                 replace(one, run=run, tables={**one.tables, "named_measures": named})
@@ -180,8 +180,8 @@ def test_contacts_and_families_of_later_births_do_not_count() -> None:
         for island, distance in ((0, 0.2), (1, 0.4))
     ]
     made = tables(levels) | {
-        "interactions": pa.Table.from_pylist(contacts, schema("interactions")),
-        "families": pa.Table.from_pylist(families, schema("families")),
+        "interactions": table("interactions", contacts),
+        "families": table("families", families),
     }
     found = [outcome(made, births, SETTINGS) for births in (30, 15, 14)]
     names = ("touched", "family_distance")
@@ -220,7 +220,7 @@ def test_fitness_of_whole_lives_counts_on_islands_that_end(
         for island, birth, value in ((0, 0, 0.2), (0, 1, 0.4), (1, 0, 0.9), (1, 1, 0.9))
     ]
     made = tables(levels, robots)
-    made["variability"] = pa.Table.from_pylist(lives, schema("variability"))
+    made["variability"] = table("variability", lives)
     settings = (SETTINGS[0], island)
     early, late = (outcome(made, births, settings) for births in (15, 30))
     # Ranks 2 1 3 4 5, or 2 1 alone: 1 - 6 (1 + 1) / (5 (25 - 1)) = 0.9.

@@ -10,23 +10,14 @@ from analysis.viewer.body import BoxModel, box_model, neutral_pose, place, place
 from schema.errors import MalformedMessage
 from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
-from schema.parts import (
-    BUILT_IN,
-    BodySpace,
-    Box,
-    Joint,
-    Matrix,
-    PartType,
-    Shape,
-    Slot,
-    cylinder,
-)
+from schema.parts import BUILT_IN, BodySpace, PartType
 from schema.robogen_parts import ACTIVE_WHEEL
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
 from tests.coordinator.arena_world import poses
+from tests.schema.robots import SLIDE
 
 GREY = (0.2, 0.4, 0.6)
 ROBOT = Robot(
@@ -90,23 +81,10 @@ def test_boxes_are_where_the_engine_has_them(seed: int) -> None:
         assert apart.min(axis=1).max(axis=1).min() < 1e-5
 
 
-SLIDING: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
-_SLIDE = Shape(
-    boxes=(
-        Box("rail", (0.02, 0.02, 0.02), (0.01, 0.0, 0.0), 0.02),
-        cylinder("rod", 0.005, 0.04, (0.04, 0.0, 0.0), 0.01, segment=1,
-                 rotation=SLIDING),
-    ),
-    slots=(
-        Slot((0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        Slot((0.06, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1),
-    ),
-    joint=Joint((0.03, 0.0, 0.0), (1.0, 0.0, 0.0), 0.015, "prismatic"),
-)  # fmt: skip
 SPACE = {
     **BUILT_IN,
     "ActiveWheel": ACTIVE_WHEEL,
-    "Slide": PartType("Slide", 2, lambda _: _SLIDE),
+    "Slide": PartType("Slide", 2, lambda _: SLIDE),
 }
 WHEELED = Robot(
     (

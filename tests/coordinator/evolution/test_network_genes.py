@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coordinator.evolution.brains import brain_rules
-from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
+from coordinator.evolution.mutable_genome import to_branches, to_genome
 from coordinator.evolution.network import (
     add_connections,
     add_hidden_neurons,
@@ -65,10 +65,9 @@ CORE = node(
 
 
 def test_deleting_a_hidden_neuron_drops_its_connections_and_shifts_the_rest() -> None:
-    root = to_mutable(CORE, TYPES)
+    core, hinge = to_branches(CORE, TYPES)
     # Three hidden neurons are asked in turn; only the second goes.
-    delete_hidden_neurons(scripted(0.9, 0.01, 0.9), preorder(root), 0.05)
-    core, hinge = preorder(root)
+    delete_hidden_neurons(scripted(0.9, 0.01, 0.9), [core, hinge], 0.05)
     assert hinge.hidden == (neuron(0.1), neuron(0.3))
     assert hinge.connections == (
         edge(("hidden", 0), (), ("output", 0)),
@@ -99,9 +98,9 @@ def test_deleting_hidden_neurons_keeps_other_connections(
 ) -> None:
     """Oracle on the robot: drop the edges of the removed neurons, and no others."""
     genome = founder(seed)
-    root = to_mutable(genome, TYPES)
-    delete_hidden_neurons(draws(seed), preorder(root), probability)
-    after = to_genome(preorder(root))
+    branches = to_branches(genome, TYPES)
+    delete_hidden_neurons(draws(seed), branches, probability)
+    after = to_genome(branches)
     left = {n.parameters for one, _, _ in walk(after) for n in one.hidden}
     expected = Counter(
         {
@@ -119,12 +118,12 @@ def test_neurons_and_connections_are_deleted_with_their_probabilities(
 ) -> None:
     neurons = edges = 0
     for seed in range(N):
-        root = to_mutable(CORE, TYPES)
-        delete_hidden_neurons(draws(seed), preorder(root), probability)
-        neurons += 3 - len(preorder(root)[1].hidden)
-        root = to_mutable(CORE, TYPES)
-        delete_connections(draws(seed), preorder(root), probability)
-        edges += 10 - sum(len(branch.connections) for branch in preorder(root))
+        branches = to_branches(CORE, TYPES)
+        delete_hidden_neurons(draws(seed), branches, probability)
+        neurons += 3 - len(branches[1].hidden)
+        branches = to_branches(CORE, TYPES)
+        delete_connections(draws(seed), branches, probability)
+        edges += 10 - sum(len(branch.connections) for branch in branches)
     spread = 5 * (probability * (1 - probability)) ** 0.5
     assert abs(neurons / N / 3 - probability) <= spread / (3 * N) ** 0.5
     assert abs(edges / N / 10 - probability) <= spread / (10 * N) ** 0.5
@@ -133,9 +132,8 @@ def test_neurons_and_connections_are_deleted_with_their_probabilities(
 def test_neuron_parameters_move_by_their_share_and_types_stay() -> None:
     moved = []
     for seed in range(N):
-        root = to_mutable(CORE, TYPES)
-        vary_neurons(draws(seed), preorder(root), 0.1, NEURON_TYPES)
-        hinge = preorder(root)[1]
+        core, hinge = to_branches(CORE, TYPES)
+        vary_neurons(draws(seed), [core, hinge], 0.1, NEURON_TYPES)
         moved.append(hinge.outputs[0].parameters)
         assert hinge.connections == HINGE.connections, "weights never mutate"
         assert {one.kind for one in hinge.hidden} == {"Simple"}
@@ -153,9 +151,8 @@ def test_how_many_hidden_neurons_are_added(before: int, expected: float) -> None
     found = []
     kinds: Counter[str] = Counter()
     for seed in range(N):
-        root = to_mutable(CORE, TYPES)
-        add_hidden_neurons(draws(seed), preorder(root), before, rules, NEURON_TYPES)
-        core, hinge = preorder(root)
+        core, hinge = to_branches(CORE, TYPES)
+        add_hidden_neurons(draws(seed), [core, hinge], before, rules, NEURON_TYPES)
         found.append(len(core.hidden) + len(hinge.hidden) - 3)
         kinds.update(one.kind for one in (*core.hidden, *hinge.hidden[3:]))
         assert hinge.hidden[:3] == HINGE.hidden, "new ones come last"
@@ -167,27 +164,27 @@ def test_how_many_hidden_neurons_are_added(before: int, expected: float) -> None
 
 def test_hidden_neurons_are_added_up_to_the_limit() -> None:
     rules = brain_rules(experiment({"max_hidden": 5}, p_delete_hidden_neuron=1.0))
-    root = to_mutable(CORE, TYPES)
-    add_hidden_neurons(draws(), preorder(root), 9, rules, NEURON_TYPES)
-    assert sum(len(branch.hidden) for branch in preorder(root)) == 5
+    branches = to_branches(CORE, TYPES)
+    add_hidden_neurons(draws(), branches, 9, rules, NEURON_TYPES)
+    assert sum(len(branch.hidden) for branch in branches) == 5
 
 
 @pytest.mark.parametrize(
     ("before", "count"), [(0, 0), (9, 0), (10, 1), (29, 1), (30, 2), (50, 3)]
 )
 def test_how_many_connections_are_added(before: int, count: int) -> None:
-    root = to_mutable(CORE, TYPES)
-    add_connections(draws(), preorder(root), before, brain_rules(experiment()))
-    assert sum(len(branch.connections) for branch in preorder(root)) == 10 + count
+    branches = to_branches(CORE, TYPES)
+    add_connections(draws(), branches, before, brain_rules(experiment()))
+    assert sum(len(branch.connections) for branch in branches) == 10 + count
 
 
 def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
     bare = node("Core", (2, node("ActiveHinge", hidden=(neuron(0.1),))))
     found: Counter[tuple[int, int]] = Counter()
     for seed in range(N):
-        root = to_mutable(bare, TYPES)
-        add_connections(draws(seed), preorder(root), 10, brain_rules(experiment()))
-        (made,) = develop(to_genome(preorder(root)), TYPES).brain.connections
+        branches = to_branches(bare, TYPES)
+        add_connections(draws(seed), branches, 10, brain_rules(experiment()))
+        (made,) = develop(to_genome(branches), TYPES).brain.connections
         found[made.source, made.target] += 1
         assert 0.0 <= made.weight < 1.0
     # Inputs 0..5, output 6, hidden 7: eight sources, two targets.
@@ -197,6 +194,6 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
 
 def test_no_connection_is_added_without_a_target() -> None:
     lone = node("Core", (0, node("Hinge")))
-    root = to_mutable(lone, TYPES)
-    add_connections(draws(), preorder(root), 40, brain_rules(experiment()))
-    assert to_genome(preorder(root)) == lone
+    branches = to_branches(lone, TYPES)
+    add_connections(draws(), branches, 40, brain_rules(experiment()))
+    assert to_genome(branches) == lone

@@ -174,15 +174,11 @@ def test_a_failed_trial_counts_as_zero_or_as_the_least_below(
 
 def test_a_robot_that_failed_at_birth_may_succeed_later() -> None:
     found = reevaluations(fitness="mean")
-    population = (failed(one(0, 0.0)),)
+    population = (Individual(BirthId(0, 0), CORE, 0.0, 1, 0, has_failed=True),)
     found.start(9, population)
     found.take(judged(0, 1, 0.6))
     ((first,), _) = found.conclude(population)
     assert (first.fitness, first.has_failed) == (0.3, False)
-
-
-def failed(individual: Individual) -> Individual:
-    return Individual(individual.birth, individual.genome, 0.0, 1, 0, has_failed=True)
 
 
 def test_duplicate_outcomes_are_ignored_and_unrequested_ones_raise() -> None:

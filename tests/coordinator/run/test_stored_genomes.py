@@ -18,6 +18,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.protobuf import decode_robot, encode_robot
 
+THESIS = Experiment(name="test")
 CPPN = Experiment(name="test", encoding=EncodingSection(type="cppn"))
 SMALL = Space(max_parts=3)
 FOLDER = Path("runs/a")
@@ -32,19 +33,28 @@ def stored(
     for number in range(count):
         candidate = breeder.candidate(BirthId(0, number), 0, ())
         assert candidate is not None
-        rows.append(
-            {
-                "birth": number,
-                "genome": encoding.to_bytes(candidate.genome),
-                "robot": encode_robot(candidate.robot)
-                if encoding.stores_robots
-                else None,
-            }
-        )
+        robot = encode_robot(candidate.robot) if encoding.stores_robots else None
+        genome = encoding.to_bytes(candidate.genome)
+        rows.append({"birth": number, "genome": genome, "robot": robot})
     columns = {"birth": pa.int64(), "genome": pa.binary(), "robot": pa.binary()}
     table = pa.Table.from_pylist(rows, schema=pa.schema(columns))
     monkeypatch.setattr(stored_genomes, "read_table", lambda *_: table)
     return table
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "why"),
+    [
+        (THESIS, CPPN, r"another encoding than 'cppn' is now: not"),
+        (CPPN, structs.replace(CPPN, space=SMALL), r"birth 0 .* into another robot"),
+    ],
+)
+def test_births_of_another_encoding_or_development_are_refused(
+    monkeypatch: pytest.MonkeyPatch, then: Experiment, now: Experiment, why: str
+) -> None:
+    stored(monkeypatch, then)
+    with pytest.raises(RunFolderError, match=why):
+        check_stored_genomes(FOLDER, now)
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])
@@ -55,32 +65,11 @@ def test_births_of_the_same_encoding_are_accepted(
     check_stored_genomes(FOLDER, CPPN)
 
 
-def test_births_of_another_encoding_are_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    stored(monkeypatch, Experiment(name="test"))
-    with pytest.raises(
-        RunFolderError, match=r"another encoding than 'cppn' is now: not"
-    ):
-        check_stored_genomes(FOLDER, CPPN)
-
-
-def test_another_development_of_a_genome_is_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    stored(monkeypatch, CPPN)
-    smaller = Experiment(name="test", encoding=CPPN.encoding, space=Space(max_parts=3))
-    with pytest.raises(
-        RunFolderError, match=r"birth 0 .* into another robot now; rest"
-    ):
-        check_stored_genomes(FOLDER, smaller)
-
-
 def test_births_of_the_thesis_encoding_are_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delattr(stored_genomes, "read_table")
-    check_stored_genomes(FOLDER, Experiment(name="test"))
+    check_stored_genomes(FOLDER, THESIS)
 
 
 def test_a_learnt_brain_is_not_another_encoding(

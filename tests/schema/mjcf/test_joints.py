@@ -11,45 +11,22 @@ from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT, Environment
 from schema.mjcf.footing import footprint, standing_height
 from schema.mjcf.model import LEVER_M, robot_spec, solo_spec
-from schema.parts import (
-    BUILT_IN,
-    Box,
-    Joint,
-    Matrix,
-    Motor,
-    PartType,
-    Shape,
-    Slot,
-    cylinder,
-)
+from schema.parts import BUILT_IN, Matrix, Motor, PartType, Shape, cylinder
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
 from schema.robot.robot import Part, Robot
-from tests.schema.robots import CORE, GREY
+from tests.schema.robots import CORE, GREY, SLIDE
 from worker.robot.devices import Servos
 from worker.robot.placed import PlacedRobot
 
 WORLD = Simulation()
 SPACE_WORLD = replace(WORLD, gravity=0.0, drop_m=5.0)
-ON_SIDE: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
-_SLIDE = Shape(
-    boxes=(
-        Box("rail", (0.02, 0.02, 0.02), (0.01, 0.0, 0.0), 0.02),
-        cylinder("rod", 0.005, 0.04, (0.04, 0.0, 0.0), 0.01, segment=1,
-                 rotation=ON_SIDE),
-    ),
-    slots=(
-        Slot((0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        Slot((0.06, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1),
-    ),
-    joint=Joint((0.03, 0.0, 0.0), (1.0, 0.0, 0.0), 0.015, "prismatic"),
-)  # fmt: skip
 POSITION = Motor(gain=2.0, max_torque=2.0, max_velocity=0.1)
 VELOCITY = Motor(gain=0.0, max_torque=2.0, max_velocity=0.1, control="velocity")
 SPACE = {
     **BUILT_IN,
-    "Slide": PartType("Slide", 2, lambda _: _SLIDE, motor=POSITION),
-    "FastSlide": PartType("FastSlide", 2, lambda _: _SLIDE, motor=VELOCITY),
-    "FreeSlide": PartType("FreeSlide", 2, lambda _: _SLIDE),
+    "Slide": PartType("Slide", 2, lambda _: SLIDE, motor=POSITION),
+    "FastSlide": PartType("FastSlide", 2, lambda _: SLIDE, motor=VELOCITY),
+    "FreeSlide": PartType("FreeSlide", 2, lambda _: SLIDE),
     "Wheel": WHEEL,
     "ActiveWheel": ACTIVE_WHEEL,
 }

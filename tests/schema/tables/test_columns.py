@@ -13,7 +13,7 @@ from hypothesis.strategies import DataObject, SearchStrategy
 from coordinator.islands.rows import body_rows, origin_columns, sizes
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, NeuronGene, Node, develop
-from schema.tables.columns import BIRTHS, EVALUATIONS, TABLES, repeatable
+from schema.tables.columns import BIRTHS, TABLES, repeatable
 from schema.wire.genome_bytes import encode_genome
 from schema.wire.protobuf import decode_genome, encode_robot
 
@@ -124,22 +124,3 @@ def test_births_round_trip_through_stream_and_parquet(
     assert [row["gene"] for row in first["body"]] == [part.gene for part in parts]
     assert [row["idx"] for row in second["body"]] == list(range(len(parts)))
     assert [row["birth"] for row in first["parents"]] == [1, 0]
-
-
-def test_a_failed_evaluation_has_a_reason_and_no_fitness() -> None:
-    row = dict.fromkeys(EVALUATIONS.names) | {
-        "record": 0,
-        "island": 0,
-        "birth": 0,
-        "trial": 0,
-        "status": "failed",
-        "reason": "diverged",
-        "wall_s": 0.1,
-        "worker": "a",
-        "platform": "b",
-    }
-    batch = pa.RecordBatch.from_pylist([row], schema=EVALUATIONS)
-    pq.write_table(pa.Table.from_batches([batch]), io.BytesIO())
-    assert batch.to_pylist() == [row]
-    required = {field.name for field in EVALUATIONS if not field.nullable}
-    assert required == {name for name, value in row.items() if value is not None}

@@ -56,14 +56,6 @@ def births(folder: Path) -> list[int]:
 WHOLE = [100, 100, 102, 102, 104, 104]
 
 
-def test_sound_segment_is_read_without_a_word(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    write(tmp_path)
-    assert births(tmp_path) == WHOLE
-    assert caplog.messages == []
-
-
 def test_every_flipped_byte_ends_the_sound_part(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -12,13 +12,13 @@ from hypothesis.strategies import DataObject, SearchStrategy
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.limits import MOST_CONNECTIONS, MOST_NEURONS, MOST_PARTS, ROBOT_BYTES
 from schema.parts import BUILT_IN
-from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.genome import Genome, Node, develop
 from schema.robot.inverse_development import genome_of
-from schema.robot.robot import Part, Robot, check_robot
+from schema.robot.robot import Robot, check_robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.genome_bytes import encode_genome
 from schema.wire.protobuf import decode_genome, decode_robot, encode_robot
+from tests.coordinator.sent_requests import ROBOT
 
 EMPTY = b"\x0a\x00"
 """Field 1, an empty message."""
@@ -26,17 +26,6 @@ CORE = pb.Robot(
     parts=[pb.Part(kind="Core", parent=-1, parent_slot=-1, slot=-1)]
 ).SerializeToString()
 GREY = (0.5, 0.5, 0.5)
-ROBOT = Robot(
-    (Part("Core", -1, -1, -1, 0, GREY), Part("ActiveHinge", 0, 0, 0, 0, GREY)),
-    Brain(
-        (
-            *(Neuron("input", "Input", 0) for _ in range(6)),
-            Neuron("output", "Simple", 1, (0.25, 0.5)),
-            Neuron("hidden", "Simple", 0, (0.25, 0.5)),
-        ),
-        (Connection(0, 6, 0.75),),
-    ),
-)
 GENOME_OF_0_1 = bytes.fromhex(
     "0a560a260a04436f72651001180120013218000000000000e03f000000000000e03f000000000000e0"
     "3f1a1a0a0653696d706c651210000000000000d03f000000000000e03f221008011a01002002310000"

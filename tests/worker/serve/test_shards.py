@@ -117,27 +117,22 @@ def test_advance_continues_from_the_kept_state() -> None:
     assert FakeWorld.made == 1
 
 
-@pytest.mark.parametrize("keep", [False, True])
-def test_rebuilt_shard_advances_like_the_original(keep: bool) -> None:  # noqa: FBT001 - a case
+@pytest.mark.parametrize(
+    ("keep", "has_more"), [(False, True), (True, True), (True, False)]
+)
+def test_rebuilt_shard_advances_like_the_original(
+    *, keep: bool, has_more: bool
+) -> None:
     first = Shards(FakeWorld)
     requester = lived(first)
     requester.ask(first, 300, keep=keep)
-    requester.ask(first, 10, Changes(removals=(BirthId(0, 0),)))
+    if has_more:
+        requester.ask(first, 10, Changes(removals=(BirthId(0, 0),)))
     assert bool(requester.snapshot) == keep
+    assert bool(requester.history) == has_more
     rebuilt = following(requester, Shards(FakeWorld), requester.whole())
     assert rebuilt is not None
     assert rebuilt == following(requester, first, None)
-
-
-def test_shard_is_rebuilt_from_a_snapshot_without_history() -> None:
-    first = Shards(FakeWorld)
-    requester = lived(first)
-    requester.ask(first, 300, keep=True)
-    assert requester.history == []
-    second = Shards(FakeWorld)
-    assert following(requester, second, requester.whole()) == following(
-        requester, first, None
-    )
 
 
 def test_answer_asks_for_a_missing_state() -> None:
