@@ -21,8 +21,17 @@ from coordinator.islands.events import (
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
 from coordinator.run.learners import Learners
-from schema.experiment.document import Experiment, island_experiment
+from schema.experiment.check import check_experiment
+from schema.experiment.document import (
+    ArenaSection,
+    Experiment,
+    Islands,
+    SelectionSection,
+    Simulation,
+    island_experiment,
+)
 from schema.experiment.identity import Origin
+from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.tables.description import KeptFounder
@@ -37,6 +46,17 @@ Fit = Callable[[BirthId, int], float]
 def distinct_on_islands(birth: BirthId, island: int) -> float:
     """Return a fitness in (0, 1) that differs between births and between islands."""
     return (birth.number * 0.618034 + birth.island * 0.31 + island * 0.07 + 0.1) % 1.0
+
+
+FEW = SelectionSection(population=5, tournament_size=2)
+ARENA = Islands(
+    simulation=Simulation(warmup_steps=600),
+    arena=ArenaSection(population_limit=12, population_floor=4),
+)
+"""Five founders in the first 4 s, then a birth every 15 s.
+
+Robots mature 15 s after they were dropped.
+"""
 
 
 @dataclass
@@ -142,3 +162,20 @@ class ArchipelagoRun:
             number: [one for one in commands if isinstance(one, Record | Finish)]
             for number, commands in self.commands.items()
         }
+
+
+def migrating(
+    *islands: Islands,
+    selection: SelectionSection = FEW,
+    fit: Fit = distinct_on_islands,
+    **migration: Any,  # noqa: ANN401 - any setting
+) -> ArchipelagoRun:
+    """Return islands in a ring, with some migration settings."""
+    document = Experiment(
+        name="test",
+        selection=selection,
+        islands=islands,
+        migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
+    )
+    check_experiment(document, "test")
+    return ArchipelagoRun(document, fit=fit)

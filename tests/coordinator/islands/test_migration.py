@@ -15,35 +15,23 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.island import Island
 from schema.errors import UnexpectedEvent
-from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
 from schema.experiment.environment import Environment
-from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.wire.messages import Evaluate
-from tests.coordinator.archipelago_run import ArchipelagoRun
+from tests.coordinator.archipelago_run import ArchipelagoRun, migrating
 
 Names = list[tuple[int, int]]
+SMALL = SelectionSection(population=4, children=2, parents="random")
 
 
-def small_islands(
-    *births: int,
-    selection: SelectionSection | None = None,
-    **migration: Any,  # noqa: ANN401 - any setting
-) -> ArchipelagoRun:
+def small_islands(*births: int, **migration: Any) -> ArchipelagoRun:  # noqa: ANN401
     """Return islands of four with broods of two; fitness rises with the name.
 
     Birth n of island i has fitness (4 i + n) / 100 everywhere.
     """
-    document = Experiment(
-        name="test",
-        selection=selection
-        or SelectionSection(population=4, children=2, parents="random"),
-        islands=tuple(Islands(births=each) for each in births),
-        migration=Migration(**{"topology": "ring", "epoch": 4, **migration}),
-    )
-    check_experiment(document, "test")
-    return ArchipelagoRun(document, fit=rising)
+    islands = [Islands(births=each) for each in births]
+    return migrating(*islands, selection=SMALL, fit=rising, **{"epoch": 4, **migration})
 
 
 def rising(birth: BirthId, island: int) -> float:
@@ -108,8 +96,7 @@ def test_edges_go_one_way() -> None:
 
 def test_an_immigrant_that_lives_on_the_island_already_is_dropped() -> None:
     # Broods are no better than immigrants: 1:3 stays the best of both islands.
-    worst = SelectionSection(population=4, children=2, parents="random")
-    lived = small_islands(8, 8, epoch=2, selection=worst)
+    lived = small_islands(8, 8, epoch=2)
     lived.fit = lambda birth, _: 0.9 if birth == (1, 3) else 0.5 - birth.number / 99
     lived.live()
     assert (1, 0, 1, 1, 3) in sent(lived)

@@ -3,43 +3,26 @@
 from math import dist
 from typing import Any
 
+from msgspec.structs import replace
+
 from coordinator.arena.arena import Arena
-from schema.experiment.check import check_experiment
 from schema.experiment.document import ArenaSection as Rules
-from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
+from schema.experiment.document import Islands
 from schema.experiment.learning import Learning
-from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.wire.arena import AdvanceShard
 from schema.wire.messages import Evaluate
 from schema.wire.protobuf import decode_robot
-from tests.coordinator.archipelago_run import ArchipelagoRun
+from tests.coordinator.archipelago_run import ARENA, ArchipelagoRun, migrating
 from tests.coordinator.arena_world import World
-
-FEW = SelectionSection(population=5, tournament_size=2)
-CALM = Simulation(warmup_steps=600)
-"""Robots mature 15 s after they were dropped."""
 
 
 def arenas(
     *births: int,
-    rules: dict[str, Any] | None = None,
-    learning: Learning | None = None,
+    arena: Islands = ARENA,
     **migration: Any,  # noqa: ANN401 - any setting
 ) -> ArchipelagoRun:
-    """Return arenas: five founders in the first 4 s, then a birth every 15 s."""
-    wanted = {"population_limit": 12, "population_floor": 4, **(rules or {})}
-    document = Experiment(
-        name="test",
-        selection=FEW,
-        simulation=CALM,
-        arena=Rules(**wanted),
-        islands=tuple(Islands(births=each) for each in births),
-        learning=learning,
-        migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
-    )
-    check_experiment(document, "test")
-    return ArchipelagoRun(document)
+    return migrating(*(replace(arena, births=each) for each in births), **migration)
 
 
 def inserted(lived: ArchipelagoRun, island: int) -> dict[BirthId, tuple[float, float]]:
@@ -87,8 +70,8 @@ def test_copies_live_in_both_arenas_and_replace_the_worst() -> None:
 
 
 def test_infants_do_not_migrate_and_immigrants_keep_what_they_learnt() -> None:
-    rules = Learning(learner="random", budget=3)
-    lived = arenas(24, 24, epoch=4, handling="evict", learning=rules).live()
+    infants = replace(ARENA, learning=Learning(learner="random", budget=3))
+    lived = arenas(24, 24, arena=infants, epoch=4, handling="evict").live()
     rows = lived.rows("learning")
     learnt = {
         BirthId(row["island"], row["birth"]): decode_robot(row["robot"])
@@ -125,8 +108,9 @@ def test_seconds_may_end_an_epoch_before_births_do() -> None:
 
 
 def test_immigrants_of_a_full_arena_await_room() -> None:
-    full = {"population_limit": 5, "population_floor": 3, "full_cull_share": 0.4}
-    lived = arenas(8, 8, rules=full, epoch=6, migrants=3, replaced="none")
+    rules = Rules(population_limit=5, population_floor=3, full_cull_share=0.4)
+    full = replace(ARENA, arena=rules)
+    lived = arenas(8, 8, arena=full, epoch=6, migrants=3, replaced="none")
     lived.start()
     while lived.waiting:
         lived.turn()
@@ -166,27 +150,8 @@ def test_an_arena_with_too_few_robots_is_extinct_without_immigrants() -> None:
         assert island.is_finished
 
 
-def mixed(**migration: Any) -> ArchipelagoRun:  # noqa: ANN401 - any setting
-    """Return an off-line island and an arena."""
-    document = Experiment(
-        name="test",
-        selection=FEW,
-        islands=(
-            Islands(births=35),
-            Islands(
-                births=12,
-                simulation=CALM,
-                arena=Rules(population_limit=12, population_floor=4),
-            ),
-        ),
-        migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
-    )
-    check_experiment(document, "test")
-    return ArchipelagoRun(document)
-
-
 def test_immigrants_from_arenas_are_re_evaluated_off_line() -> None:
-    lived = mixed().live()
+    lived = migrating(Islands(births=35), replace(ARENA, births=12)).live()
     reevaluations = [
         one
         for one in lived.commands[0]

@@ -16,21 +16,17 @@ from coordinator.run.requests import requester_of
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import ArenaSection as Rules
-from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
+from schema.experiment.document import Experiment, Islands, SelectionSection
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
-from tests.coordinator.archipelago_run import ArchipelagoRun
+from tests.coordinator.archipelago_run import ARENA, ArchipelagoRun
 
 fixed = settings(max_examples=20, derandomize=True, database=None, deadline=None)
 
 OFF_LINE = Islands(count=2, births=14)
-ON_LINE = Islands(
-    births=9,
-    simulation=Simulation(warmup_steps=600),
-    arena=Rules(population_limit=9, population_floor=4),
-)
+ON_LINE = replace(ARENA, births=9, arena=Rules(population_limit=9, population_floor=4))
 INFANTS = replace(ON_LINE, learning=Learning(learner="(1+1)-es", budget=2))
 SELECTION = SelectionSection(population=5, children=3, tournament_size=2)
 
@@ -81,10 +77,9 @@ def test_every_archipelago_ends_and_repeats(
     **migration: Any,  # noqa: ANN401 - any setting
 ) -> None:
     islands = tuple(
-        Islands(
+        replace(
+            ON_LINE if is_arena else Islands(),
             births=births,
-            simulation=ON_LINE.simulation if is_arena else None,
-            arena=ON_LINE.arena if is_arena else None,
             migration=Migration(**{**migration, "epoch": epoch}),
         )
         for births, epoch, is_arena in zip((9, 12, 15), epochs, kinds, strict=True)

@@ -20,10 +20,7 @@ from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import unbegun_status
-from schema.experiment.document import ArenaSection as Rules
-from schema.experiment.document import Experiment, Islands, SelectionSection, Simulation
 from schema.experiment.file import experiment_text
-from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode
 from schema.wire.operator import (
@@ -36,7 +33,7 @@ from schema.wire.operator import (
     SetBrain,
     decode_operator_reply,
 )
-from tests.coordinator.archipelago_run import ArchipelagoRun
+from tests.coordinator.archipelago_run import ARENA, migrating
 from tests.coordinator.arena_world import experiment
 
 DETAILS = RunDetails("arena", 0, 1, experiment_text(experiment(30)))
@@ -110,18 +107,9 @@ def test_the_name_of_a_finished_run_is_not_the_end_of_another(tmp_path: Path) ->
         assert not ask(scheduler, "o-0").is_refused
 
 
-TWO_ARENAS = Experiment(
-    name="two",
-    selection=SelectionSection(population=5, tournament_size=2),
-    simulation=Simulation(warmup_steps=600),
-    arena=Rules(population_limit=12, population_floor=4),
-    islands=(Islands(births=24), Islands(births=24)),
-    migration=Migration(topology="ring", epoch=7, handling="evict", replaced="none"),
-)
-
-
 def test_an_immigrant_is_listed_and_removed_by_its_whole_name() -> None:
-    lived = ArchipelagoRun(TWO_ARENAS)
+    island = replace(ARENA, births=24)
+    lived = migrating(island, island, handling="evict", replaced="none")
     arena = lived.islands[1]
     assert isinstance(arena, Arena)
     births: list[BirthId] = []
