@@ -79,11 +79,14 @@ def died(number: int, agent: str, cause: str = "SIGSEGV") -> Crash:
     return Crash(RunningJob(agent, "run", 1, number), cause)
 
 
-def told(*events: DispatchEvent) -> Dispatch:
-    dispatch = Dispatch()
+def tell(dispatch: Dispatch, *events: DispatchEvent) -> Dispatch:
     for event in events:
         dispatch.handle(event)
     return dispatch
+
+
+def told(*events: DispatchEvent) -> Dispatch:
+    return tell(Dispatch(), *events)
 
 
 def given_out(commands: list[DispatchCommand]) -> list[tuple[int, str]]:
@@ -137,19 +140,17 @@ def test_short_jobs_are_given_ahead_while_many_wait() -> None:
     held = dispatch._pools["worker"].agents["b"].held
     assert (len(held), dispatch.waiting("worker")) == (2 + 9, 17)
     assert dispatch.pause_s == pytest.approx(0.144)
-    for event in requests(*range(30, 60)):
-        dispatch.handle(event)
+    tell(dispatch, *requests(*range(30, 60)))
     assert len(held) == 2 + MOST_AHEAD
     assert dispatch.pause_s == PAUSE_S  # two fifths of 16 jobs take 256 ms
-    dispatch.handle(Ticked(100.0))
-    dispatch.handle(ok(next(iter(held)), "b"))  # now jobs seem to take long
+    # Now jobs seem to take long.
+    tell(dispatch, Ticked(100.0), ok(next(iter(held)), "b"))
     assert dispatch.pause_s == PAUSE_S
 
 
 def test_a_pause_does_not_lengthen_the_next_one() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(*range(100)))
-    dispatch.handle(Ticked(0.001))
-    dispatch.handle(ok(0, "a"))
+    tell(dispatch, Ticked(0.001), ok(0, "a"))
     for turn in range(1, 50):
         # The coordinator looks every 100 ms; the worker took 1 ms for each job.
         dispatch.handle(Ticked(0.1 * turn))
@@ -167,8 +168,7 @@ def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
     # The quick one, too, is done with 5 x 40 ms, and the slow one with 500 ms.
     assert dispatch.pause_s == pytest.approx(0.08)
     # What the slow one has keeps nothing from the quick one.
-    for event in requests(*range(30, 90)):
-        dispatch.handle(event)
+    tell(dispatch, *requests(*range(30, 90)))
     agents = dispatch._pools["worker"].agents
     assert {name: len(agent.held) for name, agent in agents.items()} == {
         "a": 2 + MOST_AHEAD,
@@ -178,9 +178,7 @@ def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
 
 def test_new_agent_gets_no_jobs_ahead_before_its_first_answer() -> None:
     dispatch, *_ = busy_pair(0.04, 0.04)
-    dispatch.handle(worker("c"))
-    for event in requests(*range(30, 190)):
-        dispatch.handle(event)
+    tell(dispatch, worker("c"), *requests(*range(30, 190)))
     agents = dispatch._pools["worker"].agents
     assert [len(agents[name].held) for name in "abc"] == [18, 18, 2]
     assert dispatch.pause_s == 0.0
@@ -312,9 +310,7 @@ def test_the_network_waits_for_a_multiple_of_the_typical_duration(
 
 
 def test_nothing_is_learned_from_an_agent_that_is_back_with_the_answer() -> None:
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0, 1))
-    dispatch.handle(Left("a"))
-    dispatch.handle(worker("a"))
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0, 1), Left("a"), worker("a"))
     assert dispatch.handle(replace(ok(0, "a"), took_s=0.001))
     assert dispatch.workers.agents["a"].job_s == 0.0
     assert dispatch.wait_s(Assign(job(2), "a")) == LONGEST_WAIT_S
@@ -349,12 +345,8 @@ def test_invalid_events_raise_and_change_nothing(event: DispatchEvent) -> None:
 
 def late(typical_s: float = 0.5) -> Dispatch:
     """Return a dispatcher whose worker a is late with job 1 while b is idle."""
-    dispatch = told(Ticked(0.0), worker("a"), *requests(0), Ticked(typical_s))
-    dispatch.handle(ok(0, "a"))
-    for request in requests(1, 2):
-        dispatch.handle(request)
-    dispatch.handle(worker("b"))
-    return dispatch
+    first = Ticked(0.0), worker("a"), *requests(0), Ticked(typical_s), ok(0, "a")
+    return told(*first, *requests(1, 2), worker("b"))
 
 
 @pytest.mark.parametrize(("typical_s", "patience_s"), [(0.01, LEAST_S), (0.5, 2.0)])
@@ -371,8 +363,7 @@ def test_late_job_is_duplicated_on_an_idle_agent(
 
 
 def test_first_answer_counts_and_the_other_copy_is_cancelled() -> None:
-    dispatch = late()
-    dispatch.handle(Ticked(9.0))
+    dispatch = tell(late(), Ticked(9.0))
     first = dispatch.handle(ok(1, "b"))
     assert first == [Deliver(job(1), "b", "p", b"a1"), Cancel(job(1), "a")]
     assert given_out(dispatch.handle(Ticked(19.0))) == [(2, "b")]
@@ -392,10 +383,7 @@ def test_first_answer_counts_and_the_other_copy_is_cancelled() -> None:
 def test_each_copy_of_a_job_is_timed_from_its_own_assignment(
     who: str, job_s: float
 ) -> None:
-    dispatch = late()
-    dispatch.handle(Ticked(9.0))
-    dispatch.handle(Ticked(10.0))
-    dispatch.handle(ok(1, who))
+    dispatch = tell(late(), Ticked(9.0), Ticked(10.0), ok(1, who))
     learned = dispatch._pools["worker"].agents[who].job_s
     assert learned == pytest.approx(job_s)
 
@@ -410,8 +398,7 @@ def silent(dispatch: Dispatch, now_s: float) -> list[DispatchCommand]:
 def test_a_third_copy_needs_a_silent_agent() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0), worker("b"))
     assert given_out(dispatch.handle(Ticked(FIRST_S + 1.0))) == [(0, "b")]
-    dispatch.handle(worker("c"))
-    dispatch.handle(worker("d"))
+    tell(dispatch, worker("c"), worker("d"))
     assert dispatch.handle(Ticked(2 * FIRST_S)) == [AskProgress("a")]
     # Both work: the third has no cause to help.
     dispatch.handle(Progressed("a"))
@@ -581,9 +568,7 @@ def test_agents_that_report_progress_and_never_answer_end_no_run() -> None:
 def test_a_deadline_follows_the_simulated_time() -> None:
     """Jobs that simulate 10 s take 3 s here, those of 100 s take 30 s."""
     dispatch = told(Ticked(0.0), worker("a"), Requested(simulation(0, 10.0)))
-    dispatch.handle(Ticked(3.0))
-    dispatch.handle(ok(0, "a"))
-    dispatch.handle(Requested(simulation(1, 100.0)))
+    tell(dispatch, Ticked(3.0), ok(0, "a"), Requested(simulation(1, 100.0)))
     dispatch.handle(worker("b"))
     assert dispatch.handle(Ticked(3.0 + 119.0)) == []
     assert given_out(dispatch.handle(Ticked(3.0 + 121.0))) == [(1, "b")]
@@ -615,8 +600,7 @@ def test_the_second_of_two_paired_jobs_does_not_wait_for_a_silent_worker() -> No
     first, second = simulation(0, paired=1), simulation(1, paired=0)
     assert given_out(dispatch.handle(Requested(first))) == [(0, "a")]
     assert given_out(dispatch.handle(Requested(second))) == [(1, "b")]
-    dispatch.handle(Ticked(0.04))
-    dispatch.handle(ok(0, "a"))
+    tell(dispatch, Ticked(0.04), ok(0, "a"))
     given = [
         each
         for tick in range(1, 20)
@@ -640,13 +624,11 @@ def test_an_unfit_agent_looks_at_each_waiting_job_once(
     monkeypatch.setattr(Pool, "may_take", counted)
     dispatch = told(worker("a"), worker("b"), Requested(job(0)))
     dispatch.handle(Returned(0, "a", "unfit", reason="no plug-in"))
-    for number in range(1, 1001):
-        dispatch.handle(Requested(job(number)))
+    tell(dispatch, *requests(*range(1, 1001)))
     assert dispatch.waiting("worker") == 999
     assert looks < 6 * 1000
     looks = 0
-    for number in range(1, 1001):
-        dispatch.handle(ok(number, "b"))
+    tell(dispatch, *(ok(number, "b") for number in range(1, 1001)))
     assert dispatch.pending == 1
     dispatch = told(worker("slow", 2), worker("z"))
     for number in range(0, 1000, 2):
@@ -704,8 +686,7 @@ def test_paired_jobs_go_to_two_workers_if_there_are_two() -> None:
     dispatch = told(worker("a"), worker("b", 3), Requested(first))
     assert given_out(dispatch.handle(Requested(second))) == [(2, "b")]
     assert given_out(dispatch.handle(Left("a"))) == [(1, "b")]
-    dispatch.handle(worker("c"))
-    dispatch.handle(ok(1, "b"))
+    tell(dispatch, worker("c"), ok(1, "b"))
     # c did neither of them yet.
     assert given_out(dispatch.handle(lost(2, "b"))) == [(2, "c")]
     dispatch.handle(ok(2, "c"))

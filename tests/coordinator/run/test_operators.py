@@ -9,15 +9,10 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-import analyzer.report
-import tests.null_workers
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Commanded, Remove, ReplaceBrain
-from coordinator.network.local import LocalAgents
 from coordinator.run.operators import _run, answer_operator, reply_to
 from coordinator.run.scheduler import Planned, RunScheduler
-from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import unbegun_status
 from schema.experiment.file import experiment_text
@@ -35,6 +30,7 @@ from schema.wire.operator import (
 )
 from tests.coordinator.archipelago_run import ARENA, migrating
 from tests.coordinator.arena_world import experiment
+from tests.coordinator.run.test_scheduler import local, scheduler_of
 
 DETAILS = RunDetails("arena", 0, 1, experiment_text(experiment(30)))
 
@@ -50,16 +46,7 @@ def planned(path: Path, *, is_finished: bool = False) -> Planned:
 @contextmanager
 def started(*runs: Planned) -> Iterator[RunScheduler]:
     """Start runs; a run starts when few requests of those before it are open."""
-    answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
-    fleet = JobRouter(LocalAgents(answers, "any"))  # type: ignore[arg-type]
-    scheduler = RunScheduler(
-        runs,
-        fleet,
-        open_run=lambda held, _watched: RunSession(held, fleet),
-        most=len(runs),
-        conclude=lambda _run: None,
-        report=lambda *_: None,
-    )
+    scheduler = scheduler_of(list(runs), local())
     while len(scheduler.active) < sum(not run.is_finished for run in runs):
         scheduler.turn(0.0, lambda: 0.0)
     try:
