@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,12 @@ def crowd(
             places.append(place)
             found.append(Insertion(birth, robot_of(birth.number), place, heading))
     return tuple(found)
+
+
+def placed(robot: Robot, *places: tuple[float, float]) -> tuple[Insertion, ...]:
+    """Return equal newborns with the first numbers of births."""
+    births = (BirthId(0, number) for number in range(len(places)))
+    return tuple(map(Insertion, births, repeat(robot), places))
 
 
 def populated(

@@ -16,7 +16,14 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Changes, Insertion
 from tests.schema import robots
-from tests.worker.arena_cases import SECOND, crowd, populated, seconds, settings_of
+from tests.worker.arena_cases import (
+    SECOND,
+    crowd,
+    placed,
+    populated,
+    seconds,
+    settings_of,
+)
 from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
 from worker.robot.evaluation import simulate
@@ -59,10 +66,8 @@ def test_imu_at_rest_on_a_slope_reads_the_components_of_gravity(
     slope_deg: float,
 ) -> None:
     """The readings are g sin a along x, uphill, and g cos a along z."""
-    world = populated(
-        arena(Environment(slope_deg=slope_deg), drop_m=0.01),
-        [Insertion(A, BOX, (0.5, 0.0))],
-    )
+    settings = arena(Environment(slope_deg=slope_deg), drop_m=0.01)
+    world = populated(settings, placed(BOX, (0.5, 0.0)))
     seconds(world, 2.0)
     readings = world.population.find(A).view.sensors.readings[0, :6].tolist()
     slope = math.radians(slope_deg)
@@ -95,10 +100,8 @@ def test_wall_stops_a_sliding_robot_and_its_touch_sensors_read_it() -> None:
     assert view.sensors.readings[0, 6:8].tolist() == [1.0, 1.0]
     assert view.qpos[0] == pytest.approx(-1.0 + 0.0555, abs=2e-3)
     assert np.abs(view.qvel[:3]).max() < 1e-3
-    free = populated(
-        replace(slippery, environment=Environment(slope_deg=20.0)),
-        [Insertion(A, WITH_PADS, (0.0, 0.0))],
-    )
+    without_wall = replace(slippery, environment=Environment(slope_deg=20.0))
+    free = populated(without_wall, placed(WITH_PADS, (0.0, 0.0)))
     seconds(free, 3.5)
     assert free.population.find(A).view.qpos[0] < -10.0
 
@@ -163,12 +166,10 @@ def test_robots_on_one_obstacle_are_not_in_contact() -> None:
     """Contacts with scenery neither count nor merge clusters."""
     slab = scene('<geom type="box" size="2 2 0.1" pos="0 0 0.1"/>')
     settings = arena(Environment(scenery=slab), record_touches=True, drop_m=0.0)
-    apart = [Insertion(A, BOX, (-0.3, 0.0)), Insertion(B, BOX, (0.3, 0.0))]
-    world = populated(settings, apart)
+    world = populated(settings, placed(BOX, (-0.3, 0.0), (0.3, 0.0)))
     assert seconds(world, 1.0).touches == ()
     assert world.population.merges == 0
-    near = [Insertion(A, BOX, (0.0, 0.0)), Insertion(B, BOX, (0.095, 0.0))]
-    world = populated(settings, near)
+    world = populated(settings, placed(BOX, (0.0, 0.0), (0.095, 0.0)))
     assert seconds(world, 1.0).touches == ()
     assert world.population.merges == 1
     (cluster,) = world.population.clusters

@@ -14,7 +14,8 @@ from schema.robot.brain import Brain, Connection
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
-from schema.wire.arena import Advance, BrainChange, Changes, Insertion
+from schema.wire.arena import Advance, BrainChange, Changes
+from tests.worker.arena_cases import placed, populated
 from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
 from worker.measures import BUILT_IN
@@ -38,23 +39,11 @@ def settings(**changes: Any) -> ArenaSettings:  # noqa: ANN401
     return replace(SETTINGS, simulation=CLOCK, measures=measures, **changes)
 
 
-def inserted(world: World, robot: Robot, *places: tuple[float, float]) -> None:
-    world.apply(
-        Changes(
-            insertions=tuple(
-                Insertion(BirthId(0, number), robot, place)
-                for number, place in enumerate(places)
-            )
-        )
-    )
-
-
 def test_channels_of_a_lone_robot_equal_those_of_an_evaluation(
     turtle: Robot, recorded: tuple[ArenaSettings, list[Trace]]
 ) -> None:
     own, traces = recorded
-    world = World(own)
-    inserted(world, turtle, (0.0, 0.0))
+    world = populated(own, placed(turtle, (0.0, 0.0)))
     (judged,) = world.advance(400).judgements
     assert judged.is_mature
     together = traces[-1]
@@ -78,8 +67,7 @@ def test_neighbours_are_those_within_half_a_metre(
 ) -> None:
     """The first and second are 0.4 m apart, the third is 2 m away."""
     own, traces = recorded
-    world = World(own)
-    inserted(world, turtle, (0.0, 0.0), (0.4, 0.0), (2.0, 0.0))
+    world = populated(own, placed(turtle, (0.0, 0.0), (0.4, 0.0), (2.0, 0.0)))
     world.advance(400)
     assert [trace.neighbours[0] for trace in traces] == [1, 1, 0]
 
@@ -89,8 +77,10 @@ def test_energy_of_robots_that_merge_is_not_lost(
 ) -> None:
     """A pile of robots merges and splits; energy never falls."""
     own, traces = recorded
-    world = World(replace(own, arena=replace(ARENA, drop_m=0.25)))
-    inserted(world, turtle, (0.0, 0.0), (0.1, 0.0), (0.2, 0.05))
+    world = populated(
+        replace(own, arena=replace(ARENA, drop_m=0.25)),
+        placed(turtle, (0.0, 0.0), (0.1, 0.0), (0.2, 0.05)),
+    )
     world.advance(200)
     assert world.population.merges > 0
     world.advance(400)
@@ -104,11 +94,9 @@ def test_energy_of_robots_that_merge_is_not_lost(
 def test_restored_arena_answers_equally(turtle: Robot, stops: tuple[int, ...]) -> None:
     own = settings()
     places = ((0.0, 0.0), (0.12, 0.0), (1.0, 1.0))
-    whole = World(own)
-    inserted(whole, turtle, *places)
+    whole = populated(own, placed(turtle, *places))
     steady: list[Advance] = [whole.advance(stop) for stop in stops]
-    world = World(own)
-    inserted(world, turtle, *places)
+    world = populated(own, placed(turtle, *places))
     for expected, (stop, _) in zip(steady, pairwise((*stops, 0)), strict=True):
         found = world.advance(stop)
         assert found == expected
@@ -141,8 +129,7 @@ def test_trace_has_the_present_brain_before_and_after_a_restore(
 ) -> None:
     own, traces = recorded
     learnt = Brain(turtle.brain.neurons, (Connection(0, 8, 0.5),))
-    world = World(own)
-    inserted(world, turtle, (0.0, 0.0))
+    world = populated(own, placed(turtle, (0.0, 0.0)))
     world.advance(400)
     world.apply(Changes(brains=(BrainChange(BirthId(0, 0), learnt),)))
     World.restore(own, world.snapshot()).advance(800)
@@ -151,9 +138,9 @@ def test_trace_has_the_present_brain_before_and_after_a_restore(
 
 
 def test_measures_do_not_change_the_arena(turtle: Robot) -> None:
-    plain, measured = World(replace(SETTINGS, simulation=CLOCK)), World(settings())
-    for world in (plain, measured):
-        inserted(world, turtle, (0.0, 0.0), (0.12, 0.0))
+    newborns = placed(turtle, (0.0, 0.0), (0.12, 0.0))
+    plain = populated(replace(SETTINGS, simulation=CLOCK), newborns)
+    measured = populated(settings(), newborns)
     one, other = plain.advance(400), measured.advance(400)
     assert one.poses == other.poses
     assert [each.fitness for each in one.judgements] == [

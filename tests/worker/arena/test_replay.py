@@ -1,7 +1,6 @@
 """Replay of arenas: equal to the original, or reported as different."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import msgspec
 from msgspec.structs import replace
@@ -11,7 +10,6 @@ from schema.experiment.environment import FLAT, Environment
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NO_IDENTITY, Origin
 from schema.experiment.settings import arena_settings, read_arena_settings
-from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes, Insertion, PastAdvance, Rebuild
@@ -64,15 +62,13 @@ def short(trace, parameters):
 
 
 def test_replay_judges_only_when_the_original_did(
-    turtle: Robot, tmp_path: Path
+    turtle: Robot, own_module: Callable[[str], str]
 ) -> None:
     """Between two advances, the fitness of the robot is undefined for a while."""
-    (tmp_path / "picky.py").write_text(PICKY, "utf-8")
-    allow([str(tmp_path / "picky.py")])
     settings = replace(
         settings_of(drop_m=0.0),
         simulation=Simulation(window_steps=400),
-        fitness=Fitness(function="picky:short"),
+        fitness=Fitness(function=f"{own_module(PICKY)}:short"),
     )
     text, turn = msgspec.json.encode(settings), 4 * TURN
     newborn = Insertion(A, turtle, (0.0, 0.0))

@@ -23,6 +23,7 @@ from tests.worker.arena_cases import (
     SECOND,
     SETTINGS,
     crowd,
+    placed,
     populated,
     seconds,
     settings_of,
@@ -187,10 +188,8 @@ def test_restarted_window_begins_with_the_present_sample(
 def test_ring_wall_confines_robots(turtle: Robot) -> None:
     """A robot at 1 m/s stays inside; without the wall it slides out."""
     for diameter, is_in in ((1.0, True), (0.0, False)):
-        world = populated(
-            settings_of(wall_diameter_m=diameter, drop_m=0.0),
-            [Insertion(A, turtle, (0.0, 0.0))],
-        )
+        settings = settings_of(wall_diameter_m=diameter, drop_m=0.0)
+        world = populated(settings, placed(turtle, (0.0, 0.0)))
         seconds(world, 0.5)
         for _ in range(40):
             world.population.find(A).view.qvel[0] = 1.0
