@@ -38,6 +38,19 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
+def experiment_of(path: Path, settings: str) -> tuple[str, str]:
+    """Return the flag of an experiment beside a file."""
+    experiment = path.with_name("mine.toml")
+    experiment.write_text(f'name = "mine"\n{settings}')
+    return "--experiment", str(experiment)
+
+
+WHEELED = """
+[space]
+part_types = ["schema.parts:CORE", "schema.robogen_parts:ACTIVE_WHEEL"]
+"""
+
+
 def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     assert main(["robot", "check", *words]) == 0
     return capsys.readouterr().out.strip()
@@ -69,23 +82,16 @@ def test_parts_that_intersect_are_named(
 def test_vetting_is_that_of_the_experiment(
     path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    experiment = path.with_name("mine.toml")
-    vetting = 'mode = "contact"\ntolerance_m = 1.0'
-    experiment.write_text(f'name = "mine"\n[vetting]\n{vetting}')
-    words = (str(path), "--experiment", str(experiment))
-    assert "not viable: parts 1 (ActiveHinge) and 2 " in said(capsys, *words)
+    named = experiment_of(path, '[vetting]\nmode = "contact"\ntolerance_m = 1.0')
+    found = said(capsys, str(path), *named)
+    assert "not viable: parts 1 (ActiveHinge) and 2 " in found
 
 
 def test_mjcf_keeps_its_settings_and_part_types(path: Path, tmp_path: Path) -> None:
-    experiment = tmp_path / "mine.toml"
-    experiment.write_text(
-        'name = "mine"\n[space]\npart_types = ["schema.parts:CORE", '
-        '"schema.robogen_parts:ACTIVE_WHEEL"]\n[simulation]\ngravity = 3.0'
-    )
+    light = experiment_of(path, f"{WHEELED}[simulation]\ngravity = 3.0")
     path.write_text("body: {type: Core, children: {1: {slot: 0, type: ActiveWheel}}}")
     there, again = tmp_path / "robot.xml", tmp_path / "again.xml"
-    words = [str(path), str(there), "--experiment", str(experiment)]
-    assert main(["robot", "convert", *words]) == 0
+    assert main(["robot", "convert", str(path), str(there), *light]) == 0
     assert main(["robot", "convert", str(there), str(again)]) == 0
     assert read_mjcf(again) == read_mjcf(there)
     assert read_mjcf(again)[1].simulation.gravity == 3.0
@@ -112,18 +118,12 @@ def test_show(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_show_has_the_units_of_parameters(
     path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    experiment = path.with_name("mine.toml")
-    experiment.write_text(
-        'name = "mine"\n[space]\n'
-        'part_types = ["schema.parts:CORE", "schema.robogen_parts:ACTIVE_WHEEL"]'
-    )
     path.write_text(
         "body: {type: Core, children: {1: {slot: 0, type: ActiveWheel, id: wheel, "
         "params: {radius: 45}}}}\nbrain: {neurons: [{part: wheel, layer: output, "
         "type: Oscillator, params: {period: 2.5, phase_offset: 0.25}}]}"
     )
-    words = ["robot", "show", str(path), "--experiment", str(experiment)]
-    assert main(words) == 0
+    assert main(["robot", "show", str(path), *experiment_of(path, WHEELED)]) == 0
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "orientation 0°, radius 45 mm" in shown
     assert "Oscillator(period 2.5 s, phase_offset 0.25 periods, amplitude 1)" in shown
@@ -152,12 +152,9 @@ def test_part_types_of_an_experiment(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "plugins")
-    experiment = path.with_name("mine.toml")
-    experiment.write_text(
-        'name = "mine"\n[space]\npart_types = ["schema.parts:CORE", '
-        '"schema.parts:ACTIVE_HINGE", "flippers:FLIPPER"]'
-    )
-    words = ["robot", "show", str(path), "--experiment", str(experiment)]
+    types = '"schema.parts:CORE", "schema.parts:ACTIVE_HINGE", "flippers:FLIPPER"'
+    named = experiment_of(path, f"[space]\npart_types = [{types}]")
+    words = ["robot", "show", str(path), *named]
     with pytest.raises(InvalidRobot, match="must be one of Core, ActiveHinge, Flipper"):
         main(words)
     bar = "type: ParametricBarJoint, params: {connection_length: 33}"

@@ -1,5 +1,6 @@
 """Measures: values of the built-in ones by hand, names, parameters, contract."""
 
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -8,7 +9,6 @@ import pytest
 
 from schema.errors import ExperimentError, FitnessUndefined, UnknownPlugin
 from schema.experiment.document import Measures, Simulation
-from schema.plugins.permission import allow
 from schema.plugins.simple_traces import simple_traces
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
@@ -150,13 +150,10 @@ nothing = 3
 """
 
 
-@pytest.fixture(scope="module")
-def own(tmp_path_factory: pytest.TempPathFactory) -> str:
+@pytest.fixture
+def own(own_module: Callable[[str], str]) -> str:
     """Return the name of a module with measures of its own."""
-    file = tmp_path_factory.mktemp("own") / "own_measures_of_a_test.py"
-    file.write_text(OWN)
-    allow([str(file)])
-    return file.stem
+    return own_module(OWN)
 
 
 @pytest.mark.parametrize("name", BUILT_IN)

@@ -21,31 +21,22 @@ def second_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out.splitlines()[2]
 
 
-def test_a_folder_of_runs_names_one_that_has_a_coordinator(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("is_campaign", [False, True])
+def test_a_folder_names_one_in_it_that_has_a_coordinator(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], *, is_campaign: bool
 ) -> None:
     with RunFolder(tmp_path / "a", DETAILS):
         pass
     assert second_line(tmp_path, capsys) == "no coordinator is running"
-    with RunFolder(tmp_path / "b", DETAILS):
-        found = second_line(tmp_path, capsys)
-        assert second_line(tmp_path / "b", capsys) == "the coordinator does not answer"
-    asks = f"from the files; to ask a coordinator: revolve status {tmp_path / 'b'}"
-    assert found == asks
-
-
-def test_a_folder_of_campaigns_names_one_that_has_a_coordinator(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    campaign = Campaign((EXPERIMENT,), 2, 1)
-    folder = tmp_path / "both"
-    write_campaign(folder, campaign)
-    run, details = campaign.runs(folder)[0]
+    named, run, details = tmp_path / "b", tmp_path / "b", DETAILS
+    if is_campaign:
+        campaign = Campaign((EXPERIMENT,), 2, 1)
+        write_campaign(named, campaign)
+        run, details = campaign.runs(named)[0]
     with RunFolder(run, details):
         found = second_line(tmp_path, capsys)
-        assert second_line(folder, capsys) == "the coordinator does not answer"
-    asks = f"from the files; to ask a coordinator: revolve status {folder}"
-    assert found == asks
+        assert second_line(named, capsys) == "the coordinator does not answer"
+    assert found == f"from the files; to ask a coordinator: revolve status {named}"
 
 
 HALF = RunStatus(
