@@ -345,8 +345,8 @@ def test_invalid_events_raise_and_change_nothing(event: DispatchEvent) -> None:
 
 def late(typical_s: float = 0.5) -> Dispatch:
     """Return a dispatcher whose worker a is late with job 1 while b is idle."""
-    first = Ticked(0.0), worker("a"), *requests(0), Ticked(typical_s), ok(0, "a")
-    return told(*first, *requests(1, 2), worker("b"))
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0), Ticked(typical_s))
+    return tell(dispatch, ok(0, "a"), *requests(1, 2), worker("b"))
 
 
 @pytest.mark.parametrize(("typical_s", "patience_s"), [(0.01, LEAST_S), (0.5, 2.0)])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject
 from msgspec.structs import replace
 
-from coordinator.dispatch.events import Client, Deliver, Joined, Read, Returned
+from coordinator.dispatch.events import Client, Deliver, Joined, Read
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.run_context import RunContext
@@ -96,7 +96,7 @@ class Two(SentJobs):
             self.fleet.tell(Joined(name, "worker", 1, "any"))
         founders = tuple(Insertion(each, ROBOT, (0.0, 0.0)) for each in (FIRST, SECOND))
         self.requests.send(AdvanceShard(0, 0, UNTIL, Changes((), founders), False))
-        (end,) = self.answer(self.true_answer())
+        (end,) = self.ended_by(self.true_answer())
         self.requests.commit(event_of(end))
         changes = Changes((FIRST,), (Insertion(THIRD, ROBOT, (1.0, 0.0)),))
         self.requests.send(AdvanceShard(0, 1, NEXT, changes, True))
@@ -111,11 +111,9 @@ class Two(SentJobs):
         worker = self.workers[self.sent[-1][1]]
         return decode(Answer, answer_to(worker.answer, self.request), ADVANCE_BYTES)
 
-    def answer(self, answer: Answer | bytes) -> list[Deliver]:
+    def ended_by(self, answer: Answer | bytes) -> list[Deliver]:
         """Answer the newest request; return what ended."""
-        data = answer if isinstance(answer, bytes) else encode(answer)
-        number, agent, _ = self.sent[-1]
-        self.fleet.tell(Returned(number, agent, "ok", data))
+        self.answer(data=answer if isinstance(answer, bytes) else encode(answer))
         return self.fleet.listen(0.0, 0.0).get(CLIENT, [])
 
     @property
@@ -247,13 +245,13 @@ LIES: dict[str, AdvanceChange] = {
 def check_refused(two: Two, lie: Answer | bytes) -> None:
     """Fail unless a lie is counted, its worker backs off, and the other is believed."""
     liar, before = two.sent[-1][1], two.fleet.faults.total("malformed")
-    assert two.answer(lie) == []
+    assert two.ended_by(lie) == []
     assert two.fleet.faults.total("malformed") == before + 1
     # The other worker is given the state.
     assert two.sent[-1][1] != liar
     assert isinstance(two.request.work, AdvanceShard)
     assert two.request.work.rebuild is not None
-    (end,) = two.answer(two.true_answer())
+    (end,) = two.ended_by(two.true_answer())
     event = event_of(end)
     assert [one.birth for one in event.advance.judgements] == [SECOND, THIRD]
     assert event.pose_rows == 50
@@ -279,7 +277,7 @@ def test_answer_to_another_request_is_refused(fields: dict[str, Any]) -> None:
 def test_a_worker_may_lack_the_state_unless_it_came_along() -> None:
     two = Two()
     answer = two.true_answer()
-    two.answer(replace(answer, result=StateMissing()))
+    two.ended_by(replace(answer, result=StateMissing()))
     assert two.fleet.faults.total("malformed") == 0
     number = two.sent[-1][0]
     check_refused(two, replace(answer, number=number, result=StateMissing()))
@@ -287,14 +285,14 @@ def test_a_worker_may_lack_the_state_unless_it_came_along() -> None:
 
 def test_a_snapshot_that_nobody_wanted_is_refused() -> None:
     two = Two()
-    (end,) = two.answer(two.true_answer())
+    (end,) = two.ended_by(two.true_answer())
     assert event_of(end).provenance.agent == two.sent[-1][1]
     two.requests.commit(event_of(end))
     two.requests.send(AdvanceShard(0, 2, NEXT + 1000, Changes(), False))
     true = two.true_answer()
     assert isinstance(true.result, Advance)
     assert true.result.snapshot == b""
-    assert two.answer(changed(true, having(snapshot=b"x"))) == []
+    assert two.ended_by(changed(true, having(snapshot=b"x"))) == []
     assert two.fleet.faults.total("malformed") == 1
 
 
@@ -318,7 +316,7 @@ def test_touches_are_of_robots_that_live(
 ) -> None:
     two = Two(has_touches=True)
     answer = changed(two.true_answer(), having(touches=touches))
-    assert len(two.answer(answer)) == is_true
+    assert len(two.ended_by(answer)) == is_true
     assert two.fleet.faults.total("malformed") == (not is_true)
 
 
@@ -331,7 +329,7 @@ def test_an_answer_that_is_too_large_is_refused_unread() -> None:
 def test_reasons_are_cut_to_one_printable_line() -> None:
     two = Two()
     reason = "\x1b[2Jfell\n" + "x" * 30_000_000
-    (end,) = two.answer(changed(two.true_answer(), fallen(THIRD, reason=reason)))
+    (end,) = two.ended_by(changed(two.true_answer(), fallen(THIRD, reason=reason)))
     (dead,) = event_of(end).advance.casualties
     assert dead.reason.startswith("?[2Jfell xxx")
     assert len(dead.reason) == 1000
