@@ -20,14 +20,10 @@ from msgspec.structs import replace
 import analyzer.service
 import worker.serve.service
 from coordinator.dispatch.events import DispatchEvent, Joined, Left, Returned
-from coordinator.dispatch.fleet import JobRouter
 from coordinator.dispatch.pool import AHEAD_S
 from coordinator.network.service import Network
-from coordinator.run.scheduler import Planned, RunScheduler
-from coordinator.run.session import RunSession
+from coordinator.run.scheduler import RunScheduler
 from coordinator.storage.campaign import Campaign
-from coordinator.storage.folder import RunFolder
-from coordinator.storage.folder_status import unbegun_status
 from schema.agent.network import Agent
 from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
@@ -47,6 +43,7 @@ from tests.benchmarks.dispatch_bench import (
     null_rate,
 )
 from tests.benchmarks.fleet_model import Setting, most_workers
+from tests.coordinator.run.test_scheduler import plan, scheduler_of
 
 # As the command does, before the first session is opened.
 prepare_process()
@@ -88,13 +85,7 @@ class TimedNetwork:
 def campaign(folder: Path) -> Iterator[tuple[RunScheduler, TimedNetwork]]:
     """Yield the scheduler of a new campaign and its network."""
     experiment = replace(read_experiment("scenario2"), births=BIRTHS)
-    planned = [
-        Planned(
-            unbegun_status(path, details),
-            lambda path=path, details=details: RunFolder(path, details),  # type: ignore[misc]
-        )
-        for path, details in Campaign((experiment,), RUNS, 1).runs(folder)
-    ]
+    planned = plan(folder, Campaign((experiment,), RUNS, 1))
     with ExitStack() as stack:
         network = stack.enter_context(Network(name=unique_name("bench")))
         vetting = Agent("analyzer", "analyzer", network.address)
@@ -104,14 +95,8 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, TimedNetwork]]:
             ProcessPool(worker.serve.service.process, (evaluation,), size=2)
         )
         timed = TimedNetwork(network)
-        fleet = JobRouter(timed)
-        scheduler = RunScheduler(
-            planned,
-            fleet,
-            open_run=lambda held, _timed: RunSession(held, fleet),
-            most=100,
-            conclude=lambda _run: None,
-            report=lambda _status, error: pytest.fail(str(error)),
+        scheduler = scheduler_of(
+            planned, timed, lambda _status, error: pytest.fail(str(error))
         )
         stack.callback(scheduler.close)
         yield scheduler, timed

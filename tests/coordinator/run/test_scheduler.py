@@ -39,10 +39,10 @@ def local(kind: type[LocalAgents] = LocalAgents) -> LocalAgents:
     return kind(answers, "any")  # type: ignore[arg-type]
 
 
-def plan(folder: Path) -> list[Planned]:
-    """Return the runs of the campaign, resumed where they exist."""
+def plan(folder: Path, campaign: Campaign = CAMPAIGN) -> list[Planned]:
+    """Return the runs of a campaign, resumed where they exist."""
     planned = []
-    for path, details in CAMPAIGN.runs(folder):
+    for path, details in campaign.runs(folder):
         if path.exists():
             planned.append(Planned(folder_status(path), partial(RunFolder, path)))
         else:
