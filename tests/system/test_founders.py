@@ -106,7 +106,7 @@ def test_robots_and_their_files_give_the_births_of_their_run(
 ) -> None:
     monkeypatch.chdir(folder)
     Path("short.toml").write_text(SHORT)
-    source = rv.read("source")
+    source = rv.Run("source")
     best = source.best(4)
     for number in (1, 3):
         best[number].write(f"{number}.yaml")
@@ -123,7 +123,7 @@ def test_robots_and_their_files_give_the_births_of_their_run(
     names = [str(name)[-6:] for name in runs[1]["origin_file"].to_pylist()[1:4:2]]
     assert names == ["1.yaml", "3.yaml"]
     with pytest.raises(rv.ExperimentError, match=r"name it with founders\.run"):
-        rv.run(rv.read("out-0").experiment, seed=2)
+        rv.run(rv.Run("out-0").experiment, seed=2)
 
 
 MISTAKES = [

@@ -112,8 +112,8 @@ def test_restored_arena_records_equally(
     """The sample of step 80 has the outputs of the tick of step 75."""
     own, traces = recorded
     noisy = replace(own.simulation, actuator_noise=0.1)
-    world = World(replace(own, simulation=noisy))
-    inserted(world, turtle, (0.0, 0.0), (0.12, 0.0))
+    newborns = placed(turtle, (0.0, 0.0), (0.12, 0.0))
+    world = populated(replace(own, simulation=noisy), newborns)
     world.advance(78)
     World.restore(world._settings, world.snapshot()).advance(400)
     world.advance(400)
