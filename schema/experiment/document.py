@@ -20,8 +20,8 @@ from schema.experiment.robust import Calibration, NoiseLevel, Robust
 from schema.experiment.section import (
     Angle,
     AtLeastOne,
-    Count,
     Extent,
+    Index,
     Length,
     Limit,
     NotNegative,
@@ -262,8 +262,8 @@ class FounderGenome(Section, frozen=True):
     """
 
     digest: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
-    island: Count | None = None
-    birth: Count | None = None
+    island: Index | None = None
+    birth: Index | None = None
 
 
 class Founders(Section, frozen=True):
@@ -283,8 +283,8 @@ class Founders(Section, frozen=True):
 
     files: tuple[str, ...] = ()
     run: str | None = None
-    island: Count | None = None
-    population: str | tuple[Count, ...] = "last"
+    island: Index | None = None
+    population: str | tuple[Index, ...] = "last"
     repeat: bool = False
     genomes: tuple[FounderGenome, ...] = ()
 

@@ -22,6 +22,8 @@ Angle = Annotated[float, Meta(ge=-3600, le=3600)]
 Value = Annotated[int, Meta(ge=-MOST_COUNT, le=MOST_COUNT)] | Number
 Count = Annotated[int, Meta(ge=0, le=MOST_COUNT)]
 AtLeastOne = Annotated[int, Meta(ge=1, le=10**9)]
+Index = Annotated[int, Meta(ge=0, le=10**9)]
+"""Number of an island or of a birth, from 0."""
 Size = Annotated[int, Meta(ge=1, le=10**6)]
 """Number of things that exist at the same time."""
 
