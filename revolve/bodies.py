@@ -2,13 +2,8 @@
 
 from pathlib import Path
 
-import pyarrow as pa
-
 from analysis.extras import extra
-from analysis.measures.diversity import distances_of
-from analysis.measures.trees import encode
 from analyzer.report import analyze
-from coordinator.islands.rows import body_rows
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, checked, plain
 from schema.experiment.document import Vetting, island_experiment
@@ -42,7 +37,6 @@ def body_distance(first: Robot | PlainRobot, second: Robot | PlainRobot) -> int:
 
     Source: Hupkes 2016, section 6.2.1; the figures about diversity use it, too.
     """
-    bodies = pa.array([body_rows(plain(robot)) for robot in (first, second)])
-    trees = encode(pa.chunked_array([bodies]))
     with extra("body_distance needs", "analysis"):
-        return int(distances_of(trees, trees.tree_of[:1], trees.tree_of[1:])[0])
+        from schema.robot.body_distance import body_distances  # noqa: PLC0415
+    return int(body_distances(plain(first), [plain(second)])[0])
