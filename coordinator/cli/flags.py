@@ -23,7 +23,6 @@ _COMMANDS = {
             "revolve run scenario1 --seed 1 --births 600",
             "revolve run mine.toml --births 100 --out runs/first --workers 2",
             "revolve run scenario1 no-selection --repeats 5    # a campaign",
-            "revolve run scenario3 --births 60 --view",
             "revolve run mine.toml --from runs/first --out runs/second",
         ),
     ),

@@ -106,7 +106,7 @@ def parser(_command: str = "export") -> Flags:
         "folder",
         type=Path,
         metavar="FOLDER",
-        help="run or campaign, or a folder that contains some",
+        help="run or campaign folder; or one that contains some",
     )
     flags.add_argument(
         "--table",

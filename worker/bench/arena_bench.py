@@ -108,7 +108,7 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
             parser, "--seed", 1, "random seed, of the robots and their places", least=0
         )
         parser.add_argument(
-            "--out", type=Path, metavar="FILE", help="Parquet file to write"
+            "--out", type=Path, metavar="FILE", help="file to write; Parquet"
         )
 
 
