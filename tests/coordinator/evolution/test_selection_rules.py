@@ -7,7 +7,6 @@ from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from itertools import count
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -23,7 +22,6 @@ from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import PARENTS, SURVIVORS, Experiment, SelectionSection
 from schema.experiment.migration import Migration
 from schema.experiment.selection_rules import RuleSection
-from schema.plugins import permission
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
@@ -84,17 +82,8 @@ ANSWERS = {
 
 
 @pytest.fixture
-def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
-    """Return a function that writes and allows a module, and returns its name."""
-    monkeypatch.setattr(permission, "_allowed", {})
-
-    def write(text: str) -> str:
-        name = f"rules_{tmp_path.name.replace('-', '_')}"
-        (tmp_path / f"{name}.py").write_text(text)
-        permission.allow([str(tmp_path / f"{name}.py")])
-        return name
-
-    return write
+def lab(own_module: Callable[[str], str]) -> Callable[[str], str]:
+    return own_module
 
 
 def population(*sizes: int) -> list[Individual]:

@@ -44,7 +44,6 @@ class Witness:
 @pytest.fixture
 def witnesses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Return the list of all rules that are made."""
-    monkeypatch.setattr(permission, "_allowed", {})
     file = tmp_path / "witness_of_memory.py"
     file.write_text(WITNESS)
     permission.allow([str(file)])

@@ -1,14 +1,11 @@
 """What counts as a change of a user's module or object."""
 
-import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import pytest
 
 from schema.errors import ExperimentError
-from schema.plugins import permission
 from schema.plugins.load import load_module
 from schema.plugins.state import own_modules, unchanged
 
@@ -51,13 +48,8 @@ RING.append(RING)
 
 
 @pytest.fixture
-def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    monkeypatch.setattr(permission, "_allowed", {})
-    name = f"state_{tmp_path.name.replace('-', '_')}"
-    (tmp_path / f"{name}.py").write_text(LAB)
-    permission.allow([str(tmp_path / f"{name}.py")])
-    yield load_module(name, "test")
-    del sys.modules[name]
+def lab(own_module: Callable[[str], str]) -> ModuleType:
+    return load_module(own_module(LAB), "test")
 
 
 @pytest.mark.parametrize(
