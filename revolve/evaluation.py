@@ -10,16 +10,17 @@ from msgspec.structs import replace
 from revolve.arguments import whole_number
 from revolve.children import SIMULATOR
 from revolve.experiment import Experiment, document_of
-from revolve.robot import DEFAULT, Robot, plain, task_of
-from schema.errors import ExperimentError, SimulationDiverged, shown
+from revolve.robot import DEFAULT, Robot, task_of
+from schema.errors import NO_MESSAGE, ExperimentError, SimulationDiverged, shown
 from schema.experiment.document import island_experiment
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.limits import MOST_TRIAL
+from schema.limits import LONGEST_REASON, MOST_TRIAL, printable
 from schema.plugins.needs import check_channels
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
 from schema.robot.trace import Trace
+from schema.wire.messages import Failure, Traced
 from schema.wire.trace import unpack_trace
 
 
@@ -82,14 +83,7 @@ def evaluate(
             stimulus in its environment; no such channel.
         RevolveError: another trial.
     """
-    settings = settings_for(robot, experiment, record)
-    identity = outside_of_runs(trial)
-    outcome = SIMULATOR.do(task_of(robot, settings, identity, is_judged=True))
-    trace = unpack_trace(outcome.trace, plain(robot)) if outcome.trace else None
-    if outcome.failure:
-        return Result(failure=outcome.failure, trace=trace)
-    assert outcome.evaluation is not None
-    return result_of(outcome.evaluation, settings, trace)
+    return _simulated(robot, experiment, trial, record, is_judged=True)
 
 
 def simulate(
@@ -114,11 +108,25 @@ def simulate(
         ExperimentError: as for ``evaluate``.
         RevolveError: as for ``evaluate``.
     """
+    result = _simulated(robot, experiment, trial, record, is_judged=False)
+    if result.trace is None:
+        raise SimulationDiverged(result.failure)
+    return result.trace
+
+
+def _simulated(
+    robot: Robot | PlainRobot,
+    experiment: Experiment | str | Path | None,
+    trial: int,
+    record: Sequence[str],
+    *,
+    is_judged: bool,
+) -> Result:
     settings = settings_for(robot, experiment, record)
-    outcome = SIMULATOR.do(task_of(robot, settings, outside_of_runs(trial)))
-    if outcome.trace is None:
-        raise SimulationDiverged(outcome.failure)
-    return unpack_trace(outcome.trace, plain(robot))
+    task = task_of(robot, settings, outside_of_runs(trial), is_judged=is_judged)
+    outcome = SIMULATOR.do(task)
+    traced = outcome.traced or Traced(Failure(outcome.failure), None)
+    return result_of(traced, settings, task.robot)
 
 
 def settings_for(
@@ -153,15 +161,23 @@ def outside_of_runs(trial: object) -> Identity:
 
 
 def result_of(
-    evaluation: Evaluation, settings: EvaluationSettings, trace: Trace | None = None
+    outcome: object, settings: EvaluationSettings, robot: PlainRobot
 ) -> Result:
-    """Return a worker's evaluation as a result."""
-    labels = settings.measures.labels
+    """Return a worker's evaluation of a robot, or its failure, as a result."""
+    trace = None
+    if isinstance(outcome, Traced):
+        if outcome.trace is not None:
+            trace = unpack_trace(outcome.trace, robot)
+        outcome = outcome.outcome
+    if isinstance(outcome, Failure):
+        why = printable(outcome.reason, LONGEST_REASON) or NO_MESSAGE
+        return Result(failure=why, trace=trace)
+    assert isinstance(outcome, Evaluation)
     return Result(
-        evaluation.fitness,
-        evaluation.path_velocity,
-        evaluation.straight_velocity,
-        evaluation.simulated_s,
-        dict(zip(labels, evaluation.measures, strict=True)),
+        outcome.fitness,
+        outcome.path_velocity,
+        outcome.straight_velocity,
+        outcome.simulated_s,
+        dict(zip(settings.measures.labels, outcome.measures, strict=True)),
         trace=trace,
     )

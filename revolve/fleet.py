@@ -38,11 +38,9 @@ from schema.limits import ANSWER_BYTES, VALUE_BYTES
 from schema.plugins.load import load_function
 from schema.plugins.permission import allow, allow_references, allowed
 from schema.plugins.source import forget_digests
-from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
 from schema.wire.calls import call_settings, pack_value, unpack_value
-from schema.wire.messages import Answer, Call, CallValue, Evaluate, Failure, Traced
-from schema.wire.trace import unpack_trace
+from schema.wire.messages import Answer, Call, CallValue, Evaluate, Failure
 
 T = TypeVar("T")
 
@@ -373,15 +371,7 @@ def _settle(end: Deliver, settings: EvaluationSettings, robot: PlainRobot) -> Re
     if end.reason:
         raise refusal(end)
     assert isinstance(end.answer, Answer)
-    outcome: object = end.answer.result
-    trace = None
-    if isinstance(outcome, Traced):
-        if outcome.trace is not None:
-            trace = unpack_trace(outcome.trace, robot)
-        outcome = outcome.outcome
-    if isinstance(outcome, Evaluation):
-        return result_of(outcome, settings, trace)
-    return Result(failure=failure_of(outcome), trace=trace)
+    return result_of(end.answer.result, settings, robot)
 
 
 def _path_of(function: str | Callable[[Any], Any]) -> str:

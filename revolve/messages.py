@@ -5,9 +5,8 @@ import msgspec
 import schema.errors
 from schema.errors import RevolveError, error_text
 from schema.experiment.identity import NO_IDENTITY, Identity
-from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
-from schema.wire.messages import PackedTrace
+from schema.wire.messages import Traced
 
 
 class Problem(msgspec.Struct, frozen=True):
@@ -39,13 +38,13 @@ class Outcome(msgspec.Struct, frozen=True):
     """Outcome of a task.
 
     Attributes:
-        failure: why there is no evaluation, or no trace.
+        traced: of a simulation.
+        failure: how the process ended, if it did.
         picture: PNG.
         problem: why nothing could be done.
     """
 
-    trace: PackedTrace | None = None
-    evaluation: Evaluation | None = None
+    traced: Traced | None = None
     failure: str = ""
     picture: bytes = b""
     problem: Problem | None = None

@@ -7,12 +7,10 @@ import msgspec
 
 from analysis.extras import extra
 from revolve.messages import Outcome, Task, problem_of
-from schema.errors import SensorFailed, SimulationDiverged
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot, check_types
-from schema.wire.trace import pack_trace
 
 _TASKS = msgspec.msgpack.Decoder(Task)
 
@@ -33,7 +31,7 @@ def _done(task: Task) -> Outcome:
         from analysis.render.stage import choose_engine  # noqa: PLC0415
 
         choose_engine()
-    from worker.robot.evaluation import evaluate_traced, simulate  # noqa: PLC0415
+    from worker.robot.evaluation import evaluate_traced  # noqa: PLC0415
     from worker.serve.checks import checked_evaluation  # noqa: PLC0415
 
     # Before the robot, whose neurons may be those of a plug-in.
@@ -42,18 +40,8 @@ def _done(task: Task) -> Outcome:
     check_types(robot, body_space(settings.space))
     if task.size is not None:
         return Outcome(picture=_picture(robot, settings, task.size))
-    if task.is_judged:
-        outcome, trace = evaluate_traced(robot, settings, task.identity)
-    else:
-        outcome = ""
-        try:
-            trace = simulate(robot, settings, identity=task.identity)
-        except (SimulationDiverged, SensorFailed) as error:
-            outcome, trace = str(error), None
-    packed = None if trace is None else pack_trace(trace)
-    if isinstance(outcome, str):
-        return Outcome(packed, failure=outcome)
-    return Outcome(packed, outcome)
+    identity, is_judged = task.identity, task.is_judged
+    return Outcome(evaluate_traced(robot, settings, identity, is_judged=is_judged))
 
 
 def _picture(

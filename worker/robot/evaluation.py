@@ -12,6 +12,8 @@ from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
+from schema.wire.messages import Failure, Traced
+from schema.wire.trace import pack_trace
 from worker.measures import functions_of
 from worker.robot.control_loop import ControlLoop, Watch
 from worker.robot.disturbances import evaluate_disturbed
@@ -46,29 +48,35 @@ def evaluate(
 
 
 def evaluate_traced(
-    robot: Robot, settings: EvaluationSettings, identity: Identity = NO_IDENTITY
-) -> tuple[Evaluation | str, Trace | None]:
+    robot: Robot,
+    settings: EvaluationSettings,
+    identity: Identity,
+    *,
+    is_judged: bool = True,
+) -> Traced:
     """Return the evaluation of a robot, or why it failed, and its trace.
 
     With the section ``robust`` the trace is that of a simulation without disturbances,
-    which has no part in the fitness. There is none if that simulation fails.
+    which has no part in the fitness. There is none if that simulation fails. Unless
+    ``is_judged``, only that simulation is done.
 
     It raises as ``evaluate``, but for failures.
     """
-    outcome: Evaluation | str
+    outcome: Evaluation | Failure = Failure("")
     trace: Trace | None = None
+    is_disturbed = is_judged and settings.robust is not None
     try:
-        if settings.robust is None:
-            trace = simulate(robot, settings, identity=identity)
-            outcome = judge(trace, settings)
-        else:
+        if is_disturbed:
             outcome = evaluate(robot, settings, identity)
+        else:
+            trace = simulate(robot, settings, identity=identity)
+            outcome = judge(trace, settings) if is_judged else outcome
     except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
-        outcome = str(error)
-    if settings.robust is not None:
+        outcome = Failure(str(error))
+    if is_disturbed:
         with suppress(SimulationDiverged, SensorFailed):
             trace = simulate(robot, settings, identity=identity)
-    return outcome, trace
+    return Traced(outcome, trace and pack_trace(trace))
 
 
 def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:

@@ -16,7 +16,6 @@ from schema.robot.results import Evaluation
 from schema.robot.robot import check_tree, check_types
 from schema.wire.arena import AdvanceShard
 from schema.wire.messages import Call, Evaluate, Failure, Request, Result, Traced
-from schema.wire.trace import pack_trace
 from worker.robot.evaluation import evaluate, evaluate_traced
 from worker.serve.calls import call_function
 from worker.serve.checks import checked_evaluation
@@ -69,11 +68,7 @@ def answer_evaluation(
         settings = lasting(settings, work.steps)
     identity = Identity(request.origin, work.birth, work.trial)
     if work.is_traced:
-        outcome, trace = evaluate_traced(robot, settings, identity)
-        return Traced(
-            Failure(outcome) if isinstance(outcome, str) else outcome,
-            None if trace is None else pack_trace(trace),
-        )
+        return evaluate_traced(robot, settings, identity)
     try:
         return evaluate(robot, settings, identity)
     except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
