@@ -11,7 +11,6 @@ from concurrent.futures import Future
 from functools import lru_cache, partial
 from itertools import islice
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self, TypeVar, cast
 
 import msgspec
@@ -129,12 +128,7 @@ class Fleet:
         atexit.register(self.close)
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

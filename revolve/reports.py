@@ -6,8 +6,8 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from revolve.children import run_command
-from revolve.runs import Run
-from schema.errors import RunFolderError, nearest
+from revolve.runs import Run, check_table
+from schema.errors import RunFolderError
 
 
 class Analysis:
@@ -38,10 +38,7 @@ class Analysis:
         Raises:
             RunFolderError: no such table; the nearest is named.
         """
-        if name not in self.names:
-            near = nearest(name, self.names)
-            allowed = ", ".join(self.names)
-            raise RunFolderError(f"no table {name!r}{near}; tables: {allowed}")
+        check_table(name, self.names)
         return pa.parquet.read_table(self.folder / "measures" / f"{name}.parquet")
 
     def __repr__(self) -> str:

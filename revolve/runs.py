@@ -136,20 +136,15 @@ class Run:
 
     def _born(self, birth: BirthId, home: int, fitness: float | None) -> Robot:
         """Return the robot of a birth, with its origin and one island's settings."""
-        row = self._birth(birth)
+        row = read_table(self.folder, "births", where=born_as(birth))
+        if not row.num_rows:
+            raise RunFolderError(
+                f"{self.folder}: has no birth {birth.number} on island {birth.island}"
+            )
         (robot,) = self._robots(row, [home])
         parents = read_birth(row.to_pylist()[0], 0).parents
         origin = RobotOrigin(str(self.run_id), birth, parents, fitness)
         return of_plain(plain(robot), robot.experiment, origin)
-
-    def _birth(self, birth: BirthId) -> pa.Table:
-        """Return the row of a birth."""
-        rows = read_table(self.folder, "births", where=born_as(birth))
-        if not rows.num_rows:
-            raise RunFolderError(
-                f"{self.folder}: has no birth {birth.number} on island {birth.island}"
-            )
-        return rows
 
     def robots(self, births: pa.Table | None = None) -> list[Robot]:
         """Return the robots of some births, with the brains that they have learnt.
@@ -261,10 +256,10 @@ def _check_births(rows: object) -> None:
         )
 
 
-def check_table(name: str) -> None:
-    """Raise ``RunFolderError`` unless runs have a table; the nearest is named."""
-    if name not in TABLES:
-        near, allowed = nearest(str(name), TABLES), ", ".join(TABLES)
+def check_table(name: str, tables: Iterable[str] = tuple(TABLES)) -> None:
+    """Raise ``RunFolderError`` unless a table is one of some; the nearest is named."""
+    if name not in tables:
+        near, allowed = nearest(str(name), tables), ", ".join(tables)
         raise RunFolderError(f"no table {shown(name)}{near}; tables: {allowed}")
 
 

@@ -15,6 +15,7 @@ from analysis.measures.population_table import (
 )
 from schema.errors import RunFolderError
 from schema.robot.trees import Integers
+from schema.wire.updates import individual
 
 
 def parents_of(births: pa.Table) -> list[list[int]]:
@@ -149,19 +150,18 @@ def _ends(
     """Return the time at which each individual was gone, infinite of the living."""
     islands = population.group_by("island").aggregate([("births", "distinct")])
     recorded = {
-        row["island"]: sorted(row["births_distinct"]) for row in islands.to_pylist()
+        row["island"]: [*sorted(row["births_distinct"]), math.inf]
+        for row in islands.to_pylist()
     }
 
     def after(island: int, births: int) -> float:
-        times = recorded.get(island, [])
-        place = bisect_right(times, births)
-        return times[place] if place < len(times) else math.inf
+        times = recorded.get(island, [math.inf])
+        return times[bisect_right(times, births)]
 
     ends: dict[tuple[int, int], float] = {}
     named = ["island", "birth_island", "birth"]
     for row in population.group_by(named).aggregate([("births", "max")]).to_pylist():
-        end = after(row["island"], row["births_max"])
-        home = row["island"] if row["birth_island"] is None else row["birth_island"]
-        ends[home, row["birth"]] = max(ends.get((home, row["birth"]), end), end)
+        member, end = individual(row), after(row["island"], row["births_max"])
+        ends[member] = max(ends.get(member, end), end)
     # Children that were never in a population went with the first one after them.
     return {each: ends[each] if each in ends else after(*each) for each in born}

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from pyarrow import parquet
 
 from analysis.measures.load import LoadedRun
 from schema.errors import RevolveError, RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.files import finished_path, read_table
+from schema.tables.files import read_table
 from schema.wire.updates import (
     Update,
     arenas_of,
@@ -91,13 +90,7 @@ def read_poses(
     """
     time = pc.field("sim_time_s")
     is_in = (time >= start_s) & (time <= end_s)
-    if path := finished_path(folder, "poses"):
-        # Reads no more than needed.
-        poses = parquet.read_table(
-            path, partitioning=None, filters=is_in, page_checksum_verification=True
-        )
-    else:
-        poses = read_table(folder, "poses", where=is_in)
+    poses = read_table(folder, "poses", where=is_in)
     times = poses["sim_time_s"].to_numpy()
     chunks = np.floor((times - start_s) / CHUNK_S).astype(np.int64)
     for chunk in np.unique(chunks).tolist():

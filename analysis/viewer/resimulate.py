@@ -16,14 +16,13 @@ from analysis.measures.load import LoadedRun
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
 from schema.agent.platform_tag import platform_tag
-from schema.experiment.document import Experiment, island_experiment
+from schema.experiment.document import Experiment, island_experiment, steps_of
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import (
     EvaluationSettings,
-    evaluation_settings,
+    evaluation_settings_of,
     lasting,
-    read_evaluation_settings,
 )
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
@@ -97,7 +96,7 @@ def _alone(
     run: LoadedRun, own: Experiment, birth: BirthId, simulators: Simulators
 ) -> Motion:
     """Return the motion of a robot alone on its island, in its fittest evaluation."""
-    settings = read_evaluation_settings(evaluation_settings(own))
+    settings = evaluation_settings_of(own)
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {birth.name}: no evaluation is recorded")
@@ -105,8 +104,8 @@ def _alone(
     number = fitness.index(max(fitness))
     recorded = rows[number]
     if recorded["simulated_s"] is not None:
-        steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
-        settings = lasting(settings, steps)
+        clock = settings.simulation
+        settings = lasting(settings, steps_of(recorded["simulated_s"], clock))
     born = _rows_of(run.folder, "births", birth)
     genome, stored = (born[name][0].as_py() for name in ("genome", "robot"))
     robot = robot_of_birth(genome, stored, own)

@@ -76,18 +76,18 @@ def _flat(rows: pa.Table) -> pa.Table:
     for number, field in enumerate(rows.schema):
         is_bytes = pa.types.is_binary(field.type)
         if is_bytes or pa.types.is_nested(field.type):
-            column = [_text(each) for each in rows[field.name].to_pylist()]
+            column = [
+                _text(each)
+                for each in rows[field.name].to_pylist(maps_as_pydicts="strict")
+            ]
             rows = rows.set_column(number, field.name, pa.array(column, pa.string()))
     return rows
 
 
 def _text(value: Any) -> str | None:  # noqa: ANN401 - of any nested column
-    if value is None:
-        return None
     if isinstance(value, bytes):
         return b64encode(value).decode()
-    is_map = value and isinstance(value[0], tuple)
-    return msgspec.json.encode(dict(value) if is_map else value).decode()
+    return None if value is None else msgspec.json.encode(value).decode()
 
 
 def parser(_command: str = "export") -> Flags:

@@ -51,13 +51,6 @@ class Chosen(NamedTuple):
     identity: Identity
 
 
-class _Recorded(NamedTuple):
-    """Number of a recorded evaluation among those of its robot, and simulated time."""
-
-    trial: int = 0
-    simulated_s: float | None = None
-
-
 def chosen_robots(folders: Iterable[Path], most: int | None = None) -> list[Chosen]:
     """Return the best robot ever of each run, and those of its last populations.
 
@@ -110,28 +103,30 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         }
         there = row["island"]
         origin = Origin(seed=run.seed, run=run.number, island=there)
-        evaluation = recorded.get((there, name), _Recorded())
-        identity = Identity(origin, name, evaluation.trial)
+        trial, simulated_s = recorded.get((there, name), (0, None))
+        identity = Identity(origin, name, trial)
         document = _alone(own.experiment, there)
         settings = evaluation_settings_of(document)
-        if evaluation.simulated_s is not None:
-            clock = settings.simulation
-            settings = lasting(settings, steps_of(evaluation.simulated_s, clock))
+        if simulated_s is not None:
+            steps = steps_of(simulated_s, settings.simulation)
+            settings = lasting(settings, steps)
         chosen.append(Chosen(head, document, settings, robot, own, identity))
     return chosen
 
 
-def _recorded(tables: dict[str, pa.Table]) -> dict[tuple[int, BirthId], _Recorded]:
-    """Return the last evaluation of each robot on each island.
+def _recorded(
+    tables: dict[str, pa.Table],
+) -> dict[tuple[int, BirthId], tuple[int, float | None]]:
+    """Return trial and time [s] of the last evaluation of each robot on each island.
 
     Of a robot that has learnt there it is the first of its best trials.
     """
     learnt = best_trials(tables["learning"])
-    recorded: dict[tuple[int, BirthId], _Recorded] = {}
+    recorded: dict[tuple[int, BirthId], tuple[int, float | None]] = {}
     for row in tables["evaluations"].to_pylist():
         island, birth = row["island"], individual(row)
         own = learnt.get(birth, 0) if island == birth.island else 0
-        recorded[island, birth] = _Recorded(row["trial"] or own, row["simulated_s"])
+        recorded[island, birth] = (row["trial"] or own, row["simulated_s"])
     return recorded
 
 

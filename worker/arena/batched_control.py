@@ -17,7 +17,6 @@ from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.filters.filters import Filter, filtered_outputs, filtered_readings
 from worker.filters.noise import Noise
-from worker.measures import functions_of
 from worker.robot.banks import broken_rows
 from worker.robot.brains import Controls
 from worker.robot.own_sensors import Surroundings
@@ -38,7 +37,6 @@ class BatchedControllers:
         simulation = settings.simulation
         self._settings, self._controls = settings, controls
         self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
-        self._has_outputs = "outputs" in functions_of(settings).channels
         self._tick_steps = simulation.brain_steps
         self.broken: dict[int, str] = {}
         self.gather(())
@@ -58,20 +56,15 @@ class BatchedControllers:
         Returns:
             (R, O) unclipped; may be a view that the next tick overwrites.
         """
-        rows = [robot.view.sensors.readings for robot in robots]
-        readings = np.concatenate([np.zeros((0, self._controls.width.inputs)), *rows])
         ages = (step - self._starts) // self._tick_steps
-        outputs = self._outputs(self._bank, self._filters, step, readings, ages)
-        self._keep_outputs(robots)
+        outputs = self._outputs(robots, self._bank, self._filters, step, ages)
         self.broken = broken_rows(self._bank, outputs)
         return outputs
 
     def first_tick(self, step: int, robot: ArenaRobot) -> str:
         """Update a newborn's brain alone, command its motors; return why it broke."""
         bank, filters = self._rows_of([robot])
-        readings = robot.view.sensors.readings
-        outputs = self._outputs(bank, filters, step, readings, 0.0)
-        self._keep_outputs([robot])
+        outputs = self._outputs([robot], bank, filters, step, 0.0)
         robot.view.servos.drive(outputs[0])
         robot.states = bank.states[0]
         return broken_rows(bank, outputs).get(0, "")
@@ -87,22 +80,20 @@ class BatchedControllers:
 
     def _outputs(
         self,
+        robots: Sequence[ArenaRobot],
         bank: Bank,
         filters: tuple[Filter, ...],
         step: int,
-        readings: Floats,
         ages: Floats | float,
     ) -> Floats:
+        """Return the outputs of brains; each robot keeps those that are recorded."""
         tick = step // self._tick_steps
-        received = filtered_readings(filters, tick, readings)
-        self._unfiltered = bank.step(received, ages)
-        return filtered_outputs(filters, tick, self._unfiltered)
-
-    def _keep_outputs(self, robots: Sequence[ArenaRobot]) -> None:
-        """Note the outputs of brains at the last tick, if a channel records them."""
-        if self._has_outputs:
-            for robot, row in zip(robots, self._unfiltered, strict=True):
-                robot.outputs[:] = row[: len(robot.outputs)]
+        rows = [robot.view.sensors.readings for robot in robots]
+        readings = np.concatenate([np.zeros((0, self._controls.width.inputs)), *rows])
+        outputs = bank.step(filtered_readings(filters, tick, readings), ages)
+        for robot, row in zip(robots, outputs, strict=True):
+            robot.outputs[:] = row[: len(robot.outputs)]
+        return filtered_outputs(filters, tick, outputs)
 
 
 def look(
