@@ -20,11 +20,11 @@ from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
 from analysis.measures.benchmarks import read_benchmarks
+from analysis.measures.bodies import SlotRule
 from analysis.measures.distinct_names import with_distinct_names
 from analysis.measures.load import LeftOut, LoadedRun, read_runs
 from analysis.measures.outputs import OUTPUTS, schema
 from analysis.measures.study import concatenated, measure_runs
-from analysis.measures.trees import SlotRule
 from analysis.progress import bars, replaced
 from analysis.render.picture import Simulate
 from analysis.report.page import report

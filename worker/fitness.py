@@ -20,9 +20,6 @@ from schema.experiment.settings import fitness_argument, fitness_function
 from schema.robot.results import Evaluation
 from schema.robot.trace import Trace, sum_in_order
 
-FitnessFunction = Callable[[Trace, Any], float]
-"""Function that ``fitness.function`` names: fitness of a trace; finite, maximised."""
-
 
 @dataclass(frozen=True, slots=True)
 class TraceFunction:

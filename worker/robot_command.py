@@ -6,7 +6,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from schema.agent.flags import Flags, add_plugins, add_settings, whole_number
+from schema.agent.flags import Flags, add_count, add_plugins, add_settings
 from schema.agent.terminal.progress_line import progress_if_long
 from schema.errors import counted, rounded
 from schema.experiment.identity import NO_IDENTITY
@@ -144,13 +144,7 @@ def parser(_command: str = "robot simulate") -> Flags:
         help="evaluate it again with finer time steps, 1 %% less friction and starts "
         "raised by about 0.1 mm, and show how much of its fitness it keeps",
     )
-    flags.add_argument(
-        "--trial",
-        type=whole_number(0, MOST_TRIAL),
-        default=0,
-        metavar="N",
-        help="number of the evaluation, from 0: each has noise, pushes and "
-        "disturbances of its own (default: 0)",
-    )
+    what = "number of the evaluation, from 0: each has noise, pushes and disturbances "
+    add_count(flags, "--trial", 0, f"{what}of its own", least=0, most=MOST_TRIAL)
     add_plugins(flags)
     return flags

@@ -1,4 +1,6 @@
-"""Sizes of robots."""
+"""Sizes of robots, and their bodies as trees."""
+
+from typing import Literal
 
 import numpy as np
 import pyarrow as pa
@@ -6,9 +8,12 @@ import pyarrow.compute as pc
 
 from analysis.measures.outputs import BODY, PER_PART
 from analysis.measures.population_table import Numbers
+from schema.robot.trees import Trees, trees_of
 
 TOUCH = "TouchSensor"
 """Part type of touch sensors."""
+SlotRule = Literal["parent", "own"]
+"""Slot that labels a part: its parent's (thesis) or its own (published code)."""
 
 
 def body_sizes(births: pa.Table) -> dict[str, Numbers]:
@@ -62,3 +67,26 @@ def extremity_bins(robots: pa.Table) -> pa.Table:
                 binned = binned.add_column(0, name, repeated)
             pieces.append(binned)
     return pa.concat_tables(pieces)
+
+
+def encode(bodies: pa.ChunkedArray, slots: SlotRule = "parent") -> Trees:
+    """Return bodies as trees.
+
+    Args:
+        bodies: (B,) lists of parts, as column ``body`` of the births table.
+        slots: slot that labels a part.
+
+    Raises:
+        InvalidRobot: a body is not a tree in depth-first order with children by
+            ascending slot.
+    """
+    lists = bodies.combine_chunks()
+    parts = lists.flatten()
+    sizes = np.asarray(pc.list_value_length(lists), np.int64)
+    own = np.asarray(parts.field("child_slot"), np.int64)
+    places = np.asarray(parts.field("parent_slot"), np.int64)
+    parents = np.asarray(parts.field("parent"), np.int64)
+    kinds = parts.field("kind").dictionary_encode().indices
+    label = np.where(parents < 0, -1, places if slots == "parent" else own)
+    columns = np.stack([parents, np.asarray(kinds, np.int64), label, places], axis=1)
+    return trees_of(columns, sizes)

@@ -38,6 +38,8 @@ from schema.robot.trees import Integers
 def robots(run: RunTables) -> pa.Table:
     """Return all robots that were evaluated, with sizes, rank and fitness, by birth."""
     fitness, islands, is_last, is_failed = _evaluated(run)
+    table, greatest = run.population_table, fitness.copy()
+    np.fmax.at(greatest, table.members, table.fitness)
     chosen = np.flatnonzero(~np.isnan(fitness))
     births = run.births.take(chosen)
     return pa.table(
@@ -50,7 +52,7 @@ def robots(run: RunTables) -> pa.Table:
             "rank": births["rank"],
             "ancestors": [run.lines[row].bit_count() for row in chosen.tolist()],
             **{name: values[chosen] for name, values in run.sizes.items()},
-            "fitness_max": _greatest(run, fitness)[chosen],
+            "fitness_max": greatest[chosen],
             "births": births_so_far(run.births)[chosen],
             "is_failed": is_failed[chosen],
         }
@@ -151,13 +153,6 @@ def _evaluations(run: RunTables) -> pa.Table:
     return last.set_column(last.schema.get_field_index("fitness"), "fitness", fitness)
 
 
-def _greatest(run: RunTables, last: Numbers) -> Numbers:
-    """Return each individual's greatest fitness, given its last one; NaN if none."""
-    table, greatest = run.population_table, last.copy()
-    np.fmax.at(greatest, table.members, table.fitness)
-    return greatest
-
-
 def brains(run: RunTables) -> pa.Table:
     """Return measures of the brains of all robots, in the order of birth."""
     return pa.table(
@@ -184,10 +179,6 @@ class _Measure(NamedTuple):
     applies: Callable[[Sequence[Experiment]], bool] = lambda _: True
 
 
-def _has_arena(islands: Sequence[Experiment]) -> bool:
-    return any(island.arena for island in islands)
-
-
 def _learns(islands: Sequence[Experiment]) -> bool:
     return any(island.learning for island in islands)
 
@@ -202,7 +193,9 @@ _OTHERS = {
     "extremities": _Measure(lambda run: extremity_bins(robots(run)), _OF_ROBOTS),
     "families": _Measure(families, "births population"),
     "brains": _Measure(brains, "births"),
-    "variability": _Measure(variability, "fitness", _has_arena),
+    "variability": _Measure(
+        variability, "fitness", lambda islands: any(island.arena for island in islands)
+    ),
     "interactions": _Measure(
         interactions,
         "births fitness deaths touches",

@@ -6,14 +6,13 @@ from functools import cached_property
 import pyarrow as pa
 
 from analysis.measures.ancestry import ancestors, parents_of
-from analysis.measures.bodies import body_sizes
+from analysis.measures.bodies import SlotRule, body_sizes, encode
 from analysis.measures.brains.measures import brain_measures
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
     population_table,
 )
-from analysis.measures.trees import SlotRule, encode
 from schema.experiment.document import Experiment
 from schema.robot.trees import Trees
 

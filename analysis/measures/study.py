@@ -10,6 +10,7 @@ from multiprocessing import active_children, get_context
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analysis.measures.bodies import SlotRule
 from analysis.measures.load import (
     TABLE,
     LeftOut,
@@ -22,7 +23,6 @@ from analysis.measures.measures import measure
 from analysis.measures.named_measures import with_docstrings
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
-from analysis.measures.trees import SlotRule
 from schema.tables.description import run_columns
 
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -13,11 +12,15 @@ from PIL import Image, ImageDraw, ImageFont
 from analysis.render.stage import FIELD_OF_VIEW, Picture, Stage, choose_engine, furnish
 from schema.errors import RevolveError
 from schema.experiment.document import body_space
-from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats, Trace
 
+Simulate = Callable[..., Trace]
+"""The worker's simulation of a robot with settings; it may take an ``identity``.
+
+Each tick calls ``watch`` with ``MjData``.
+"""
 _COLOURS = 256
 _SAMPLES = 6
 """Pictures from which the colours of a film are chosen."""
@@ -209,17 +212,3 @@ def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:
         loop=0,
     )
     return file.getvalue()
-
-
-class Simulate(Protocol):
-    """The worker's simulation of one robot."""
-
-    def __call__(
-        self,
-        robot: Robot,
-        settings: EvaluationSettings,
-        *,
-        identity: Identity = NO_IDENTITY,
-        watch: Callable[[Any], None],
-    ) -> Trace:
-        """Return the robot's track; each tick calls ``watch`` with ``MjData``."""

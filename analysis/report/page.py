@@ -113,6 +113,8 @@ def _sections(
     courses = _of_functions(tables, fitness_over_births, over_births, by_number)
     last = _of_functions(tables, last_populations, _LAST, by_number)
     plots = {"6.3": courses, "6.2": last}
+    installed = [[cell(name), cell(text)] for name, text in versions.items()]
+    software = table(("software", "version"), installed)
 
     def shown(section: Section) -> str:
         content = "".join(
@@ -138,7 +140,7 @@ def _sections(
         "runs": ("Runs", folded("All runs", all_runs(tables))),
         "left-out": ("Left out", _left_out(tables["left_out"].to_pylist())),
         "tables": ("Tables", folded("Files and columns", _contents(tables))),
-        "made": ("How this was made", _provenance(command, versions)),
+        "made": ("How this was made", f"<pre>{escape(command)}</pre>{software}"),
     }
 
 
@@ -291,8 +293,3 @@ def _contents(tables: Tables) -> str:
         if name in tables
     ]
     return table(("file", "rows", "columns"), rows)
-
-
-def _provenance(command: str, versions: Mapping[str, str]) -> str:
-    rows = [[cell(name), cell(text)] for name, text in versions.items()]
-    return f"<pre>{escape(command)}</pre>" + table(("software", "version"), rows)

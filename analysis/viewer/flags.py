@@ -1,11 +1,9 @@
 """Command line flags of ``revolve view``; needs no viewer."""
 
-import argparse
-import re
 from pathlib import Path
 
 from schema.agent.command import NETWORK, add_shared
-from schema.agent.flags import Flags, add_plugins, number
+from schema.agent.flags import Flags, add_plugins, birth_name, number
 from schema.robot.ids import BirthId
 
 HOST, PORT = "127.0.0.1", 9876
@@ -74,17 +72,9 @@ def parser(_command: str = "view") -> Flags:
 
 
 def _robot_name(text: str) -> BirthId:
-    """Return the individual of a flag, such as ``1:17``; ``17`` is of island 0.
-
-    Raises:
-        argparse.ArgumentTypeError: the text has another form.
-    """
-    match = re.fullmatch(r"(?:(\d+):)?(\d+)", text)
-    if match is None:
-        raise argparse.ArgumentTypeError(
-            f"must be BIRTH or ISLAND:BIRTH, such as 17 or 1:17, got {text!r}"
-        )
-    return BirthId(int(match[1] or 0), int(match[2]))
+    """Return the individual of a flag, as ``birth_name``; ``17`` is of island 0."""
+    island, number_there = birth_name(text)
+    return BirthId(island or 0, number_there)
 
 
 def selected(text: str) -> BirthId | str:

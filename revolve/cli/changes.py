@@ -27,7 +27,6 @@ from revolve.robot import Robot, plain
 from schema.errors import counted
 from schema.experiment.document import REVOLVE_ANGLE, body_space
 from schema.experiment.settings import EvaluationSettings
-from schema.robot.ids import BirthId
 from schema.robot.robot import Robot as PlainRobot
 from schema.tables.description import make_folder
 from worker.filters.ablation import all_ablations
@@ -148,9 +147,9 @@ def _ablations(one: Chosen, brains: int) -> Iterator[ReevaluationJob]:
     # Other encodings make body and brain of one genome.
     if one.document.encoding.type != REVOLVE_ANGLE:
         return
-    birth = BirthId(one.row["island"], one.row["birth"])
+    origin, birth = one.identity.origin, one.identity.birth
     for number in range(brains):
-        rng = stream(one.run.seed, one.run.number, birth, number, Purpose.OTHER_BRAIN)
+        rng = stream(origin.seed, origin.run, birth, number, Purpose.OTHER_BRAIN)
         values = (ablation.RANDOM, "one", "", None, number)
         columns = dict(zip(_OF_ABLATION, values, strict=True))
         columns["change"] = f"random brain {number + 1}"

@@ -47,7 +47,6 @@ class Chosen(NamedTuple):
     document: Document
     settings: EvaluationSettings
     robot: Robot
-    run: OwnRun
     identity: Identity
 
 
@@ -87,16 +86,15 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     recorded = _recorded(tables)
     chosen: list[Chosen] = []
     for number, row in enumerate(table.to_pylist()):
-        island, birth = row["birth_island"], row["birth"]
-        name = BirthId(island, birth)
+        name = BirthId(row["birth_island"], row["birth"])
         if not (number in last or name == ever):
             continue
         (robot,) = own.robots(births.filter(born_as(name)))
         head = {
             "experiment": run.experiment,
             "folder": str(folder),
-            "island": island,
-            "birth": birth,
+            "island": name.island,
+            "birth": name.number,
             "is_best": name == ever,
             "is_last": number in last,
             "recorded": row["fitness"],
@@ -110,7 +108,7 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         if simulated_s is not None:
             steps = steps_of(simulated_s, settings.simulation)
             settings = lasting(settings, steps)
-        chosen.append(Chosen(head, document, settings, robot, own, identity))
+        chosen.append(Chosen(head, document, settings, robot, identity))
     return chosen
 
 

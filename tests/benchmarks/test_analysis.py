@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.measures.trees import encode
+from analysis.measures.bodies import encode
 from schema.robot.body_distance import tree_distances
 from schema.tables.columns import BIRTHS
 from tests.analysis.bodies import column, random_body

@@ -156,7 +156,7 @@ def test_a_file_is_packed_with_the_settings_that_apply_to_it(
         ("{run} out.yaml", "out.yaml: must end in .robot, got '.yaml'"),
         ("gone.yaml out.robot", "gone.yaml: cannot be read: No such file"),
         ("{run} out.robot --robot 2:1", "has no birth 1 on island 2"),
-        ("{run} out.robot --robot best-evr", "must be BIRTH or ISLAND:BIRTH"),
+        ("{run} out.robot --robot best-evr", "must be N or ISLAND:N in whole numbers"),
         (
             "{run} out.robot --experiment scenario1",
             "--robot is for a run, --experi",

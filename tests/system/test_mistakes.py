@@ -89,7 +89,7 @@ MISTAKES = [
     ("view x --connect hub", "give either a run folder or --connect"),
     ("view --connect tcp/127.0.0.1:1 --save a.rrd", "no hub at"),
     ("view nowhere --serve 9876", "must be HOST:PORT"),
-    ("view nowhere --follow x", "must be BIRTH or ISLAND:BIRTH"),
+    ("view nowhere --follow x", "must be N or ISLAND:N in whole numbers >= 0"),
     ("view nowhere --ancestry", "needs --robot best"),
     ("view --connect tcp/127.0.0.1:1 --robot best", "a run folder only"),
     ("arena list --connect tcp/127.0.0.1:1", "no hub at tcp/127.0.0.1:1"),

@@ -7,10 +7,10 @@ from msgspec import Struct
 from schema.errors import ExperimentError, FitnessUndefined
 from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_argument
+from schema.plugins.protocols import FitnessFunction
 from schema.plugins.simple_traces import check_function
 from schema.robot.trace import Trace
 from worker.fitness import (
-    FitnessFunction,
     TraceFunction,
     path_velocity,
     straight_velocity,

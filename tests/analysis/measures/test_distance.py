@@ -9,7 +9,7 @@ import zss
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.measures.trees import SlotRule, encode
+from analysis.measures.bodies import SlotRule, encode
 from schema.errors import InvalidRobot
 from schema.robot import body_distance as module
 from schema.robot.body_distance import body_distances, tree_distances

@@ -10,7 +10,7 @@ import pytest
 from analysis.comparison.progression import progression
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.arenas import interactions, variability
-from analysis.measures.bodies import body_sizes, extremity_bins
+from analysis.measures.bodies import body_sizes, encode, extremity_bins
 from analysis.measures.diversity import diversity
 from analysis.measures.islands import mean_distances, migrants
 from analysis.measures.measures import births_so_far, measure, robots
@@ -18,7 +18,6 @@ from analysis.measures.outputs import schema
 from analysis.measures.population_table import population_table
 from analysis.measures.populations import populations, retention
 from analysis.measures.run_tables import RunTables
-from analysis.measures.trees import encode
 from schema.errors import RunFolderError
 from schema.experiment.document import (
     ArenaSection,

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from schema.errors import ExperimentError, FitnessUndefined, SimulationDiverged
 from schema.experiment.document import Fitness, Simulation, Space
+from schema.plugins.protocols import FitnessFunction
 from schema.robot.ids import NOBODY
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace
@@ -17,7 +18,6 @@ from schema.wire.messages import Evaluate, Request
 from tests.schema import robots
 from tests.worker.evaluations import bits, with_simulation
 from worker.fitness import (
-    FitnessFunction,
     Functions,
     TraceFunction,
     path_velocity,
