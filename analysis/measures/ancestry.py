@@ -149,7 +149,7 @@ def _ends(
 ) -> dict[tuple[int, int], float]:
     """Return the time at which each individual was gone, infinite of the living."""
     islands = population.group_by("island").aggregate([("births", "distinct")])
-    recorded = {
+    recorded: dict[int, list[float]] = {
         row["island"]: [*sorted(row["births_distinct"]), math.inf]
         for row in islands.to_pylist()
     }

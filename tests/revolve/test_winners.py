@@ -40,7 +40,7 @@ def test_last_evaluation_on_an_island_is_repeated() -> None:
     fitness = pa.array([0.5, 1.5, 0.5, 1.5])
     trials = trials.append_column("fitness", fitness)
     found = _recorded({"evaluations": evaluations, "learning": trials})
-    assert {key: each.trial for key, each in found.items()} == {
+    assert {key: trial for key, (trial, _) in found.items()} == {
         (0, WANDERER): 2,
         (0, SETTLER): 4,
         (1, WANDERER): 1,

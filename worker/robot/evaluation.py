@@ -76,7 +76,7 @@ def evaluate_traced(
     if is_disturbed:
         with suppress(SimulationDiverged, SensorFailed):
             trace = simulate(robot, settings, identity=identity)
-    return Traced(outcome, trace and pack_trace(trace))
+    return Traced(outcome, None if trace is None else pack_trace(trace))
 
 
 def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:
