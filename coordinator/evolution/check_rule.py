@@ -6,7 +6,6 @@ The rule must depend on its arguments alone or, if it is a class, on the broods 
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from functools import partial
 from types import MappingProxyType
 
@@ -86,30 +85,29 @@ def _populations(
 def _live(
     rules: Mapping[int, Rule],
     examples: Sequence[Individual],
-    modules: Sequence[str] | None = None,
+    modules: Sequence[str],
     *,
     is_backward: bool = False,
 ) -> dict[int, dict[tuple[int, int], list[int]]]:
     """Return what rules of islands that take turns select, by brood and population.
 
-    Modules and, in ``select``, objects must not change if modules are given.
+    Modules and, in ``select``, objects must not change.
     """
     least, count = _ASKED[next(iter(rules.values())).key]
     samples = {island: _populations(least, examples, island) for island in rules}
     answers: dict[int, dict[tuple[int, int], list[int]]] = {at: {} for at in rules}
     for brood in range(_BROODS):
         for island, rule in rules.items():
-            with nullcontext() if modules is None else unchanged(_IN_UPDATE, modules):
+            with unchanged(_IN_UPDATE, modules):
                 children = slice(brood * _CHILDREN, (brood + 1) * _CHILDREN)
                 rule.update(samples[island][2][children])
         numbers = range(len(samples[min(rules)]))
         for number in reversed(numbers) if is_backward else numbers:
             for island, rule in rules.items():
                 places = partial(_places, rule, count, samples[island][number], brood)
-                if modules is not None:
-                    must = _IN_FUNCTION if rule.memory is None else _IN_SELECT
-                    with unchanged(must, modules, rule.memory):
-                        places()
+                must = _IN_FUNCTION if rule.memory is None else _IN_SELECT
+                with unchanged(must, modules, rule.memory):
+                    places()
                 answers[island][brood, number] = repeated("", places)
     return answers
 
@@ -146,10 +144,10 @@ def check_rule(
         **_live({0: new()}, examples, modules),
         **_live({1: new()}, examples, modules),
     }
-    if _live({0: new(), 1: new()}, examples) != alone:
+    if _live({0: new(), 1: new()}, examples, modules) != alone:
         must = "select on an island as if there were no other"
         raise broken("", must, came="other places when two islands take turns")
-    if _live({0: new()}, examples, is_backward=True)[0] != alone[0]:
+    if _live({0: new()}, examples, modules, is_backward=True)[0] != alone[0]:
         must = "select the same whatever was selected before"
         raise broken("", must, came="other places in another order")
     least, count = _ASKED[last.key]

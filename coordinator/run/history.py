@@ -2,7 +2,7 @@
 
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from coordinator.dispatch.fleet import JobRouter
@@ -18,7 +18,10 @@ from coordinator.storage.snapshots import Snapshots
 from schema.errors import RunFolderError
 from schema.experiment.document import steps_of
 from schema.experiment.file import experiment_from_text
-from schema.wire.arena import AdvanceShard, Rebuild
+from schema.wire.arena import Rebuild
+
+NO_SNAPSHOTS = Snapshots(Path(), until=-1)
+"""Store of islands that repeat all of a run, from its first advance."""
 
 
 def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebuild]:
@@ -54,32 +57,26 @@ def replayed(
     events: Iterable[JournalledEvent],
     *,
     store: SnapshotStore,
-    note: Callable[[Advanced, AdvanceShard | None], None] = lambda *_: None,
 ) -> Loop:
     """Return the islands of a run after a journal, without any effect.
 
-    ``store``: snapshots on disk, read-only. ``note``: called with each advance and the
-    command that it answers.
+    ``store``: snapshots on disk, read-only.
 
     Raises:
         UnexpectedEvent: the journal of another kind of run.
     """
-    loop = silent_loop(details, context, store)
-
-    def noted() -> Iterator[JournalledEvent]:
-        for event in events:
-            if isinstance(event, Advanced):
-                note(event, loop.shard_requests.requested(event.island))
-            yield event
-
-    loop.start(noted())
+    loop = begun_loop(details, context, store)
+    for event in events:
+        loop.repeat(event)
     return loop
 
 
-def silent_loop(details: RunDetails, context: RunContext, store: SnapshotStore) -> Loop:
-    """Return the islands of a run before its start; they act on nothing outside."""
+def begun_loop(
+    details: RunDetails, context: RunContext, store: SnapshotStore = NO_SNAPSHOTS
+) -> Loop:
+    """Return the islands of a run at its start; they act on nothing outside."""
     experiment = experiment_from_text(details.document)
-    return Loop(
+    loop = Loop(
         archipelago(experiment, details.seed, details.run, details.founders),
         context=context,
         fleet=JobRouter(LocalAgents({}, "")),
@@ -87,6 +84,8 @@ def silent_loop(details: RunDetails, context: RunContext, store: SnapshotStore) 
         rows=_Nothing(),
         snapshot_store=store,
     )
+    loop.begin()
+    return loop
 
 
 class _Nothing:

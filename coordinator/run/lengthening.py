@@ -6,8 +6,7 @@ re-evaluations of a population; the run goes on without them and asks anew. So i
 becomes equal to a run that was begun with the new number.
 """
 
-import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,21 +14,19 @@ import pyarrow as pa
 from msgspec import structs
 
 from coordinator.islands.events import Advanced, JournalledEvent
-from coordinator.run.history import silent_loop
+from coordinator.run.history import begun_loop
 from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
 from coordinator.run.session import check_journal
-from coordinator.storage.disk import replace_text
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunDetails, RunFolder, write_description
 from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.rewriting import rewriting
-from coordinator.storage.snapshots import Snapshots
 from schema.agent.log import tell_user
 from schema.agent.terminal.progress_line import progress_if_long
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_from_text, experiment_text, with_births
-from schema.tables.description import DETAILS, description_text, read_description
+from schema.tables.description import read_description
 from schema.tables.files import rows_of_island
 
 _TOLD = 256
@@ -61,13 +58,15 @@ def lengthen(folder: Path, births: int) -> None:
             events = journal.replay()
             old_islands, new_islands = (_islands(folder, one) for one in (details, new))
             judged: list[tuple[JournalledEvent, bool]] = []
-            for pair in _judged(events, old_islands, new_islands):
-                if not len(judged) % _TOLD:
-                    tell(f"{folder}: answer {len(judged)} of {len(events)}")
-                judged.append(pair)
+            for number, event in enumerate(events):
+                if not number % _TOLD:
+                    tell(f"{folder}: answer {number} of {len(events)}")
+                judged.append((event, _stays(event, old_islands, new_islands)))
             born = max(each.births for each in old_islands.islands.values())
             refuse_fewer(folder, births, born)
-            _write_description(folder, place, new)
+            known = read_description(folder)
+            known = structs.replace(known, document=new.document, digests={})
+            write_description(folder, known, place)
             with Journal.open(place, epoch=held.epoch) as target:
                 target.append(event for event, stays in judged if stays)
             _copy_poses(folder, place, new, judged)
@@ -81,22 +80,17 @@ def _islands(folder: Path, details: RunDetails) -> Loop:
     """Return the islands of a run, begun; they act on nothing outside."""
     experiment = experiment_from_text(details.document, is_resumed=True)
     context = RunContext.of(str(folder), 0, experiment, details.origin)
-    loop = silent_loop(details, context, Snapshots(folder, until=-1))
-    loop.begin()
-    return loop
+    return begun_loop(details, context)
 
 
-def _judged(
-    events: Iterable[JournalledEvent], old: Loop, new: Loop
-) -> Iterator[tuple[JournalledEvent, bool]]:
-    """Yield each event of a journal, and whether it answers the same question anew."""
-    for event in events:
-        question = old.question(event)
-        stays = question is not None and question == new.question(event)
-        old.repeat(event)
-        if stays:
-            new.repeat(event)
-        yield event, stays
+def _stays(event: JournalledEvent, old: Loop, new: Loop) -> bool:
+    """Repeat an event; return whether it answers the same question in both."""
+    question = old.question(event)
+    stays = question is not None and question == new.question(event)
+    old.repeat(event)
+    if stays:
+        new.repeat(event)
+    return stays
 
 
 def refuse_fewer(folder: Path, births: int, born: int) -> None:
@@ -108,17 +102,6 @@ def refuse_fewer(folder: Path, births: int, born: int) -> None:
     if births < born:
         rule = f"must be >= {born}, the births that the run has"
         raise RunFolderError(f"{folder}: --births: {rule}, got {births}")
-
-
-def _write_description(folder: Path, place: Path, details: RunDetails) -> None:
-    """Write the new description; its time of change stays, when the run began."""
-    known = read_description(folder)
-    text = description_text(
-        structs.replace(known, document=details.document, digests={})
-    )
-    replace_text(place / DETAILS, text)
-    began = (folder / DETAILS).stat().st_mtime_ns
-    os.utime(place / DETAILS, ns=(began, began))
 
 
 def _copy_poses(
@@ -142,7 +125,7 @@ def _copy_poses(
         if rows.num_rows < event.pose_rows:
             break
         if stays:
-            recorder.add_poses(rows)
+            recorder.poses.add(rows)
     recorder.close()
 
 
@@ -156,11 +139,8 @@ class _IslandRows:
     def take(self, count: int) -> pa.Table:
         """Return the next rows; fewer if there are no more."""
         parts: list[pa.Table] = []
-        missing = count
-        while missing and (rows := self._rest or next(self._groups, None)) is not None:
-            parts.append(rows.slice(0, missing))
-            missing -= parts[-1].num_rows
-            self._rest = rows.slice(parts[-1].num_rows)
-            if not self._rest.num_rows:
-                self._rest = None
+        while count and (rows := self._rest or next(self._groups, None)):
+            parts.append(rows.slice(0, count))
+            count -= len(parts[-1])
+            self._rest = rows.slice(len(parts[-1]))
         return pa.concat_tables(parts) if parts else pa.table({})

@@ -5,15 +5,14 @@ workers of the same platform repeat the advances in the order of the journal. Ea
 reach the state whose digest the journal holds.
 """
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from coordinator.dispatch.events import Deliver
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced, JournalledEvent
-from coordinator.run.history import replayed
+from coordinator.run.history import begun_loop
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
 from coordinator.storage.folder import RunDetails
@@ -67,12 +66,12 @@ class PoseRecovery:
         self._client = context.client
         self._fleet = fleet
         self._recorder = recorder
-        self._order = deque(_lost(events, recorder.stored_poses))
+        self._order = deque(_lost(events, recorder.poses.stored))
         self._snapshots = snapshots
         self._requests = ShardRequests(context, snapshots, fleet)
         self._arenas: dict[int, _Arena] = {}
         if self._order:
-            recorder.keep_poses(_rows(events) - sum(e.pose_rows for e in self._order))
+            recorder.poses.keep(_rows(events) - sum(e.pose_rows for e in self._order))
             self._plan(_advances(details, context, events))
         self._total = sum(len(arena.left) for arena in self._arenas.values())
 
@@ -158,7 +157,7 @@ class PoseRecovery:
             reached = self._arenas[self._order[0].island].reached
             if not reached:
                 return
-            self._recorder.restore(reached.popleft())
+            self._recorder.poses.restore(reached.popleft())
             self._order.popleft()
 
 
@@ -192,12 +191,12 @@ def _advances(
     Raises:
         UnexpectedEvent: the journal of another kind of run.
     """
-    advances: dict[int, list[tuple[AdvanceShard, Advanced]]] = {}
-
-    def note(event: Advanced, command: AdvanceShard | None) -> None:
-        if command is not None:  # otherwise the replay raises
-            advances.setdefault(event.island, []).append((command, event))
-
-    # Without snapshots: all advances are wanted, from the first.
-    replayed(details, context, events, store=Snapshots(Path(), until=-1), note=note)
+    advances: dict[int, list[tuple[AdvanceShard, Advanced]]] = defaultdict(list)
+    loop = begun_loop(details, context)
+    for event in events:
+        if isinstance(event, Advanced):
+            command = loop.shard_requests.requested(event.island)
+            if command is not None:  # otherwise ``repeat`` raises
+                advances[event.island].append((command, event))
+        loop.repeat(event)
     return advances

@@ -142,7 +142,7 @@ class RunSession:
         """
         check_stored_genomes(self.held.path, self.experiment)
         self._events = self._journal.replay()
-        if has_lost_poses(self._events, self._recorder.stored_poses):
+        if has_lost_poses(self._events, self._recorder.poses.stored):
             self._recover()
         else:
             self.loop.start(self._replay())

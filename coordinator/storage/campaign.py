@@ -218,11 +218,17 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
     plugins: dict[str, KeptPlugin] = {}
     for document in documents:
         plugins |= keep(folder, document, replace_bytes)
-    numbers = (campaign.seed, campaign.repeats, campaign.first)
-    digest = _digest(numbers, documents, plugins, campaign.founders)
+    content = _Document(
+        campaign.seed,
+        campaign.repeats,
+        list(map(_Entry, documents)),
+        plugins=plugins,
+        first=campaign.first,
+        founders=dict(campaign.founders),
+    )
     lines = [
         f"# To resume it:  {printable_line(command('resume', folder))}",
-        f'digest = "{digest}"',
+        f'digest = "{_digest(content)}"',
         f"seed = {campaign.seed}",
         f"repeats = {campaign.repeats}",
     ]
@@ -281,10 +287,7 @@ def _read(folder: Path) -> "_Document":
         raise RunFolderError(
             f"{folder / CAMPAIGN}: damaged: seed must be < 2^64, got {found.seed}"
         )
-    documents = [each.document for each in found.experiments]
-    numbers = (found.seed, found.repeats, found.first)
-    digest = _digest(numbers, documents, found.plugins, found.founders)
-    if found.digest not in ("", digest):
+    if found.digest not in ("", _digest(found)):
         raise _damaged(folder, "its digest is not that of its content")
     return found
 
@@ -312,26 +315,16 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
     founders: dict[str, KeptFounder] = {}
 
 
-def _digest(
-    numbers: tuple[int, int, int],
-    documents: Sequence[str],
-    plugins: Mapping[str, KeptPlugin],
-    founders: Mapping[str, KeptFounder],
-) -> str:
+def _digest(found: _Document) -> str:
     """Return the SHA-256 of a campaign.
 
-    Args:
-        numbers: seed, repeats, and number of the first repeat, which counts only if it
-            is not 0: older campaigns have none.
-        documents: of its experiments.
-        plugins: by name.
-        founders: by digest.
+    A first repeat of 0 does not count: older campaigns have none.
     """
-    seed, repeats, first = map(str, numbers)
-    parts = [seed, repeats, *([first] if first != "0" else []), *documents]
-    for name, note in sorted(plugins.items()):
+    numbers = (found.seed, found.repeats, *([found.first] if found.first else ()))
+    parts = [*map(str, numbers), *(each.document for each in found.experiments)]
+    for name, note in sorted(found.plugins.items()):
         parts += [name, *msgspec.structs.astuple(note)]
-    for key, kept in sorted(founders.items()):
+    for key, kept in sorted(found.founders.items()):
         parts += [key, kept.genome.hex(), kept.run, kept.file]
     return sha256("\n".join(parts).encode()).hexdigest()
 

@@ -150,23 +150,12 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
     def seal(self, digests: Mapping[str, str]) -> None:
         """Write the SHA-256 (hexadecimal) of finished tables to the run's description.
 
-        Its time of change stays: it is when the run began.
-
         Raises:
             RunFolderError: the description is damaged, or the disk is full or failed.
         """
-        file = self.path / DETAILS
         known = read_description(self.path)
         sealed = structs.replace(known, digests={**known.digests, **digests})
-        text = description_text(sealed)
-        with storage_errors(file):
-            began = file.stat().st_mtime_ns
-
-        def write(path: Path) -> None:
-            path.write_text(text, encoding="utf-8")
-            os.utime(path, ns=(began, began))
-
-        replace_durably(file, write)
+        write_description(self.path, sealed, self.path)
 
     def confirm(self) -> None:
         """Check that no other coordinator has taken over the run.
@@ -215,6 +204,25 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
 
     def __exit__(self, *_error: object) -> None:
         self.close()
+
+
+def write_description(folder: Path, changed: Description, place: Path) -> None:
+    """Write a run's changed description to a place.
+
+    Its time of change is that in the run folder: it is when the run began.
+
+    Raises:
+        RunFolderError: the disk is full or failed.
+    """
+    text, file = description_text(changed), folder / DETAILS
+    with storage_errors(file):
+        began = file.stat().st_mtime_ns
+
+    def write(path: Path) -> None:
+        path.write_text(text, encoding="utf-8")
+        os.utime(path, ns=(began, began))
+
+    replace_durably(place / DETAILS, write)
 
 
 def holds_run(path: Path) -> bool:

@@ -42,7 +42,12 @@ BUFFERED = 64
 
 
 class Recorder:
-    """Writer of a run's tables; rows arrive in their repeatable order."""
+    """Writer of a run's tables; rows arrive in their repeatable order.
+
+    Attributes:
+        poses: table of the poses; only before a replay counts any are they removed or
+            written here.
+    """
 
     def __init__(
         self,
@@ -78,7 +83,7 @@ class Recorder:
             )
             for name in TABLES
         }
-        self._poses = self._tables["poses"]
+        self.poses = self._tables["poses"]
 
     def write(self, record: Record) -> None:
         """Add one row, with every column except ``record``; it may be buffered.
@@ -100,7 +105,7 @@ class Recorder:
         Raises:
             RunFolderError: the disk is full or failed.
         """
-        self._poses.store(event)
+        self.poses.store(event)
 
     def append(self, event: Advanced) -> None:
         """Add the poses of an advance in the journal; stored ones are only counted.
@@ -109,36 +114,7 @@ class Recorder:
             RunFolderError: poses are missing on disk and the event does not hold
                 them, or the disk is full or failed.
         """
-        self._poses.take_advance(event)
-
-    @property
-    def stored_poses(self) -> int:
-        """Number of poses on disk."""
-        return self._poses.stored
-
-    def keep_poses(self, rows: int) -> None:
-        """Remove the poses on disk from a number on, which must start a batch.
-
-        Raises:
-            RunFolderError: it does not start a batch, or the disk failed.
-        """
-        self._poses.keep(rows)
-
-    def restore(self, event: Advanced) -> None:
-        """Write poses that are missing on disk, before a replay counts any.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
-        self._poses.restore(event)
-
-    def add_poses(self, rows: pa.Table) -> None:
-        """Write poses of another run's table as one batch, with new record numbers.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
-        self._poses.add(rows)
+        self.poses.take_advance(event)
 
     def flush(self) -> None:
         """Write all buffered rows to disk.
@@ -185,6 +161,7 @@ class TableFile:
     A table gets single rows, which are buffered, or the poses of whole advances.
 
     Attributes:
+        stored: number of rows on disk.
         buffered: rows that are not on disk yet.
     """
 
@@ -200,19 +177,14 @@ class TableFile:
         self._ahead = 0
         self.buffered: list[Mapping[str, Any]] = []
         if parquet.exists() and not self._set_aside():
-            self._stored: int = read_table(folder, name, ["record"]).num_rows
+            self.stored: int = read_table(folder, name, ["record"]).num_rows
             return
         stored = stored_rows(folder, name)
-        self._stored = stored.rows
+        self.stored = stored.rows
         for path, last in stored.used.items():
             cut_segment(path, last)
         for path in stored.unused:
             remove_segment(path)
-
-    @property
-    def stored(self) -> int:
-        """Number of rows on disk."""
-        return self._stored
 
     def _set_aside(self) -> bool:
         """Rename the finished file if it is damaged; return whether it is.
@@ -229,7 +201,7 @@ class TableFile:
 
     def take(self, row: Mapping[str, Any]) -> None:
         """Add the next row, unless it is already on disk."""
-        if self._seen >= self._stored:
+        if self._seen >= self.stored:
             self.buffered.append(row)
         self._seen += 1
 
@@ -243,10 +215,10 @@ class TableFile:
     def take_advance(self, event: Advanced) -> None:
         """Count the next poses; write them unless they are already on disk."""
         end = self._seen + event.pose_rows
-        if self._stored < end:
+        if self.stored < end:
             if event.advance.poses == NO_POSES:
                 raise RunFolderError(
-                    f"{self._folder / SEGMENTS}: {self._name}: rows {self._stored} to "
+                    f"{self._folder / SEGMENTS}: {self._name}: rows {self.stored} to "
                     f"{end - 1} are missing, and the journal does not hold them: "
                     "resume the run to compute them again"
                 )
@@ -255,20 +227,28 @@ class TableFile:
         self._ahead = max(0, self._ahead - event.pose_rows)
 
     def restore(self, event: Advanced) -> None:
-        """Write the next poses behind those on disk, before any is counted."""
+        """Write the next poses behind those on disk; errors as of ``add``."""
         self.add(PoseArrays.received(event.advance.poses).rows(event.island))
 
     def add(self, rows: pa.Table) -> None:
-        """Write rows as one batch; columns that are the same in a run are set anew."""
+        """Write rows as one batch; columns that are the same in a run are set anew.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
         own = {name for name in rows.column_names if name in ROWS[self._name].names}
         columns = {name: rows[name].combine_chunks() for name in own}
         self._write(self._numbered(columns, rows.num_rows))
 
     def keep(self, rows: int) -> None:
-        """Remove all rows on disk from a number on, which must start a batch."""
-        if self._stored > rows:
+        """Remove all rows on disk from a number on.
+
+        Raises:
+            RunFolderError: it does not start a batch, or the disk failed.
+        """
+        if self.stored > rows:
             remove_rows(self._folder, self._name, rows)
-            self._stored = rows
+            self.stored = rows
 
     def flush(self) -> None:
         """Write the buffered rows as one batch, all or none."""
@@ -285,9 +265,9 @@ class TableFile:
         if self._parquet.exists():
             return ""
         rows = stored_rows(self._folder, self._name).rows
-        if rows != self._stored:
+        if rows != self.stored:
             raise RunFolderError(
-                f"{self._folder / SEGMENTS}: {self._name}: must hold {self._stored} "
+                f"{self._folder / SEGMENTS}: {self._name}: must hold {self.stored} "
                 f"rows, got {rows}: resume the run to write them again"
             )
         with storage_errors(self._parquet):
@@ -321,12 +301,12 @@ class TableFile:
         """Append a batch to the segment, all or nothing."""
         if self._parquet.exists():
             raise RunFolderError(
-                f"{self._parquet}: finished with {self._stored} rows, got more"
+                f"{self._parquet}: finished with {self.stored} rows, got more"
             )
         if self._segment is None:
             self._segment = self._opened()
         self._segment.append(batch)
-        self._stored += batch.num_rows
+        self.stored += batch.num_rows
 
     def _opened(self) -> "Segment":
         """Return a new segment that contains the schema."""
@@ -345,9 +325,7 @@ class TableFile:
 
     def _numbered(self, columns: dict[str, pa.Array], rows: int) -> pa.RecordBatch:
         """Return a batch of the next rows, with record numbers and those of the run."""
-        columns["record"] = pa.array(
-            range(self._stored, self._stored + rows), pa.int64()
-        )
+        columns["record"] = pa.array(range(self.stored, self.stored + rows), pa.int64())
         for each in self._schema:
             if each.name not in columns:
                 value = pa.scalar(self._of_run[each.name], each.type)

@@ -5,12 +5,6 @@ from collections.abc import Mapping
 import pyarrow as pa
 
 
-def absent_value(field: pa.Field) -> int | None:
-    """Return the value of a column in rows that are older than it; None is null."""
-    absent = field.metadata.get(b"absent")
-    return absent and int(absent)
-
-
 def completed(
     rows: pa.Table, schema: pa.Schema, of_run: Mapping[str, object]
 ) -> pa.Table:
@@ -26,7 +20,9 @@ def completed(
     """
     missing = [field for field in schema if field.name not in rows.column_names]
     for field in missing:
-        value = pa.scalar(of_run.get(field.name, absent_value(field)), field.type)
+        # Of rows that are older than a column; otherwise they have null.
+        absent = field.metadata.get(b"absent")
+        value = pa.scalar(of_run.get(field.name, absent and int(absent)), field.type)
         rows = rows.append_column(field, pa.repeat(value, rows.num_rows))
     # Parquet has its own name for the items of a list.
     return rows.select(schema.names).cast(schema)
