@@ -103,20 +103,13 @@ def main(arguments: list[str]) -> int:
     name = "+".join(options.experiments) if is_shipped else joined_name(experiments)
     folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
     deployment = _deployment(options, experiments, folder)
-    if not is_campaign_wanted:
-        return _stoppable(
-            folder,
-            deployment,
-            lambda: start(folder, experiments[0], options.seed, deployment, founders),
-        )
     repeats, first = options.repeats or 1, options.first_repeat or 0
     if (count := first + repeats) > MOST_REPEATS:
         also = " with those before --first-repeat" if first else ""
         flags.error(f"--repeats: must be <= {MOST_REPEATS}{also}, got {count}")
     campaign = Campaign(experiments, repeats, options.seed, first, founders)
-    return _stoppable(
-        folder, deployment, lambda: start_campaign(folder, campaign, deployment)
-    )
+    begin = start_campaign if is_campaign_wanted else start
+    return _stoppable(folder, deployment, lambda: begin(folder, campaign, deployment))
 
 
 def parser(command: str) -> Flags:

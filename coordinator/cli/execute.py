@@ -1,6 +1,6 @@
 """Start and resume runs and campaigns."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,6 @@ from coordinator.storage.campaign import (
     write_campaign,
 )
 from coordinator.storage.folder import (
-    RunDetails,
     RunFolder,
     holds_run,
     read_details,
@@ -40,32 +39,22 @@ from coordinator.storage.rewriting import is_rewritten
 from schema.agent.log import tell_error, tell_user, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.errors import NetworkError, RevolveError, RunFolderError, counted
-from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text, with_births
 from schema.plugins.kept import refuse_other
-from schema.tables.description import STATE, KeptFounder, read_description, read_state
+from schema.tables.description import STATE, read_description, read_state
 from schema.tables.files import is_sealed
 from schema.wire.status import RunStatus
 
 
-def start(
-    folder: Path,
-    experiment: Experiment,
-    seed: int,
-    deployment: Deployment,
-    founders: Mapping[str, KeptFounder],
-) -> int:
-    """Run an experiment in a new folder; return the exit code.
-
-    ``founders``: the given ones that it names, by digest.
+def start(folder: Path, campaign: Campaign, deployment: Deployment) -> int:
+    """Run the only run of a campaign in a new folder; return the exit code.
 
     Raises:
         RunFolderError: the folder is used or locked, or the disk fails.
         NetworkError: the address cannot be listened on, or no hub answers.
         ExperimentError: no robot meets the experiment's restrictions.
     """
-    text = experiment_text(experiment)
-    details = RunDetails(experiment.name, 0, seed, text, founders)
+    ((_, details),) = campaign.runs(folder)
     return _execute_run(folder, RunFolder(folder, details), deployment)
 
 

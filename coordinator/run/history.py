@@ -1,7 +1,5 @@
 """History of an arena from the journal of its run, for a re-simulation."""
 
-import shutil
-import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -13,7 +11,7 @@ from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import SnapshotStore
 from coordinator.storage.folder import RunDetails, read_details
-from coordinator.storage.journal import NAME, Journal
+from coordinator.storage.journal import NAME, read_events
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import RunFolderError
 from schema.experiment.document import steps_of
@@ -43,11 +41,8 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
         raise RunFolderError(f"{folder}: island {island} has no arena")
     until = steps_of(from_s, context.experiments[island].simulation)
     store = Snapshots(folder, until=until)
-    with tempfile.TemporaryDirectory() as place:
-        # A copy: opening a journal repairs it, and its run may be active.
-        shutil.copyfile(folder / NAME, Path(place) / NAME)
-        with Journal.open(Path(place)) as journal:
-            loop = replayed(details, context, journal.replay(), store=store)
+    events, _ = read_events(folder / NAME)
+    loop = replayed(details, context, events, store=store)
     return context.arena[island], loop.shard_requests.past(island)
 
 

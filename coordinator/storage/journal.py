@@ -61,21 +61,11 @@ class Journal(AbstractContextManager["Journal"]):
             RunFolderError: the file is no journal, is damaged before intact records,
                 or the disk fails.
         """
-        data = read_journal(path)
-        end = 0
-        payloads: list[bytes] = []
-        if not is_empty(path, data):
-            position = Position()
-            for sequence, payload in read_records(data, position):
-                del payloads[sequence:]  # void records
-                payloads.append(payload)
-            check_gap(path, data, position)
-            end = position.end
-        self._history = [decode_record(path, payload) for payload in payloads]
+        self._history, end = read_events(path)
         self._epoch = epoch
-        self._sequence = len(payloads)
+        self._sequence = len(self._history)
         self._file = AppendedFile(path, fsync=fsync)
-        self.dropped = len(data) - end
+        self.dropped = self._file.size - end
         if self.dropped:
             self._file.cut(end)
         if not end:
@@ -206,6 +196,25 @@ def decode_record(path: Path, payload: bytes) -> JournalledEvent:
             f"{path}: this version cannot decode an intact record: {error}"
         ) from None
     return event
+
+
+def read_events(path: Path) -> tuple[list[JournalledEvent], int]:
+    """Return the events of a journal that are not void, and their end [bytes].
+
+    Raises:
+        RunFolderError: the file is no journal, cannot be read, or is damaged before
+            intact records.
+    """
+    data = read_journal(path)
+    if is_empty(path, data):
+        return [], 0
+    position = Position()
+    payloads: list[bytes] = []
+    for sequence, payload in read_records(data, position):
+        del payloads[sequence:]  # void records
+        payloads.append(payload)
+    check_gap(path, data, position)
+    return [decode_record(path, payload) for payload in payloads], position.end
 
 
 def read_journal(path: Path) -> bytes:

@@ -254,18 +254,19 @@ BIRTHS = _table(
         is_nullable=True,
     ),
     *(
-        _column(name, kind, f"of a given founder {text}; else null", is_nullable=True)
+        _column(
+            name,
+            kind,
+            f"of a given founder {text}; else null",
+            is_repeatable=name not in ("origin_run", "origin_file"),
+            is_nullable=True,
+        )
         for name, kind, text in (
             ("origin_digest", pa.string(), "the SHA-256 of its genome, in hexadecimal"),
             ("origin_island", pa.int32(), "of a run the island of its birth there"),
             ("origin_birth", pa.int64(), "of a run the number of that birth"),
-        )
-    ),
-    *(
-        _column(name, pa.string(), text, is_repeatable=False, is_nullable=True)
-        for name, text in (
-            ("origin_run", "of a given founder the run_id of its run; else null"),
-            ("origin_file", "of a given founder its robot file; else null"),
+            ("origin_run", pa.string(), "the run_id of its run"),
+            ("origin_file", pa.string(), "its robot file"),
         )
     ),
 )
