@@ -1,6 +1,6 @@
 """History of an arena from the journal of its run, for a re-simulation."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from coordinator.dispatch.fleet import JobRouter
@@ -14,7 +14,7 @@ from coordinator.storage.folder import RunDetails, read_details
 from coordinator.storage.journal import NAME, read_events
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import RunFolderError
-from schema.experiment.document import steps_of
+from schema.experiment.document import island_experiments, steps_of
 from schema.experiment.file import experiment_from_text
 from schema.wire.arena import Rebuild
 
@@ -35,45 +35,25 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
         RunFolderError: no run, or a damaged journal.
     """
     details = read_details(folder)
-    experiment = experiment_from_text(details.document)
-    context = RunContext.of(str(folder), 0, experiment, details.origin)
-    if island not in context.arena:
+    islands = island_experiments(experiment_from_text(details.document))
+    if island not in range(len(islands)) or islands[island].arena is None:
         raise RunFolderError(f"{folder}: island {island} has no arena")
-    until = steps_of(from_s, context.experiments[island].simulation)
-    store = Snapshots(folder, until=until)
-    events, _ = read_events(folder / NAME)
-    loop = replayed(details, context, events, store=store)
-    return context.arena[island], loop.shard_requests.past(island)
+    until = steps_of(from_s, islands[island].simulation)
+    loop = begun_loop(details, Snapshots(folder, until=until))
+    for event in read_events(folder / NAME)[0]:
+        loop.repeat(event)
+    return loop.context.arena[island], loop.shard_requests.past(island)
 
 
-def replayed(
-    details: RunDetails,
-    context: RunContext,
-    events: Iterable[JournalledEvent],
-    *,
-    store: SnapshotStore,
-) -> Loop:
-    """Return the islands of a run after a journal, without any effect.
+def begun_loop(details: RunDetails, store: SnapshotStore = NO_SNAPSHOTS) -> Loop:
+    """Return the islands of a run at its start; they act on nothing outside.
 
     ``store``: snapshots on disk, read-only.
-
-    Raises:
-        UnexpectedEvent: the journal of another kind of run.
     """
-    loop = begun_loop(details, context, store)
-    for event in events:
-        loop.repeat(event)
-    return loop
-
-
-def begun_loop(
-    details: RunDetails, context: RunContext, store: SnapshotStore = NO_SNAPSHOTS
-) -> Loop:
-    """Return the islands of a run at its start; they act on nothing outside."""
     experiment = experiment_from_text(details.document)
     loop = Loop(
         archipelago(experiment, details.seed, details.run, details.founders),
-        context=context,
+        context=RunContext.of(details.name, 0, experiment, details.origin),
         fleet=JobRouter(LocalAgents({}, "")),
         log=_Nothing(),
         rows=_Nothing(),

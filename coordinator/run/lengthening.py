@@ -16,7 +16,6 @@ from msgspec import structs
 from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.run.history import begun_loop
 from coordinator.run.loop import Loop
-from coordinator.run.run_context import RunContext
 from coordinator.run.session import check_journal
 from coordinator.storage.folder import RunDetails, RunFolder, write_description
 from coordinator.storage.journal import Journal
@@ -56,7 +55,7 @@ def lengthen(folder: Path, births: int) -> None:
             rewriting(folder) as place,
         ):
             events = journal.replay()
-            old_islands, new_islands = (_islands(folder, one) for one in (details, new))
+            old_islands, new_islands = begun_loop(details), begun_loop(new)
             judged: list[tuple[JournalledEvent, bool]] = []
             for number, event in enumerate(events):
                 if not number % _TOLD:
@@ -74,13 +73,6 @@ def lengthen(folder: Path, births: int) -> None:
     void = sum(not stays for _, stays in judged)
     line = f"{folder}: {births} births instead of {before}"
     tell_user(line + (f"; {void} of {len(judged)} answers are void" if void else ""))
-
-
-def _islands(folder: Path, details: RunDetails) -> Loop:
-    """Return the islands of a run, begun; they act on nothing outside."""
-    experiment = experiment_from_text(details.document, is_resumed=True)
-    context = RunContext.of(str(folder), 0, experiment, details.origin)
-    return begun_loop(details, context)
 
 
 def _stays(event: JournalledEvent, old: Loop, new: Loop) -> bool:

@@ -72,7 +72,7 @@ class PoseRecovery:
         self._arenas: dict[int, _Arena] = {}
         if self._order:
             recorder.poses.keep(_rows(events) - sum(e.pose_rows for e in self._order))
-            self._plan(_advances(details, context, events))
+            self._plan(_advances(details, events))
         self._total = sum(len(arena.left) for arena in self._arenas.values())
 
     def _plan(
@@ -184,7 +184,7 @@ def _lost(events: Iterable[JournalledEvent], stored: int) -> Iterator[Advanced]:
 
 
 def _advances(
-    details: RunDetails, context: RunContext, events: Iterable[JournalledEvent]
+    details: RunDetails, events: Iterable[JournalledEvent]
 ) -> dict[int, list[tuple[AdvanceShard, Advanced]]]:
     """Return all advances of each arena: the command, and its result in the journal.
 
@@ -192,7 +192,7 @@ def _advances(
         UnexpectedEvent: the journal of another kind of run.
     """
     advances: dict[int, list[tuple[AdvanceShard, Advanced]]] = defaultdict(list)
-    loop = begun_loop(details, context)
+    loop = begun_loop(details)
     for event in events:
         if isinstance(event, Advanced):
             command = loop.shard_requests.requested(event.island)

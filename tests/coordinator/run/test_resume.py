@@ -13,9 +13,8 @@ import pytest
 from msgspec import structs
 
 from coordinator.islands.events import Ask, Asked, EvaluationFailed
-from coordinator.run.history import replayed
+from coordinator.run.history import begun_loop
 from coordinator.run.learners import Learners
-from coordinator.run.run_context import RunContext
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.journal import NAME, Journal
@@ -145,12 +144,14 @@ def test_newborns_that_learn_are_resumed_in_the_middle(
 
 def test_an_unexpected_event_comes_with_the_last_ones(undisturbed: Path) -> None:
     with Journal.open(undisturbed) as journal:
-        events = list(journal.replay())
+        events = journal.replay()
     stranger = EvaluationFailed(BirthId(0, 10**6), "no such robot", PROVENANCE)
     details = replace(DETAILS, document=experiment_text(EXPERIMENT))
-    context = RunContext.of("resume", 1, EXPERIMENT, DETAILS.origin)
+    loop = begun_loop(details, Snapshots(undisturbed))
+    for event in events:
+        loop.repeat(event)
     with pytest.raises(UnexpectedEvent) as caught:
-        replayed(details, context, [*events, stranger], store=Snapshots(undisturbed))
+        loop.repeat(stranger)
     last = str(caught.value).partition("; the last events: ")[2].split("; ")
     assert len(last) == 20
     birth = "birth=BirthId(island=0, number=1000000)"
