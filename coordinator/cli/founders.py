@@ -39,8 +39,8 @@ Kept = dict[str, KeptFounder]
 Vet = Callable[[Robot, BodySpace, Vetting], Report]
 Check = Callable[[Robot], str]
 """Returns what is wrong with a robot that a genome describes here, or nothing."""
-Read = Iterator[tuple[str, FounderGenome, KeptFounder, Check]]
-"""For each founder where it is, and what the experiment and the run folder hold."""
+Read = Iterator[tuple[str, BirthId | None, KeptFounder, Check]]
+"""For each founder where it is, its birth in a run, and what the run folder holds."""
 
 
 def with_founders(
@@ -81,20 +81,23 @@ def _named(
     encoding = encoding_of(island_experiments(experiment)[0])
     source = _of_files if given.run is None else _of_run
     genomes = []
-    for where, genome, founder, check in source(given, experiment, encoding):
+    for where, birth, founder, check in source(given, experiment, encoding):
         try:
             robot = encoding.develop(encoding.from_bytes(founder.genome))
             encoding.check(robot)
-            why = outside_limits(robot, experiment.space, encoding.types) or check(
-                robot
+            why = (
+                outside_limits(robot, experiment.space, encoding.types)
+                or check(robot)
+                or vet(robot, encoding.types, experiment.vetting).reason
             )
-            why = why or vet(robot, encoding.types, experiment.vetting).reason
         except InvalidRobot as error:
             why = str(error)
         if why:
             raise ExperimentError(f"founders: {where}: {why}")
-        kept.setdefault(genome.digest, founder)
-        genomes.append(genome)
+        digest = digest_of_genome(founder.genome)
+        kept.setdefault(digest, founder)
+        born = {"island": birth.island, "birth": birth.number} if birth else {}
+        genomes.append(FounderGenome(digest=digest, **born))
     return Founders(repeat=given.repeat, genomes=tuple(genomes))
 
 
@@ -108,8 +111,7 @@ def _of_files(
         except (InvalidRobot, MalformedMessage) as error:
             why = str(error).removeprefix(f"{file}: ").replace(OTHER_TYPES, "")
             raise ExperimentError(f"founders: {file}: {why}") from error
-        named = FounderGenome(digest=digest_of_genome(genome))
-        yield file, named, KeptFounder(genome, file=file), lambda _: ""
+        yield file, None, KeptFounder(genome, file=file), lambda _: ""
 
 
 def _of_run(given: Founders, experiment: Experiment, encoding: IslandEncoding) -> Read:
@@ -124,12 +126,9 @@ def _of_run(given: Founders, experiment: Experiment, encoding: IslandEncoding) -
     others = {kind: p for kind, p in paths if p not in theirs.space.part_types}
     most = max(each.selection.population for each in island_experiments(experiment))
     for birth, row in _births(folder, given, most):
-        genome = row["genome"]
-        digest = digest_of_genome(genome)
-        named = FounderGenome(digest=digest, island=birth.island, birth=birth.number)
-        where = f"{folder}: birth {birth.name}"
         check = partial(_difference, stored=row["robot"], others=others)
-        yield where, named, KeptFounder(genome, run=run_id), check
+        founder = KeptFounder(row["genome"], run=run_id)
+        yield f"{folder}: birth {birth.name}", birth, founder, check
 
 
 def _difference(robot: Robot, stored: bytes | None, others: dict[str, str]) -> str:

@@ -5,7 +5,7 @@ A rule, built-in or of a user, gets a population and returns places in it;
 ``update`` changes: couples are selected when verdicts arrive, in any order.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,13 +122,11 @@ def rule_of(section: RuleSection, name: str, relatives: Relatives) -> Rule:
             memory = plugin(parameters)
         return Rule(key, plugin, memory.select, relatives, memory)
     assert isinstance(section, SelectionSection)
-    if name == "survivors":
-        survivors = SURVIVOR_RULES[section.survivors]
-        return Rule(key, survivors, _with_parameters(name, survivors, None))
-    is_tournament = section.parents == "tournament"
-    size = Tournament(section.tournament_size) if is_tournament else None
-    parents = PARENT_RULES.get(section.parents, random_parents)
-    return Rule(key, parents, _with_parameters(name, parents, size))
+    rules: Mapping[str, Any] = SURVIVOR_RULES if name == "survivors" else PARENT_RULES
+    rule = rules.get(getattr(section, name), random_parents)
+    # The only parameters that any of them reads.
+    size = Tournament(section.tournament_size)
+    return Rule(key, rule, _with_parameters(name, rule, size))
 
 
 def _with_parameters(

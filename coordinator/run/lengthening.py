@@ -86,11 +86,7 @@ def _stays(event: JournalledEvent, old: Loop, new: Loop) -> bool:
 
 
 def refuse_fewer(folder: Path, births: int, born: int) -> None:
-    """Raise if a run is to have fewer births than an island of it has already.
-
-    Raises:
-        RunFolderError: it is.
-    """
+    """Raise ``RunFolderError`` if an island has more births than a run is to have."""
     if births < born:
         rule = f"must be >= {born}, the births that the run has"
         raise RunFolderError(f"{folder}: --births: {rule}, got {births}")

@@ -135,11 +135,7 @@ def _order(
 
 
 def _living(birth: BirthId, arena: Arena, island: int) -> LivingRobot:
-    """Return a living robot of an arena.
-
-    Raises:
-        Refused: it is not alive.
-    """
+    """Return a living robot of an arena; ``Refused`` if it is not alive."""
     living = arena.living.get(birth)
     if living is None:
         alive = [birth_name(one.birth, island) for one in arena.living]

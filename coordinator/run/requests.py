@@ -173,11 +173,12 @@ def read_evaluation(
     kind, most = (Traced, TRACE_BYTES) if is_traced else (Evaluation, ANSWER_BYTES)
     answer = read_answer(data, expected, kind, most)
     result = answer.result
-    outcome = result.outcome if isinstance(result, Traced) else result
-    if isinstance(result, Traced) and result.trace is not None:
-        check_trace(result.trace)
-    if isinstance(outcome, Evaluation):
-        check_count(outcome.measures, measures)
+    if isinstance(result, Traced):
+        if result.trace is not None:
+            check_trace(result.trace)
+        result = result.outcome
+    if isinstance(result, Evaluation):
+        check_count(result.measures, measures)
     return answer
 
 

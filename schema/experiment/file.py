@@ -201,10 +201,7 @@ def experiment_from_text(
 def with_births(text: str, births: int, where: str) -> Experiment:
     """Return the experiment of a run with another number of births on each island.
 
-    Args:
-        text: of its run folder.
-        births: of ``--births``.
-        where: the folder, for messages.
+    ``text`` is that of its folder, which ``where`` names in messages.
 
     Raises:
         ExperimentError: the number is not allowed, or a sweep changes it.

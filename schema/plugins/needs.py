@@ -26,11 +26,7 @@ def needs(*channels: str) -> Callable[[_Function], _Function]:
 
 
 def check_channels(where: str, names: Iterable[str]) -> None:
-    """Raise unless all names are those of channels.
-
-    Raises:
-        ExperimentError: no such channel; the nearest is named.
-    """
+    """Raise ``ExperimentError``, with the nearest, unless all names are channels'."""
     known = (*RECORDED, *COMPUTED, *CONSTANT)
     for name in names:
         if name not in known:

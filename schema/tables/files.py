@@ -323,11 +323,7 @@ def rows_of_island(folder: Path, table: str, island: int) -> Iterator[pa.Table]:
 
 
 def _finished(folder: Path, path: Path, schema: pa.Schema) -> Iterator[pa.Table]:
-    """Yield the columns of a schema from a Parquet file, row group by row group.
-
-    Raises:
-        RunFolderError: it cannot be read.
-    """
+    """Yield the columns of a schema from a Parquet file; errors of ``read_table``."""
     of_run = run_columns(folder)
     try:
         with ParquetFile(path, page_checksum_verification=True) as file:
