@@ -28,6 +28,7 @@ from coordinator.storage.folder import (
     refuse_other_version,
 )
 from coordinator.storage.folder_status import (
+    births_of,
     check_rewritable,
     folder_status,
     table_damages,
@@ -118,8 +119,7 @@ def lengthen_all(folder: Path, births: int) -> None:
         begun = [path for path, _ in campaign.runs(folder) if holds_run(path)]
         for path in begun:
             refuse_other_version(path)
-            born = max(each.births for each in folder_status(path).islands)
-            refuse_fewer(path, births, born)
+            refuse_fewer(path, births, max(births_of(path).values(), default=0))
         for path in begun:
             lengthen(path, births)
         write_campaign(folder, replace(campaign, experiments=experiments))

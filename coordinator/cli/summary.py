@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 
 from coordinator.storage.disk import replace_text, storage_errors
 from coordinator.storage.folder import read_details
+from coordinator.storage.folder_status import births_of
 from coordinator.storage.hints import command
 from schema.agent.log import tell_user, warn_user
 from schema.agent.terminal.screen import missing_screen
@@ -78,7 +79,7 @@ def restore_best(folder: Path) -> None:
     try:
         allow_plugins_of(folder, is_resumed=False)
         experiment = experiment_from_text(read_details(folder).document, is_own=True)
-        if _is_extinct(experiment, _born(folder)):
+        if _is_extinct(experiment, births_of(folder)):
             return
         _, robot = _read_best(folder, best, experiment)
         done = _write_best(robot, folder, experiment)
@@ -87,11 +88,6 @@ def restore_best(folder: Path) -> None:
         warn_user(f"{folder}: the file {BEST} is missing and not written: {error}")
         return
     tell_user(f"{folder}: {BEST} was missing; {_BEST}: {done}")
-
-
-def _born(folder: Path) -> Counter[int]:
-    """Return the number of births of each island."""
-    return Counter(read_table(folder, "births", ["island"])["island"].to_pylist())
 
 
 def _is_extinct(experiment: Experiment, births: Mapping[int, int]) -> bool:
@@ -125,7 +121,7 @@ def _results(folder: Path, experiment: Experiment) -> list[str]:
     The tables, not the living: robots of an arena have newer windows at the end of a
     run than the last population has, which status and report show.
     """
-    born, islands = _born(folder), island_experiments(experiment)
+    born, islands = births_of(folder), island_experiments(experiment)
     births = counted(born.total(), "birth")
     if _is_extinct(experiment, born):
         return [f"extinct after {births}: too few robots are left to mate"]

@@ -167,10 +167,9 @@ class Loop:
 
         An order answers nothing, but its arena must stand at the same decision.
         """
-        if isinstance(event, Audited):
-            return self._unanswered.get(key_of(event.first))
-        if isinstance(event, Answered):
-            return self._unanswered.get(key_of(event))
+        if isinstance(event, Audited | Answered):
+            answer = event.first if isinstance(event, Audited) else event
+            return self._unanswered.get(key_of(answer))
         requested = self.shard_requests.requested(event.island)
         if isinstance(event, Advanced):
             is_it = requested is not None and requested.number == event.number

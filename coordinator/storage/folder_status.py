@@ -45,7 +45,7 @@ def folder_status(folder: Path) -> RunStatus:
             f"{folder}: is finished, but its tables are missing; to write them again: "
             f"{command('resume', folder)}"
         )
-    births = Counter(read_table(folder, "births", ["island"])["island"].to_pylist())
+    births = births_of(folder)
     names = ["island", "births", "fitness"]
     populations = read_table(folder, "population", names).group_by(names[:2])
     summaries = populations.aggregate([("fitness", "max"), ([], "count_all")])
@@ -60,6 +60,11 @@ def folder_status(folder: Path) -> RunStatus:
         for number, island in enumerate(status.islands)
     )
     return replace(status, state=state, islands=islands)
+
+
+def births_of(folder: Path) -> Counter[int]:
+    """Return the number of births of each island of a run."""
+    return Counter(read_table(folder, "births", ["island"])["island"].to_pylist())
 
 
 def status_below(folder: Path) -> Status:

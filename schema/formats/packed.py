@@ -14,7 +14,7 @@ from schema.plugins.permission import FLAG, allow_references
 from schema.plugins.source import digest_in_use, digest_of, modules_named
 from schema.robot import archive
 from schema.robot.archive import RobotOrigin
-from schema.robot.robot import Robot, check_number, check_robot
+from schema.robot.robot import Robot, check_number
 from schema.wire.protobuf import encode_robot
 
 
@@ -32,7 +32,6 @@ def packed_robot(
     """
     types = types_of(experiment)
     check_number(robot)
-    check_robot(robot, *types)
     text = experiment_text(experiment)
     plugins = named_files(text)
     members = {
