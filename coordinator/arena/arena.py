@@ -57,6 +57,7 @@ class Arena:
         encoding: of its robots.
         clock: its intervals.
         births: number of births, founders included.
+        living: its living robots; only the arena changes them.
         step: physics step of the last decision.
         is_finished: all births of the experiment are done, or ``is_extinct``.
         is_extinct: too few robots are left to mate, and none can arrive.
@@ -91,18 +92,18 @@ class Arena:
         self._number = number
         self._breeder = Breeder(experiment, seed, run, given)
         self._vetting_queue = VettingQueue(experiment, self._breeder, number)
-        self._living = LivingRobots(
+        self.living = LivingRobots(
             rules, experiment.measures.labels, seed=seed, run=run
         )
         learning = experiment.learning
         self._infancy = (
-            Infancy(experiment, self.encoding, self._living)
+            Infancy(experiment, self.encoding, self.living)
             if learning and learning.budget > 1
             else None
         )
-        self._orders = Orders(experiment, self._living, self._infancy)
+        self._orders = Orders(experiment, self.living, self._infancy)
         self._migration = (
-            None if epochs is None else ArenaMigration(experiment, epochs, self._living)
+            None if epochs is None else ArenaMigration(experiment, epochs, self.living)
         )
         if epochs:
             epochs.emigrants = self._breeder.emigrants
@@ -124,17 +125,12 @@ class Arena:
     @property
     def population(self) -> tuple[Individual, ...]:
         """Living individuals by birth id, each with its last fitness."""
-        return tuple(one.individual for one in self._living)
-
-    @property
-    def living(self) -> LivingRobots:
-        """Its living robots; only the arena changes them."""
-        return self._living
+        return tuple(one.individual for one in self.living)
 
     @property
     def judged(self) -> tuple[Individual, ...]:
         """Living individuals whose fitness counts: the mature."""
-        return self._living.mature()
+        return self.living.mature()
 
     @property
     def is_paused(self) -> bool:
@@ -203,7 +199,7 @@ class Arena:
             raise self._unexpected(
                 event, f"advance {awaited.number} to {awaited.until} is awaited"
             )
-        if why := self._living.mismatch(advance):
+        if why := self.living.mismatch(advance):
             raise self._unexpected(event, why)
         return True
 
@@ -224,7 +220,7 @@ class Arena:
             died_s = self.clock.seconds(casualty.step)
             moment = self._moment._replace(sim_time_s=died_s)
             commands.append(death_record(casualty, "diverged", moment))
-        self._living.update(advance)
+        self.living.update(advance)
         if self._infancy is not None:
             commands += self._infancy.end_trials(event, self._moment)
         return commands + self._decide()
@@ -236,13 +232,13 @@ class Arena:
             if self.step % self.clock.founder == 0:
                 commands += self._insert(self._founders.pop())
             return commands + self._conclude()
-        if matured := self._living.take_matured(self._number):
-            self._breeder.update(self._living.mature(), matured)
+        if matured := self.living.take_matured(self._number):
+            self._breeder.update(self.living.mature(), matured)
         if self.step % self.clock.sample == 0:
-            commands += self._living.sample(self._moment)
+            commands += self.living.sample(self._moment)
         if self.step % self.clock.birth == 0:
             self.is_extinct = not self._orders.prevent_extinction and (
-                len(self._living) < self._parents_needed
+                len(self.living) < self._parents_needed
             )
             migration = self._migration
             if migration is not None:
@@ -250,13 +246,13 @@ class Arena:
                 self.is_extinct = self.is_extinct and not migration.is_starving
             if self.is_extinct or self.births >= self.experiment.births:
                 return [*commands, *self._finish()]
-            mature = self._living.mature()
-            if self._living.has_room and len(mature) >= self._parents_needed:
+            mature = self.living.mature()
+            if self.living.has_room and len(mature) >= self._parents_needed:
                 commands += self._vetting_queue.begin_child(mature)
         if self.step % self.clock.cull == 0:
-            reason, culled = select_culled(self._living.mature(), self._rules)
+            reason, culled = select_culled(self.living.mature(), self._rules)
             commands += [
-                death_record(self._living.remove(one.birth), reason, self._moment)
+                death_record(self.living.remove(one.birth), reason, self._moment)
                 for one in culled
             ]
         return commands if self._vetting_queue.is_busy else commands + self._conclude()
@@ -269,7 +265,7 @@ class Arena:
         orders = self._orders
         if orders.pending:
             commands += orders.carry_out(self._moment)
-        while orders.insertions and not self._founders and self._living.has_room:
+        while orders.insertions and not self._founders and self.living.has_room:
             order = orders.insertions.pop(0)
             birth = self._vetting_queue.take_number()
             commands += self._insert(inserted(order, birth, self.encoding), order.place)
@@ -316,7 +312,7 @@ class Arena:
         until = clock.next_decision(step, is_founding=bool(self._founders))
         if self._infancy is not None:
             until = self._infancy.next_end(until)
-        changes = self._living.take_changes()
+        changes = self.living.take_changes()
         is_saved = clock.is_snapshot_due(step, until)
         self._awaited = AdvanceShard(
             self._number, self._advances, until, changes, is_saved
@@ -332,7 +328,7 @@ class Arena:
             The rows of its birth; the first request to its learner if it learns.
         """
         self.births += 1
-        rows = self._living.add_newborn(candidate, self.encoding, self._moment, place)
+        rows = self.living.add_newborn(candidate, self.encoding, self._moment, place)
         if self._infancy is None:
             return [*rows]
         return [*rows, *self._infancy.begin(candidate, self.step)]
@@ -344,7 +340,7 @@ class Arena:
     def _unexpected(self, event: ArenaEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
             f"arena {self._number} at step {self.step}, {self.births} of "
-            f"{self.experiment.births} born, {len(self._living)} alive, "
+            f"{self.experiment.births} born, {len(self.living)} alive, "
             f"{self._advances} advances done: {why}, got {event}"
         )
 

@@ -213,8 +213,7 @@ class RunSession:
         Raises:
             RunFolderError: another process owns the folder, or the disk failed.
         """
-        self.held.confirm()
-        self._recorder.flush()
+        self.do_chores()
         self.held.set_state("stopped")
 
     def close(self) -> None:
