@@ -209,7 +209,7 @@ class TableFile:
         """Write poses ahead of the count; remove rows on disk that do not count."""
         self.keep(self._seen + self._ahead)
         if event.pose_rows:
-            self.restore(event)
+            self.add(_poses_of(event))
             self._ahead += event.pose_rows
 
     def take_advance(self, event: Advanced) -> None:
@@ -228,7 +228,7 @@ class TableFile:
 
     def restore(self, event: Advanced) -> None:
         """Write the next poses behind those on disk; errors as of ``add``."""
-        self.add(PoseArrays.received(event.advance.poses).rows(event.island))
+        self.add(_poses_of(event))
 
     def add(self, rows: pa.Table) -> None:
         """Write rows as one batch; columns that are the same in a run are set anew.
@@ -332,6 +332,11 @@ class TableFile:
                 columns[each.name] = pa.repeat(value, rows)
         arrays = [columns[name] for name in self._schema.names]
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
+
+
+def _poses_of(event: Advanced) -> pa.Table:
+    """Return the poses of an advance as rows."""
+    return PoseArrays.received(event.advance.poses).rows(event.island)
 
 
 def _aside(parquet: Path) -> Path:

@@ -18,7 +18,7 @@ import pyarrow.parquet
 
 from coordinator.storage import recorder
 from coordinator.storage.folder import RunFolder
-from coordinator.storage.recorder import Recorder
+from coordinator.storage.recorder import TableFile
 
 JOURNAL = "write journal.bin"
 RECOVERY = "restore"
@@ -56,7 +56,7 @@ class Instants:
         self._around(
             pyarrow.parquet.ParquetWriter, "write_table", lambda *_: ".parquet.new"
         )
-        self._around(Recorder, RECOVERY, lambda *_: "")
+        self._around(TableFile, RECOVERY, lambda *_: "")
         self._around(RunFolder, "seal", lambda *_: "")
 
     def _is_due(self, kind: str) -> bool:
