@@ -66,7 +66,7 @@ class Runs:
         return pa.concat_tables(_named(rows, run) for run, rows in tables)
 
     def phylogeny(self) -> pa.Table:
-        """Return who descends from whom, as the ALife data standard asks for.
+        """Return the phylogeny of all individuals, in the ALife data standard.
 
         ``id``, ``ancestor_list``, ``origin_time`` and ``destruction_time`` of each
         individual of all runs; docs/analysis.md has the meaning of the columns.

@@ -2,7 +2,7 @@
 
 An answer stays if the islands ask the same question under the new number. Others are
 void, such as what followed in an archipelago when an island had closed, or the last
-re-evaluations of a population; the run goes on without them and asks anew. So it
+re-evaluations of a population; the run requests what it needs again. So it
 becomes equal to a run that was begun with the new number.
 """
 

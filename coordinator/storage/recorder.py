@@ -231,7 +231,7 @@ class TableFile:
         self.add(_poses_of(event))
 
     def add(self, rows: pa.Table) -> None:
-        """Write rows as one batch; columns that are the same in a run are set anew.
+        """Write rows as one batch; columns of the run get this run's values.
 
         Raises:
             RunFolderError: the disk is full or failed.
