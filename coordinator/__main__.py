@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import schema.experiment.kinds
+from coordinator.arena.kinds import RULES
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import (
     finished_code,
@@ -134,6 +135,7 @@ def plugin_kinds() -> tuple[Kind, ...]:
         *schema.experiment.kinds.KINDS,
         *worker.kinds.KINDS,
         *KINDS,
+        RULES,
         brain_kind(check_brain),
     )
 

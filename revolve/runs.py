@@ -97,6 +97,11 @@ class Run:
     touches = _table(
         "touches", "One row per pair of robots that touched, on-line, if recorded."
     )
+    meetings = _table(
+        "meetings", "One row per pair of robots that met before a decision of rules."
+    )
+    matings = _table("matings", "One row per mating that rules decided on.")
+    patches = _table("patches", "One row per place of an arena's rules and sample.")
     migrations = _table("migrations", "One row per migrant.")
     audits = _table(
         "audits", "One row per evaluation that was repeated on a second worker."

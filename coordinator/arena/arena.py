@@ -12,11 +12,12 @@ from typing import Any
 
 from coordinator.arena.arena_migration import ArenaMigration
 from coordinator.arena.candidates import VettingQueue
+from coordinator.arena.decisions import ArenaDecisions, matings_of
 from coordinator.arena.infancy import Infancy
 from coordinator.arena.living import (
+    NO_WISH,
     LivingRobots,
     Moment,
-    Place,
     death_record,
     touch_records,
 )
@@ -24,7 +25,6 @@ from coordinator.arena.orders import Orders, inserted
 from coordinator.evolution.breeding import Breeder, Candidate, Individual
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.founders import Founder
-from coordinator.evolution.selection import select_culled
 from coordinator.islands.events import (
     Advanced,
     Append,
@@ -46,6 +46,7 @@ from coordinator.islands.events import (
 from coordinator.islands.migration import MigrationEpochs
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, steps_of
+from schema.plugins.arena_rules import Conception, Decisions, Place
 from schema.wire.arena import AdvanceShard
 
 
@@ -78,22 +79,27 @@ class Arena:
         Raises:
             ExperimentError: the experiment is off-line.
         """
-        rules = experiment.arena
-        if rules is None:
+        arena = experiment.arena
+        if arena is None:
             raise ExperimentError(f"{experiment.name}: has no [arena]")
         self.births = 0
         self.step = 0
         self.is_finished = self.is_extinct = False
         self.experiment = experiment
-        self._rules = rules
+        self._end_s = arena.end_s
         self.clock = ArenaClock(experiment)
         self.encoding = encoding_of(experiment)
-        self._parents_needed = experiment.selection.parents_needed
         self._number = number
         self._breeder = Breeder(experiment, seed, run, given)
         self._vetting_queue = VettingQueue(experiment, self._breeder, number)
+        self._rules = ArenaDecisions(experiment, number, seed=seed, run=run)
         self.living = LivingRobots(
-            rules, experiment.measures.labels, seed=seed, run=run
+            arena,
+            experiment.measures.labels,
+            seed=seed,
+            run=run,
+            stores=self._rules.rules.stores,
+            has_work=self._rules.needs_tracks,
         )
         learning = experiment.learning
         self._infancy = (
@@ -168,7 +174,7 @@ class Arena:
         if not was_busy or self._vetting_queue.is_busy:
             return [*vets]
         if self.births:
-            return self._conclude()
+            return [*self._bear(), *self._conclude()]
         self._founders = self._vetting_queue.take_viable()
         return self._decide()
 
@@ -221,6 +227,7 @@ class Arena:
             moment = self._moment._replace(sim_time_s=died_s)
             commands.append(death_record(casualty, "diverged", moment))
         self.living.update(advance)
+        self._rules.note(advance)
         if self._infancy is not None:
             commands += self._infancy.end_trials(event, self._moment)
         return commands + self._decide()
@@ -236,36 +243,64 @@ class Arena:
             self._breeder.update(self.living.mature(), matured)
         if self.step % self.clock.sample == 0:
             commands += self.living.sample(self._moment)
-        if self.step % self.clock.birth == 0:
-            self.is_extinct = not self._orders.prevent_extinction and (
-                len(self.living) < self._parents_needed
-            )
-            migration = self._migration
-            if migration is not None:
-                migration.is_starving = self.is_extinct and migration.may_bring_robots
-                self.is_extinct = self.is_extinct and not migration.is_starving
-            if self.is_extinct or self.births >= self.experiment.births:
-                return [*commands, *self._finish()]
-            mature = self.living.mature()
-            if self.living.has_room and len(mature) >= self._parents_needed:
-                commands += self._vetting_queue.begin_child(mature)
-        if self.step % self.clock.cull == 0:
-            reason, culled = select_culled(self.living.mature(), self._rules)
-            commands += [
-                death_record(self.living.remove(one.birth), reason, self._moment)
-                for one in culled
-            ]
-        return commands if self._vetting_queue.is_busy else commands + self._conclude()
+            commands += self._rules.sample(self._moment)
+        if self.step % self.clock.birth == 0 or self.step % self.clock.cull == 0:
+            commands += self._apply_rules()
+        if self.is_finished or self._vetting_queue.is_busy:
+            return commands
+        return [*commands, *self._bear(), *self._conclude()]
+
+    def _apply_rules(self) -> list[ArenaCommand]:
+        """Let the rules decide; end the run if it is over."""
+        moment, births_are_due = self._moment, self.step % self.clock.birth == 0
+        decisions, rows = self._rules.decide(
+            self.living,
+            moment,
+            self.step,
+            births=births_are_due,
+            deaths=self.step % self.clock.cull == 0,
+        )
+        commands: list[ArenaCommand] = [*rows]
+        if births_are_due and self._is_over(decisions):
+            return [*commands, *self._finish()]
+        matings = matings_of(decisions, self.living)
+        for birth, stores in sorted(decisions.stores.items()):
+            self.living.store(birth, stores)
+        for death in decisions.deaths:
+            commands += self._orders.end_infancy(death.birth, death.reason, moment)
+            removed = self.living.remove(death.birth)
+            commands.append(death_record(removed, death.reason, moment))
+        room = min(self.living.room, self.experiment.births - self.births)
+        return [*commands, *self._vetting_queue.begin_children(matings, room)]
+
+    def _is_over(self, decisions: Decisions) -> bool:
+        """Return whether the run ends here: extinct, all births done, or late."""
+        self.is_extinct = not self._orders.prevent_extinction and (
+            decisions.is_extinct or not len(self.living)
+        )
+        migration = self._migration
+        if migration is not None:
+            migration.is_starving = self.is_extinct and migration.may_bring_robots
+            self.is_extinct = self.is_extinct and not migration.is_starving
+        is_late = 0.0 < self._end_s <= self.clock.seconds(self.step)
+        return self.is_extinct or is_late or self.births >= self.experiment.births
+
+    def _bear(self) -> list[Record | Ask]:
+        """Insert the children of the last decision."""
+        commands: list[Record | Ask] = []
+        for mating, child, outcome in self._vetting_queue.take_children():
+            if child is not None:
+                commands += self._insert(child, wish=mating.wish)
+            commands += self._rules.end_mating(mating, child, outcome, self._moment)
+        return commands
 
     def _conclude(self) -> list[ArenaCommand]:
-        """Insert viable robots, carry out orders, and advance unless paused."""
+        """Carry out orders, and advance unless paused."""
         commands: list[ArenaCommand] = []
-        for candidate in self._vetting_queue.take_viable():
-            commands += self._insert(candidate)
         orders = self._orders
         if orders.pending:
             commands += orders.carry_out(self._moment)
-        while orders.insertions and not self._founders and self.living.has_room:
+        while orders.insertions and not self._founders and self.living.room:
             order = orders.insertions.pop(0)
             birth = self._vetting_queue.take_number()
             commands += self._insert(inserted(order, birth, self.encoding), order.place)
@@ -315,20 +350,30 @@ class Arena:
         changes = self.living.take_changes()
         is_saved = clock.is_snapshot_due(step, until)
         self._awaited = AdvanceShard(
-            self._number, self._advances, until, changes, is_saved
+            self._number,
+            self._advances,
+            until,
+            changes,
+            is_saved,
+            wants_tracks=self._rules.needs_tracks,
         )
         return self._awaited
 
     def _insert(
-        self, candidate: Candidate, place: Place | None = None
+        self,
+        candidate: Candidate,
+        place: Place | None = None,
+        wish: Conception = NO_WISH,
     ) -> list[Record | Ask]:
-        """Insert a robot at a place, random if None.
+        """Insert a robot at a place, random as wished if None.
 
         Returns:
             The rows of its birth; the first request to its learner if it learns.
         """
         self.births += 1
-        rows = self.living.add_newborn(candidate, self.encoding, self._moment, place)
+        rows = self.living.add_newborn(
+            candidate, self.encoding, self._moment, place, wish
+        )
         if self._infancy is None:
             return [*rows]
         return [*rows, *self._infancy.begin(candidate, self.step)]

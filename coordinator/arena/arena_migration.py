@@ -95,7 +95,7 @@ class ArenaMigration:
                 replaced = self.epochs.choose_replaced(mature, self._settled)
             if replaced is not None:
                 records.append(self._removed(replaced, "replaced", moment))
-            elif not self._living.has_room:
+            elif not self._living.room:
                 break
             self._vacancies = max(0, self._vacancies - 1)
             self._settled += 1

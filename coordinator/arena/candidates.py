@@ -1,18 +1,41 @@
 """Candidates of an arena that await vetting or insertion."""
 
+from collections import deque
 from collections.abc import Sequence
 from math import inf
+
+from msgspec import Struct
 
 from coordinator.evolution.breeding import Breeder, Candidate, Couple, Individual
 from coordinator.islands.events import Verdict, Vetted
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
+from schema.plugins.arena_rules import Conception
 from schema.robot.ids import BirthId
 from schema.wire.messages import Vet
 
 
+class Mating(Struct, frozen=True):
+    """Child that the rules of an arena want.
+
+    Attributes:
+        wish: what they say of it.
+        parents: those that they name; else all that may be selected.
+    """
+
+    wish: Conception
+    parents: tuple[Individual, ...]
+
+    @property
+    def parents_are_named(self) -> bool:
+        """Its parents are not selected."""
+        return bool(self.wish.parents)
+
+
 class VettingQueue:
     """Founders and children until their bodies are viable and they are inserted.
+
+    The children of one decision follow one another, as each needs a birth number.
 
     A birth number is used once a candidate is viable. Failed attempts at a number are
     counted on at the next birth, so that each attempt has its own stream.
@@ -24,7 +47,10 @@ class VettingQueue:
         self._attempts = experiment.selection.max_mating_attempts
         self._viable: dict[int, Candidate] = {}
         self._in_vetting: dict[int, Candidate] = {}
-        self._mature: tuple[Individual, ...] = ()
+        self._children: list[tuple[Mating, Candidate | None, str]] = []
+        self._excess: Sequence[Mating] = ()
+        self._matings: deque[Mating] = deque()
+        self._mating: Mating | None = None
         self._next = experiment.selection.population
         self._failed = 0
         self._end = 0
@@ -38,16 +64,33 @@ class VettingQueue:
         """Generate the founders; return their vettings."""
         return [vet for number in range(self._next) for vet in self._try(number, 0)]
 
-    def begin_child(self, mature: Sequence[Individual]) -> list[Vet]:
-        """Mate two of the mature; return the vetting, if there is a candidate."""
-        self._mature = tuple(mature)
-        self._end = self._failed + self._attempts
-        return self._try(self._next, self._failed)
+    def begin_children(self, matings: Sequence[Mating], room: int) -> list[Vet]:
+        """Mate one couple after the other; return the first vetting, if any.
+
+        Those beyond ``room`` have no child.
+        """
+        self._matings.extend(matings[:room])
+        self._excess = matings[room:]
+        return self._next_child()
+
+    def _next_child(self) -> list[Vet]:
+        vets: list[Vet] = []
+        while self._matings and not vets:
+            self._mating = self._matings.popleft()
+            self._end = self._failed + self._attempts
+            vets = self._try(self._next, self._failed)
+        return vets
 
     def take_viable(self) -> list[Candidate]:
-        """Return the viable candidates by birth id, and remove them."""
+        """Return the viable founders by birth id, and remove them."""
         viable, self._viable = self._viable, {}
         return [viable[number] for number in sorted(viable)]
+
+    def take_children(self) -> list[tuple[Mating, Candidate | None, str]]:
+        """Return the matings since the last call, each with child and outcome."""
+        children, self._children = self._children, []
+        excess, self._excess = self._excess, ()
+        return [*children, *((mating, None, "no room") for mating in excess)]
 
     def take_number(self) -> BirthId:
         """Return the next birth id, for a robot that needs no vetting."""
@@ -76,12 +119,15 @@ class VettingQueue:
             return []
         del self._in_vetting[number]
         if isinstance(event, Vetted) and event.report.is_viable:
-            self._viable[number] = candidate
-            if number == self._next:
-                self.take_number()
-            return []
+            if number < self._next:
+                self._viable[number] = candidate
+                return []
+            self.take_number()
+            self._end_mating(candidate)
+            return self._next_child()
         why = event.report.reason if isinstance(event, Vetted) else event.reason
-        return self._try(number, candidate.attempt + 1, candidate.couple, why)
+        vets = self._try(number, candidate.attempt + 1, candidate.couple, why)
+        return vets or self._next_child()
 
     def _is_new(self, event: Verdict, candidate: Candidate | None) -> bool:
         """Return whether an answer belongs to no request so far."""
@@ -92,18 +138,29 @@ class VettingQueue:
             return event.attempt >= self._failed
         return not 0 <= number < self._next
 
+    def _end_mating(self, child: Candidate | None) -> None:
+        assert self._mating is not None
+        outcome = "not viable" if child is None else "born"
+        self._children.append((self._mating, child, outcome))
+
     def _try(
         self, number: int, attempt: int, couple: Couple | None = None, why: str = ""
     ) -> list[Vet]:
         """Return the vetting of the first candidate from an attempt on, if any."""
         birth = BirthId(self._island, number)
-        is_founder = number < self._next
-        parents, end = ((), inf) if is_founder else (self._mature, self._end)
+        mating = None if number < self._next else self._mating
         candidate = self._breeder.candidate(
-            birth, attempt, parents, couple, why, end=end
+            birth,
+            attempt,
+            mating.parents if mating else (),
+            couple,
+            why,
+            end=self._end if mating else inf,
+            is_chosen=mating is not None and mating.parents_are_named,
         )
         if candidate is None:
             self._failed = self._end
+            self._end_mating(None)
             return []
         self._in_vetting[number] = candidate
         return [Vet(birth, candidate.attempt, candidate.robot)]

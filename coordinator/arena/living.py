@@ -4,9 +4,10 @@ Their table rows are made here, too, besides those of migrations.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from math import cos, dist, isfinite, sin, tau
+from itertools import repeat
+from math import cos, dist, hypot, isfinite, sin, tau
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from coordinator.islands.rows import (
     population_records,
 )
 from schema.experiment.document import ArenaSection
+from schema.plugins.arena_rules import Conception, Place, Stores
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import (
@@ -35,8 +37,9 @@ from schema.wire.arena import (
     Touch,
 )
 
-Place = tuple[float, float]
-"""A point of the ground plane [m]."""
+NO_WISH = Conception()
+_OFF_WALL_M = 0.5
+"""Distance of places of birth from the wall [m], unless founders are born nearer."""
 
 
 class Moment(NamedTuple):
@@ -64,6 +67,8 @@ class LivingRobot:
         judgement: the last report; None before the first advance.
         is_infant: it learns, and does not count as mature.
         has_matured: rules of selection know that it is mature.
+        stores: what the rules of the arena keep for it, by name.
+        work_j: work of its motors so far [J], if the rules need it.
     """
 
     individual: Individual
@@ -72,6 +77,8 @@ class LivingRobot:
     judgement: Judgement | None = None
     is_infant: bool = False
     has_matured: bool = False
+    stores: Stores = field(default_factory=dict)
+    work_j: float = 0.0
 
     @property
     def birth(self) -> BirthId:
@@ -103,9 +110,21 @@ class LivingRobots:
     """
 
     def __init__(
-        self, rules: ArenaSection, labels: Sequence[str], *, seed: int, run: int
+        self,
+        rules: ArenaSection,
+        labels: Sequence[str],
+        *,
+        seed: int,
+        run: int,
+        stores: Stores = MappingProxyType({}),
+        has_work: bool = False,
     ) -> None:
+        """Initialise without robots.
+
+        ``stores`` are those of a robot that comes; its work is known if ``has_work``.
+        """
         self._rules = rules
+        self._stores, self._has_work = stores, has_work
         self._labels = labels
         self._stream = partial(stream, seed, run)
         self._living: dict[BirthId, LivingRobot] = {}
@@ -120,9 +139,9 @@ class LivingRobots:
         return (self._living[birth] for birth in sorted(self._living))
 
     @property
-    def has_room(self) -> bool:
-        """The population is below its limit."""
-        return len(self._living) < self._rules.population_limit
+    def room(self) -> int:
+        """Number of robots below the limit of the population."""
+        return max(0, self._rules.population_limit - len(self._living))
 
     def get(self, birth: BirthId) -> LivingRobot | None:
         """Return the robot with a birth id, or None if no such robot is alive."""
@@ -143,10 +162,13 @@ class LivingRobots:
             one.has_matured = True
         return [one.individual for one in matured]
 
-    def random_place(self, name: BirthId, purpose: Purpose) -> Place:
+    def random_place(
+        self, name: BirthId, purpose: Purpose, wish: Conception = NO_WISH
+    ) -> Place:
         """Return a random place away from the living; the name is that of a stream."""
         draws = BufferedRng(self._stream(name, 0, purpose))
-        return draw_place(draws, [one.position[:2] for one in self], self._rules)
+        others = [one.position[:2] for one in self]
+        return draw_place(draws, others, self._rules, wish)
 
     def add_newborn(
         self,
@@ -154,14 +176,15 @@ class LivingRobots:
         encoding: IslandEncoding,
         moment: Moment,
         place: Place | None,
+        wish: Conception = NO_WISH,
     ) -> list[Record]:
         """Insert a newborn; return the rows of its birth and of the population.
 
-        The moment counts its birth; the place is random if None.
+        The moment counts its birth; the place is random, as wished, if None.
         """
         individual = candidate.individual(generation=None)
-        place = place or self.random_place(candidate.birth, Purpose.PLACE)
-        self.insert(individual, candidate.robot, place)
+        place = place or self.random_place(candidate.birth, Purpose.PLACE, wish)
+        self.insert(individual, candidate.robot, place, wish.stores)
         now_s = moment.sim_time_s
         born = birth_record(
             candidate, individual, encoding, sim_time_s=now_s, place=place
@@ -169,10 +192,23 @@ class LivingRobots:
         fitness = [(one.birth, one.known_fitness) for one in self]
         return [born, *population_records(moment.island, moment.births, fitness)]
 
-    def insert(self, individual: Individual, robot: Robot, place: Place) -> None:
-        """Insert a robot."""
-        self._living[individual.birth] = LivingRobot(individual, robot, place)
+    def insert(
+        self,
+        individual: Individual,
+        robot: Robot,
+        place: Place,
+        stores: Stores = MappingProxyType({}),
+    ) -> None:
+        """Insert a robot; its stores may differ from those of others."""
+        living = LivingRobot(individual, robot, place)
+        living.stores = {**self._stores, **stores}
+        self._living[individual.birth] = living
         self._insertions[individual.birth] = Insertion(individual.birth, robot, place)
+
+    def store(self, birth: BirthId, stores: Stores) -> None:
+        """Replace values of a living robot's stores."""
+        robot = self._living[birth]
+        robot.stores = {**robot.stores, **stores}
 
     def remove(self, birth: BirthId) -> LivingRobot:
         """Remove a living robot, and return it."""
@@ -215,9 +251,11 @@ class LivingRobots:
         """Store the reports of an advance, and drop the robots that diverged."""
         for casualty in advance.casualties:
             del self._living[casualty.birth]
-        for judgement in advance.judgements:
+        works = advance.work_j or repeat(0.0)
+        for judgement, work_j in zip(advance.judgements, works, strict=False):
             robot = self._living[judgement.birth]
             robot.judgement = judgement
+            robot.work_j += work_j
             robot.individual = replace(
                 robot.individual,
                 fitness=judgement.fitness,
@@ -241,6 +279,8 @@ class LivingRobots:
                     "fitness": one.judgement.fitness,
                     "is_mature": one.is_mature,
                     "measures": named_measures(self._labels, one.judgement.measures),
+                    "stores": list(one.stores.items()) or None,
+                    "work_j": one.work_j if self._has_work else None,
                 },
             )
             for one in self
@@ -259,22 +299,38 @@ class LivingRobots:
 
 
 def draw_place(
-    draws: BufferedRng, others: Sequence[Place], arena: ArenaSection
+    draws: BufferedRng,
+    others: Sequence[Place],
+    arena: ArenaSection,
+    wish: Conception = NO_WISH,
 ) -> Place:
     """Return a random place away from all others, or the last one tried.
 
     Places are uniform in radius, so denser in the centre (as in the
     code of the original).
-    The angle is drawn first. The others are last known places of the living [m].
+    The angle is drawn first. The others are last known places of the living [m]. The
+    centre and the radius are those of the wish, if it has some; places beyond a wall
+    are drawn towards the origin.
     """
     place = (0.0, 0.0)
+    x, y = wish.near or (0.0, 0.0)
+    most_m = arena.birth_radius_m if wish.radius_m is None else wish.radius_m
     for _ in range(arena.birth_place_tries):
         angle = tau * draws.number()
-        radius = arena.birth_radius_m * draws.number()
-        place = (radius * cos(angle), radius * sin(angle))
+        radius = most_m * draws.number()
+        place = _within_wall(x + radius * cos(angle), y + radius * sin(angle), arena)
         if all(dist(place, other) >= arena.birth_distance_m for other in others):
             break
     return place
+
+
+def _within_wall(x: float, y: float, arena: ArenaSection) -> Place:
+    """Return the nearest place as far from the wall as births from robots [m]."""
+    if not arena.wall_diameter_m:
+        return x, y
+    most_m = max(arena.birth_radius_m, arena.wall_diameter_m / 2 - _OFF_WALL_M)
+    share = min(1.0, most_m / max(hypot(x, y), most_m))
+    return x * share, y * share
 
 
 def death_record(dead: LivingRobot | Casualty, reason: str, moment: Moment) -> Record:

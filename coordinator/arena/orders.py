@@ -80,7 +80,7 @@ class Orders:
                 case Insert():
                     self.insertions.append(order)
                 case Remove(birth=birth) if self._living.get(birth):
-                    records += self._end_infancy(birth, "removed", moment)
+                    records += self.end_infancy(birth, "removed", moment)
                     removed = self._living.remove(birth)
                     records.append(death_record(removed, "removed", moment))
                 case ReplaceBrain(birth=birth, brain=brain):
@@ -97,11 +97,11 @@ class Orders:
         if not (living and robot):
             return []
         was_infant = living.is_infant
-        rows = self._end_infancy(birth, "brain replaced", moment)
+        rows = self.end_infancy(birth, "brain replaced", moment)
         self._living.replace_brain(living, robot, restarts_window=was_infant)
         return rows
 
-    def _end_infancy(self, birth: BirthId, why: str, moment: Moment) -> list[Record]:
+    def end_infancy(self, birth: BirthId, why: str, moment: Moment) -> list[Record]:
         """End the infancy of a robot, if it is an infant; return its rows."""
         if self._infancy is None:
             return []

@@ -107,7 +107,7 @@ def failed_last(individuals: Iterable[Individual]) -> list[Individual]:
 
 
 Couple = tuple[Individual, ...]
-"""Two parents; the first gives the root of the child."""
+"""Parents, two or one; the first gives the root of the child."""
 
 
 class Candidate(Struct, frozen=True):
@@ -180,6 +180,7 @@ class Breeder:
         why: str = "",
         *,
         end: float = inf,
+        is_chosen: bool = False,
     ) -> Candidate | None:
         """Return the candidate of the first attempt that gives one.
 
@@ -190,6 +191,7 @@ class Breeder:
             couple: parents of the attempt before; None at the first.
             why: reason why the attempt before failed; empty at the first.
             end: number of the attempt at which to stop.
+            is_chosen: the population are the parents, two or one.
 
         Returns:
             The candidate; None if no attempt before ``end`` gives one.
@@ -203,7 +205,9 @@ class Breeder:
                 return self._given(birth, attempt, why)
             while attempt < end:
                 self.check_attempts(attempt, population, why)
-                couple, genome = self.conceive(birth, attempt, population, couple)
+                couple, genome = self.conceive(
+                    birth, attempt, population, couple, is_chosen=is_chosen
+                )
                 why = self._encoding.no_child
                 if genome is not None:
                     try:
@@ -230,6 +234,8 @@ class Breeder:
         attempt: int,
         population: Sequence[Individual],
         couple: Couple | None,
+        *,
+        is_chosen: bool = False,
     ) -> tuple[Couple | None, object | None]:
         """Return the parents of one attempt and the genome of their child.
 
@@ -241,15 +247,17 @@ class Breeder:
             failed.
         """
         selection = self._experiment.selection
-        if self._is_random(population):
+        if is_chosen:
+            couple = tuple(population)
+        elif self._is_random(population):
             rng = self._stream(birth, attempt, Purpose.GENERATE)
             return None, self._encoding.random(rng, birth)
-        if couple is None or attempt % selection.max_mating_attempts == 0:
+        elif couple is None or attempt % selection.max_mating_attempts == 0:
             rng = self._stream(birth, attempt, Purpose.PARENTS)
             couple = select_parents(population, rng, self._parents_rule)
         rng = self._stream(birth, attempt, Purpose.MATE)
-        first, second = couple
-        return couple, self._encoding.mate(first.genome, second.genome, rng, birth)
+        first, last = couple[0].genome, couple[-1].genome
+        return couple, self._encoding.mate(first, last, rng, birth)
 
     def check_attempts(
         self, attempts: int, population: Sequence[Individual], why: str

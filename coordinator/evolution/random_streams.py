@@ -25,7 +25,8 @@ class Purpose(IntEnum):
     """Purpose of a stream; the numbers are part of what a seed means.
 
     The birth id that names a stream of migration is (island, epoch); for the place of
-    an immigrant it is (island, number of immigrants). 11 to 13 belong to workers
+    an immigrant it is (island, number of immigrants), for a decision of an arena's
+    rules (island, step). 11 to 13 belong to workers
     (noise, pushes, disturbances). The attempt that names a stream of a learner is the
     number of its request.
     """
@@ -41,6 +42,7 @@ class Purpose(IntEnum):
     REPLACED = 9
     IMMIGRANT_PLACE = 10
     LEARNING = 14
+    RULES = 15
     OTHER_BRAIN = 20
 
 

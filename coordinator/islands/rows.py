@@ -44,10 +44,7 @@ def birth_record(
     row = {
         "island": candidate.birth.island,
         "birth": candidate.birth.number,
-        "parents": [
-            {"island": parent.birth.island, "birth": parent.birth.number}
-            for parent in candidate.couple or ()
-        ],
+        "parents": parent_column(candidate.couple or ()),
         "generation": individual.generation,
         "rank": individual.rank,
         "attempts": candidate.attempt + 1,
@@ -61,6 +58,11 @@ def birth_record(
         **origin_columns(candidate.origin),
     }
     return Record("births", row)
+
+
+def parent_column(parents: Iterable[Individual]) -> list[dict[str, int]]:
+    """Return the column ``parents``: their birth ids."""
+    return [{"island": one.birth.island, "birth": one.birth.number} for one in parents]
 
 
 def origin_columns(founder: Founder | None) -> dict[str, Any]:

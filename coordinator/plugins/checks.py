@@ -15,6 +15,7 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import IO
 
+from coordinator.arena.rules import load_rules
 from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.learning import IslandLearning
 from coordinator.storage.campaign import (
@@ -123,6 +124,8 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
         except ExperimentError as error:
             raise _with_hint(error, experiment) from None
     for own in island_experiments(experiment):
+        if own.arena is not None and not is_own(own.arena.rules):
+            load_rules(own.arena)
         if not is_own(own.fitness.function):
             check_fitness_keys(own.fitness)
         if own.learning is not None:

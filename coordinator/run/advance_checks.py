@@ -29,6 +29,7 @@ class ExpectedAdvance:
         from_step, until: steps of the request.
         living: robots that live after the requested changes.
         wants_snapshot: the result must hold the state at the end.
+        wants_tracks: the result must hold the work of the motors.
     """
 
     from_step: int
@@ -36,6 +37,7 @@ class ExpectedAdvance:
     living: AbstractSet[BirthId]
     experiment: Experiment
     wants_snapshot: bool
+    wants_tracks: bool = False
 
     @property
     def samples(self) -> range:
@@ -50,8 +52,8 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
 
     Raises:
         MalformedMessage: another step; unknown, missing or repeated robots; another
-            number of measures; a snapshot that is missing, was not wanted, or is that
-            of another state.
+            number of measures or works; tracks; a snapshot that is missing, was not
+            wanted, or is that of another state.
     """
     if advance.step != expected.until:
         raise impossible(
@@ -67,6 +69,10 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
     for judgement in advance.judgements:
         if judgement.measures or judgement.is_mature:
             check_count(judgement.measures, measures)
+    worked = len(advance.judgements) if expected.wants_tracks else 0
+    if len(advance.work_j) != worked or advance.tracks:
+        got = f"{len(advance.work_j)} and {len(advance.tracks)} bytes of tracks"
+        raise impossible(f"advance: must have {worked} works and no tracks, got {got}")
     last = expected.from_step
     for casualty in advance.casualties:
         if not last <= casualty.step <= expected.until:

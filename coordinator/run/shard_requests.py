@@ -33,6 +33,7 @@ from schema.robot.results import Provenance
 from schema.wire.arena import Advance, AdvanceShard, Changes, PastAdvance, Rebuild
 from schema.wire.codec import encode
 from schema.wire.messages import Request, StateMissing
+from schema.wire.poses import PoseArrays
 
 
 class SnapshotStore(Protocol):
@@ -285,6 +286,7 @@ class ShardRequests:
                 past.living_after(requested.changes),
                 self._context.experiments[shard],
                 wants_snapshot,
+                requested.wants_tracks,
             ),
             provenance=Provenance(command.agent, command.platform),
             complete=complete,
@@ -323,6 +325,10 @@ def _read_answer(
         advance = complete(advance)
     check_advance(advance, expected)
     rows = check_poses(advance, expected)
+    if requested.wants_tracks:
+        robots = [judgement.birth for judgement in advance.judgements]
+        tracks = PoseArrays.received(advance.poses).tracks(robots)
+        advance = structs.replace(advance, tracks=tracks.tobytes())
     if repeats is not None:
         _check_repeated(advance, rows, repeats)
     casualties = tuple(

@@ -405,7 +405,7 @@ class Measures(PluginSection, frozen=True, dict=True):
         return tuple(name.rpartition(":")[2] for name in self.names)
 
 
-class ArenaSection(Section, frozen=True):
+class ArenaWorld(PluginSection, frozen=True):
     """An on-line world: robots are born, evaluated all the time and die in it.
 
     Times are simulated. Source: Hupkes 2016, section 5.3.3, and the intervals of its
@@ -462,6 +462,26 @@ class ArenaSection(Section, frozen=True):
     proximity_steps: AtLeastOne = 8
     merge_distance_m: Length = 0.02
     split_distance_m: Length = 0.06
+
+
+class ArenaSection(ArenaWorld, frozen=True):
+    """An arena, and the rules that decide who is born and who dies in it.
+
+    Workers get what it inherits only.
+
+    Attributes:
+        rules: "thesis", "ecosystem", or ``module:Class`` of own rules. They decide at
+            every multiple of ``birth_interval_s`` and ``cull_interval_s``. The limit,
+            the floor and the shares above are those of "thesis"; with other rules the
+            limit is the greatest number of living robots.
+        parameters: of the rules.
+        end_s: simulated time at which the run ends, whatever the number of births [s];
+            0 is no such time.
+    """
+
+    rules: str = "thesis"
+    parameters: Parameters = field(default_factory=dict)
+    end_s: NotNegative = 0.0
 
 
 class Islands(Section, frozen=True):
@@ -596,7 +616,7 @@ def island_experiments(experiment: Experiment) -> tuple[Experiment, ...]:
     return tuple(island_experiment(experiment, number) for number in numbers)
 
 
-def light_of(environment: Environment, arena: ArenaSection | None) -> Vector | None:
+def light_of(environment: Environment, arena: ArenaWorld | None) -> Vector | None:
     """Return the position of the light of a world [m]; None is no light."""
     own = None if arena is None else arena.light
     return own or environment.light

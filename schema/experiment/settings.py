@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError, check_most
 from schema.experiment.document import (
     NETWORK,
-    ArenaSection,
+    ArenaWorld,
     BrainSection,
     Experiment,
     Fitness,
@@ -113,7 +113,7 @@ class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
     space: Space
     simulation: Simulation
     fitness: Fitness
-    arena: ArenaSection
+    arena: ArenaWorld
     environment: Environment = FLAT
     origin: Origin = Origin()
     measures: Measures = Measures()

@@ -20,7 +20,7 @@ from math import ceil, pi, tan
 import mujoco
 import numpy as np
 
-from schema.experiment.document import ArenaSection, Simulation
+from schema.experiment.document import ArenaWorld, Simulation
 from schema.experiment.environment import Environment, gravity_vector, relief
 from schema.experiment.scenery import add_scenery, object_count
 from schema.mjcf.footing import footprint, standing_height
@@ -224,7 +224,7 @@ def _add_relief(spec: mujoco.MjSpec, environment: Environment) -> None:
     )
 
 
-def ring_wall(arena: ArenaSection) -> Floats:
+def ring_wall(arena: ArenaWorld) -> Floats:
     """Return the boxes of a ring of straight walls about the origin, if there is one.
 
     The inner faces touch the circle of ``wall_diameter_m`` from outside. Source: the

@@ -133,6 +133,10 @@ _BIRTH_ISLAND = _column(
     is_nullable=True,
 )
 _INDIVIDUAL = (_ISLAND, _BIRTH_ISLAND, _BIRTH)
+_SECOND_ROBOT = (
+    _column("other_island", pa.int32(), "island where the second robot was born"),
+    _column("other_birth", pa.int64(), "number of the birth of the second robot"),
+)
 _BIRTHS = _column("births", pa.int64(), "individuals born on the island so far")
 _TIME = _column("sim_time_s", _FLOAT, "simulated time of the arena", unit="s")
 _FITNESS_UNIT = "m/s, or as of fitness.function"
@@ -383,6 +387,20 @@ FITNESS = _table(
         "whether the robot has lived its warm-up and a whole fitness window",
     ),
     _MEASURES,
+    _column(
+        "stores",
+        MEASURES,
+        "what the arena's rules keep for the robot, before their decision at this time",
+        is_nullable=True,
+    ),
+    _column(
+        "work_j",
+        _FLOAT,
+        "work of its motors since birth, read at the checks of distances; null if the "
+        "arena's rules do not need it",
+        unit="J",
+        is_nullable=True,
+    ),
 )
 POSES = _table(
     "poses",
@@ -419,7 +437,8 @@ DEATHS = _table(
         '"selection" (below the share of the mean fitness), "cull" (removed from an '
         'arena full of mature robots), "diverged" (its physics or brain diverged, or '
         'code of a plug-in failed: see detail), "removed" (by an operator), "migrated" '
-        '(moved to another island) or "replaced" (made room for an immigrant)',
+        '(moved to another island), "replaced" (made room for an immigrant), or as the '
+        "rules of the arena say",
     ),
     _column("detail", pa.string(), "what diverged or failed; otherwise empty"),
     *_axes("xy", _FLOAT, "the centre of its core"),
@@ -436,11 +455,59 @@ TOUCHES = _table(
     "touches",
     "a pair of robots that touched during an interval of an arena",
     *_INDIVIDUAL,
-    _column("other_island", pa.int32(), "island where the second robot was born"),
-    _column("other_birth", pa.int64(), "number of the birth of the second robot"),
+    *_SECOND_ROBOT,
     _column("sim_time_s", _FLOAT, "simulated time of the interval's end", unit="s"),
     _column("over_s", _FLOAT, "length of the interval", unit="s"),
     _column("duration_s", _FLOAT, "time in contact during the interval", unit="s"),
+)
+MEETINGS = _table(
+    "meetings",
+    "a pair of robots that met, as arena.rules say, before a decision of an arena",
+    *_INDIVIDUAL,
+    *_SECOND_ROBOT,
+    _column("sim_time_s", _FLOAT, "simulated time of the decision", unit="s"),
+    _column("over_s", _FLOAT, "time since the decision before", unit="s"),
+    _column("duration_s", _FLOAT, "time within the distance, by samples", unit="s"),
+    _column("nearest_m", _FLOAT, "least distance of the cores", unit="m"),
+)
+MATINGS = _table(
+    "matings",
+    "a mating of parents that the rules of an arena named",
+    _ISLAND,
+    _TIME,
+    _column("parents", pa.list_(PARENT), "ids of the parents, two or one"),
+    *(
+        _column(
+            axis,
+            _FLOAT,
+            f"{axis} of the place near which the child is born; null if any place",
+            unit="m",
+            is_nullable=True,
+        )
+        for axis in "xy"
+    ),
+    _column(
+        "birth",
+        pa.int64(),
+        "number of the birth of the child; null without one",
+        is_nullable=True,
+    ),
+    _column(
+        "outcome",
+        pa.string(),
+        '"born", "not viable" (no body passed vetting) or "no room" (a full arena, or '
+        "no birth left)",
+    ),
+)
+PATCHES = _table(
+    "patches",
+    "a place that the rules of an arena keep, and sample of the arena",
+    _ISLAND,
+    _TIME,
+    _column("patch", pa.int32(), "number of the place, from 0"),
+    *_axes("xy", _FLOAT, "its centre"),
+    _column("radius_m", _FLOAT, "its radius", unit="m"),
+    _column("content", _FLOAT, "what it holds, such as energy", unit="1"),
 )
 MIGRATIONS = _table(
     "migrations",

@@ -104,6 +104,7 @@ class AdvanceShard(Message, frozen=True, tag="advance"):
         until: step to reach.
         changes: changes before the advance.
         wants_snapshot: a snapshot is due at the end of the advance.
+        wants_tracks: the rules of the arena need ``Advance.tracks``.
         from_step: step at which the advance starts.
         from_digest: of the state at that step; empty before the first advance.
         rebuild: data to rebuild the state at the start; None for a worker that
@@ -115,6 +116,7 @@ class AdvanceShard(Message, frozen=True, tag="advance"):
     until: Count
     changes: Changes
     wants_snapshot: bool
+    wants_tracks: bool = False
     from_step: Count = 0
     from_digest: Annotated[bytes, Meta(max_length=32)] = b""
     rebuild: Rebuild | None = None
@@ -207,6 +209,11 @@ class Advance(Message, frozen=True, tag="advance"):
         touches: by pair; empty unless the experiment records them.
         poses: samples of the robots' poses; empty in a journal.
         snapshot: the state at that step; empty if it was not wanted, and in a journal.
+        work_j: motor work of the robots of ``judgements`` during the advance [J];
+            empty unless tracks were wanted.
+        tracks: positions of their cores in the ground plane at the S samples of poses
+            [m], R x S x 2 float32; empty unless wanted. The coordinator takes them
+            from the poses.
     """
 
     step: Count
@@ -216,6 +223,8 @@ class Advance(Message, frozen=True, tag="advance"):
     touches: Annotated[tuple[Touch, ...], Meta(max_length=MOST_TOUCHES)]
     poses: Poses = NO_POSES
     snapshot: bytes = b""
+    work_j: Annotated[tuple[Finite, ...], Meta(max_length=MOST_LIVING)] = ()
+    tracks: bytes = b""
 
 
 class Live(Message, frozen=True):

@@ -1,5 +1,6 @@
 """Poses of an arena's robots: as they travel, as arrays, as rows of their table."""
 
+from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -82,6 +83,17 @@ class PoseArrays(NamedTuple):
         """The robot of each sample."""
         pairs = zip(self.islands.tolist(), self.births.tolist(), strict=True)
         return [BirthId(*pair) for pair in pairs]
+
+    def tracks(self, births: Sequence[BirthId]) -> npt.NDArray[np.float32]:
+        """Return where the cores of some robots were at all S samples, (R, S, 2) [m].
+
+        Each of the R robots, ascending, has a pose at each sample.
+        """
+        wanted = set(births)
+        kept = [row for row, one in enumerate(self.robots) if one in wanted]
+        names = self.births[kept], self.islands[kept]
+        by_robot = self.cores[kept][np.lexsort((self.times_s[kept], *names)), :2]
+        return by_robot.reshape(len(births), -1, 2)
 
     @property
     def are_finite(self) -> bool:

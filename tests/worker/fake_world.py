@@ -64,7 +64,7 @@ class FakeWorld:
             self._record(repr(change))
         self._record(repr((changes.removals, [i.place for i in changes.insertions])))
 
-    def advance(self, until: int) -> Advance:
+    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
         assert until > self.step
         assert not self.is_closed
         samples = range(self.step // POSE_STEPS + 1, until // POSE_STEPS + 1)
@@ -119,6 +119,6 @@ class FakeWorld:
 class OddWorld(FakeWorld):
     """World on a machine whose results differ."""
 
-    def advance(self, until: int) -> Advance:
+    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
         self._record("different")
         return super().advance(until)

@@ -80,6 +80,48 @@ class Samples:
         return counts
 
 
+class MotorWork:
+    """Work of the motors during an advance, added to ``ArenaRobot.work_j``.
+
+    The power of a motor is the absolute value of torque times velocity, read at the
+    checks for merges, which do not depend on where advances end.
+    """
+
+    def __init__(self, settings: ArenaSettings) -> None:
+        steps = settings.arena.proximity_steps
+        self._interval_s = steps * settings.simulation.timestep_s
+        self._layout: Layout | None = None
+
+    def begin(self, robots: Sequence[ArenaRobot]) -> None:
+        """Begin an advance of robots, with their motors as they are now."""
+        self._layout = None
+        self._motors = {robot.birth: robot.view.servos.torques() for robot in robots}
+        for robot in robots:
+            robot.work_j = 0.0
+
+    def add(self, layout: Layout, state: Floats) -> None:
+        """Add the work since the last check; ``state`` is the present one."""
+        robots = layout.robot_rows.robots
+        if layout is not self._layout:
+            self._layout = layout
+            motors = [self._motors[robot.birth] for robot in robots]
+            counts = [len(each[0]) for each in motors]
+            self._rows = np.repeat(np.arange(len(robots)), counts)
+            self._columns = layout.motions[self._rows, 0]
+            self._columns += np.concatenate([each[0] for each in motors])
+            self._stiffness = np.concatenate([each[1] for each in motors])
+            self._limits = np.concatenate([each[2] for each in motors])
+        velocity = state[self._columns]
+        wanted = np.concatenate([robot.view.ctrl for robot in robots])
+        torque = self._stiffness * (wanted - velocity)
+        power = np.abs(np.clip(torque, -self._limits, self._limits) * velocity)
+        sums = np.bincount(self._rows, power, minlength=len(robots))
+        for robot, work_j in zip(
+            robots, (sums * self._interval_s).tolist(), strict=True
+        ):
+            robot.work_j += work_j
+
+
 class PoseLog:
     """Samples of all robots' poses."""
 

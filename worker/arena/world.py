@@ -28,7 +28,7 @@ from schema.wire.codec import encode
 from schema.wire.poses import PoseArrays
 from worker.arena.batched_control import BatchedControllers, look
 from worker.arena.changes import check_changes, diverged, newborn
-from worker.arena.records import Contacts, PoseLog, Samples
+from worker.arena.records import Contacts, MotorWork, PoseLog, Samples
 from worker.arena.snapshot import read_snapshot, state_of
 from worker.arena.threads import ThreadTeam
 from worker.clusters.population import ArenaPopulation
@@ -66,6 +66,8 @@ class World:
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = PoseLog(clock.timestep_s)
         self._samples = Samples(settings, self.population)
+        self._work = MotorWork(settings)
+        self._measures_work = False
 
     def close(self) -> None:
         """Stop the threads; the world cannot be advanced any more."""
@@ -108,8 +110,8 @@ class World:
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 
-    def advance(self, until: int) -> Advance:
-        """Advance the arena to a step.
+    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
+        """Advance the arena to a step; measure the work of the motors if asked to.
 
         Raises:
             UnexpectedEvent: ``until`` is not later than the present step.
@@ -118,6 +120,9 @@ class World:
             raise UnexpectedEvent(
                 f"advance: until must be > step = {self.step}, got {until}"
             )
+        self._measures_work = measures_work
+        if measures_work:
+            self._work.begin(self.population.robots)
         self.step_to(until)
         return self._report()
 
@@ -184,6 +189,8 @@ class World:
         self._remove(
             diverged(self.population, rollout, step, reads_warnings=reads_warnings)
         )
+        if is_merge and self._measures_work and self.population.robots:
+            self._work.add(self.population.layout, rollout.state)
         if is_tick:
             self._tick()
         if is_sample:
@@ -270,4 +277,7 @@ class World:
             casualties=casualties,
             touches=() if self._contacts is None else self._contacts.take(),
             poses=self._poses.take().message(),
+            work_j=tuple(robot.work_j for robot in self.population.robots)
+            if self._measures_work
+            else (),
         )

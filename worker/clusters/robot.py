@@ -88,6 +88,7 @@ class ArenaRobot:
         brain_start: step from which the age of its brain counts.
         outputs: (O,) of its brain at the last tick, unclipped; (0,) if no channel
             records them.
+        work_j: of its motors since the last report [J], if it is measured.
     """
 
     def __init__(
@@ -101,6 +102,7 @@ class ArenaRobot:
         """Initialise in its own cluster, with a brain that starts at its birth."""
         self.birth, self.body, self.view = birth, body, body.solo.views[0]
         self.window, self.place = window, place
+        self.work_j = 0.0
         has_outputs = "outputs" in body.channels.names
         self.outputs = np.zeros(has_outputs * body.robot.brain.count("output"))
         self.set_brain(body.robot.brain, controls, window.born)

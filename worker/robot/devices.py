@@ -16,6 +16,7 @@ import numpy as np
 from schema.errors import ExperimentError
 from schema.parts import Sensor, Vector
 from schema.robot.trace import Floats
+from schema.robot.trees import Integers
 from worker.robot.own_sensors import OwnSensors, Surroundings, brightness
 from worker.robot.placed import PlacedRobot, contact_reader
 
@@ -220,12 +221,25 @@ class Servos:
                 fastest = motor.max_velocity
                 address, limits = -1, (-fastest, 2.0 * fastest, 1.0, fastest)
             self.motors.append((address, *limits))
+        self._model, self._first_dof = model, placed.dofs.start
         first = found[0] if found else 0
         self.actuators = slice(first, first + len(found))
         assert found == list(range(first, first + len(found)))
         # Memory views are faster than arrays, number by number.
         self._angles = data.qpos.data
         self._commands = data.ctrl[self.actuators].data
+
+    def torques(self) -> tuple[Integers, Floats, Floats]:
+        """Return what the torque of each of its A motors depends on.
+
+        Returns:
+            (A,) velocities' places among those of the robot; torque per error of
+            velocity [N m s/rad]; greatest torque [N m]. Of sliders forces.
+        """
+        model, own = self._model, self.actuators
+        dofs = model.jnt_dofadr[model.actuator_trnid[own, 0]].astype(np.int64)
+        dofs -= self._first_dof
+        return dofs, model.actuator_gainprm[own, 0], model.actuator_forcerange[own, 1]
 
     def drive(self, outputs: Floats) -> None:
         """Command each joint towards its target, until the next tick.

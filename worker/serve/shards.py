@@ -50,7 +50,7 @@ class ShardWorld(Protocol):
     def apply(self, changes: Changes) -> None:
         """Remove robots, insert robots, replace brains."""
 
-    def advance(self, until: int) -> Advance:
+    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
         """Advance to a step and report."""
 
     def snapshot(self) -> bytes:
@@ -141,7 +141,8 @@ class Shards:
             return StateMissing()
         with _closed_on_error(held.world) as world:
             world.apply(changes)
-            advance = world.advance(work.until)
+            wants = work.wants_tracks
+            advance = world.advance(work.until, measures_work=wants)
             snapshot = world.snapshot() if work.wants_snapshot else b""
         held.digest = advance.digest
         self._keep(key, held)

@@ -113,7 +113,7 @@ def test_every_living_robot_is_sampled_every_five_seconds() -> None:
         "island": 0, "birth_island": None, "birth": 14,
         "sim_time_s": 45.0, "births": 16, "age_s": 45.0,
         "path_velocity": 0.0, "straight_velocity": 0.02, "fitness": 0.1,
-        "is_mature": True, "measures": None,
+        "is_mature": True, "measures": None, "stores": None, "work_j": None,
     }  # fmt: skip
     assert (at_45[15]["age_s"], at_45[15]["is_mature"]) == (15.0, True)
 

@@ -1,0 +1,150 @@
+"""Decisions of the rules of one arena: what they see, and the rows of what they do."""
+
+from functools import partial
+
+from coordinator.arena.activity import Activity, meeting_records
+from coordinator.arena.candidates import Mating
+from coordinator.arena.living import LivingRobot, LivingRobots, Moment
+from coordinator.arena.rules import CheckedRules
+from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.random_streams import Purpose, stream
+from coordinator.islands.events import Record
+from coordinator.islands.rows import parent_column
+from schema.experiment.document import Experiment
+from schema.plugins.arena_rules import ArenaView, Decisions, Patch, Resident
+from schema.robot.ids import BirthId
+from schema.wire.arena import Advance
+
+
+class ArenaDecisions:
+    """The rules of one arena, and what they need to know.
+
+    Attributes:
+        rules: they decide.
+        needs_tracks: they need what robots did since the last decision.
+        patches: as of the last decision.
+    """
+
+    def __init__(
+        self, experiment: Experiment, number: int, *, seed: int, run: int
+    ) -> None:
+        """Initialise before the first decision.
+
+        Raises:
+            ExperimentError: as of ``CheckedRules``.
+        """
+        self.rules = CheckedRules(experiment)
+        distance_m, clock = self.rules.meeting_distance_m, experiment.simulation
+        self.needs_tracks = distance_m is not None
+        self._activity = Activity(
+            distance_m or 0.0, clock.pose_steps * clock.timestep_s
+        )
+        self._stream = partial(stream, seed, run)
+        self._number = number
+        self._before_s = 0.0
+        self._born: list[BirthId | None] = []
+        self.patches: tuple[Patch, ...] = ()
+
+    def note(self, advance: Advance) -> None:
+        """Remember what robots did in an advance."""
+        if self.needs_tracks:
+            self._activity.add(advance)
+
+    def decide(
+        self,
+        living: LivingRobots,
+        moment: Moment,
+        step: int,
+        *,
+        births: bool,
+        deaths: bool,
+    ) -> tuple[Decisions, list[Record]]:
+        """Return the decisions at a step, and the rows of meetings since the last one.
+
+        ``births`` and ``deaths`` say what is due.
+
+        Raises:
+            ExperimentError: as of ``CheckedRules.decide``.
+        """
+        over_s = moment.sim_time_s - self._before_s
+        meetings = self._activity.meetings()
+        view = ArenaView(
+            moment.sim_time_s,
+            over_s,
+            moment.births,
+            living.room,
+            births,
+            deaths,
+            tuple(map(self._resident, living)),
+            meetings,
+            tuple(self._born),
+        )
+        rng = self._stream(BirthId(self._number, step), 0, Purpose.RULES)
+        decisions = self.rules.decide(view, rng)
+        self._activity.clear()
+        self._before_s, self._born = moment.sim_time_s, []
+        self.patches = decisions.patches
+        return decisions, meeting_records(meetings, moment, over_s)
+
+    def end_mating(
+        self, mating: Mating, child: Candidate | None, outcome: str, moment: Moment
+    ) -> list[Record]:
+        """Note what became of a mating; return its row if the rules named parents."""
+        self._born.append(None if child is None else child.birth)
+        if not mating.parents_are_named:
+            return []
+        x, y = mating.wish.near or (None, None)
+        row = {
+            "island": moment.island,
+            "sim_time_s": moment.sim_time_s,
+            "parents": parent_column(mating.parents),
+            "x": x,
+            "y": y,
+            "birth": child and child.birth.number,
+            "outcome": outcome,
+        }
+        return [Record("matings", row)]
+
+    def sample(self, moment: Moment) -> list[Record]:
+        """Return the rows of all patches."""
+        return [
+            Record(
+                "patches",
+                {
+                    "island": moment.island,
+                    "sim_time_s": moment.sim_time_s,
+                    "patch": number,
+                    "x": patch.x,
+                    "y": patch.y,
+                    "radius_m": patch.radius_m,
+                    "content": patch.content,
+                },
+            )
+            for number, patch in enumerate(self.patches)
+        ]
+
+    def _resident(self, one: LivingRobot) -> Resident:
+        individual, judgement = one.individual, one.judgement
+        return Resident(
+            one.birth,
+            individual.parents,
+            judgement.age_s if judgement else 0.0,
+            one.position[:2],
+            self._activity.track(one.birth),
+            self._activity.work_j(one.birth),
+            one.known_fitness,
+            individual.measures,
+            individual.size,
+            one.is_infant,
+            one.stores,
+        )
+
+
+def matings_of(decisions: Decisions, living: LivingRobots) -> list[Mating]:
+    """Return the matings that rules decided on; parents that they name live."""
+    matings: list[Mating] = []
+    for wish in decisions.births:
+        named = [living.get(birth) for birth in wish.parents]
+        parents = tuple(one.individual for one in named if one is not None)
+        matings.append(Mating(wish, parents or living.mature()))
+    return matings

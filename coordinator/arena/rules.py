@@ -1,0 +1,118 @@
+"""Rules of one arena: loading, and checks of their decisions.
+
+``schema.plugins.arena_rules`` says what rules see and decide.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import chain
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from msgspec import ValidationError, msgpack
+
+from coordinator.arena.ecosystem import EcosystemRules
+from coordinator.arena.thesis_rules import ThesisRules
+from schema.errors import ExperimentError, shown
+from schema.experiment.brains import NoParameters
+from schema.experiment.document import ArenaSection, Experiment
+from schema.plugins.arena_rules import ArenaRules, ArenaView, Decisions, Stores
+from schema.plugins.contract import broken
+from schema.plugins.load import load_object
+from schema.plugins.origin import naming_plugin
+from schema.plugins.parameters import read_parameters
+
+WHERE = "arena.rules"
+METHODS = ("stores", "meeting_distance_m", "decide")
+"""Attributes of a class of rules."""
+Make = Callable[[Experiment, Any], ArenaRules]
+BUILT_IN: dict[str, Make] = {"thesis": ThesisRules, "ecosystem": EcosystemRules}
+"""Rules that come with the toolkit, by short name."""
+
+
+def load_rules(arena: ArenaSection) -> tuple[Make, Any]:
+    """Return the class of an arena's rules, and its parameters.
+
+    Raises:
+        ExperimentError: no such class, or other parameters than it declares.
+    """
+    made = load_object(arena.rules, WHERE, BUILT_IN, METHODS)
+    declared = getattr(made, "Parameters", None)
+    kind = declared or NoParameters
+    read = read_parameters(arena.parameters, kind, "arena.parameters")
+    return made, read if declared else None
+
+
+class CheckedRules:
+    """New rules of an arena, whose decisions are checked.
+
+    Attributes:
+        stores: names and initial values.
+        meeting_distance_m: as of ``ArenaRules``.
+    """
+
+    def __init__(self, experiment: Experiment) -> None:
+        """Make the object.
+
+        Raises:
+            ExperimentError: as of ``load_rules``; the class raises, or one of its
+                attributes is of another type.
+        """
+        assert experiment.arena is not None
+        self._plugin, parameters = load_rules(experiment.arena)
+        with naming_plugin(WHERE, self._plugin):
+            self.memory = self._plugin(experiment, parameters)
+            self.stores = _converted("stores", self.memory.stores, Stores)
+            distance_m = self.memory.meeting_distance_m
+            kind = float | None
+            self.meeting_distance_m = _converted("meeting_distance_m", distance_m, kind)
+
+    def decide(self, view: ArenaView, rng: np.random.Generator) -> Decisions:
+        """Return the decisions of the rules.
+
+        Raises:
+            ExperimentError: they raise, or decide what cannot be.
+        """
+        with naming_plugin(WHERE, self._plugin):
+            answer = self.memory.decide(view, rng)
+            if not isinstance(answer, Decisions):
+                raise broken("decide", "return Decisions", answer)
+            decisions: Decisions = _converted("decide", answer, Decisions)
+            for problem in _problems(decisions, view, self.stores):
+                raise ExperimentError(f"decide: {problem}")
+        return decisions
+
+
+def _converted(what: str, value: Any, kind: Any) -> Any:  # noqa: ANN401 - of the kind
+    """Return a value whose types and bounds have been checked."""
+    try:
+        data = msgpack.encode(value, enc_hook=_plain)
+        return msgpack.decode(data, type=kind)
+    except (ValidationError, TypeError, AttributeError) as error:
+        raise broken(what, f"have the types of its protocol ({error})", value) from None
+
+
+def _plain(value: Any) -> object:  # noqa: ANN401 - a mapping, or of NumPy
+    return dict(value) if isinstance(value, Mapping) else value.item()
+
+
+def _problems(decisions: Decisions, view: ArenaView, known: Stores) -> Iterator[str]:
+    """Yield what cannot be."""
+    living = {robot.birth for robot in view.robots}
+    dying = [death.birth for death in decisions.deaths]
+    if len(set(dying)) < len(dying):
+        yield f"must name each robot that dies once, got {shown(dying)}"
+    parents = [one for child in decisions.births for one in child.parents]
+    for one in {*dying, *parents, *decisions.stores} - living:
+        yield f"must name living robots, got {shown(one)}"
+    for child in decisions.births:
+        if len(set(child.parents)) < len(child.parents):
+            yield f"must name different parents, got {shown(child.parents)}"
+    children = [child.stores for child in decisions.births]
+    for stores in (*decisions.stores.values(), *children):
+        if unknown := stores.keys() - known.keys():
+            yield f"stores: must be of {shown(list(known))}, got {shown(unknown)}"
+    places = [child.near or () for child in decisions.births]
+    numbers = [each.values() for each in (*decisions.stores.values(), *children)]
+    if not all(map(isfinite, chain(*places, *numbers))):
+        yield "places and stores must be finite, got others"
