@@ -67,6 +67,7 @@ class FakeWorld:
     def advance(self, until: int, *, measures_work: bool = False) -> Advance:
         assert until > self.step
         assert not self.is_closed
+        assert not measures_work
         samples = range(self.step // POSE_STEPS + 1, until // POSE_STEPS + 1)
         self.step = until
         self._record(str(until))
@@ -121,4 +122,4 @@ class OddWorld(FakeWorld):
 
     def advance(self, until: int, *, measures_work: bool = False) -> Advance:
         self._record("different")
-        return super().advance(until)
+        return super().advance(until, measures_work=measures_work)
