@@ -9,7 +9,6 @@ from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
-from coordinator.run.shard_requests import SnapshotStore
 from coordinator.storage.folder import RunDetails, read_details
 from coordinator.storage.journal import NAME, read_events
 from coordinator.storage.snapshots import Snapshots
@@ -45,7 +44,7 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     return loop.context.arena[island], loop.shard_requests.past(island)
 
 
-def begun_loop(details: RunDetails, store: SnapshotStore = NO_SNAPSHOTS) -> Loop:
+def begun_loop(details: RunDetails, store: Snapshots = NO_SNAPSHOTS) -> Loop:
     """Return the islands of a run at its start; they act on nothing outside.
 
     ``store``: snapshots on disk, read-only.

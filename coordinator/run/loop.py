@@ -42,8 +42,9 @@ from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, descr
 from coordinator.run.learners import Learners
 from coordinator.run.requests import Key, Requests, island_of, key_of
 from coordinator.run.run_context import RunContext
-from coordinator.run.shard_requests import Reached, ShardRequests, SnapshotStore
+from coordinator.run.shard_requests import Reached, ShardRequests
 from coordinator.run.throttle import RealTimeThrottle
+from coordinator.storage.snapshots import Snapshots
 from schema.agent.log import warn_user
 from schema.errors import RunPaused, UnexpectedEvent
 from schema.wire.arena import AdvanceShard
@@ -105,7 +106,7 @@ class Loop:
     fleet: JobRouter
     log: Log
     rows: Rows
-    snapshot_store: SnapshotStore
+    snapshot_store: Snapshots
     throttle: RealTimeThrottle | None = None
     checks: Checks = NO_CHECKS
     confirm: Callable[[], None] = lambda: None

@@ -20,7 +20,6 @@ from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from coordinator.run.pose_recovery import PoseRecovery, has_lost_poses
 from coordinator.run.run_context import RunContext
-from coordinator.run.stored_genomes import check_stored_genomes
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.folder import RunFolder
 from coordinator.storage.journal import NAME as JOURNAL
@@ -137,10 +136,8 @@ class RunSession:
         """Start, or resume where the journal ends, or first recover lost poses.
 
         Raises:
-            RevolveError: the run cannot continue; see ``Loop.start``, and
-                ``check_stored_genomes``.
+            RevolveError: the run cannot continue; see ``Loop.start``.
         """
-        check_stored_genomes(self.held.path, self.experiment)
         self._events = self._journal.replay()
         if has_lost_poses(self._events, self._recorder.poses.stored):
             self._recover()

@@ -7,7 +7,6 @@ worker can rebuild its state. Nothing here decides what happens in an arena.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Protocol
 
 from msgspec import structs
 
@@ -18,6 +17,7 @@ from coordinator.run.advance_checks import ExpectedAdvance, check_advance, check
 from coordinator.run.drift import Drift, with_losses
 from coordinator.run.requests import Expected, impossible, read_answer
 from coordinator.run.run_context import RunContext
+from coordinator.storage.snapshots import Snapshots
 from schema.errors import (
     NO_MESSAGE,
     JobRefused,
@@ -34,22 +34,6 @@ from schema.wire.arena import Advance, AdvanceShard, Changes, PastAdvance, Rebui
 from schema.wire.codec import encode
 from schema.wire.messages import Request, StateMissing
 from schema.wire.poses import PoseArrays
-
-
-class SnapshotStore(Protocol):
-    """Storage of shard snapshots."""
-
-    def has(self, shard: int, step: int, digest: bytes) -> bool:
-        """Return whether there is a snapshot of this digest at a step."""
-
-    def write(self, shard: int, step: int, data: bytes) -> None:
-        """Store the state of a shard at a step, durably."""
-
-    def read(self, shard: int, step: int) -> bytes:
-        """Return the state of a shard at a step."""
-
-    def drop_before(self, shard: int, step: int, kept: int = 0) -> None:
-        """Remove the snapshots before a step, but that of a step to be kept."""
 
 
 @dataclass(slots=True)
@@ -102,7 +86,7 @@ class ShardRequests:
     """The advances of all arenas of a run."""
 
     def __init__(
-        self, context: RunContext, snapshot_store: SnapshotStore, fleet: JobRouter
+        self, context: RunContext, snapshot_store: Snapshots, fleet: JobRouter
     ) -> None:
         """Initialise without shards; ``fleet`` has the workers."""
         self._context = context

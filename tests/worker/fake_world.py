@@ -14,9 +14,10 @@ from schema.wire.arena import Advance, Casualty, Changes, Judgement
 from schema.wire.arena_state import ArenaState, state_digest
 from schema.wire.codec import decode, encode
 from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, WINDOW, poses
+from worker.arena.world import World
 
 
-class FakeWorld:
+class FakeWorld(World):
     """World in which the fitness of robots depends on all earlier advances."""
 
     made = 0

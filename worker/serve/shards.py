@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol, Self
+from typing import Protocol
 
 from msgspec.structs import replace
 
@@ -23,44 +23,11 @@ from schema.wire.arena import Advance, AdvanceShard, Changes, Live, PastAdvance,
 from schema.wire.codec import encode
 from schema.wire.messages import Request, StateMissing
 from worker.arena.changes import possible
+from worker.arena.world import World
 from worker.serve.checks import checked_arena
 
 Key = tuple[str, int]
 """Name of a shard: its run and its number."""
-
-
-class ShardWorld(Protocol):
-    """Interface of ``worker.arena.world.World``."""
-
-    def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
-        """Initialise an empty arena."""
-
-    @classmethod
-    def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
-        """Return the arena of a snapshot."""
-
-    @property
-    def step(self) -> int:
-        """Physics steps since the start."""
-
-    @property
-    def births(self) -> tuple[BirthId, ...]:
-        """Births of the living robots."""
-
-    def apply(self, changes: Changes) -> None:
-        """Remove robots, insert robots, replace brains."""
-
-    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
-        """Advance to a step and report."""
-
-    def snapshot(self) -> bytes:
-        """Return the whole state."""
-
-    def digest(self) -> bytes:
-        """Return the SHA-256 of the whole state."""
-
-    def close(self) -> None:
-        """Stop its threads."""
 
 
 class LiveOutlet(Protocol):
@@ -82,7 +49,7 @@ class _Held:
         digest: of its state; empty before the first advance.
     """
 
-    world: ShardWorld
+    world: World
     settings: bytes
     digest: bytes
 
@@ -92,7 +59,7 @@ class Shards:
 
     def __init__(
         self,
-        world: type[ShardWorld],
+        world: type[World],
         *,
         most_held: int = 16,
         threads: int = 1,
@@ -173,7 +140,7 @@ class Shards:
         if len(self._held) > self._most_held:
             self._held.popitem(last=False)[1].world.close()
 
-    def _rebuilt(self, data: bytes, work: AdvanceShard, rebuild: Rebuild) -> ShardWorld:
+    def _rebuilt(self, data: bytes, work: AdvanceShard, rebuild: Rebuild) -> World:
         """Return the arena in the state that an advance starts from.
 
         Raises:
@@ -201,7 +168,7 @@ class Shards:
 
 
 @contextmanager
-def _closed_on_error(world: ShardWorld) -> Iterator[ShardWorld]:
+def _closed_on_error(world: World) -> Iterator[World]:
     """Close a world if an error occurs."""
     try:
         yield world
@@ -219,7 +186,7 @@ def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
 _types_of = lru_cache(maxsize=64)(types_of)
 
 
-def _repeat(world: ShardWorld, history: Sequence[PastAdvance]) -> None:
+def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
     """Repeat a history of the same platform, equal to the last bit.
 
     Raises:
@@ -232,7 +199,7 @@ def _repeat(world: ShardWorld, history: Sequence[PastAdvance]) -> None:
 
 
 def _approximate(
-    world: ShardWorld, history: Sequence[PastAdvance], living: Sequence[BirthId]
+    world: World, history: Sequence[PastAdvance], living: Sequence[BirthId]
 ) -> None:
     """Repeat a history of another platform as exactly as this platform can.
 

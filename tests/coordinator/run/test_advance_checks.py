@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
+from coordinator.storage.snapshots import Snapshots
 from schema.agent.request_handler import answer as answer_to
 from schema.errors import MalformedMessage
 from schema.experiment.identity import Origin
@@ -59,10 +61,11 @@ class NoDeaths(FakeWorld):
         return max(0.02, super()._chance(birth))
 
 
-class Kept:
+class Kept(Snapshots):
     """Snapshots in memory."""
 
     def __init__(self) -> None:
+        super().__init__(Path())
         self.data: dict[tuple[int, int], bytes] = {}
 
     def has(self, shard: int, step: int, digest: bytes) -> bool:
