@@ -28,7 +28,7 @@ _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 
 def reference() -> str:
     """Return the page."""
-    names = sorted(revolve.__all__, key=lambda name: (_order(name), name.lower()))
+    names = sorted(dir(revolve), key=lambda name: (_order(name), name.lower()))
     text = "\n".join(line for name in names for line in _entry(name))
     return _HEAD + linked(text)
 

@@ -12,8 +12,8 @@ from msgspec.msgpack import encode
 from msgspec.structs import replace
 
 from coordinator.islands.events import Record
-from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
+from schema.tables.description import RunDetails
 from schema.wire.updates import (
     Birth,
     Level,

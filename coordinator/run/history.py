@@ -1,20 +1,19 @@
 """History of an arena from the journal of its run, for a re-simulation."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from coordinator.dispatch.fleet import JobRouter
-from coordinator.islands.events import Advanced, JournalledEvent, Record
 from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
-from coordinator.storage.folder import RunDetails, read_details
+from coordinator.storage.folder import read_details
 from coordinator.storage.journal import NAME, read_events
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import RunFolderError
 from schema.experiment.document import island_experiments, steps_of
 from schema.experiment.file import experiment_from_text
+from schema.tables.description import RunDetails
 from schema.wire.arena import Rebuild
 
 NO_SNAPSHOTS = Snapshots(Path(), until=-1)
@@ -54,22 +53,9 @@ def begun_loop(details: RunDetails, store: Snapshots = NO_SNAPSHOTS) -> Loop:
         archipelago(experiment, details.seed, details.run, details.founders),
         context=RunContext.of(details.name, 0, experiment, details.origin),
         fleet=JobRouter(LocalAgents({}, "")),
-        log=_Nothing(),
-        rows=_Nothing(),
+        log=None,
+        rows=None,
         snapshot_store=store,
     )
     loop.begin()
     return loop
-
-
-class _Nothing:
-    """Journal and tables that take nothing: all is on disk already."""
-
-    def write(self, record: Record) -> None:
-        """Write nothing."""
-
-    def store(self, event: Advanced) -> None:
-        """Store nothing."""
-
-    def append(self, events: Advanced | Sequence[JournalledEvent]) -> None:
-        """Append nothing."""

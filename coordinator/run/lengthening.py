@@ -7,7 +7,6 @@ becomes equal to a run that was begun with the new number.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -17,7 +16,7 @@ from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.run.history import begun_loop
 from coordinator.run.loop import Loop
 from coordinator.run.session import check_journal
-from coordinator.storage.folder import RunDetails, RunFolder, write_description
+from coordinator.storage.folder import RunFolder, write_description
 from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.rewriting import rewriting
@@ -25,7 +24,7 @@ from schema.agent.log import tell_user
 from schema.agent.terminal.progress_line import progress_if_long
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_from_text, experiment_text, with_births
-from schema.tables.description import read_description
+from schema.tables.description import RunDetails, read_description
 from schema.tables.files import rows_of_island
 
 _TOLD = 256
@@ -45,7 +44,7 @@ def lengthen(folder: Path, births: int) -> None:
     with RunFolder(folder) as held:
         details = held.details
         longer = with_births(details.document, births, str(folder))
-        new = replace(details, document=experiment_text(longer))
+        new = structs.replace(details, document=experiment_text(longer))
         if new == details:
             return
         check_journal(folder)

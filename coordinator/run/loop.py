@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from itertools import chain
-from typing import Protocol
 
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import Deliver
@@ -44,6 +43,8 @@ from coordinator.run.requests import Key, Requests, island_of, key_of
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
 from coordinator.run.throttle import RealTimeThrottle
+from coordinator.storage.journal import Journal
+from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.agent.log import warn_user
 from schema.errors import RunPaused, UnexpectedEvent
@@ -64,34 +65,14 @@ _RECENT = 20
 """Events that the error about an unexpected one names."""
 
 
-class Log(Protocol):
-    """Storage of events that survives a crash of this process."""
-
-    def append(self, events: Sequence[JournalledEvent]) -> None:
-        """Store events, durably."""
-
-
-class Rows(Protocol):
-    """Storage of table rows."""
-
-    def write(self, record: Record) -> None:
-        """Take one row."""
-
-    def store(self, event: Advanced) -> None:
-        """Bring the poses of an event to disk before the journal has it."""
-
-    def append(self, event: Advanced) -> None:
-        """Take the poses of an event that the journal has."""
-
-
 @dataclass(eq=False)
 class Loop:
     """The islands of a run and their connection to agents, journal and tables.
 
     Attributes:
         islands: the state machines of the islands, by number.
-        log: the journal.
-        rows: the tables.
+        log: the journal; None if events of it are only repeated.
+        rows: the tables; None if nothing is to be written.
         snapshot_store: the snapshots of arenas.
         throttle: limits the speed of arenas; None: no limit.
         checks: cross-checks to make.
@@ -104,8 +85,8 @@ class Loop:
     _: KW_ONLY
     context: RunContext
     fleet: JobRouter
-    log: Log
-    rows: Rows
+    log: Journal | None
+    rows: Recorder | None
     snapshot_store: Snapshots
     throttle: RealTimeThrottle | None = None
     checks: Checks = NO_CHECKS
@@ -234,6 +215,8 @@ class Loop:
         while events:
             # A process that was suspended while another took over must not write.
             self.confirm()
+            assert self.log is not None
+            assert self.rows is not None
             for event in events:
                 if isinstance(event, Advanced) and event.pose_rows:
                     self.rows.store(event)
@@ -254,7 +237,7 @@ class Loop:
         if not isinstance(event, Audited):
             return self._tell(island_of(event), event)
         for record in audit_records(event):
-            self.rows.write(record)
+            self._write(record)
         return []
 
     def _warn(self, events: Sequence[JournalledEvent]) -> None:
@@ -305,7 +288,7 @@ class Loop:
                 match command:
                     case Record():
                         self._write(command)
-                    case Append(advanced):
+                    case Append(advanced) if self.rows is not None:
                         self.rows.append(advanced)
                     case Vet() | Evaluate() | AdvanceShard() | Ask():
                         requests.append(command)
@@ -318,7 +301,8 @@ class Loop:
         return requests
 
     def _write(self, record: Record) -> None:
-        self.rows.write(record)
+        if self.rows is not None:
+            self.rows.write(record)
         if self.watch is not None:
             self.watch(record)
 

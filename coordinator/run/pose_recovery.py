@@ -15,9 +15,9 @@ from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.run.history import begun_loop
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
+from schema.tables.description import RunDetails
 from schema.wire.arena import AdvanceShard
 
 MOST_AHEAD = 64

@@ -4,10 +4,11 @@ import json
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
+
+from msgspec import structs
 
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import KINDS, AgentKind, Deliver
@@ -289,7 +290,7 @@ def _runs_row(held: RunFolder) -> Record:
     began = (held.path / DETAILS).stat().st_mtime
     versions = {name: metadata.version(name) for name in _LIBRARIES}
     versions["revolve-islands"] = VERSION
-    details = asdict(held.details)
+    details = structs.asdict(held.details)
     del details["founders"]
     row = {
         **details,

@@ -8,7 +8,7 @@ experiment and repeat; a run that was made separately is used as it is.
 import dataclasses
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -20,7 +20,7 @@ import msgspec
 from msgspec.structs import replace
 
 from coordinator.storage.disk import replace_bytes, replace_text
-from coordinator.storage.folder import RunDetails, forget_plugins, holds_run
+from coordinator.storage.folder import forget_plugins, holds_run
 from coordinator.storage.hints import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.check import naming
@@ -35,7 +35,7 @@ from schema.experiment.file import (
 )
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
 from schema.plugins.kept import KeptPlugin, keep
-from schema.tables.description import KeptFounder, read_small
+from schema.tables.description import KeptFounder, RunDetails, read_small
 
 CAMPAIGN = "campaign.toml"
 _LONGEST_NAME = 100
@@ -58,7 +58,7 @@ class Campaign:
     repeats: int
     seed: int
     first: int = 0
-    founders: Mapping[str, KeptFounder] = field(default_factory=dict)
+    founders: dict[str, KeptFounder] = field(default_factory=dict)
 
     def runs(self, folder: Path) -> list[tuple[Path, RunDetails]]:
         """Return folder and details of each run, repeat by repeat."""
@@ -224,7 +224,7 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
         list(map(_Entry, documents)),
         plugins=plugins,
         first=campaign.first,
-        founders=dict(campaign.founders),
+        founders=campaign.founders,
     )
     lines = [
         f"# To resume it:  {printable_line(command('resume', folder))}",

@@ -12,7 +12,6 @@ import secrets
 import shutil
 import socket
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from msgspec import structs
@@ -36,14 +35,13 @@ from coordinator.storage.rewriting import complete_rewriting
 from schema.agent.version import VERSION
 from schema.errors import ExperimentError, RunFolderError, unreadable
 from schema.experiment.file import experiment_from_text
-from schema.experiment.identity import Origin
 from schema.limits import MOST_MARK
 from schema.plugins.kept import PLUGINS, KeptPlugin, keep, kept_file
 from schema.tables.description import (
     DETAILS,
     STATE,
     Description,
-    KeptFounder,
+    RunDetails,
     State,
     description_text,
     make_folder,
@@ -61,30 +59,6 @@ MOST_FILED_EPOCH = MOST_RECORDED_EPOCH - _UNRECORDED
 _VERSION_OF_UNNAMED = "0.2"
 """Version that resumes runs whose description names none."""
 _DIGITS = re.compile(rb"[1-9][0-9]{0,9}")
-
-
-@dataclass(frozen=True, slots=True)
-class RunDetails:
-    """Description of a run: everything that determines its births.
-
-    Attributes:
-        name: name of the experiment.
-        run: number of the repeat, from 0.
-        seed: random seed of the run or campaign.
-        document: the experiment as JSON, with all defaults.
-        founders: given founders, by the digests that the document holds.
-    """
-
-    name: str
-    run: int
-    seed: int
-    document: str
-    founders: Mapping[str, KeptFounder] = field(default_factory=dict)
-
-    @property
-    def origin(self) -> Origin:
-        """Origin of the random streams of sensor and motor noise, for island 0."""
-        return Origin(seed=self.seed, run=self.run)
 
 
 class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
@@ -120,7 +94,7 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             if details is not None:
                 _refuse_used(path, details)
                 new = Description(
-                    **asdict(details),
+                    **structs.asdict(details),
                     nonce=secrets.token_hex(4),
                     checksums=True,
                     version=VERSION,
@@ -311,7 +285,7 @@ def _difference(path: Path, wanted: RunDetails) -> tuple[str, tuple[str, ...]]:
         # The text of an older version lacks keys with their defaults.
         theirs, ours = map(experiment_from_text, (known.document, wanted.document))
         births = ours.births
-        if known != replace(wanted, document=known.document) or (
+        if known != structs.replace(wanted, document=known.document) or (
             structs.replace(theirs, births=births) != ours
         ):
             return "a run with other settings", ()

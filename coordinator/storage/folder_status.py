@@ -6,7 +6,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
-from coordinator.storage.folder import EPOCH, RunDetails, holds_run, read_details
+from coordinator.storage.folder import EPOCH, holds_run, read_details
 from coordinator.storage.hints import command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import is_begun
@@ -16,7 +16,13 @@ from schema.errors import RevolveError, RunFolderError
 from schema.experiment.document import island_experiments
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
-from schema.tables.description import DETAILS, STATE, check_folder, read_state
+from schema.tables.description import (
+    DETAILS,
+    STATE,
+    RunDetails,
+    check_folder,
+    read_state,
+)
 from schema.tables.files import damage_of, has_rows, is_sealed, read_table
 from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.status import IslandStatus, RunStatus, Status

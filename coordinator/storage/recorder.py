@@ -16,12 +16,11 @@ import pyarrow.parquet
 
 from coordinator.islands.events import Advanced, Record
 from coordinator.storage.disk import AppendedFile, storage_errors
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.removal import cut_segment, remove_rows, remove_segment
 from schema.errors import RunFolderError
 from schema.tables.checksums import CHECK, FIELDS, MAGIC, digest_of, sums_path
 from schema.tables.columns import ROWS, TABLES
-from schema.tables.description import run_columns
+from schema.tables.description import RunDetails, run_columns
 from schema.tables.files import (
     batches_by_island,
     damage_of,

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import msgspec
 
 from schema.errors import RunFolderError, expectation, unreadable
+from schema.experiment.identity import Origin
 from schema.limits import MOST_DESCRIPTION, MOST_MARK, MOST_NAME, printable
 from schema.plugins.kept import KeptPlugin, allow_kept
 
@@ -40,34 +41,47 @@ class KeptFounder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     file: str = ""
 
 
-class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Content of ``run.json``; runs of 0.1 have only the first four fields.
+class RunDetails(msgspec.Struct, frozen=True):
+    """Description of a run: everything that determines its births.
 
     Attributes:
         name: name of the experiment.
         run: number of the repeat, from 0.
         seed: random seed of the run or campaign.
         document: the experiment as JSON, with all defaults.
-        nonce: distinguishes runs that were made in the same folder.
-        checksums: all segments have checksums.
-        digests: SHA-256 of each finished table in hexadecimal, by name of the table.
-        plugins: modules of the experiment's plug-ins, by name.
-        digest: SHA-256 of the other fields in hexadecimal; empty in runs of 0.1.
-        version: of Revolve Islands that began the run; empty in runs of 0.1 and 0.2.
-        founders: given founders, by the digests that the experiment holds.
+        founders: given founders, by the digests that the document holds.
     """
 
     name: str
     run: int
     seed: int
     document: str
+    founders: dict[str, KeptFounder] = {}
+
+    @property
+    def origin(self) -> Origin:
+        """Origin of the random streams of sensor and motor noise, for island 0."""
+        return Origin(seed=self.seed, run=self.run)
+
+
+class Description(RunDetails, frozen=True, forbid_unknown_fields=True):
+    """Content of ``run.json``; runs of 0.1 have only the first four fields.
+
+    Attributes:
+        nonce: distinguishes runs that were made in the same folder.
+        checksums: all segments have checksums.
+        digests: SHA-256 of each finished table in hexadecimal, by name of the table.
+        plugins: modules of the experiment's plug-ins, by name.
+        digest: SHA-256 of the other fields in hexadecimal; empty in runs of 0.1.
+        version: of Revolve Islands that began the run; empty in runs of 0.1 and 0.2.
+    """
+
     nonce: str = ""
     checksums: bool = False
     digests: dict[str, str] = {}
     plugins: dict[str, KeptPlugin] = {}
     digest: str = ""
     version: str = ""
-    founders: dict[str, KeptFounder] = {}
 
 
 def description_text(description: Description) -> str:

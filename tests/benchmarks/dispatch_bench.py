@@ -26,7 +26,7 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from schema.agent.network import Agent
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool, prepare_process
@@ -37,6 +37,7 @@ from schema.experiment.settings import evaluation_settings
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.tables.arrow import skip_pandas
+from schema.tables.description import RunDetails
 from schema.wire.codec import encode
 from schema.wire.messages import Evaluate, Request
 from tests import null_workers

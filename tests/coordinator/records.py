@@ -7,9 +7,9 @@ import pyarrow as pa
 
 from coordinator.islands.events import Record
 from coordinator.islands.rows import origin_columns
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.tables.columns import TABLES
+from schema.tables.description import RunDetails
 from schema.tables.files import read_table
 
 DETAILS = RunDetails("a/b c", 2, 1, "{}")

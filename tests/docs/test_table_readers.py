@@ -7,9 +7,10 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.recorder import Recorder
 from schema.tables.columns import BIRTHS, EVALUATIONS
+from schema.tables.description import RunDetails
 from schema.tables.files import read_table
 from tests.coordinator.records import make_records
 

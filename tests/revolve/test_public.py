@@ -45,11 +45,12 @@ def test_import_is_fast_and_leaves_the_process_as_it_is(tmp_path: Path) -> None:
 
 
 def test_each_public_name_is_loaded_and_documented() -> None:
-    assert len(revolve.__all__) > 30
-    for name in revolve.__all__:
+    names = dir(revolve)
+    assert len(names) > 30
+    for name in names:
         found = getattr(revolve, name)
         assert getattr(found, "__doc__", None), name
-    assert dir(revolve) == sorted(revolve.__all__)
+    assert names == sorted(vars(revolve)["__all__"])
 
 
 @pytest.mark.parametrize(
@@ -79,12 +80,6 @@ def test_types_are_those_of_the_loaded_objects() -> None:
     }
     assert typed.pop("main") == "revolve.command"
     assert typed == vars(revolve)["_HOMES"]
-    (names,) = (
-        ast.literal_eval(node.value)
-        for node in tree.body
-        if isinstance(node, ast.Assign)
-    )
-    assert names == sorted(revolve.__all__)
 
 
 def test_a_misspelt_name_gets_the_nearest() -> None:

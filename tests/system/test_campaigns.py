@@ -7,10 +7,10 @@ import pytest
 import zenoh
 
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
-from schema.tables.description import read_state
+from schema.tables.description import RunDetails, read_state
 from tests.system.conftest import Once
 from tests.system.workspace import Workspace, address_of, free_address, wait_until
 

@@ -10,14 +10,14 @@ import pytest
 
 from coordinator.cli.status import main as status
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.folder_status import check_rewritable, folder_status
 from coordinator.storage.journal import Journal
 from revolve import command as revolve
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.columns import TABLES
-from schema.tables.description import read_state
+from schema.tables.description import RunDetails, read_state
 from schema.tables.last_populations import last_populations
 from tests.system.conftest import Once
 from tests.system.flipping import flip

@@ -16,9 +16,10 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from schema.experiment.file import experiment_text, read_experiment
 from schema.limits import ADVANCE_REQUEST_BYTES
+from schema.tables.description import RunDetails
 from schema.wire.arena import AdvanceShard
 from schema.wire.codec import decode
 from schema.wire.messages import Request

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 from msgspec.structs import replace
 
+from schema.agent.service import Outlet
 from schema.errors import MalformedMessage, StateDiffers
 from schema.experiment.brains import types_of
 from schema.experiment.settings import ArenaSettings, read_arena_settings
@@ -28,16 +28,6 @@ from worker.serve.checks import checked_arena
 
 Key = tuple[str, int]
 """Name of a shard: its run and its number."""
-
-
-class LiveOutlet(Protocol):
-    """Interface of ``schema.agent.service.Outlet``."""
-
-    def has_listeners(self, key: str) -> bool:
-        """Return whether any viewer subscribes to a key."""
-
-    def put(self, key: str, data: bytes) -> None:
-        """Publish bytes."""
 
 
 @dataclass(slots=True)
@@ -63,7 +53,7 @@ class Shards:
         *,
         most_held: int = 16,
         threads: int = 1,
-        outlet: LiveOutlet | None = None,
+        outlet: Outlet | None = None,
         key_of: Callable[[int], str] = str,
     ) -> None:
         """Initialise without shards.

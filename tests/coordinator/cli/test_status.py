@@ -8,8 +8,9 @@ import pytest
 from coordinator.cli.status import Source, main, show_source, status_json
 from coordinator.cli.status_text import fault_lines, state_of
 from coordinator.storage.campaign import Campaign, write_campaign
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from schema.experiment.file import experiment_text, read_experiment
+from schema.tables.description import RunDetails
 from schema.wire.status import IslandStatus, PeerFault, Queue, RunStatus, Status
 
 EXPERIMENT = read_experiment("scenario1")

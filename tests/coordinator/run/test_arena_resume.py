@@ -7,13 +7,12 @@ snapshots.
 import re
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from msgspec import structs
+from msgspec.structs import replace
 
 import analyzer.report
 from coordinator.dispatch.events import DispatchEvent, Returned
@@ -25,7 +24,7 @@ from coordinator.run.operators import reply_to
 from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
@@ -36,6 +35,7 @@ from schema.experiment.learning import Learning
 from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
+from schema.tables.description import RunDetails
 from schema.tables.files import read_table
 from schema.wire.arena_state import ArenaState, state_digest
 from schema.wire.codec import encode
@@ -55,7 +55,7 @@ from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards
 
 EXPERIMENT = experiment(30, snapshot_interval_s=20.0, wall_diameter_m=20.0)
-INFANCY = structs.replace(
+INFANCY = replace(
     experiment(20, snapshot_interval_s=20.0),
     learning=Learning(learner="(1+1)-es", budget=2),
 )
@@ -103,6 +103,11 @@ class Frail:
         return call
 
 
+def frail(inner: object, point: Point, *names: str) -> Any:  # noqa: ANN401 - any class
+    """Return a wrapper in place of what it wraps."""
+    return Frail(inner, point, *names)
+
+
 class Run:
     """One coordinator process of a run, and a worker that may outlive it."""
 
@@ -134,9 +139,9 @@ class Run:
             islands,
             context=RunContext.of("resume", folder.epoch, document, DETAILS.origin),
             fleet=self.fleet,
-            log=Frail(journal, point, "append"),
-            rows=Frail(self.rows, point, "store"),
-            snapshot_store=Frail(Snapshots(path), point, "write", "drop_before"),
+            log=frail(journal, point, "append"),
+            rows=frail(self.rows, point, "store"),
+            snapshot_store=frail(Snapshots(path), point, "write", "drop_before"),
             **other,
         )
         self.loop.start(journal.replay())

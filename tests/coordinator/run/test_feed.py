@@ -6,11 +6,11 @@ from msgspec.structs import replace
 from coordinator.islands.events import Record
 from coordinator.islands.rows import body_rows
 from coordinator.run.feed import Feed
-from coordinator.storage.folder import RunDetails
 from schema.limits import UPDATE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row
+from schema.tables.description import RunDetails
 from schema.wire.codec import decode, encode
 from schema.wire.updates import Birth, Update, WorkerInfo
 

@@ -9,8 +9,9 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
 from coordinator.run.history import arena_history
 from coordinator.run.session import RunSession
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from schema.experiment.file import experiment_text, read_draft
+from schema.tables.description import RunDetails
 from worker.arena.world import World
 from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards

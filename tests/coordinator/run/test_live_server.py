@@ -13,9 +13,9 @@ from coordinator.network.operator_service import Queries
 from coordinator.run import live_server
 from coordinator.run.feed import Feed
 from coordinator.run.live_server import LiveServer
-from coordinator.storage.folder import RunDetails
 from schema.limits import MOST_QUERIES, UPDATE_BYTES
 from schema.robot.robot import Part, Robot
+from schema.tables.description import RunDetails
 from schema.wire.codec import decode, encode
 from schema.wire.updates import Page, Update, decode_page, pages_of
 

@@ -13,10 +13,11 @@ from coordinator.arena.arena import Arena
 from coordinator.islands.events import Commanded, Remove, ReplaceBrain
 from coordinator.run.operators import _run, answer_operator, reply_to
 from coordinator.run.scheduler import Planned, RunScheduler
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.folder_status import unbegun_status
 from schema.experiment.file import experiment_text
 from schema.robot.ids import BirthId
+from schema.tables.description import RunDetails
 from schema.wire.codec import encode
 from schema.wire.operator import (
     ListRobots,

@@ -17,7 +17,7 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
 from coordinator.run.session import RunSession
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.folder_status import table_damages
 from schema.agent.request_handler import Compute
 from schema.errors import JobRefused
@@ -25,6 +25,7 @@ from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.learning import Learning
 from schema.tables.columns import TABLES
+from schema.tables.description import RunDetails
 from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path, segments_of
 from tests.coordinator.arena_world import experiment

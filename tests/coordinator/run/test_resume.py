@@ -4,7 +4,7 @@ Everything but the physics is real: island, loop, analyzer, journal and tables.
 """
 
 import os
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from zlib import crc32
 
@@ -16,7 +16,6 @@ from coordinator.islands.events import Ask, Asked, EvaluationFailed
 from coordinator.run.history import begun_loop
 from coordinator.run.learners import Learners
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import UnexpectedEvent
@@ -25,6 +24,7 @@ from schema.experiment.file import experiment_text
 from schema.experiment.learning import Learning
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
+from schema.tables.description import RunDetails
 from schema.tables.files import read_table
 from schema.wire.messages import Evaluate, Failure, Request
 from schema.wire.protobuf import encode_robot
@@ -146,7 +146,7 @@ def test_an_unexpected_event_comes_with_the_last_ones(undisturbed: Path) -> None
     with Journal.open(undisturbed) as journal:
         events = journal.replay()
     stranger = EvaluationFailed(BirthId(0, 10**6), "no such robot", PROVENANCE)
-    details = replace(DETAILS, document=experiment_text(EXPERIMENT))
+    details = structs.replace(DETAILS, document=experiment_text(EXPERIMENT))
     loop = begun_loop(details, Snapshots(undisturbed))
     for event in events:
         loop.repeat(event)

@@ -22,11 +22,12 @@ from coordinator.storage.campaign import (
     shipped_campaigns,
     write_campaign,
 )
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.hints import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.sweep import Sweep
+from schema.tables.description import RunDetails
 from schema.wire.status import IslandStatus, RunStatus
 
 FIRST, SECOND = read_experiment("scenario1"), read_experiment("no-selection")
@@ -126,15 +127,15 @@ WANTED = RunDetails("scenario1", 1, 5, experiment_text(FIRST))
 @pytest.mark.parametrize("births", [FIRST.births, 600])
 def test_a_run_of_any_number_of_births_is_adopted(tmp_path: Path, births: int) -> None:
     document = experiment_text(replace(FIRST, births=births))
-    check_adopted(tmp_path, changed(WANTED, document=document), WANTED)
+    check_adopted(tmp_path, replace(WANTED, document=document), WANTED)
 
 
 @pytest.mark.parametrize(
     "other",
     [
-        changed(WANTED, run=2),
-        changed(WANTED, seed=6),
-        changed(
+        replace(WANTED, run=2),
+        replace(WANTED, seed=6),
+        replace(
             WANTED,
             document=experiment_text(
                 replace(FIRST, selection=replace(FIRST.selection, children=9))

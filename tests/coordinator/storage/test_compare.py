@@ -11,11 +11,12 @@ from msgspec.structs import replace
 from coordinator.islands.events import Record
 from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, Simulation
 from schema.experiment.file import experiment_text
+from schema.tables.description import RunDetails
 from schema.tables.files import read_table
 from tests.coordinator.records import make_records
 

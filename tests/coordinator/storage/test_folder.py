@@ -12,21 +12,25 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from msgspec import structs
+from msgspec.structs import replace
 
 from coordinator.islands.events import VettingFailed
-from coordinator.storage.folder import RunDetails, RunFolder, read_details
+from coordinator.storage.folder import RunFolder, read_details
 from coordinator.storage.journal import Journal
 from coordinator.storage.lock import read_holder
 from schema.agent.version import VERSION
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
-from schema.tables.description import description_text, read_description, read_state
+from schema.tables.description import (
+    RunDetails,
+    description_text,
+    read_description,
+    read_state,
+)
 
 DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
 MINOR = VERSION.rpartition(".")[0]
@@ -97,7 +101,7 @@ def test_a_run_is_resumed_by_the_minor_version_that_began_it(
     RunFolder(tmp_path, DETAILS).close()
     known = read_description(tmp_path)
     assert known.version == VERSION
-    text = description_text(structs.replace(known, version=begun_by))
+    text = description_text(replace(known, version=begun_by))
     (tmp_path / "run.json").write_text(text)
     if not named:
         RunFolder(tmp_path).close()
@@ -140,7 +144,7 @@ def test_a_used_folder_is_refused_with_the_hint_of_other_settings(
     RunFolder(tmp_path / "run", older).close()
     with pytest.raises(RunFolderError, match="already holds a run; to resume it"):
         RunFolder(tmp_path / "run", details)
-    births = experiment_text(structs.replace(first, births=9))
+    births = experiment_text(replace(first, births=9))
     for other, why in (
         (replace(details, document=births), "this run with 3000 births; to resume it"),
         (replace(details, seed=7), "holds a run with other settings"),

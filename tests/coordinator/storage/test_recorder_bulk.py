@@ -6,11 +6,11 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.islands.events import Advanced
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.columns import POSES
+from schema.tables.description import RunDetails
 from schema.tables.files import read_table
 from schema.tables.segments import segment_path, segments_of
 from schema.wire.arena import NO_POSES, Advance

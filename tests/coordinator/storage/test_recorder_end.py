@@ -11,10 +11,10 @@ import pyarrow as pa
 import pytest
 from pyarrow.parquet import ParquetFile, ParquetWriter
 
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
 from schema.tables import files
+from schema.tables.description import RunDetails
 from schema.tables.files import parquet_path, read_table
 from tests.coordinator.records import check_complete, feed_rows, make_records
 

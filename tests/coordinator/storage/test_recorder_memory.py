@@ -8,10 +8,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
 
-from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder, Segment
 from schema.tables import files
 from schema.tables.columns import TABLES
+from schema.tables.description import RunDetails
 from schema.tables.files import read_table
 from schema.tables.segments import SEGMENTS, segment_path
 from tests.coordinator.records import birth_row

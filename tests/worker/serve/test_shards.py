@@ -5,6 +5,7 @@ from functools import partial
 import pytest
 from msgspec.structs import replace
 
+from schema.agent.service import Outlet
 from schema.errors import InvalidRobot, MalformedMessage, StateDiffers
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import Origin
@@ -213,10 +214,11 @@ def test_least_recently_used_shard_is_dropped_first() -> None:
 KEYS = {0: "fleet/poses/0"}
 
 
-class Viewers:
+class Viewers(Outlet):
     """An outlet that keeps what is published while viewers are there."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.are_there = False
         self.put_at: list[tuple[str, bytes]] = []
 
