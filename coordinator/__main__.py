@@ -1,7 +1,7 @@
 """Commands of the coordinator: runs, their comparison, plug-ins."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
@@ -84,9 +84,10 @@ def main(arguments: list[str]) -> int:
         of a campaign failed, or all evaluations failed; 130 after a stop signal.
     """
     command, words = arguments[0], arguments[1:]
-    if command in ("check", "plugins"):
-        about_plugins = check if command == "check" else list_plugins
-        return about_plugins(words, plugin_kinds())
+    if command == "check":
+        return check(words, plugin_kinds(), _with_founders)
+    if command == "plugins":
+        return list_plugins(words, plugin_kinds())
     flags = run_flags(command)
     options = flags.parse_args(words)
     skip_pandas()
@@ -172,18 +173,26 @@ def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int])
 def _experiments(
     options: argparse.Namespace,
 ) -> tuple[tuple[Experiment, ...], dict[str, KeptFounder]]:
-    """Return checked experiments and their founders; imports worker and analyzer."""
-    import analyzer.report
+    """Return checked experiments and their founders; imports the worker's room."""
     import worker.kinds
 
     drafts = read_drafts(options.experiments, options.births, options.founders)
-    refuse_faulty(drafts, options.births)
+    refuse_faulty(drafts, options.births, options.founders)
     check = partial(check_built_in, kinds=worker.kinds.KINDS)
     found = checked_experiments(drafts, check)
     islands = (own for each in found for own in island_experiments(each))
     for line in dict.fromkeys(filter(None, map(cost_line, islands))):
         warn_user(line)
-    return with_founders(found, analyzer.report.analyze)
+    return _with_founders(found)
+
+
+def _with_founders(
+    experiments: Sequence[Experiment],
+) -> tuple[tuple[Experiment, ...], dict[str, KeptFounder]]:
+    """Return experiments and founders; imports the room of the analyzer."""
+    import analyzer.report
+
+    return with_founders(experiments, analyzer.report.analyze)
 
 
 def _deployment(

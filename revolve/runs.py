@@ -14,7 +14,11 @@ from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, as_experiment, of_plain, plain
 from schema.agent.supervisor import most_processes
 from schema.errors import RevolveError, RunFolderError, nearest, rounded, shown
-from schema.experiment.document import island_experiment, island_experiments
+from schema.experiment.document import (
+    UNNAMED,
+    island_experiment,
+    island_experiments,
+)
 from schema.experiment.file import experiment_from_text
 from schema.limits import MOST_SEED
 from schema.plugins.permission import allowed
@@ -333,7 +337,7 @@ def _given(
     for number, each in enumerate(in_order("founders", founders)):
         file = each
         if not isinstance(file, str | Path):
-            file = place / f"founder-{number}.pb"
+            file = place / f"{number}{UNNAMED}"
             file.write_bytes(encode_robot(plain(each)))
         files.append(str(file))
     return keys | {"files": files}

@@ -81,6 +81,7 @@ def parser(command: str) -> Flags:
             None,
             "number of births; each run, finished or not, becomes equal to one "
             "begun with it (default: as begun)",
+            most=10**9,
         )
     else:
         _add_experiments(flags)

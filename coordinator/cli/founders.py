@@ -2,18 +2,20 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from hashlib import sha256
 from itertools import islice
 from pathlib import Path
 
 import pyarrow.compute as pc
+from msgspec import json
 from msgspec.structs import replace
 
 from coordinator.evolution.encodings import IslandEncoding, encoding_of, outside_limits
-from coordinator.evolution.founders import digest_of_genome
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage, check_most
 from schema.experiment.brains import types_of
 from schema.experiment.check import naming
 from schema.experiment.document import (
+    UNNAMED,
     Experiment,
     FounderGenome,
     Founders,
@@ -25,6 +27,7 @@ from schema.formats.files import read_robot
 from schema.formats.yaml_reader import OTHER_TYPES
 from schema.limits import MOST_FOUNDER_BYTES
 from schema.parts import BodySpace
+from schema.plugins.source import digest_in_use, modules_named
 from schema.robot.ids import BirthId
 from schema.robot.results import Report
 from schema.robot.robot import Robot
@@ -94,7 +97,7 @@ def _named(
             why = str(error)
         if why:
             raise ExperimentError(f"founders: {where}: {why}")
-        digest = digest_of_genome(founder.genome)
+        digest = sha256(founder.genome).hexdigest()
         kept.setdefault(digest, founder)
         born = {"island": birth.island, "birth": birth.number} if birth else {}
         genomes.append(FounderGenome(digest=digest, **born))
@@ -104,23 +107,32 @@ def _named(
 def _of_files(
     given: Founders, experiment: Experiment, encoding: IslandEncoding
 ) -> Read:
-    for file in given.files:
+    for number, file in enumerate(given.files):
+        name = "" if file.endswith(UNNAMED) else file
+        where = name or f"robot {number}"
         try:
             robot = read_robot(Path(file), *types_of(experiment))
             genome = encoding.to_bytes(encoding.from_robot(robot))
         except (InvalidRobot, MalformedMessage) as error:
             why = str(error).removeprefix(f"{file}: ").replace(OTHER_TYPES, "")
-            raise ExperimentError(f"founders: {file}: {why}") from error
-        yield file, None, KeptFounder(genome, file=file), lambda _: ""
+            raise ExperimentError(f"founders: {where}: {why}") from error
+        yield where, None, KeptFounder(genome, file=name), lambda _: ""
 
 
 def _of_run(given: Founders, experiment: Experiment, encoding: IslandEncoding) -> Read:
     folder = Path(given.run or "")
-    theirs = experiment_from_text(read_description(folder).document)
+    known = read_description(folder)
+    theirs = experiment_from_text(known.document)
     if theirs.encoding != experiment.encoding:
         other = f"{theirs.encoding.type!r}, {theirs.encoding.parameters}"
         what = "another encoding than the experiment, or other parameters of it"
         raise ExperimentError(f"founders.run: {folder}: has {what}: {other}")
+    for name in modules_named(json.encode(experiment.space.part_types)):
+        note = known.plugins.get(name)
+        if note is not None and note.digest != digest_in_use(name):
+            what = f"has part types of plug-in {name} with another source"
+            how = "restore it, or give robot files of the run as founders.files"
+            raise ExperimentError(f"founders.run: {folder}: {what}: {how}")
     run_id = str(run_columns(folder)["run_id"])
     paths = zip(encoding.types, experiment.space.part_types, strict=True)
     others = {kind: p for kind, p in paths if p not in theirs.space.part_types}

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
+from itertools import chain
 from pathlib import Path
 from typing import IO
 
@@ -23,7 +24,6 @@ from coordinator.storage.campaign import (
     checked_experiments,
     is_campaign,
     read_campaign,
-    read_drafts,
 )
 from coordinator.storage.folder import holds_run, read_details
 from schema.agent.import_path import environment, python_command
@@ -57,7 +57,8 @@ LIMIT_S = 30.0
 HERE = "--here"
 """Flag of ``revolve check`` in the process that does the checks, with their limit."""
 BIRTHS = "--births"
-"""Flag of the same process: births in place of those of the experiments."""
+FROM = "--from"
+"""Flags of the same process, as of ``revolve run``."""
 # What ``faulthandler`` writes for each thread when time is up; the main one is last.
 _LATE = re.compile(r'^Thread .* first\):\n *File "([^"]*)", line (\d+)', re.MULTILINE)
 
@@ -65,7 +66,9 @@ _PLACE = re.compile(r"\.py:\d")
 
 
 def refuse_faulty(
-    drafts: Iterable[tuple[str, Draft]], births: int | None = None
+    drafts: Iterable[tuple[str, Draft]],
+    births: int | None = None,
+    run: str | None = None,
 ) -> None:
     """Check the plug-ins of experiments before a run, in a process of their own.
 
@@ -76,7 +79,9 @@ def refuse_faulty(
     """
     own = [word for word, draft in drafts if any(map(is_own, draft.references))]
     if own:
-        _refuse(own if births is None else [*own, BIRTHS, str(births)])
+        flags = ((BIRTHS, births), (FROM, run))
+        given = [(flag, str(value)) for flag, value in flags if value is not None]
+        _refuse([*own, *chain(*given)])
 
 
 def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
@@ -195,12 +200,14 @@ def check_here(
     output: IO[str],
     limit_s: float,
     *,
-    births: int | None = None,
+    read: Callable[[str], Draft] = read_draft,
+    read_founders: Callable[[Sequence[Experiment]], object] = lambda _: None,
 ) -> bool:
     """Check plug-ins in this process; return whether all are in order.
 
     The words are as of ``revolve check``; their kind is detected unless it is named.
-    The output gets the steps as lines of JSON.
+    The output gets the steps as lines of JSON. Documents are read by ``read``, and
+    their given founders by ``read_founders``.
     """
     is_fine = True
 
@@ -214,13 +221,15 @@ def check_here(
             try:
                 say("begin", word)
                 with _time_limit(limit_s):
-                    own = _uses(word, kinds, kind, births)
+                    own = _uses(word, kinds, kind, read)
                 for use in own:
                     with _time_limit(limit_s), _placing(word, use):
                         _check_plugin(use, say)
                 if ":" not in word and not _is_folder(Path(word)):
-                    for warning in _check_document(word, kinds, births, limit_s):
+                    experiments = checked_experiments([(word, read(word))])
+                    for warning in _check_document(word, experiments, kinds, limit_s):
                         say("warn", f"{word}: warning: {warning}")
+                    read_founders(experiments)
                 if not own:
                     say("fine", f"{word}: in order, no plug-ins of its own")
             except RevolveError as error:
@@ -240,10 +249,13 @@ def _check_plugin(use: Use, say: Callable[[str, str], None]) -> None:
 
 
 def _check_document(
-    source: str, kinds: Sequence[Kind], births: int | None, limit_s: float
+    source: str,
+    experiments: Iterable[Experiment],
+    kinds: Sequence[Kind],
+    limit_s: float,
 ) -> Iterator[str]:
     """Raise what a run would refuse besides own plug-ins; yield warnings."""
-    for experiment in checked_experiments(read_drafts((source,), births)):
+    for experiment in experiments:
         with _time_limit(limit_s), naming(source):
             check_built_in(experiment, kinds)
             for own in island_experiments(experiment):
@@ -294,7 +306,7 @@ def _time_limit(limit_s: float) -> Iterator[None]:
 
 
 def _uses(
-    word: str, kinds: Sequence[Kind], kind: str | None, births: int | None
+    word: str, kinds: Sequence[Kind], kind: str | None, read: Callable[[str], Draft]
 ) -> list[Use]:
     """Return the own plug-ins that a word of the command line means."""
     place, colon, attribute = word.rpartition(":")
@@ -303,9 +315,7 @@ def _uses(
     if not colon:
         folder = Path(word)
         experiments = (
-            _experiments_of(folder)
-            if _is_folder(folder)
-            else read_draft(word, births).allowed()
+            _experiments_of(folder) if _is_folder(folder) else read(word).allowed()
         )
         named = [use for each in experiments for use in uses(each, kinds)]
         return [use for use in dict.fromkeys(named) if is_own(use.path)]

@@ -3,14 +3,17 @@
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from importlib.metadata import entry_points
 from pkgutil import iter_modules
 from typing import NamedTuple
 
-from coordinator.plugins.checks import BIRTHS, HERE, check_apart, check_here
+from coordinator.plugins.checks import BIRTHS, FROM, HERE, check_apart, check_here
 from schema.agent.flags import Flags, add_plugins, positive_number
 from schema.errors import RevolveError, one_line
+from schema.experiment.document import Experiment
+from schema.experiment.file import read_draft
 from schema.experiment.kinds import Kind, offered
 from schema.plugins.load import load_module, place_of
 from schema.plugins.origin import where_named
@@ -36,8 +39,15 @@ class Listed(NamedTuple):
     digest: str
 
 
-def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
-    """Run ``revolve check``; return 0 if all plug-ins are in order, else 1."""
+def check(
+    arguments: list[str],
+    kinds: Sequence[Kind],
+    read_founders: Callable[[Sequence[Experiment]], object],
+) -> int:
+    """Run ``revolve check``; return 0 if all plug-ins are in order, else 1.
+
+    ``read_founders`` reads those that experiments are given, and raises.
+    """
     options = check_flags(kinds).parse_args(arguments)
     allow(options.plugins)
     if options.here:
@@ -47,7 +57,8 @@ def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
             options.kind,
             sys.stdout,
             options.here,
-            births=options.births,
+            read=partial(read_draft, births=options.births, run=options.founders),
+            read_founders=read_founders,
         )
         return 0 if is_fine else 1
     words = [*options.plugin, *(("--kind", options.kind) if options.kind else ())]
@@ -119,6 +130,7 @@ def check_flags(kinds: Sequence[Kind]) -> Flags:
     )
     flags.add_argument(HERE, type=positive_number, help=argparse.SUPPRESS)
     flags.add_argument(BIRTHS, type=int, help=argparse.SUPPRESS)
+    flags.add_argument(FROM, dest="founders", help=argparse.SUPPRESS)
     add_plugins(flags)
     return flags
 

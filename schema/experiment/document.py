@@ -211,6 +211,8 @@ SURVIVORS = ("best", "random")
 """Names of the built-in rules of selection."""
 FOUNDERS = ("last", "best")
 """Names of the populations of another run that may be founders."""
+UNNAMED = ".founder.pb"
+"""Ending of temporary files of given robots, whose paths say nothing."""
 
 
 class SelectionSection(PluginSection, frozen=True):

@@ -57,8 +57,10 @@ def allow(entries: Iterable[str]) -> None:
         if is_copy and _may_be_plugin(name):
             copy = Path(place).resolve()
             other = _copies.get(_top(name), copy)
-            if other != copy or not copy.exists():
-                why = f"{other} is in use" if other != copy else "no such file"
+            why = "" if other == copy else f"{other} is in use"
+            if not (copy.is_dir() or (copy.suffix == ".py" and copy.is_file())):
+                why = "no such .py file or folder"
+            if why:
                 raise UnknownPlugin(f"{FLAG}: {entry}: {why}")
             use_copy(_top(name), copy)
             _allowed.setdefault(name, None)

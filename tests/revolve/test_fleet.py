@@ -112,7 +112,15 @@ def test_failed_evaluation_has_its_trace(fleet: rv.Fleet) -> None:
             {"trials": [0, -1]},
             "trial: must be a whole number from 0 to 1000000, got -1",
         ),
+        (
+            {"trials": [10**7]},
+            "trial: must be a whole number from 0 to 1000000, got 10000000",
+        ),
+        ({"trials": [1.0]}, "trial: must be a whole number from 0 to 1000000, got 1.0"),
+        ({"trials": "12"}, "trial: must be a whole number from 0 to 1000000, got '1'"),
         ({"record": ["outputz"]}, "record: 'outputz' is not a channel; did you mean"),
+        ({"record": "outputs"}, "record: must be a list of names, got 'outputs'"),
+        ({"record": [None]}, "record: None is not a channel; channels: "),
     ],
 )
 def test_mistakes_of_trials_and_channels(

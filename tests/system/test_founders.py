@@ -1,16 +1,21 @@
 """Runs that start from robots of other runs and of files."""
 
+import json
 import shutil
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 import revolve as rv
 from coordinator.run.history import arena_history
 from coordinator.storage.compare import compare
 from revolve.command import main
+from schema.experiment.document import UNNAMED
+from schema.plugins.kept import KeptPlugin
+from schema.tables.description import description_text, read_description
 from schema.tables.files import read_table
 from tests.system.documents import MIXED
 from tests.system.fleet import kill_beyond, size
@@ -120,8 +125,9 @@ def test_robots_and_their_files_give_the_births_of_their_run(
     assert runs[0].select(columns).equals(runs[1].select(columns))
     assert runs[2].drop_columns("run_id").equals(runs[3].drop_columns("run_id"))
     assert set(runs[2]["origin_run"].to_pylist()) == {source.run_id, None}
-    names = [str(name)[-6:] for name in runs[1]["origin_file"].to_pylist()[1:4:2]]
-    assert names == ["1.yaml", "3.yaml"]
+    names = [name and name[-6:] for name in runs[1]["origin_file"].to_pylist()[:4]]
+    assert names == [None, "1.yaml", None, "3.yaml"]
+    assert runs[0]["origin_file"].null_count == 12
     with pytest.raises(rv.ExperimentError, match=r"name it with founders\.run"):
         rv.run(rv.Run("out-0").experiment, seed=2)
 
@@ -155,6 +161,12 @@ MISTAKES = [
     (f"run = 'source'{OWN_PARTS}", "FixedBrick is founder_parts:BRICK here, another"),
     ("run = 'source'\n[vetting]\nmode = 'contact'\ntolerance_m = 9.0", "intersect"),
     (f"genomes = [{{digest = '{'0' * 64}'}}]", "name it with founders.run"),
+    (f"run = 'edited'{OWN_PARTS}", "has part types of plug-in founder_parts with anot"),
+    # As Python gives robots.
+    (
+        f"files = ['0{UNNAMED}']\n[space]\nmax_parts = 3",
+        "short: founders: robot 0: the",
+    ),
 ]
 
 
@@ -163,6 +175,12 @@ def careless(undisturbed: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     """Return a folder with a run, for documents that are refused."""
     folder = tmp_path_factory.mktemp("careless")
     shutil.copytree(undisturbed, folder / "source")
+    shutil.copytree(undisturbed, folder / "edited")
+    known = read_description(undisturbed)
+    edited = replace(known, plugins={"founder_parts": KeptPlugin("0" * 12)})
+    (folder / "edited" / "run.json").write_text(description_text(edited))
+    rv.Run(undisturbed).best()[0].write(folder / "0.pb")
+    (folder / "0.pb").rename(folder / f"0{UNNAMED}")
     (folder / "founder_parts.py").write_text(OWN_PART)
     return folder
 
@@ -184,6 +202,37 @@ def test_each_mistake_gives_one_line(
     (line,) = said.err.splitlines()
     assert message in line
     assert sorted(Path().rglob("*")) == before
+    assert main(["check", "short.toml", "--here", "900"]) == 1
+    faults = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    assert faults[-1] == ["fault", line.partition("revolve: ")[2]]
+
+
+def test_a_document_with_plug_ins_may_leave_the_run_to_the_flag(
+    careless: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(careless)
+    own = '[fitness]\nfunction = "founder_fitness:judge"\n[founders]\nrepeat = true\n'
+    Path("flag.toml").write_text(SHORT.replace("births = 12", "births = 6") + own)
+    Path("founder_fitness.py").write_text("def judge(trace, _):\n    return 1.0\n")
+    words = ("--from", "source", "--in-process", "--quiet", "--out", "flag")
+    assert main(["run", "flag.toml", *words]) == 0
+    origins = rv.Run("flag").births["origin_birth"]
+    assert (len(origins), origins.null_count) == (6, 0)
+
+
+@pytest.mark.parametrize(
+    ("founders", "line"),
+    [
+        (5, "founders: must be a list, or another iterable with an order, got 5"),
+        ({"a.yaml"}, "founders: must be a list, or another iterable with an order"),
+        ([5], "robot must be a Robot, got 5"),
+        (["a.yaml", None], "robot must be a Robot, got None"),
+    ],
+)
+def test_what_python_cannot_give_as_founders(founders: object, line: str) -> None:
+    with pytest.raises(rv.RevolveError) as caught:
+        rv.run("scenario1", founders=founders, out="never")  # type: ignore[arg-type]
+    assert str(caught.value).startswith(line)
 
 
 def test_a_changed_founder_is_refused(workspace: Workspace, folder: Path) -> None:

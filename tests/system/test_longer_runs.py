@@ -1,13 +1,17 @@
 """Runs that get more births: equal to those that were begun with as many."""
 
+import shutil
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from coordinator.run.history import arena_history
 from coordinator.run.lengthening import lengthen
 from coordinator.storage.compare import compare
-from schema.tables.description import read_description
+from coordinator.storage.lock import FolderLock
+from revolve.command import main
+from schema.tables.description import description_text, read_description
 from tests.system.documents import (
     ARENAS,
     BRIDGE,
@@ -23,6 +27,8 @@ from tests.system.workspace import Workspace
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 ALONE = ("--in-process", "--quiet")
+OPENED = ("epoch", "lock")
+"""Files that each opening of a run changes."""
 HOLDS = (
     "a: already holds this run with 18 births; to resume it: "
     "revolve resume a --births 20; or choose another folder"
@@ -106,6 +112,54 @@ def test_campaign_and_its_runs_get_longer(workspace: Workspace) -> None:
     assert "keeps its own" not in told
 
 
+@pytest.fixture(scope="module")
+def careless(undisturbed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with runs that cannot get longer."""
+    folder = tmp_path_factory.mktemp("careless")
+    for name in ("sound", "older", "lost", "torn", "locked"):
+        shutil.copytree(undisturbed, folder / name)
+    older = replace(read_description(undisturbed), version="0.2.1")
+    (folder / "older" / "run.json").write_text(description_text(older))
+    (folder / "lost" / "journal.bin").unlink()
+    (folder / "torn" / "run.json").write_text("{")
+    (folder / "empty").mkdir()
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("older --births 900", "Revolve Islands 0.2 began this run, and this is"),
+        ("lost --births 900", "lost/journal.bin: is lost: put a sound copy"),
+        ("torn --births 900", "torn/run.json: damaged: "),
+        ("locked --births 900", "locked: in use by process "),
+        ("locked --births 0", "--births: must be a whole number"),
+        ("sound --births 9999999999", "number in 1..1000000000, got"),
+        ("locked --births", "--births: expected one argument"),
+        ("empty --births 900", "empty: no run is there (run.json is missing)"),
+        ("older/run.json --births 900", "must be a folder, got a file"),
+    ],
+)
+def test_each_mistake_is_one_line(
+    words: str,
+    line: str,
+    careless: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(careless)
+    files = [path for path in Path().rglob("*") if path.is_file()]
+    before = {path: path.read_bytes() for path in files if path.name not in OPENED}
+    with FolderLock(Path("locked")):
+        try:
+            code = main(["resume", *words.split(), *ALONE])
+        except SystemExit as stop:
+            code = int(str(stop.code))
+    (said,) = capfd.readouterr().err.splitlines()
+    assert (code, line in said) == (2, True), said
+    assert {path: path.read_bytes() for path in before} == before
+
+
 def test_mistakes_change_nothing(workspace: Workspace) -> None:
     run = begin(workspace, OFF_LINE, 18, "a")
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
@@ -120,7 +174,7 @@ def test_mistakes_change_nothing(workspace: Workspace) -> None:
         ((*again, "20", "--seed", "4"), "a: already holds a run with other settings;"),
     ):
         assert line in workspace.run(*words, code=2)
-    for name in ("epoch", "lock"):  # of every opening
+    for name in OPENED:
         del before[run / name]
     after = {path: path.read_bytes() for path in before}
     assert after == before

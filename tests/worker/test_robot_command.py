@@ -87,7 +87,9 @@ def test_trials_have_noise_of_their_own(simulated: Simulate) -> None:
     assert changed.startswith(second)
 
 
-@pytest.mark.parametrize("trial", ["-1", "1.5", "x", "1000001", ""])
+@pytest.mark.parametrize(
+    "trial", ["-1", "1.5", "x", "1000001", "", "1e3", "nan", "1,2", "0x1", "None"]
+)
 def test_other_trials_are_refused(
     simulated: Simulate, trial: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,11 +1,13 @@
 """Given founders on islands of all kinds, against runs of random founders."""
 
+from hashlib import sha256
+
 import pytest
 from msgspec.structs import replace
 
 from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.founders import digest_of_genome, founders_of
+from coordinator.evolution.founders import founders_of
 from schema.errors import ExperimentError
 from schema.experiment.document import (
     EncodingSection,
@@ -36,7 +38,7 @@ GENOMES = [
 ]
 """Genomes of another run."""
 NAMED = tuple(
-    FounderGenome(digest=digest_of_genome(genome), island=4, birth=number)
+    FounderGenome(digest=sha256(genome).hexdigest(), island=4, birth=number)
     for number, genome in enumerate(GENOMES)
 )
 KEPT = {
@@ -103,18 +105,16 @@ def test_a_given_founder_that_is_refused_is_not_replaced_by_a_random_one(
         run.live()
 
 
-def test_a_changed_or_missing_genome_is_refused() -> None:
-    changed = KEPT | {NAMED[1].digest: KeptFounder(GENOMES[0])}
-    missing = {NAMED[0].digest: KEPT[NAMED[0].digest]}
-    for kept in (changed, missing):
-        with pytest.raises(ExperimentError, match=f"{NAMED[1].digest[:12]} is missing"):
-            founders_of(given(PLAIN), kept)
+def test_a_missing_genome_is_refused() -> None:
+    kept = {NAMED[0].digest: KEPT[NAMED[0].digest]}
+    with pytest.raises(ExperimentError, match=f"{NAMED[1].digest[:12]} is missing"):
+        founders_of(given(PLAIN), kept)
 
 
 def test_genomes_of_other_encodings_are_given_as_they_are() -> None:
     patterns = replace(PLAIN, encoding=EncodingSection(type="cppn"))
     first = ArchipelagoRun(patterns, 8, 0).live().rows("births")[20]
-    digest = digest_of_genome(first["genome"])
+    digest = sha256(first["genome"]).hexdigest()
     founders = Founders(genomes=(FounderGenome(digest=digest, island=0, birth=20),))
     again = ArchipelagoRun(
         replace(patterns, founders=founders),

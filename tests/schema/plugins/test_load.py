@@ -222,6 +222,17 @@ def test_entry_that_is_no_plug_in_is_refused(entry: str, message: str) -> None:
         allow([entry])
 
 
+@pytest.mark.parametrize("ending", [".robot", ".zip", ""])
+def test_a_copy_that_is_no_source_is_refused(tmp_path: Path, ending: str) -> None:
+    file = tmp_path / f"copied{ending}"
+    file.write_bytes(b"PK")
+    with pytest.raises(
+        UnknownPlugin, match=r"^--plugins: copied_lab=.* no such \.py f"
+    ):
+        allow([f"copied_lab={file}"])
+    assert allowed() == ()
+
+
 def test_file_with_the_name_of_another_module_is_refused(tmp_path: Path) -> None:
     for name in ("pytest", "twice_there"):
         (tmp_path / f"{name}.py").write_text(FITNESS)
