@@ -166,7 +166,7 @@ def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     past = PastAdvance(changes, 200, bytes(32))
     rebuild = Rebuild(snapshot, (past,), (BIRTH,))
     kept = (200, bytes(32), rebuild)
-    advance = _request(AdvanceShard(0, 1, 400, changes, True, *kept), settings)
+    advance = _request(AdvanceShard(0, 1, 400, changes, True, False, *kept), settings)
     evaluation = _request(Evaluate(BIRTH, ROBOT, 1, 400, 0), evaluation_settings(rules))
     vetting = _request(Vet(BIRTH, 0, ROBOT), vetting_settings(rules))
     argument = Call(pack_value({"a": [1, 2.5, None, "é"]}))
