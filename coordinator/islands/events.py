@@ -71,6 +71,7 @@ class Evaluated(Message, frozen=True, tag=True):
         provenance: which worker did it.
         trial: number of the evaluation of this robot; 0 is the one at its birth.
         requester: island that requested it; None for the island of its birth.
+        point: of the request.
     """
 
     birth: BirthId
@@ -78,6 +79,7 @@ class Evaluated(Message, frozen=True, tag=True):
     provenance: Provenance
     trial: int = 0
     requester: int | None = None
+    point: int | None = None
     reason: ClassVar[str] = ""
     is_quarantined: ClassVar[bool] = False
 
@@ -89,7 +91,7 @@ class EvaluationFailed(Message, frozen=True, tag=True):
         birth: id of the robot.
         reason: the reason.
         provenance: which worker reported it.
-        trial, requester: as in ``Evaluated``.
+        trial, requester, point: as in ``Evaluated``.
     """
 
     birth: BirthId
@@ -97,6 +99,7 @@ class EvaluationFailed(Message, frozen=True, tag=True):
     provenance: Provenance
     trial: int = 0
     requester: int | None = None
+    point: int | None = None
     evaluation: ClassVar[None] = None
 
     @property

@@ -35,7 +35,11 @@ from coordinator.islands.events import (
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.learning import IslandLearning, NewbornLearning
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.reevaluation import Reevaluations, with_durations
+from coordinator.islands.reevaluation import (
+    Reevaluations,
+    with_durations,
+    with_points,
+)
 from coordinator.islands.rows import birth_record, evaluation_record, population_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
@@ -147,6 +151,9 @@ class Island:
                 continue.
         """
         commands = self._handlers[type(event)](event)
+        if self.experiment.changes:
+            learns = self._learning is not None
+            commands = with_points(commands, self.births, learns=learns)
         simulation = self.experiment.simulation
         if simulation.evaluation_s is None:
             return commands

@@ -1,4 +1,4 @@
-"""Re-evaluation of living robots, and evaluations of a random duration.
+"""Re-evaluation of living robots; durations of evaluations, and points of changes.
 
 Physics is deterministic: a re-evaluation differs only if its duration differs or the
 experiment has noise. The duration is drawn for each trial of each robot from its own
@@ -38,6 +38,25 @@ def with_durations(
         else:
             timed.append(each)
     return timed
+
+
+def with_points(
+    commands: Iterable[IslandCommand], births: int, *, learns: bool
+) -> list[IslandCommand]:
+    """Return commands with the points at which robots meet changing settings.
+
+    That of a newborn is its number, also in the trials in which it learns; that of a
+    re-evaluation are the births of the island so far.
+    """
+    pointed: list[IslandCommand] = []
+    for each in commands:
+        if isinstance(each, Evaluate):
+            is_newborn = each.requester is None and (learns or not each.trial)
+            point = each.birth.number if is_newborn else births
+            pointed.append(replace(each, point=point))
+        else:
+            pointed.append(each)
+    return pointed
 
 
 class Reevaluations:

@@ -163,6 +163,7 @@ def evaluation_record(outcome: Outcome, labels: Sequence[str] = ()) -> Record:
         "worker": outcome.provenance.agent,
         "platform": outcome.provenance.platform,
         "measures": found and named_measures(labels, found.measures),
+        "point": outcome.point,
     }
     return Record("evaluations", row)
 

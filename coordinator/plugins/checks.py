@@ -132,7 +132,7 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
         if own.arena is not None and not is_own(own.arena.rules):
             load_rules(own.arena)
         if not is_own(own.fitness.function):
-            check_fitness_keys(own.fitness)
+            check_fitness_keys(own)
         if own.learning is not None:
             IslandLearning(own, encoding_of(own))
         elif not is_own(own.encoding.type):
@@ -259,7 +259,7 @@ def _check_document(
         with _time_limit(limit_s), naming(source):
             check_built_in(experiment, kinds)
             for own in island_experiments(experiment):
-                check_fitness_keys(own.fitness)
+                check_fitness_keys(own)
             types = body_space(experiment.space)
         for kind in types.values():
             for name in kind.not_on:

@@ -255,12 +255,12 @@ def _event(end: Deliver) -> Answered:
         return VettingFailed(birth, request.attempt, why)
     wall_s = answer.wall_s if answer else 0.0
     provenance = Provenance(end.agent, end.platform, wall_s)
-    trial, requester = request.trial, request.requester
+    about = provenance, request.trial, request.requester, request.point
     if isinstance(result, Evaluation):
-        return Evaluated(birth, result, provenance, trial, requester)
+        return Evaluated(birth, result, *about)
     if reason:
         why = f"{QUARANTINED}{reason}"
     elif why.startswith(QUARANTINED):
         # Only the coordinator knows that: it counts the deaths.
         why = f"failed: {why}"
-    return EvaluationFailed(birth, why, provenance, trial, requester)
+    return EvaluationFailed(birth, why, *about)

@@ -5,6 +5,7 @@ from math import lcm
 from operator import attrgetter
 
 from schema.errors import ExperimentError, nearest, shown
+from schema.experiment.changes import change_problems
 from schema.experiment.document import (
     FOUNDERS,
     ArenaSection,
@@ -41,6 +42,7 @@ def island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _push_problems(experiment)
     yield from _light_problems(experiment)
     yield from range_problems(experiment.robust)
+    yield from change_problems(experiment)
     yield from _learning_problems(experiment)
     if (founders := experiment.founders) is not None:
         yield from _founders_problems(founders, experiment.selection.population)

@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field, structs, to_builtins
 
 from schema.errors import ExperimentError
+from schema.experiment.changes import SettingChange
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
@@ -507,6 +508,7 @@ class Islands(Section, frozen=True):
         robust: evaluation of these islands' robots under drawn disturbances.
         learning: lifetime learning of these islands' newborns.
         founders: given founders of each of these islands.
+        changes: of settings of these islands.
     """
 
     count: Annotated[int, Meta(ge=1, le=MOST_ISLANDS)] = 1
@@ -522,6 +524,7 @@ class Islands(Section, frozen=True):
     robust: Robust | None = None
     learning: Learning | None = None
     founders: Founders | None = None
+    changes: tuple[SettingChange, ...] | None = None
 
 
 class Experiment(Section, frozen=True, dict=True, cache_hash=True):
@@ -556,6 +559,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
         learning: lifetime learning; without it newborns are evaluated with the brain
             that they inherit.
         founders: given founders of each island; without them all are random.
+        changes: of settings, during the run.
     """
 
     name: str
@@ -579,6 +583,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
     sweep: Sweep | None = None
     learning: Learning | None = None
     founders: Founders | None = None
+    changes: tuple[SettingChange, ...] = ()
 
     @cached_property
     def window(self) -> int:

@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from schema.errors import cut
 from schema.experiment.section import (
+    Angle,
     Count,
     Extent,
     Length,
@@ -47,7 +48,8 @@ class Environment(Section, frozen=True, dict=True):
     that descends to the plane at its rim; beyond the rim is the plane.
 
     Attributes:
-        slope_deg: rise of the ground along x [degrees], below 45.
+        slope_deg: rise of the ground [degrees], below 45.
+        slope_direction_deg: direction uphill, from x towards y [degrees].
         roughness_m: height of the highest bump [m]; 0 is a plane.
         patch_m: distance between nodes of the height field [m].
         extent_m: half length of the height field along x and y [m], about the origin.
@@ -61,6 +63,7 @@ class Environment(Section, frozen=True, dict=True):
     """
 
     slope_deg: Annotated[float, Meta(ge=0, lt=45)] = 0.0
+    slope_direction_deg: Angle = 0.0
     roughness_m: Length = 0.0
     patch_m: Extent = 0.1
     extent_m: Extent = 5.0
@@ -82,10 +85,11 @@ class Environment(Section, frozen=True, dict=True):
 
     @cached_property
     def down(self) -> Vector:
-        """Unit vector of gravity in the ground's frame, x uphill."""
-        slope = radians(self.slope_deg)
+        """Unit vector of gravity in the ground's frame."""
+        slope, uphill = radians(self.slope_deg), radians(self.slope_direction_deg)
         # 0.0 minus: avoids -0.0, which would change sensor readings.
-        return 0.0 - sin(slope), 0.0, -cos(slope)
+        x, y = 0.0 - sin(slope) * cos(uphill), 0.0 - sin(slope) * sin(uphill)
+        return x, y, -cos(slope)
 
 
 FLAT = Environment()
@@ -94,9 +98,9 @@ FLAT = Environment()
 
 @lru_cache(maxsize=64)
 def gravity_vector(environment: Environment, gravity: float) -> Vector:
-    """Return the gravity vector in the ground's frame, x uphill [m/s2]."""
+    """Return the gravity vector in the ground's frame [m/s2]."""
     x, y, z = environment.down
-    return 0.0 + gravity * x, gravity * y, gravity * z
+    return 0.0 + gravity * x, 0.0 + gravity * y, gravity * z
 
 
 def scenery_problem(scenery: str) -> str:

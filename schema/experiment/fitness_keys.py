@@ -6,11 +6,13 @@ The text tells whose fitness is comparable.
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from itertools import pairwise
 from typing import Any
 
 from msgspec import to_builtins
 
 from schema.errors import ExperimentError
+from schema.experiment.changes import OF_FITNESS, between, with_value
 from schema.experiment.document import Experiment, Fitness, island_experiments
 from schema.experiment.settings import FITNESS, fitness_argument, fitness_function
 from schema.plugins.permission import ROOMS
@@ -21,12 +23,17 @@ _SHORT = {path: name for name, path in FITNESS.items()}
 _DEFAULTS: dict[str, Any] = to_builtins(Fitness())
 
 
-def check_fitness_keys(fitness: Fitness) -> None:
-    """Raise if a key that was changed has no effect; the function is called.
+def check_fitness_keys(experiment: Experiment) -> None:
+    """Raise if a key of one island has no effect, or a change is not allowed.
+
+    The function is called.
 
     Raises:
-        ExperimentError: such a key; errors of ``fitness_argument``.
+        ExperimentError: a key with another value than the default that has no effect;
+            errors of ``fitness_argument``, also for values of ``changes``.
     """
+    _check_changes(experiment)
+    fitness = experiment.fitness
     changed = [key for key in _KEYS if getattr(fitness, key) != _DEFAULTS[key]]
     if not changed:
         return
@@ -41,6 +48,22 @@ def check_fitness_keys(fitness: Fitness) -> None:
             why = f"has no effect on {name}, which does not read it"
             how = f"remove the key, or let the function use it (parameters.{key})"
             raise ExperimentError(f"fitness.{key}: {why}: {how}")
+
+
+def _check_changes(experiment: Experiment) -> None:
+    for number, change in enumerate(experiment.changes):
+        if not change.setting.startswith(OF_FITNESS):
+            continue
+        values = [*change.values]
+        if change.between == "linear":
+            # No whole number lies there, should the function want one.
+            values += [between(*pair, 0.41) for pair in pairwise(change.values)]
+        for value in values:
+            fitness = with_value(experiment, change.setting, value).fitness
+            try:
+                fitness_argument(fitness_function(fitness), fitness)
+            except ExperimentError as error:
+                raise type(error)(f"changes[{number}].values: {error}") from None
 
 
 class _Watched:

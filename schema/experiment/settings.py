@@ -8,6 +8,7 @@ import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError, check_most
+from schema.experiment.changes import SettingChange, change_problems, settings_at
 from schema.experiment.document import (
     NETWORK,
     ArenaWorld,
@@ -100,6 +101,7 @@ class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
     calibration: tuple[Calibration, ...] = ()
     ablation: Ablation | None = None
     record: tuple[str, ...] = ()
+    changes: tuple[SettingChange, ...] = ()
 
     @cached_property
     def light(self) -> Vector | None:
@@ -118,6 +120,7 @@ class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
     origin: Origin = Origin()
     measures: Measures = Measures()
     brain: BrainSection = NETWORK
+    changes: tuple[SettingChange, ...] = ()
 
     @cached_property
     def light(self) -> Vector | None:
@@ -130,11 +133,17 @@ def vetting_settings(experiment: Experiment) -> bytes:
     return msgspec.json.encode(_sections(experiment, VettingSettings))
 
 
-def evaluation_settings_of(experiment: Experiment) -> EvaluationSettings:
-    """Return the evaluation settings of an experiment.
+def evaluation_settings_of(
+    experiment: Experiment, point: float = 0.0
+) -> EvaluationSettings:
+    """Return the evaluation settings of an experiment at a point of its changes.
 
     A robot of an arena that is evaluated alone has the arena's light.
     """
+    return settings_at(_changing_settings(experiment), point)
+
+
+def _changing_settings(experiment: Experiment) -> EvaluationSettings:
     settings = _sections(experiment, EvaluationSettings)
     light = light_of(experiment.environment, experiment.arena)
     if light == settings.environment.light:
@@ -144,7 +153,7 @@ def evaluation_settings_of(experiment: Experiment) -> EvaluationSettings:
 
 def evaluation_settings(experiment: Experiment) -> bytes:
     """Return the JSON that every evaluation request of an experiment holds."""
-    return msgspec.json.encode(evaluation_settings_of(experiment))
+    return msgspec.json.encode(_changing_settings(experiment))
 
 
 def arena_settings_of(experiment: Experiment) -> ArenaSettings:
@@ -189,6 +198,8 @@ def _problems(settings: object) -> Iterator[str]:
     yield from ground_problems(getattr(settings, "environment", FLAT))
     if isinstance(settings, ArenaSettings):
         yield from arena_problems(settings)
+    if isinstance(settings, ArenaSettings | EvaluationSettings):
+        yield from change_problems(settings)
     if isinstance(settings, EvaluationSettings):
         clock = settings.simulation
         key, unit = "simulation.window_steps", "simulation.pose_steps"

@@ -4,7 +4,8 @@ There is one body per rigid segment, so a robot with k joints has k + 1 bodies. 
 neutral pose all body frames are parallel to the core's. The origin of the root body
 is the centre of the core; that of every other body is the anchor of its joint. The
 position of the free joint is therefore the position that the thesis tracks. The world
-frame lies in the ground: z is its normal, and x points uphill.
+frame lies in the ground: z is its normal, and
+``environment.slope_direction_deg`` points uphill.
 
 The spec of a robot has no ground and can be attached to any number of worlds, each
 time with another prefix. Names of its elements, where p is the index of the part:

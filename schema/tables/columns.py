@@ -301,6 +301,14 @@ EVALUATIONS = _table(
     *_OUTCOME,
     *_PROVENANCE,
     _MEASURES,
+    _column(
+        "point",
+        pa.int64(),
+        "births at which the settings in [[changes]] had the values of the evaluation; "
+        "null without changes",
+        is_repeatable=False,
+        is_nullable=True,
+    ),
 )
 LEARNING = _table(
     "learning",

@@ -57,6 +57,7 @@ class Evaluate(Message, frozen=True, tag="evaluate"):
         steps: physics steps to simulate; 0 for the duration of the experiment.
         requester: island that requests it; None for the island of its birth.
         is_traced: the answer has the trace, too.
+        point: births at which changing settings have their values; None without any.
     """
 
     birth: BirthId
@@ -65,6 +66,7 @@ class Evaluate(Message, frozen=True, tag="evaluate"):
     steps: Count = 0
     requester: IslandNumber | None = None
     is_traced: bool = False
+    point: Count | None = None
 
 
 class Call(Message, frozen=True, tag="call"):

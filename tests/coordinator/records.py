@@ -66,6 +66,7 @@ def evaluation_row(number: int, worker: str, platform: str) -> dict[str, Any]:
         "worker": worker,
         "platform": platform,
         "measures": None if is_failed else [("height", value), ("turning", 0.5)],
+        "point": None,
     }
 
 

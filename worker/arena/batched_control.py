@@ -34,12 +34,17 @@ class BatchedControllers:
     """
 
     def __init__(self, settings: ArenaSettings, controls: Controls) -> None:
-        simulation = settings.simulation
-        self._settings, self._controls = settings, controls
-        self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
-        self._tick_steps = simulation.brain_steps
+        self._controls = controls
+        self._tick_steps = settings.simulation.brain_steps
         self.broken: dict[int, str] = {}
-        self.gather(())
+        self.change(settings, ())
+
+    def change(self, settings: ArenaSettings, robots: Sequence[ArenaRobot]) -> None:
+        """Give the sensors and motors of all robots the noise of settings."""
+        simulation = settings.simulation
+        self._settings = settings
+        self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
+        self.gather(robots)
 
     def gather(self, robots: Sequence[ArenaRobot]) -> None:
         """Rebuild the bank; each robot's states are moved to its row."""
@@ -104,7 +109,7 @@ def look(
     if not looking:
         return []
     population.kinematics()
-    settings = population.model_cache.settings
+    settings = population.model_cache.present
     places = np.array([robot.view.qpos[:3] for robot in population.robots])
     rows = population.robot_rows.rows
     failed = []

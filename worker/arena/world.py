@@ -1,10 +1,11 @@
 """An arena: robots that are born, live together, are evaluated and die.
 
 Everything that happens at a step happens on arrival there, in this order: diverged
-robots are removed; controllers tick; positions are sampled; contacts are counted;
-clusters of robots that may touch soon are merged. Then the physics continues, without
-interruption, to the next such moment. A state between two advances is therefore
-complete, and the way of an arena does not depend on the number of advances.
+robots are removed; controllers tick; settings change; positions are sampled; contacts
+are counted; clusters of robots that may touch soon are merged. Then the physics
+continues, without interruption, to the next such moment. A state between two advances
+is therefore complete, and the way of an arena does not depend on the number of
+advances.
 """
 
 import itertools
@@ -13,6 +14,7 @@ from functools import partial
 from typing import Self
 
 from schema.errors import SimulationDiverged, UnexpectedEvent
+from schema.experiment.changes import settings_at
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.wire.arena import (
@@ -57,7 +59,7 @@ class World:
         clock = settings.simulation
         self.step = 0
         self.population = ArenaPopulation(settings)
-        self._settings = settings
+        self._settings = self._present = settings
         self._schedule = Schedule(settings)
         self._pool = ThreadTeam(threads)
         controls = self.population.model_cache.controls
@@ -68,6 +70,7 @@ class World:
         self._samples = Samples(settings, self.population)
         self._work = MotorWork(settings)
         self._measures_work = False
+        self._change()
 
     def close(self) -> None:
         """Stop the threads; the world cannot be advanced any more."""
@@ -152,6 +155,7 @@ class World:
         world = cls(settings, threads)
         world.step, world._casualties = read_snapshot(settings, data, world.population)
         world._controllers.gather(world.population.robots)
+        world._change()
         return world
 
     # --- time -------------------------------------------------------------------
@@ -193,6 +197,8 @@ class World:
             self._work.add(self.population.layout, rollout.state)
         if is_tick:
             self._tick()
+            if self._settings.changes:
+                self._change()
         if is_sample:
             self._samples.add(step, rollout.state)
             self._poses.add(step, self.population.layout, rollout.state)
@@ -200,6 +206,17 @@ class World:
             if self._contacts is not None:
                 self._contacts.count(self.population.clusters, rollout.moment)
             self.population.merge()
+
+    def _change(self) -> None:
+        """Give the world the settings of the last tick."""
+        clock = self._settings.simulation
+        tick = self.step - self.step % clock.brain_steps
+        # Rounded: 60600 steps of 0.005 s are 303 s.
+        settings = settings_at(self._settings, round(tick * clock.timestep_s, 9))
+        if settings is not self._present:
+            self._present = settings
+            self.population.change(settings)
+            self._controllers.change(settings, self.population.robots)
 
     def _tick(self) -> None:
         """Read sensors, update brains and command motors.
@@ -267,7 +284,7 @@ class World:
         self._remove([Casualty(r.birth, self.step, why, r.place) for r, why in broken])
 
     def _report(self) -> Advance:
-        found = [r.judgement(self.step, self._settings) for r in self.population.robots]
+        found = [r.judgement(self.step, self._present) for r in self.population.robots]
         self._remove([each for each in found if isinstance(each, Casualty)])
         casualties, self._casualties = tuple(self._casualties), []
         return Advance(

@@ -12,6 +12,8 @@ import mujoco
 import numpy as np
 
 from schema.errors import one_line
+from schema.experiment.environment import gravity_vector
+from schema.experiment.scenery import scenery_model
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -205,6 +207,19 @@ class Cluster:
         # Plain numbers, as contacts are few and most of them with the ground.
         pairs = {(owners[first], owners[second]) for first, second in self._contacts()}
         return sorted({(min(p), max(p)) for p in pairs if p[0] != p[1] and min(p) >= 0})
+
+    def change(self, settings: ArenaSettings) -> None:
+        """Give the model the gravity, friction and torques of settings."""
+        model, clock, world = self.model, settings.simulation, settings.environment
+        model.opt.gravity = gravity_vector(world, clock.gravity)
+        model.geom_friction[:, 0] = clock.friction
+        if world.scenery:
+            # Its geoms may have a friction of their own.
+            own = scenery_model(world.scenery, clock).geom_friction
+            first = int(model.geom("scenery/0").id)
+            model.geom_friction[first : first + len(own)] = own
+        for view in self.views:
+            view.servos.limit(clock.torque_factor)
 
     def reset(self) -> None:
         """Reset the state to the model's initial one."""

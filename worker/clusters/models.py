@@ -82,7 +82,12 @@ class Body:
 
 
 class ModelCache:
-    """Compiles the models of one arena and caches shared clusters."""
+    """Compiles the models of one arena and caches shared clusters.
+
+    Attributes:
+        settings: of the arena.
+        present: the settings at the present step, if some of them change.
+    """
 
     def __init__(self, settings: ArenaSettings) -> None:
         """Initialise an empty cache.
@@ -91,7 +96,7 @@ class ModelCache:
             ExperimentError: scenery that is invalid, or has objects that move.
         """
         refuse_objects(settings.environment, settings.simulation)
-        self.settings = settings
+        self.settings = self.present = settings
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
         self.controls = controls_of(settings)
         self._types = body_space(settings.space)
@@ -114,7 +119,9 @@ class ModelCache:
             furnish=self._furnish,
         ).compile()
         solo = Cluster((birth,), {"": robot}, model, self.settings)
-        channels = Channels(solo.views[0], self.settings)
+        if self.settings.changes:
+            solo.change(self.present)
+        channels = Channels(solo.views[0], self.present)
         return Body(robot, bounding_spheres(model), solo, channels)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
@@ -143,6 +150,9 @@ class ModelCache:
             self._clusters[births] = found
             if len(self._clusters) > CACHE_SIZE:
                 self._clusters.popitem(last=False)
+        if self.settings.changes:
+            # It may be older than the last change.
+            found.change(self.present)
         found.reset()
         return found
 

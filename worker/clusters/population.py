@@ -89,6 +89,14 @@ class ArenaPopulation:
             self.model_cache.forget(birth)
         self._settle(kept)
 
+    def change(self, settings: ArenaSettings) -> None:
+        """Give the world of all robots, also of later ones, other settings."""
+        self.model_cache.present = settings
+        for cluster in self.clusters:
+            cluster.change(settings)
+        for robot in self.robots:
+            robot.body.channels.light = settings.light
+
     def begin(self, plan: Sequence[int], is_merge: Sequence[bool]) -> Rollout:
         """Start to handle an interval that all clusters have been stepped through."""
         self.rollout = Rollout(tuple(plan), tuple(is_merge))

@@ -62,8 +62,8 @@ class Sensors:
         qpos, qvel = placed.joints.start, placed.dofs.start
         self._orientation = _cells(data.qpos[qpos + 3 : qpos + 7])
         self._motion = _cells(data.qvel[qvel : qvel + 6])
-        gx, gy, gz = model.opt.gravity.tolist()
-        self._gravity = (gx, gy, gz)
+        # A view of the model's, which may change.
+        self._gravity = _cells(model.opt.gravity)
         place, own = 0, []
         for index, part in enumerate(placed.robot.parts):
             for sensor in placed.space[part.kind].sensors:
@@ -160,7 +160,7 @@ class Sensors:
         w, x, y, z = self._orientation.tolist()
         vx, vy, vz, gx, gy, gz = self._motion.tolist()
         ux, uy, uz = self.velocities[0]
-        fx, fy, fz = self._gravity
+        fx, fy, fz = self._gravity.tolist()
         self.velocities[0] = (vx, vy, vz)
         ax = (vx - ux) / interval_s - fx
         ay = (vy - uy) / interval_s - fy
@@ -206,6 +206,8 @@ class Servos:
     def __init__(self, placed: PlacedRobot) -> None:
         model, data = placed.model, placed.data
         self.motors: list[tuple[int, float, float, float, float]] = []
+        self._limits = model.actuator_forcerange
+        torques: list[float] = []
         found: list[int] = []
         for index, part in enumerate(placed.robot.parts):
             motor = placed.space[part.kind].motor
@@ -213,6 +215,7 @@ class Servos:
                 continue
             name = f"{placed.prefix}joint{index}"
             found.append(model.actuator(name).id)
+            torques.append(motor.max_torque)
             joint = model.joint(name).id
             low, high = model.jnt_range[joint].tolist()
             address = int(model.jnt_qposadr[joint])
@@ -224,6 +227,7 @@ class Servos:
         self._model, self._first_dof = model, placed.dofs.start
         first = found[0] if found else 0
         self.actuators = slice(first, first + len(found))
+        self._torques = np.array(torques)
         assert found == list(range(first, first + len(found)))
         # Memory views are faster than arrays, number by number.
         self._angles = data.qpos.data
@@ -240,6 +244,11 @@ class Servos:
         dofs = model.jnt_dofadr[model.actuator_trnid[own, 0]].astype(np.int64)
         dofs -= self._first_dof
         return dofs, model.actuator_gainprm[own, 0], model.actuator_forcerange[own, 1]
+
+    def limit(self, factor: float) -> None:
+        """Set the greatest torques of the motors, by the factor of ``simulation``."""
+        most = self._torques * factor
+        self._limits[self.actuators] = np.column_stack((-most, most))
 
     def drive(self, outputs: Floats) -> None:
         """Command each joint towards its target, until the next tick.

@@ -41,6 +41,7 @@ class Channels:
     Attributes:
         names: of the recorded channels, in the order of ``RECORDED``.
         width: numbers of a row.
+        light: position of the light in traces [m]; None is no light.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class Channels:
         for name in self.names:
             self._spans[name] = slice(self.width, self.width + sizes[name])
             self.width += sizes[name]
-        self._constants = placed.constants(settings)
+        self._constants, self.light = placed.constants(settings), settings.light
         if "part_position" in wanted:
             shapes = shapes_of(robot, placed.space)
             self._constants["part_position"] = place_parts(robot, shapes)[1]
@@ -113,7 +114,7 @@ class Channels:
         self, robot: Robot, interval_s: float, positions: Floats, rows: Iterable[Floats]
     ) -> Trace:
         """Return the trace of some samples."""
-        constants = self._constants | {"robot": robot}
+        constants = self._constants | {"robot": robot, "light": self.light}
         if not self.names:
             return Trace(interval_s, positions, constants)
         table = np.array(list(rows)).reshape(len(positions), self.width)
@@ -151,7 +152,8 @@ class Probe:
         self._forces: Floats = data.actuator_force[motors]
         self._before: Floats = data.actuator_velocity[motors]
         self._slopes: Floats = model.actuator_biasprm[motors, 2].copy()
-        self._limits: Floats = model.actuator_forcerange[motors, 1].copy()
+        # No copy: torques may change.
+        self._limits: Floats = model.actuator_forcerange[motors, 1]
         prefix = placed.prefix
         self._part_of = {
             geom: int(model.geom(geom).name.removeprefix(prefix).partition("/")[0])

@@ -8,6 +8,7 @@ from schema.errors import (
     SensorFailed,
     SimulationDiverged,
 )
+from schema.experiment.changes import settings_at
 from schema.experiment.document import body_space
 from schema.experiment.identity import Identity
 from schema.experiment.settings import lasting
@@ -59,7 +60,7 @@ def answer_evaluation(
             contract, or a sensor that has no stimulus in the environment.
         InvalidRobot: a robot that breaks the rules of its body space.
     """
-    settings = checked_evaluation(request.settings)
+    settings = settings_at(checked_evaluation(request.settings), work.point or 0)
     robot = work.robot
     check_tree(robot.parts)
     check_brain(robot.brain, len(robot.parts))

@@ -74,7 +74,7 @@ def test_every_column_has_a_description_and_a_unit(name: str) -> None:
     ("name", "others"),
     [
         ("births", {"robot", "origin_run", "origin_file", "run_id"}),
-        ("evaluations", {"wall_s", "worker", "platform", "run_id"}),
+        ("evaluations", {"wall_s", "worker", "platform", "point", "run_id"}),
         ("population", {"run_id"}),
         ("fitness", {"run_id"}),
         ("poses", {"run_id"}),
