@@ -2,13 +2,17 @@
 
 import json
 from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 from typing import Any, Self
 
 import msgspec
 
+from schema.errors import ExperimentError
 from schema.experiment.bounded import parse_toml
+from schema.experiment.changes import settings_at
 from schema.experiment.document import Experiment as Document
+from schema.experiment.document import island_experiment
 from schema.experiment.file import read_experiment, source_text
 
 _GIVEN = "experiment"
@@ -79,6 +83,24 @@ class Experiment:
     ) -> Self:
         merged = _merged(tables, changes)
         return cls(read_experiment(merged, where), merged.get("islands", []))
+
+    def at(self, point: float, island: int = 0) -> Self:
+        """Return an island's settings with the values at a point of ``changes``.
+
+        Args:
+            point: number of births off-line, simulated time of an arena [s]; >= 0.
+            island: number of the island.
+
+        Raises:
+            ExperimentError: a point below 0, or no such island.
+        """
+        if not 0 <= point < inf:
+            raise ExperimentError(f"point: must be >= 0 and finite, got {point}")
+        try:
+            own = island_experiment(self._document, island)
+        except ValueError as error:
+            raise ExperimentError(str(error)) from None
+        return type(self)(settings_at(own, point))
 
     def _tables(self) -> dict[str, Any]:
         return {**self.settings, "islands": self._islands}

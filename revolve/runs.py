@@ -40,7 +40,7 @@ from schema.tables.last_populations import (
     last_populations,
 )
 from schema.tables.learnt import with_learnt
-from schema.wire.born import robot_of_birth
+from schema.wire.born import birth_point, robot_of_birth
 from schema.wire.protobuf import encode_robot
 from schema.wire.updates import individual, read_birth
 
@@ -170,7 +170,10 @@ class Run:
         return self._robots(rows, rows["island"].to_pylist())
 
     def _robots(self, births: pa.Table, homes: Sequence[int]) -> list[Robot]:
-        """Return the robots of some births, with the settings of one island each."""
+        """Return the robots of some births, with the settings of one island each.
+
+        Settings that change have the values of the birth.
+        """
         allow_plugins_of(self.folder)
         learning = read_table(self.folder, "learning", ["island", "birth", "robot"])
         rows = with_learnt(births, learning)
@@ -179,10 +182,18 @@ class Run:
             for island in set(homes)
         }
         own = {island: Experiment(each) for island, each in documents.items()}
+        # Only an arena's births have a time.
+        named = [name for name in rows.column_names if name in ("birth", "sim_time_s")]
+        points = map(birth_point, rows.select(named).to_pylist())
         columns = (rows[name].to_pylist() for name in ("genome", "robot"))
         return [
-            of_plain(robot_of_birth(genome, stored, documents[island]), own[island])
-            for island, genome, stored in zip(homes, *columns, strict=True)
+            of_plain(
+                robot_of_birth(genome, stored, documents[island]),
+                own[island].at(point) if documents[island].changes else own[island],
+            )
+            for island, genome, stored, point in zip(
+                homes, *columns, points, strict=True
+            )
         ]
 
     def best(self, count: int = 1) -> list[Robot]:

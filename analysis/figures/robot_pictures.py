@@ -21,7 +21,7 @@ from schema.experiment.settings import EvaluationSettings, evaluation_settings_o
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
-from schema.wire.born import robot_of_birth
+from schema.wire.born import birth_point, robot_of_birth
 
 FRAMES = 6
 EVERY_S = 0.5
@@ -96,7 +96,9 @@ def robot_picture(
         SimulationDiverged: the physics diverged.
     """
     ((row,), *_) = relatives.levels
-    settings = evaluation_settings_of(island_experiment(experiment, best.island))
+    (born,) = births.take([row]).to_pylist()
+    own_island = island_experiment(experiment, best.island)
+    settings = evaluation_settings_of(own_island, birth_point(born))
     paint = dict(zip(relatives.founders, FOUNDERS, strict=False))
 
     def colour(gene: int) -> Colour:

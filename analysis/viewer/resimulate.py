@@ -96,13 +96,13 @@ def _alone(
     run: LoadedRun, own: Experiment, birth: BirthId, simulators: Simulators
 ) -> Motion:
     """Return the motion of a robot alone on its island, in its fittest evaluation."""
-    settings = evaluation_settings_of(own)
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {birth.name}: no evaluation is recorded")
     fitness = [-math.inf if row["fitness"] is None else row["fitness"] for row in rows]
     number = fitness.index(max(fitness))
     recorded = rows[number]
+    settings = evaluation_settings_of(own, recorded["point"] or 0)
     if recorded["simulated_s"] is not None:
         clock = settings.simulation
         settings = lasting(settings, steps_of(recorded["simulated_s"], clock))

@@ -130,6 +130,10 @@ def _changes(one: Chosen) -> Iterator[ReevaluationJob]:
     """Yield the evaluations of a robot, without ``[robust]``."""
     settings = replace(one.settings, robust=None)
     yield ReevaluationJob(one, None, settings, one.robot)
+    for point, season in one.seasons.items():
+        columns = {"group": "changes", "change": f"changes at {point:g}"}
+        elsewhere = replace(season, robust=None)
+        yield ReevaluationJob(one, columns, elsewhere, one.robot)
     for change in all_changes(settings):
         columns = {"group": change.group, "change": change.name}
         yield ReevaluationJob(one, columns, change.settings, one.robot)

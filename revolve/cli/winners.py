@@ -14,6 +14,7 @@ from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot
 from revolve.runs import Run as OwnRun
 from schema.errors import RunFolderError
+from schema.experiment.changes import settings_at
 from schema.experiment.document import Experiment as Document
 from schema.experiment.document import island_experiment, light_of, steps_of
 from schema.experiment.identity import Identity, Origin
@@ -27,6 +28,7 @@ from schema.tables.description import check_folder
 from schema.tables.files import born_as
 from schema.tables.last_populations import best_ever, fittest_first
 from schema.tables.learnt import best_trials
+from schema.wire.born import birth_point
 from schema.wire.updates import individual
 
 
@@ -41,6 +43,7 @@ class Chosen(NamedTuple):
             of an evaluation alone.
         identity: of the recorded evaluation, which determines noise, pushes and
             disturbances; of a robot of an arena, of a first evaluation there.
+        seasons: those settings with the values at each point of the changes.
     """
 
     row: dict[str, Any]
@@ -48,6 +51,7 @@ class Chosen(NamedTuple):
     settings: EvaluationSettings
     robot: Robot
     identity: Identity
+    seasons: dict[float, EvaluationSettings] = {}  # noqa: RUF012 - never changed
 
 
 def chosen_robots(folders: Iterable[Path], most: int | None = None) -> list[Chosen]:
@@ -101,30 +105,51 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         }
         there = row["island"]
         origin = Origin(seed=run.seed, run=run.number, island=there)
-        trial, simulated_s = recorded.get((there, name), (0, None))
+        trial, simulated_s, point = recorded.get((there, name), (0, None, None))
         identity = Identity(origin, name, trial)
-        document = _alone(own.experiment, there)
+        changing = _alone(own.experiment, there)
+        if point is None:
+            (born,) = births.filter(born_as(name)).to_pylist()
+            point = birth_point(born)
+        document = settings_at(changing, point)
         settings = evaluation_settings_of(document)
         if simulated_s is not None:
             steps = steps_of(simulated_s, settings.simulation)
             settings = lasting(settings, steps)
-        chosen.append(Chosen(head, document, settings, robot, identity))
+        seasons = _seasons(changing, settings)
+        chosen.append(Chosen(head, document, settings, robot, identity, seasons))
     return chosen
+
+
+def _seasons(
+    changing: Document, settings: EvaluationSettings
+) -> dict[float, EvaluationSettings]:
+    """Return settings with the values at each point of one period of the changes."""
+    points = sorted({at for change in changing.changes for at in change.at})
+    seasons: dict[float, EvaluationSettings] = {}
+    for point in points:
+        there = evaluation_settings_of(changing, point)
+        simulation = structs.replace(
+            there.simulation, warmup_steps=settings.simulation.warmup_steps
+        )
+        seasons[point] = structs.replace(there, simulation=simulation)
+    return seasons
 
 
 def _recorded(
     tables: dict[str, pa.Table],
-) -> dict[tuple[int, BirthId], tuple[int, float | None]]:
-    """Return trial and time [s] of the last evaluation of each robot on each island.
+) -> dict[tuple[int, BirthId], tuple[int, float | None, float | None]]:
+    """Return trial, time [s] and point of each robot's last evaluation on each island.
 
     Of a robot that has learnt there it is the first of its best trials.
     """
     learnt = best_trials(tables["learning"])
-    recorded: dict[tuple[int, BirthId], tuple[int, float | None]] = {}
+    recorded: dict[tuple[int, BirthId], tuple[int, float | None, float | None]] = {}
     for row in tables["evaluations"].to_pylist():
         island, birth = row["island"], individual(row)
         own = learnt.get(birth, 0) if island == birth.island else 0
-        recorded[island, birth] = (row["trial"] or own, row["simulated_s"])
+        trial = row["trial"] or own
+        recorded[island, birth] = (trial, row["simulated_s"], row["point"])
     return recorded
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from schema.errors import ExperimentError
 from schema.experiment.brains import types_of
+from schema.experiment.changes import settings_at
 from schema.experiment.document import Experiment, island_experiment, island_experiments
 from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -14,7 +15,10 @@ from schema.formats.packed import packed_experiment
 from schema.robot.archive import PACKED
 from schema.robot.robot import Robot
 from schema.tables.description import DETAILS, allow_plugins_of, read_description
-from schema.tables.last_populations import best_of, last_populations
+from schema.tables.files import born_as, read_table
+from schema.tables.last_populations import Row, best_of, last_populations
+from schema.wire.born import birth_point
+from schema.wire.updates import individual
 
 
 def tell(line: str) -> None:
@@ -54,8 +58,8 @@ def experiment_of(
         return None
     where = f"with the settings of {folder} ({experiment.name})"
     number = island or 0
+    best = best_of(last_populations(folder)) if file.name == BEST else None
     if _differs(experiment):
-        best = best_of(last_populations(folder)) if file.name == BEST else None
         if island is None and best is not None:
             number = best["island"]
         where += f", island {number}"
@@ -63,8 +67,17 @@ def experiment_of(
             where += ", where it is the best of the last population" if best else ""
             where += "; --island names another"
     own = _of_island(experiment, number)
-    say(where)
-    return own
+    point = _birth_of(folder, best) if own.changes else 0.0
+    say(f"{where}; changing settings as at {point:g}" if own.changes else where)
+    return settings_at(own, point)
+
+
+def _birth_of(folder: Path, best: Row | None) -> float:
+    """Return the point at which the best robot of a run was born; 0 of another one."""
+    if best is None:
+        return 0.0
+    births = read_table(folder, "births", where=born_as(individual(best)))
+    return birth_point(births.to_pylist()[0])
 
 
 def read_with_settings(

@@ -1,4 +1,7 @@
-"""Robot of a row of the births table."""
+"""Robot of a row of the births table, and the point at which it was born."""
+
+from collections.abc import Mapping
+from typing import Any
 
 from schema.errors import RunFolderError
 from schema.experiment.document import REVOLVE_ANGLE, Experiment, body_space
@@ -28,3 +31,12 @@ def robot_of_birth(genome: bytes, robot: bytes | None, experiment: Experiment) -
             f"beside it, and only genomes of {REVOLVE_ANGLE!r} can be read here"
         )
     return develop(decode_genome(genome), types)
+
+
+def birth_point(row: Mapping[str, Any]) -> float:
+    """Return the point of a birth in the changes of its island.
+
+    ``row`` of the births table: an arena's has a time [s], another one the number.
+    """
+    time_s: float | None = row.get("sim_time_s")
+    return row["birth"] if time_s is None else time_s
