@@ -125,12 +125,23 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
         )
     figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
     figure += lone_points(mean, ["experiment"])
+    figure += _change_marks(tables)
     figure = figure + scales(tables, shown.sizes, is_filled=sure.num_rows > 0)
     figure += p9.expand_limits(y=0)
     if functions:
         figure += p9.facet_wrap("function", scales="free_y", ncol=2)
     rows = -(-len(set(functions.values())) // 2) or 1
     return figure + p9.labs(x="births", y=y_text) + theme_of_size(0.8 + 3.0 * rows)
+
+
+def _change_marks(tables: Tables) -> list[Any]:
+    """Return thin vertical lines where settings change; in arenas at mean births."""
+    if not tables.get("changes"):
+        return []
+    rows = tables["changes"].to_pandas()
+    marks = rows.groupby(["experiment", "point"], as_index=False)["births"].mean()
+    line = p9.aes(xintercept="births")
+    return [p9.geom_vline(line, marks, size=0.3, colour="#808080", alpha=0.6)]
 
 
 def course_caption(tables: Tables, measure: str) -> str:

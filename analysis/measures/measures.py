@@ -30,6 +30,7 @@ from analysis.measures.population_table import (
 )
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import Problems, RunTables
+from analysis.measures.season_changes import season_changes
 from schema.errors import RevolveError
 from schema.experiment.document import Experiment
 from schema.robot.trees import Integers
@@ -206,6 +207,11 @@ _OTHERS = {
         named_measures,
         _OF_ROBOTS,
         lambda islands: any(island.measures.names for island in islands),
+    ),
+    "changes": _Measure(
+        season_changes,
+        "births population fitness",
+        lambda islands: any(island.changes for island in islands),
     ),
     "learning": _Measure(learning, "births population learning deaths", _learns),
     "learning_curves": _Measure(learning_curves, "births learning", _learns),

@@ -234,6 +234,18 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "robots": "number of these robots",
         "about": "first line of an own measure's docstring; empty if it is not known",
     },
+    "changes": {
+        **_ISLAND,
+        "births": "births there up to the point",
+        "setting": "settings that have a value at the point, with commas",
+        "point": "births off-line, simulated time in arenas [s]",
+        "before": "mean fitness of the last population before the point",
+        "after": "mean fitness of the first population after it; in an arena a window "
+        "later",
+        "lost": "before minus after",
+        "recovery": "births, or seconds, from the point until the mean is back at "
+        "before; null if it is not before the next point",
+    },
     "learning": {
         **_RUN,
         **_ROBOT,

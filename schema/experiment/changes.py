@@ -6,7 +6,7 @@ that neither a journal nor a snapshot needs to hold them.
 """
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from functools import lru_cache
 from itertools import pairwise
 from math import floor
@@ -63,7 +63,7 @@ class SettingChange(Section, frozen=True):
     period: Annotated[float, Meta(ge=1, le=1e12)] | None = None
 
 
-class Changing(Protocol):
+class Changing(Hashable, Protocol):
     """Settings that may have changes: an experiment, or those of a request."""
 
     @property
@@ -87,7 +87,8 @@ def value_at(change: SettingChange, point: float) -> Values:
         return value
     # Beyond the last point is the first one, a period later.
     other = change.values[following % len(change.values)]
-    return between(value, other, (point - start) / (end - start))
+    mixed: Values = between(value, other, (point - start) / (end - start))
+    return mixed
 
 
 def between(low: Any, high: Any, share: float) -> Any:  # noqa: ANN401 - ``Values``

@@ -36,12 +36,14 @@ def test_last_evaluation_on_an_island_is_repeated() -> None:
     born = pa.array([None, None, 0, None], pa.uint32())
     evaluations = evaluations.append_column("birth_island", born)
     evaluations = evaluations.append_column("simulated_s", pa.nulls(4, pa.float64()))
+    points = pa.array([None, None, 7, 9], pa.int64())
+    evaluations = evaluations.append_column("point", points)
     trials = rows("learning", (0, 1, 0), (0, 1, 3), (0, 2, 0), (0, 2, 4))
     fitness = pa.array([0.5, 1.5, 0.5, 1.5])
     trials = trials.append_column("fitness", fitness)
     found = _recorded({"evaluations": evaluations, "learning": trials})
-    assert {key: trial for key, (trial, _) in found.items()} == {
-        (0, WANDERER): 2,
-        (0, SETTLER): 4,
-        (1, WANDERER): 1,
+    assert {key: (trial, point) for key, (trial, _, point) in found.items()} == {
+        (0, WANDERER): (2, 9),
+        (0, SETTLER): (4, None),
+        (1, WANDERER): (1, 7),
     }

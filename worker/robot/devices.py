@@ -180,7 +180,7 @@ class Sensors:
             motion = self._site_motion(site)
             rotation = data.site_xmat[site].reshape(3, 3)
             change = np.subtract(motion[3:], self.velocities[number]) / interval_s
-            change -= self._gravity
+            change -= self._gravity.tolist()
             self.velocities[number] = _velocity_of(motion[3:])
             self._row[place : place + 3] = change @ rotation
             self._row[place + 3 : place + 6] = motion[:3] @ rotation

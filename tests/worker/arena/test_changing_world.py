@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from schema.experiment.changes import SettingChange, settings_at
+from schema.experiment.changes import SettingChange, Values, settings_at
 from schema.experiment.document import Fitness
 from schema.experiment.environment import Environment
 from schema.experiment.settings import ArenaSettings
@@ -41,7 +41,7 @@ def changing(*changes: SettingChange, **sections: Any) -> ArenaSettings:  # noqa
     return replace(settings_of(drop_m=0.0), changes=changes, **sections)
 
 
-def change(setting: str, *values: object, **keys: Any) -> SettingChange:  # noqa: ANN401
+def change(setting: str, *values: Values, **keys: Any) -> SettingChange:  # noqa: ANN401
     """Return values that change every second."""
     at = tuple(float(number) for number in range(len(values)))
     return SettingChange(setting=setting, at=at, values=values, **keys)
