@@ -6,7 +6,7 @@ import pytest
 
 from analysis.measures.run_tables import RunTables
 from analysis.measures.season_changes import season_changes
-from tests.analysis.tables import births, population, table
+from tests.analysis.tables import Name, births, population, table
 from tests.documents import parse
 
 CHANGE = """
@@ -26,10 +26,10 @@ def measured(run: RunTables) -> list[tuple[Any, ...]]:
 def test_loss_and_recovery_of_an_island_by_hand() -> None:
     """From 0.8 to 0.5 at 20 births, back at 40; 0.9 after 50 births is no loss."""
     course = {10: 0.7, 20: 0.8, 30: 0.5, 40: 0.8, 50: 0.85, 60: 0.9}
-    tables = {
-        "births": births(((0, 0), [])),
-        "population": population(*((0, n, {(0, 0): f}) for n, f in course.items())),
-    }
+    levels: list[tuple[int, int, dict[Name, float | None]]] = [
+        (0, number, {(0, 0): fitness}) for number, fitness in course.items()
+    ]
+    tables = {"births": births(((0, 0), [])), "population": population(*levels)}
     found = measured(RunTables(tables, islands=[parse(CHANGE)]))
     assert found == [
         (20, 20, 0.8, 0.5, pytest.approx(0.3), 20),

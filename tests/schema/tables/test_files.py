@@ -30,6 +30,7 @@ ROW = {
     "worker": "w",
     "platform": "p",
     "measures": [("height", 0.1), ("turning", 2.0)],
+    "point": None,
     "seed": 7,
     "run_id": "0123456789ab",
 }
