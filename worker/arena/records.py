@@ -93,11 +93,15 @@ class MotorWork:
         self._layout: Layout | None = None
 
     def begin(self, robots: Sequence[ArenaRobot]) -> None:
-        """Begin an advance of robots, with their motors as they are now."""
-        self._layout = None
-        self._motors = {robot.birth: robot.view.servos.torques() for robot in robots}
+        """Begin an advance of robots."""
+        self.read_motors(robots)
         for robot in robots:
             robot.work_j = 0.0
+
+    def read_motors(self, robots: Sequence[ArenaRobot]) -> None:
+        """Take the motors as they are now: their torques may change."""
+        self._layout = None
+        self._motors = {robot.birth: robot.view.servos.torques() for robot in robots}
 
     def add(self, layout: Layout, state: Floats) -> None:
         """Add the work since the last check; ``state`` is the present one."""

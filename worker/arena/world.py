@@ -217,6 +217,8 @@ class World:
             self._present = settings
             self.population.change(settings)
             self._controllers.change(settings, self.population.robots)
+            if self._measures_work:
+                self._work.read_motors(self.population.robots)
 
     def _tick(self) -> None:
         """Read sensors, update brains and command motors.
