@@ -75,8 +75,15 @@ def introduction(found: object) -> str:
     return f"{text.strip()}\n\n{source[0] if source else ''}".strip()
 
 
-def attributes(found: object) -> dict[str, str]:
-    """Return the meanings of the attributes in a docstring, by name."""
+def attributes(found: type) -> dict[str, str]:
+    """Return the meanings of the attributes in the docstrings of a class, by name."""
+    meanings: dict[str, str] = {}
+    for kind in reversed(found.__mro__):
+        meanings |= _own_attributes(kind)
+    return meanings
+
+
+def _own_attributes(found: type) -> dict[str, str]:
     block = _docstring(found).partition("\nAttributes:\n")[2]
     block = re.split(r"\n(?=\S)", block)[0]
     meanings: dict[str, str] = {}

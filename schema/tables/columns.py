@@ -514,7 +514,7 @@ PATCHES = _table(
     _TIME,
     _column("patch", pa.int32(), "number of the place, from 0"),
     *_axes("xy", _FLOAT, "its centre"),
-    _column("radius_m", _FLOAT, "its radius", unit="m"),
+    _column("radius_m", _FLOAT, "radius of the place", unit="m"),
     _column("content", _FLOAT, "what it holds, such as energy", unit="1"),
 )
 MIGRATIONS = _table(

@@ -4,9 +4,11 @@ import math
 from pathlib import Path
 
 import pytest
+from msgspec import convert
 
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import (
+    ArenaWorld,
     Experiment,
     Measures,
     Simulation,
@@ -250,7 +252,8 @@ def test_settings_and_text_round_trip() -> None:
     experiment = parse("[arena]\nlight = [0.0, 1.0, 2.5]\nrecord_touches = true")
     origin = Origin(seed=5, run=2, island=3)
     settings = read_arena_settings(arena_settings(experiment, origin))
-    assert (settings.origin, settings.arena) == (origin, experiment.arena)
+    assert settings.origin == origin
+    assert settings.arena == convert(experiment.arena, ArenaWorld, from_attributes=True)
     assert settings.simulation == experiment.simulation
     assert experiment_from_text(experiment_text(experiment)) == experiment
     with pytest.raises(ExperimentError, match="experiment of a run"):
