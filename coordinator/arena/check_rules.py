@@ -76,6 +76,7 @@ class _PointArena:
         interval_s = self._interval_s
         deaths_are_due = self._time_s % self._arena.cull_interval_s < interval_s
         return ArenaView(
+            self.rules.parameters(self._time_s),
             self._time_s,
             interval_s,
             self._births,

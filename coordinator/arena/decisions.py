@@ -69,6 +69,7 @@ class ArenaDecisions:
         over_s = moment.sim_time_s - self._before_s
         meetings = self._activity.meetings()
         view = ArenaView(
+            self.rules.parameters(moment.sim_time_s),
             moment.sim_time_s,
             over_s,
             moment.births,

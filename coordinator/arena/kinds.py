@@ -7,12 +7,6 @@ from coordinator.arena.rules import BUILT_IN, METHODS, WHERE, load_rules
 from schema.experiment.document import ArenaSection, Experiment, island_experiments
 from schema.experiment.kinds import Kind, is_class
 
-
-def _load(experiment: Experiment) -> object:
-    assert experiment.arena is not None
-    return load_rules(experiment.arena)[0]
-
-
 RULES = Kind(
     "rules",
     WHERE,
@@ -21,7 +15,7 @@ RULES = Kind(
     section=lambda path: Experiment("by hand", arena=ArenaSection(rules=path)),
     sections=lambda whole: [at for at in island_experiments(whole) if at.arena],
     path=lambda experiment: experiment.arena.rules if experiment.arena else "",
-    load=_load,
+    load=lambda experiment: load_rules(experiment)[0],
     check=check_rules,
 )
 """``arena.rules``."""

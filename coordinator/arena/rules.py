@@ -15,7 +15,8 @@ from coordinator.arena.ecosystem import EcosystemRules
 from coordinator.arena.thesis_rules import ThesisRules
 from schema.errors import ExperimentError, shown
 from schema.experiment.brains import NoParameters
-from schema.experiment.document import ArenaSection, Experiment
+from schema.experiment.changes import OF_RULES, settings_at, with_value
+from schema.experiment.document import Experiment
 from schema.plugins.arena_rules import ArenaRules, ArenaView, Decisions, Stores
 from schema.plugins.contract import broken
 from schema.plugins.load import load_object
@@ -30,12 +31,24 @@ BUILT_IN: dict[str, Make] = {"thesis": ThesisRules, "ecosystem": EcosystemRules}
 """Rules that come with the toolkit, by short name."""
 
 
-def load_rules(arena: ArenaSection) -> tuple[Make, Any]:
-    """Return the class of an arena's rules, and its parameters.
+def load_rules(experiment: Experiment) -> tuple[Make, Any]:
+    """Return the class of the rules of an arena, and its parameters.
 
     Raises:
-        ExperimentError: no such class, or other parameters than it declares.
+        ExperimentError: no such class, or other parameters than it declares, also
+            those of ``[[changes]]``.
     """
+    for change in experiment.changes:
+        if change.setting.startswith(OF_RULES):
+            for value in change.values:
+                parameters_at(with_value(experiment, change.setting, value))
+    return parameters_at(experiment)
+
+
+def parameters_at(experiment: Experiment) -> tuple[Make, Any]:
+    """Return the class of the rules and its parameters, without those of changes."""
+    arena = experiment.arena
+    assert arena is not None
     made = load_object(arena.rules, WHERE, BUILT_IN, METHODS)
     declared = getattr(made, "Parameters", None)
     kind = declared or NoParameters
@@ -58,14 +71,18 @@ class CheckedRules:
             ExperimentError: as of ``load_rules``; the class raises, or one of its
                 attributes is of another type.
         """
-        assert experiment.arena is not None
-        self._plugin, parameters = load_rules(experiment.arena)
+        self._experiment = experiment
+        self._plugin, parameters = load_rules(experiment)
         with naming_plugin(WHERE, self._plugin):
             self.memory = self._plugin(experiment, parameters)
             self.stores = _converted("stores", self.memory.stores, Stores)
             distance_m = self.memory.meeting_distance_m
             kind = float | None
             self.meeting_distance_m = _converted("meeting_distance_m", distance_m, kind)
+
+    def parameters(self, time_s: float) -> Any:  # noqa: ANN401 - of the class
+        """Return the parameters at a simulated time [s]."""
+        return parameters_at(settings_at(self._experiment, time_s))[1]
 
     def decide(self, view: ArenaView, rng: np.random.Generator) -> Decisions:
         """Return the decisions of the rules.

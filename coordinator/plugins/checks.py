@@ -130,7 +130,7 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
             raise _with_hint(error, experiment) from None
     for own in island_experiments(experiment):
         if own.arena is not None and not is_own(own.arena.rules):
-            load_rules(own.arena)
+            load_rules(own)
         if not is_own(own.fitness.function):
             check_fitness_keys(own)
         if own.learning is not None:

@@ -28,8 +28,8 @@ CHANGEABLE = (
     "environment.slope_direction_deg",
     "environment.light",
 )
-"""Settings that may change, beside the parameters of a fitness function."""
-OF_FITNESS = "fitness.parameters."
+"""Settings that may change, beside the parameters of fitness and of arena rules."""
+OF_FITNESS, OF_RULES = "fitness.parameters.", "arena.parameters."
 LIGHT = "environment.light"
 
 Values = float | tuple[float | tuple[float, ...], ...]
@@ -44,8 +44,9 @@ class SettingChange(Section, frozen=True):
         setting: dotted key: ``simulation.friction``, ``simulation.torque_factor``,
             ``simulation.sensor_noise``, ``simulation.actuator_noise``,
             ``environment.slope_deg``, ``environment.slope_direction_deg``,
-            ``environment.light``, or a parameter of the fitness function, such as
-            ``fitness.parameters.targets``.
+            ``environment.light``, or a parameter of the fitness function or of the
+            rules of an arena: ``fitness.parameters.targets``, for example, or
+            ``arena.parameters.patch_inflow``.
         at: points, ascending from 0: numbers of births off-line, simulated seconds in
             arenas.
         values: value of the setting from each point on; in place of that in its
@@ -123,8 +124,8 @@ def with_value(settings: Any, key: str, value: Any) -> Any:  # noqa: ANN401
     """Return settings with another value of the setting with a dotted key."""
     section, _, name = key.partition(".")
     known = getattr(settings, section)
-    if key.startswith(OF_FITNESS):
-        parameter = key.removeprefix(OF_FITNESS)
+    if key.startswith((OF_FITNESS, OF_RULES)):
+        parameter = name.removeprefix("parameters.")
         name, value = "parameters", {**known.parameters, parameter: value}
     return replace(settings, **{section: replace(known, **{name: value})})
 
@@ -142,14 +143,17 @@ def change_points(change: SettingChange, end: float) -> Iterator[float]:
 def change_problems(settings: Any) -> Iterator[str]:  # noqa: ANN401 - as ``Changing``
     """Yield what is wrong with changes; each check relies on those before it.
 
-    Parameters of fitness functions, which may be plug-ins, are checked elsewhere.
+    Parameters of functions and rules, which may be plug-ins, are checked elsewhere.
     """
     known: set[str] = set()
     for number, change in enumerate(settings.changes):
         where, key = f"changes[{number}]", change.setting
-        is_known = key in CHANGEABLE or key.startswith(OF_FITNESS)
+        if key.startswith(OF_RULES) and getattr(settings, "arena", None) is None:
+            yield f"{where}.setting: {shown(key)} needs [arena]"
+        is_known = key in CHANGEABLE or key.startswith((OF_FITNESS, OF_RULES))
         if not is_known:
-            allowed = f"one of {', '.join(CHANGEABLE)}, {OF_FITNESS}NAME"
+            allowed = ", ".join((*CHANGEABLE, f"{OF_FITNESS}NAME", f"{OF_RULES}NAME"))
+            allowed = f"one of {allowed}"
             got = f"got {shown(key)}{nearest(key, CHANGEABLE)}"
             yield f"{where}.setting: must be {allowed}, {got}"
         if key in known:

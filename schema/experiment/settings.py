@@ -8,7 +8,12 @@ import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError, check_most
-from schema.experiment.changes import SettingChange, change_problems, settings_at
+from schema.experiment.changes import (
+    OF_RULES,
+    SettingChange,
+    change_problems,
+    settings_at,
+)
 from schema.experiment.document import (
     NETWORK,
     ArenaWorld,
@@ -173,7 +178,12 @@ def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
 
 
 def _sections(experiment: Experiment, kind: type[T]) -> T:
-    """Return settings with the sections of the same names of an experiment."""
+    """Return settings with the sections of the same names of an experiment.
+
+    The rules of an arena, and their changes, are none of a worker's business.
+    """
+    changes = (each for each in experiment.changes if OF_RULES not in each.setting)
+    experiment = replace(experiment, changes=tuple(changes))
     return msgspec.convert(experiment, kind, from_attributes=True)
 
 

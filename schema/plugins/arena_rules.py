@@ -1,7 +1,7 @@
 """Rules of an arena as a plug-in: what they see at a decision, and what they decide."""
 
 from collections.abc import Mapping
-from typing import Annotated, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -69,6 +69,8 @@ class ArenaView(Struct, frozen=True):
     """State of an arena at a decision.
 
     Attributes:
+        parameters: as the class of the rules got them; those that ``[[changes]]`` names
+            have their present values.
         time_s: simulated time [s].
         interval_s: simulated time since the last decision [s].
         births: number of births so far.
@@ -81,6 +83,7 @@ class ArenaView(Struct, frozen=True):
             child, or None if no body was viable or the arena was full.
     """
 
+    parameters: Any
     time_s: float
     interval_s: float
     births: int
