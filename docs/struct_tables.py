@@ -79,7 +79,8 @@ def attributes(found: type) -> dict[str, str]:
     """Return the meanings of the attributes in the docstrings of a class, by name."""
     meanings: dict[str, str] = {}
     for kind in reversed(found.__mro__):
-        meanings |= _own_attributes(kind)
+        if "\nAttributes:\n" in _docstring(kind):
+            meanings |= _own_attributes(kind)
     return meanings
 
 

@@ -13,7 +13,7 @@ from docs import messages_reference, python_reference, settings_reference
 from docs.reference_pages import PAGES
 from docs.struct_tables import attributes, rows
 from revolve.cli.commands import COMMANDS, parser_of
-from schema.experiment.document import Experiment
+from schema.experiment.document import ArenaWorld, Experiment
 from schema.experiment.section import PluginSection, Section
 from schema.experiment.settings import (
     Ablation,
@@ -47,7 +47,8 @@ _INNER = ("Origin", "Range")
 def _sections(base: type[Section] = Section) -> Iterator[type[Section]]:
     """Yield the sections that users write; the others are parts of requests."""
     others = (
-        PluginSection, VettingSettings, EvaluationSettings, ArenaSettings, Ablation
+        PluginSection, ArenaWorld, VettingSettings, EvaluationSettings, ArenaSettings,
+        Ablation,
     )  # fmt: skip
     for found in base.__subclasses__():
         in_document = found.__module__.startswith("schema.experiment.")

@@ -99,7 +99,7 @@ def shown_again(
     """
     rows: dict[str, list[dict[str, Any]]] = {
         "evaluations": [
-            {"trial": number, "fitness": value, "path_velocity": 0.1,
+            {"trial": number, "point": None, "fitness": value, "path_velocity": 0.1,
              "straight_velocity": 0.1, "simulated_s": 12.0, "platform": "p"}
             for number, value in enumerate(fitness)
         ],
