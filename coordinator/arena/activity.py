@@ -34,7 +34,9 @@ class Activity:
     def add(self, advance: Advance) -> None:
         """Add an advance with tracks."""
         births = [judgement.birth for judgement in advance.judgements]
-        tracks = np.frombuffer(advance.tracks, "<f4").reshape(len(births), -1, 2)
+        places = np.frombuffer(advance.tracks, "<f4").reshape(-1, 2)
+        samples = len(places) // max(1, len(births))
+        tracks = places.reshape(len(births), samples, 2)
         before, self._tracks = self._tracks, {}
         for birth, track in zip(births, tracks, strict=True):
             self._tracks[birth] = [*before.get(birth, ()), track]

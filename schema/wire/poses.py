@@ -93,7 +93,9 @@ class PoseArrays(NamedTuple):
         kept = [row for row, one in enumerate(self.robots) if one in wanted]
         names = self.births[kept], self.islands[kept]
         by_robot = self.cores[kept][np.lexsort((self.times_s[kept], *names)), :2]
-        return by_robot.reshape(len(births), -1, 2)
+        # -1 for the number of samples would be undefined without robots.
+        samples = len(by_robot) // max(1, len(births))
+        return by_robot.reshape(len(births), samples, 2)
 
     @property
     def are_finite(self) -> bool:
