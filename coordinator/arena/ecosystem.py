@@ -109,7 +109,7 @@ class EcosystemRules:
         for birth, taken in self._feed(view).items():
             energy[birth] += taken
         for robot in view.robots:
-            lost = rules.energy_per_s * view.interval_s
+            lost = rules.energy_per_s * lived_s(robot, view)
             energy[robot.birth] -= lost + rules.energy_per_j * robot.work_j
         deaths = tuple(
             Death(robot.birth, "age" if energy[robot.birth] > 0.0 else "no energy")
@@ -145,8 +145,12 @@ class EcosystemRules:
         for number, patch in enumerate(self._patches):
             grown = patch.content + rules.patch_inflow * view.interval_s
             content = min(rules.patch_capacity, grown)
-            most = rules.intake_per_s * view.interval_s
-            wanted = {r.birth: most * share_within(r, patch) for r in view.robots}
+            wanted = {
+                robot.birth: rules.intake_per_s
+                * lived_s(robot, view)
+                * share_within(robot, patch)
+                for robot in view.robots
+            }
             total = sum(wanted.values())
             share = min(1.0, content / total) if total else 0.0
             for birth, energy in wanted.items():
@@ -219,6 +223,14 @@ class EcosystemRules:
                 Patch(x, y, rules.patch_radius_m, content),
                 *patches[number + 1 :],
             ]
+
+
+def lived_s(robot: Resident, view: ArenaView) -> float:
+    """Return how long a robot lived since the last decision [s].
+
+    The first decision is after the last founder's birth.
+    """
+    return min(robot.age_s, view.interval_s)
 
 
 def share_within(robot: Resident, patch: Patch) -> float:
