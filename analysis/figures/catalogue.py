@@ -13,6 +13,7 @@ from analysis.figures.courses import (
     measures_over_births,
     over_births,
 )
+from analysis.figures.ecosystems import ages_at_death, ground_map, life_courses
 from analysis.figures.findings import effects
 from analysis.figures.forms import (
     NothingToDraw,
@@ -30,6 +31,7 @@ from analysis.figures.style import file_name
 BIRTHS = "the births tables of the runs"
 """A source that is not a table of measures."""
 _BENCHMARK = "the benchmark file"
+_NO_RULES = "no arena has rules of its own"
 
 Section = Literal[
     "sweeps",
@@ -251,5 +253,23 @@ FIGURES: tuple[Figure, ...] = (
            "Learning has saved a body if its robot is there although its fitness at "
            "birth is below that of each robot of that population.",
            ("learning",), bodies_saved, "learning", nothing="no robot learns"),
+    Figure("M", "Population, energy and births over time",
+           "Of arenas with rules of their own, by simulated minute: means over samples "
+           "of the living robots and of their energy, and births, founders included. "
+           "Each line is an arena. A line ends when no robot is left.",
+           ("life_courses",), life_courses, "islands", nothing=_NO_RULES),
+    Figure("N", "Ages at death",
+           "Ages of robots when they died, by reason, in arenas with rules of their "
+           "own; in brackets the number of robots. Those that live at the end are left "
+           "out.",
+           ("lifespans",), ages_at_death, "islands", nothing=_NO_RULES),
+    Figure("O", "Map of births and matings",
+           "Each point is the place of a robot's birth, larger the more children it "
+           "had. Lines join the places of birth of two parents; the colour is the "
+           "share of the parents and their ancestors that both have in common. Discs "
+           "are patches, with the mean of what they hold. The first four arenas with "
+           "rules of their own are shown.",
+           ("birth_places", "couples", "patch_means"), ground_map, "islands",
+           nothing=_NO_RULES),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

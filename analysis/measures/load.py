@@ -30,7 +30,7 @@ TABLE = "table "
 
 _NEEDED = (
     "births", "evaluations", "population", "fitness", "deaths", "touches",
-    "migrations", "learning",
+    "migrations", "learning", "matings", "patches",
 )  # fmt: skip
 
 
@@ -46,6 +46,11 @@ class LeftOut:
 def island_settings(island: int, islands: Sequence[Experiment]) -> Experiment:
     """Return an island's settings; the last ones if it is not in the document."""
     return islands[min(island, len(islands) - 1)]
+
+
+def has_rules(islands: Sequence[Experiment]) -> bool:
+    """Return whether an island is an arena with other rules than the thesis's."""
+    return any(one.arena and one.arena.rules != "thesis" for one in islands)
 
 
 def records_touches(island: Experiment) -> bool:
@@ -303,6 +308,9 @@ def _check_there(run: LoadedRun, name: str) -> None:
         "touches": any(map(records_touches, run.islands)),
         "migrations": len(run.islands) > 1,
         "learning": any(island.learning for island in run.islands),
+        # Rules of an arena may have neither.
+        "matings": False,
+        "patches": False,
     }
     is_expected = run.is_finished and expected.get(name, True)
     if is_expected and not has_rows(run.folder, name):

@@ -14,10 +14,17 @@ import pyarrow.compute as pc
 
 from analysis.measures.arenas import interactions, last_samples, variability
 from analysis.measures.bodies import extremity_bins
+from analysis.measures.ecosystems import (
+    birth_places,
+    couples,
+    life_courses,
+    lifespans,
+    patch_means,
+)
 from analysis.measures.families import families
 from analysis.measures.islands import mean_distances, migrants
 from analysis.measures.learning import learning, learning_curves
-from analysis.measures.load import island_settings, records_touches
+from analysis.measures.load import has_rules, island_settings, records_touches
 from analysis.measures.named_measures import named_measures
 from analysis.measures.population_table import (
     Booleans,
@@ -215,6 +222,11 @@ _OTHERS = {
     ),
     "learning": _Measure(learning, "births population learning deaths", _learns),
     "learning_curves": _Measure(learning_curves, "births learning", _learns),
+    "life_courses": _Measure(life_courses, "births fitness", has_rules),
+    "lifespans": _Measure(lifespans, "births deaths", has_rules),
+    "birth_places": _Measure(birth_places, "births", has_rules),
+    "couples": _Measure(couples, "births matings", has_rules),
+    "patch_means": _Measure(patch_means, "patches", has_rules),
     "migrants": _Measure(migrants, "births population migrations", _is_divided),
 }
 """Measures other than those of populations."""

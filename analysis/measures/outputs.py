@@ -269,6 +269,52 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "low": "lower quartile",
         "high": "upper quartile",
     },
+    "life_courses": {
+        **_RUN,
+        "island": _ISLAND["island"],
+        "sim_time_s": "simulated time of a sample of fitness [s]",
+        "living": "robots that live then",
+        "energy": "mean of their store energy; null if they have none",
+        "born": "births since the sample before",
+    },
+    "lifespans": {
+        **_RUN,
+        "island": _ISLAND["island"],
+        **_ROBOT,
+        "age_s": "age at death [s]",
+        "reason": "reason of the death",
+    },
+    "birth_places": {
+        **_RUN,
+        "island": _ISLAND["island"],
+        "birth": _ROBOT["birth"],
+        "sim_time_s": "simulated time of the birth [s]",
+        "x": "x of its place, world frame [m]",
+        "y": "y of its place, world frame [m]",
+        "children": "number of its children",
+    },
+    "couples": {
+        **_RUN,
+        "island": _ISLAND["island"],
+        "sim_time_s": "simulated time of the mating [s]",
+        "birth": "number of birth of the child",
+        "x": "x of the place near which the child was born; null if any [m]",
+        "y": "y of that place [m]",
+        "first_x": "x of the place where the first parent was born [m]",
+        "first_y": "y of that place [m]",
+        "second_x": "x of the place where the second parent was born [m]",
+        "second_y": "y of that place [m]",
+        "related": "share of the parents and their ancestors that both have in common",
+    },
+    "patch_means": {
+        **_RUN,
+        "island": _ISLAND["island"],
+        "patch": "number of the patch",
+        "x": "x of its centre [m]",
+        "y": "y of its centre [m]",
+        "radius_m": "its radius [m]",
+        "content": "mean over samples of what it holds there",
+    },
     "sweeps": {
         **_RUN,
         "setting": "dotted key of a setting that the sweep changes",
@@ -330,11 +376,11 @@ _INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "pla
              "islands", "robots", "samples", "pairs", "epoch", "to", "descendants",
              "living", "reached", "runs", "runs_a", "runs_b", "failures", "deaths",
              "finding", "births", "birth", "members", "founders", "trials",
-             "trial"}  # fmt: skip
+             "trial", "born", "children", "patch"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measure",
           "a", "b", "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "setting", "value", "differs", "function", "fitness_function",
-          "plugins", "about"}  # fmt: skip
+          "plugins", "about", "reason"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

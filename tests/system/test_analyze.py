@@ -61,7 +61,8 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
     measures = {path.stem: pq.read_table(path) for path in report.glob("*/*.parquet")}
     assert set(measures) == set(OUTPUTS) - {
         "between", "migrants", "named_measures", "sweeps", "learning",
-        "learning_curves",
+        "learning_curves", "life_courses", "lifespans", "birth_places", "couples",
+        "patch_means",
     }  # fmt: skip
     for name, table in measures.items():
         assert table.schema.equals(schema(name), check_metadata=True)
