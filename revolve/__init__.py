@@ -48,6 +48,9 @@ _NAMES = {
         "BrainType BrainGenes BrainControl Bank Encoding Learner ParentSelection "
         "SurvivorSelection StatefulSelection FitnessFunction MeasureFunction"
     ),
+    "schema.plugins.arena_rules": (
+        "ArenaRules ArenaView Resident Meeting Conception Death Patch Decisions"
+    ),
     "schema.errors": (
         "RevolveError ExperimentError UnknownPlugin InvalidRobot RunFolderError "
         "NetworkError FitnessUndefined SensorFailed SimulationDiverged JobRefused"

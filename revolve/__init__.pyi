@@ -36,6 +36,14 @@ from schema.parts import Shape as Shape
 from schema.parts import Slot as Slot
 from schema.parts import constant_shape as constant_shape
 from schema.parts import cylinder as cylinder
+from schema.plugins.arena_rules import ArenaRules as ArenaRules
+from schema.plugins.arena_rules import ArenaView as ArenaView
+from schema.plugins.arena_rules import Conception as Conception
+from schema.plugins.arena_rules import Death as Death
+from schema.plugins.arena_rules import Decisions as Decisions
+from schema.plugins.arena_rules import Meeting as Meeting
+from schema.plugins.arena_rules import Patch as Patch
+from schema.plugins.arena_rules import Resident as Resident
 from schema.plugins.needs import needs as needs
 from schema.plugins.permission import allow as allow
 from schema.plugins.protocols import Bank as Bank

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from msgspec import ValidationError, msgpack
+from msgspec.structs import astuple
 
 from coordinator.arena.ecosystem import EcosystemRules
 from coordinator.arena.thesis_rules import ThesisRules
@@ -24,8 +25,8 @@ from schema.plugins.origin import naming_plugin
 from schema.plugins.parameters import read_parameters
 
 WHERE = "arena.rules"
-METHODS = ("stores", "meeting_distance_m", "decide")
-"""Attributes of a class of rules."""
+METHODS = ("decide",)
+"""Methods of a class of rules; its other attributes may be those of its objects."""
 Make = Callable[[Experiment, Any], ArenaRules]
 BUILT_IN: dict[str, Make] = {"thesis": ThesisRules, "ecosystem": EcosystemRules}
 """Rules that come with the toolkit, by short name."""
@@ -131,5 +132,7 @@ def _problems(decisions: Decisions, view: ArenaView, known: Stores) -> Iterator[
             yield f"stores: must be of {shown(list(known))}, got {shown(unknown)}"
     places = [child.near or () for child in decisions.births]
     numbers = [each.values() for each in (*decisions.stores.values(), *children)]
-    if not all(map(isfinite, chain(*places, *numbers))):
-        yield "places and stores must be finite, got others"
+    radii = [child.radius_m or 0.0 for child in decisions.births]
+    patches = [astuple(patch) for patch in decisions.patches]
+    if not all(map(isfinite, chain(*places, radii, *numbers, *patches))):
+        yield "places, radii, stores and patches must be finite, got others"
