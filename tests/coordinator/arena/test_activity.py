@@ -10,6 +10,7 @@ from schema.plugins.arena_rules import Meeting
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Judgement
 from tests.coordinator.arena_views import born
+from tests.coordinator.arena_world import poses
 
 
 def advance(
@@ -60,3 +61,12 @@ def test_meetings_are_those_of_a_loop_over_positions(seed: int) -> None:
     activity.clear()
     assert not activity.meetings()
     assert activity.track(born(2)[0]).shape == (0, 2)
+
+
+def test_robots_that_are_all_gone_have_no_meetings() -> None:
+    activity = Activity(0.4, 0.2)
+    activity.add(advance(born(0, 1), np.zeros((2, 3, 2)), (0.0, 0.0)))
+    activity.add(advance((), np.zeros((0, 0, 2)), ()))
+    assert not activity.meetings()
+    tracks = poses([], 0.2).tracks(())
+    assert tracks.shape == (0, 0, 2)
