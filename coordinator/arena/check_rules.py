@@ -76,7 +76,6 @@ class _PointArena:
         interval_s = self._interval_s
         deaths_are_due = self._time_s % self._arena.cull_interval_s < interval_s
         return ArenaView(
-            self.rules.parameters(self._time_s),
             self._time_s,
             interval_s,
             self._births,
@@ -86,6 +85,7 @@ class _PointArena:
             robots=tuple(map(self._resident, births)),
             meetings=self._activity.meetings(),
             born=tuple(self._born),
+            parameters=self.rules.parameters(self._time_s),
         )
 
     def _resident(self, birth: BirthId) -> Resident:

@@ -69,7 +69,6 @@ class ArenaDecisions:
         over_s = moment.sim_time_s - self._before_s
         meetings = self._activity.meetings()
         view = ArenaView(
-            self.rules.parameters(moment.sim_time_s),
             moment.sim_time_s,
             over_s,
             moment.births,
@@ -79,6 +78,7 @@ class ArenaDecisions:
             tuple(map(self._resident, living)),
             meetings,
             tuple(self._born),
+            self.rules.parameters(moment.sim_time_s),
         )
         rng = self._stream(BirthId(self._number, step), 0, Purpose.RULES)
         decisions = self.rules.decide(view, rng)

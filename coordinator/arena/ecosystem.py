@@ -103,7 +103,9 @@ class EcosystemRules:
 
     def decide(self, view: ArenaView, rng: np.random.Generator) -> Decisions:
         """Feed the robots, and return who mates and who dies."""
-        rules = self._rules = view.parameters
+        if view.parameters is not None:
+            self._rules = view.parameters
+        rules = self._rules
         energy = {robot.birth: robot.stores[ENERGY] for robot in view.robots}
         self._refund(view, energy)
         for birth, taken in self._feed(view).items():

@@ -73,6 +73,8 @@ class CheckedRules:
                 attributes is of another type.
         """
         self._experiment = experiment
+        keys = [change.setting for change in experiment.changes]
+        self._may_change = any(key.startswith(OF_RULES) for key in keys)
         self._plugin, parameters = load_rules(experiment)
         with naming_plugin(WHERE, self._plugin):
             self.memory = self._plugin(experiment, parameters)
@@ -82,7 +84,9 @@ class CheckedRules:
             self.meeting_distance_m = _converted("meeting_distance_m", distance_m, kind)
 
     def parameters(self, time_s: float) -> Any:  # noqa: ANN401 - of the class
-        """Return the parameters at a simulated time [s]."""
+        """Return the parameters at a simulated time [s]; None if they never change."""
+        if not self._may_change:
+            return None
         return parameters_at(settings_at(self._experiment, time_s))[1]
 
     def decide(self, view: ArenaView, rng: np.random.Generator) -> Decisions:

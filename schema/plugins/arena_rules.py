@@ -69,8 +69,6 @@ class ArenaView(Struct, frozen=True):
     """State of an arena at a decision.
 
     Attributes:
-        parameters: as the class of the rules got them; those that ``[[changes]]`` names
-            have their present values.
         time_s: simulated time [s].
         interval_s: simulated time since the last decision [s].
         births: number of births so far.
@@ -81,9 +79,10 @@ class ArenaView(Struct, frozen=True):
         meetings: since the last decision, by pair.
         born: what became of the last decision's ``births``, in order: the id of the
             child, or None if no body was viable or the arena was full.
+        parameters: of the rules, with the present values of ``[[changes]]``; None if no
+            change names one of them.
     """
 
-    parameters: Any
     time_s: float
     interval_s: float
     births: int
@@ -93,6 +92,7 @@ class ArenaView(Struct, frozen=True):
     robots: tuple[Resident, ...]
     meetings: tuple[Meeting, ...]
     born: tuple[BirthId | None, ...]
+    parameters: Any = None
 
 
 class Conception(Struct, frozen=True):
