@@ -35,7 +35,8 @@ def _run(page: Path, folder: Path, *numbers: str) -> None:
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(
-    ("name", "births"), [("04-part", "150=20"), ("07-tables", "60=20")]
+    ("name", "births"),
+    [("04-part", "150=20"), ("07-tables", "60=20"), ("10-rules", "60=25")],
 )
 def test_tutorial_runs_with_fewer_births(
     name: str, births: str, tmp_path: Path
@@ -108,3 +109,9 @@ def test_notebook_runs(name: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert len(cells) >= 5
     assert re.search(r"(?:parents|difference) [+-]?\d\.\d{4}", done.stdout)
+
+
+def test_predators_of_the_tutorial_are_the_example() -> None:
+    page = (TUTORIALS / "10-rules.md").read_text()
+    for name in ("predators.py", "predators.toml"):
+        assert f"# {name}\n{(DOCS / 'examples' / name).read_text()}```" in page
