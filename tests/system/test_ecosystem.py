@@ -82,7 +82,8 @@ def test_run_is_equal_with_kills_on_two_workers_and_lengthened(
     shutil.copy(EXAMPLES / "predators.py", workspace.folder)
     wanted = begin(workspace, document, births, "wanted")
     killed = begin(workspace, document, before, "killed")
-    shorter, words = size(killed), ("resume", "killed", "--births", str(births))
+    shorter = size(killed)
+    words: tuple[str, ...] = ("resume", "killed", "--births", str(births))
     for share in (0.3, 0.7):
         process = workspace.start(*words, "--quiet", "--workers", "2")
         kill_beyond(process, killed, shorter + share * (size(wanted) - shorter))

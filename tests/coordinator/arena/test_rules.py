@@ -146,8 +146,8 @@ def test_attributes_of_another_type_are_refused(
 
 
 def test_numbers_of_numpy_are_numbers(scripted: type[Scripted]) -> None:
-    stores = {A: {"food": np.float32(0.5)}}
-    near = (np.float64(1.0), np.float32(2.0))
+    stores: Any = {A: {"food": np.float32(0.5)}}
+    near: Any = (np.float64(1.0), np.float32(2.0))
     scripted.answer = Decisions((Conception((A,), near),), stores=stores)
     decided = decide(CheckedRules(experiment(rules="scripted")))
     assert decided == Decisions(
