@@ -2,6 +2,7 @@
 
 import json
 import socket
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import cycle
@@ -87,20 +88,22 @@ class Attacker:
         self.overhear(act)
 
     def replace_by_deadly(self, first: int, times: int) -> None:
-        """Send endless requests in the name of one evaluation to its workers."""
-        chosen: list[int] = []
+        """Send endless requests in the name of an evaluation to its workers.
+
+        If a worker answers the true one before, a later evaluation is chosen.
+        """
+        sent = Counter[int]()
 
         def act(key: str, data: bytes) -> None:
             request = decode(Request, data, ADVANCE_REQUEST_BYTES)
             work = request.work
             if not isinstance(work, Evaluate) or work.steps >= _ENDLESS:
                 return
-            if request.number != (chosen[0] if chosen else max(first, request.number)):
+            if request.number < first or times in sent.values():
                 return
-            chosen.append(request.number)
-            if len(chosen) <= times:
-                endless = replace(request, work=replace(work, steps=_ENDLESS))
-                self.session.get(key, payload=encode(endless), consolidation=_NOW)
+            sent[request.number] += 1
+            endless = replace(request, work=replace(work, steps=_ENDLESS))
+            self.session.get(key, payload=encode(endless), consolidation=_NOW)
 
         self.overhear(act)
 
