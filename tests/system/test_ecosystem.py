@@ -136,16 +136,19 @@ class Second:
         rules, tables, over_s = self.rules, self.tables, time_s - before_s
         energy = tables.energy(time_s)
         places = list(tables.places(before_s, time_s))
+        ages = {row["birth"]: row["age_s"] for row in tables.robots[time_s]}
+        # Before the first decision founders are born one after the other.
+        lived_s = {birth: min(over_s, age_s) for birth, age_s in ages.items()}
         for birth in self.unborn:
             energy[birth] += rules.child_energy / 2 if birth in energy else 0.0
         for patch in tables.patches[time_s]:
-            self.feed(patch, energy, places, over_s)
+            self.feed(patch, lived_s, energy, places, over_s)
         for row in tables.robots[time_s]:
             birth, work_j = row["birth"], row["work_j"]
             used_j = work_j - self.work_j[birth]
-            energy[birth] -= rules.energy_per_s * over_s + rules.energy_per_j * used_j
+            energy[birth] -= rules.energy_per_s * lived_s[birth]
+            energy[birth] -= rules.energy_per_j * used_j
             self.work_j[birth] = work_j
-        ages = {row["birth"]: row["age_s"] for row in tables.robots[time_s]}
         dead = {
             birth: "age" if energy[birth] > 0 else "no energy"
             for birth in energy
@@ -160,6 +163,7 @@ class Second:
     def feed(
         self,
         patch: dict[str, Any],
+        lived_s: dict[int, float],
         energy: dict[int, float],
         places: list[Any],
         over_s: float,
@@ -175,7 +179,7 @@ class Second:
             ]
             inside = sum(each <= patch["radius_m"] for each in away)
             share = inside / len(away) if away else 0.0
-            wanted[birth] = self.rules.intake_per_s * over_s * share
+            wanted[birth] = self.rules.intake_per_s * lived_s[birth] * share
         enough = left >= sum(wanted.values())
         for birth, most in wanted.items():
             energy[birth] += most if enough else most * left / sum(wanted.values())
