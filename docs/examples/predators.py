@@ -10,11 +10,11 @@ class Predators:
     """A robot without energy dies; one with enough has a child, and shares with it."""
 
     class Parameters(msgspec.Struct):
-        """Energy: of the light, shared by all; lost; taken by a predator; to divide."""
+        """Energy a second: light, for all together; loss; bite. To divide."""
 
-        light_per_s: float = 6.0
-        loss_per_s: float = 0.1
-        bite_per_s: float = 2.0
+        light: float = 6.0
+        loss: float = 0.1
+        bite: float = 2.0
         divides_at: float = 15.0
 
     def __init__(self, _experiment: rv.Experiment, parameters: Parameters) -> None:
@@ -24,26 +24,17 @@ class Predators:
     def decide(self, view: rv.ArenaView, _rng: np.random.Generator) -> rv.Decisions:
         """Return who dies, who divides, and the energy of all others."""
         rules, robots = self.parameters, {robot.birth: robot for robot in view.robots}
-        gain = rules.light_per_s / max(1, len(robots)) - rules.loss_per_s
-        energy = {
-            birth: robot.stores["energy"] + gain * view.interval_s
-            for birth, robot in robots.items()
-        }
-        for meeting in view.meetings:
-            pair = meeting.first, meeting.second
-            prey, predator = sorted(pair, key=lambda birth: robots[birth].parts)
-            if robots[prey].parts < robots[predator].parts:
-                bite = min(rules.bite_per_s * meeting.duration_s, energy[prey])
-                energy[prey] -= bite
-                energy[predator] += bite
-        dead = [birth for birth in robots if energy[birth] <= 0.0]
+        gain = (rules.light / max(1, len(robots)) - rules.loss) * view.interval_s
+        energy = {b: one.stores["energy"] + gain for b, one in robots.items()}
+        for met in view.meetings:
+            pair = met.first, met.second
+            prey, hunter = sorted(pair, key=lambda b: robots[b].parts)
+            if robots[prey].parts < robots[hunter].parts:
+                bite = min(rules.bite * met.duration_s, energy[prey])
+                energy |= {prey: energy[prey] - bite, hunter: energy[hunter] + bite}
+        dead = [rv.Death(b, "no energy") for b in robots if energy[b] <= 0.0]
+        mothers = [b for b in robots if energy[b] >= rules.divides_at][: view.room]
+        energy |= {b: energy[b] / 2 for b in mothers}
         stores = {b: {"energy": energy[b]} for b in robots if energy[b] > 0.0}
-        births: list[rv.Conception] = []
-        for birth in stores if view.room else ():
-            if energy[birth] >= rules.divides_at:
-                stores[birth] = {"energy": energy[birth] / 2}
-                births += [
-                    rv.Conception((birth,), robots[birth].place, 0.5, stores[birth])
-                ]
-        deaths = tuple(rv.Death(birth, "no energy") for birth in dead)
-        return rv.Decisions(tuple(births), deaths, stores)
+        born = [rv.Conception((b,), robots[b].place, 0.5, stores[b]) for b in mothers]
+        return rv.Decisions(tuple(born), tuple(dead), stores)

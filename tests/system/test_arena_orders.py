@@ -110,7 +110,7 @@ def orders_of_python(arena: rv.Arena, guest: rv.Robot, document: str) -> None:
     first, second = listing.robots[:2]
     for robot, parents, why in (
         (guest, (999,), "birth 999: is not alive; alive are "),
-        (guest, (first, second, first), "length <= 2"),
+        (guest, (first, second, first), "must be at most 2 robots"),
         ("guest.yaml", (), "Robot.read reads a file"),
     ):
         with pytest.raises(rv.RevolveError, match=why):

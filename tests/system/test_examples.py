@@ -11,8 +11,8 @@ from tests.system.workspace import Workspace
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 MOST_LINES = 40
-OTHERS = ("test_view_picture.py", "test_docs.py")
-"""Run the script that needs a Vulkan driver, and that which is a plug-in of a page."""
+OTHERS = ("test_view_picture.py", "test_docs.py", "test_ecosystem.py")
+"""Run the script that needs a Vulkan driver, and those that are plug-ins."""
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 

@@ -24,7 +24,8 @@ BIRTHS = {"off-line": 72, "arena": 24, "archipelago": 74}
 FILLED = {
     "off-line": {"births", "evaluations", "population", "runs"},
     "arena": {"births", "deaths", "fitness", "population", "poses", "runs", "touches"},
-    "archipelago": {*TABLES} - {"audits", "drifts", "learning", "touches"},
+    "archipelago": {*TABLES}
+    - {"audits", "drifts", "learning", "touches", "meetings", "matings", "patches"},
 }
 """Tables that have rows in each run."""
 

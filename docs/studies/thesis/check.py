@@ -24,6 +24,10 @@ from schema.experiment.file import experiment_from_text, experiment_text
 _TO_THE_END = {"outcomes", "populations", "runs"}
 
 
+_OTHER_STUDIES = {"ecosystem"}
+"""Folders of the rows of other studies."""
+
+
 def problems_of(data: Path, part: Part, name: str) -> Iterator[str]:
     """Yield the problems of a repeat's files."""
     for table in tables_of(part):
@@ -91,7 +95,8 @@ def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
             lack = f", missing: {_ranges(missing)}" if missing else ""
             print(f"{experiment}: {len(kept)} of {part.repeats} repeats{lack}")
     expected |= {benchmark_path(data, kind) for kind in BENCHMARKS}
-    there = {path for table in data.glob("*/") for path in table.iterdir()}
+    tables = (table for table in data.glob("*/") if table.name not in _OTHER_STUDIES)
+    there = {path for table in tables for path in table.iterdir()}
     strays = sorted(there - expected)
     problems += [f"{path.relative_to(data)}: unexpected file" for path in strays]
     size = sum(path.stat().st_size for path in there)
