@@ -88,7 +88,7 @@ def ages_at_death(tables: Tables) -> p9.ggplot:
 
 
 def ground_map(tables: Tables) -> Any:  # noqa: ANN401 - untyped
-    """Return where robots were born, patches, and who had children with whom.
+    """Return a map of places of birth, patches, and lines between parents.
 
     Raises:
         NothingToDraw: no robot has a place of birth.

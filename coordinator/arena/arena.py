@@ -276,7 +276,7 @@ class Arena:
     def _is_over(self, decisions: Decisions) -> bool:
         """Return whether the run ends here: extinct, all births done, or late."""
         self.is_extinct = not self._orders.prevent_extinction and (
-            decisions.is_extinct or not len(self.living)
+            decisions.is_extinct or not (len(self.living) or decisions.births)
         )
         migration = self._migration
         if migration is not None:

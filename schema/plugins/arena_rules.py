@@ -172,8 +172,8 @@ class ArenaRules(Protocol):
 
     The object may keep a memory in ``self``, which ``decide`` changes. A run that is
     resumed repeats all decisions, so ``decide`` must depend on nothing but its
-    arguments and that memory: no clock, file, or state of a module. An arena that is
-    left by all robots ends its run.
+    arguments and that memory: no clock, file, or state of a module. A run ends
+    if no robot is left in its arena, and none is to be born.
     """
 
     @property
