@@ -36,9 +36,8 @@ UNBOUNDED = 1000.0
 """Inflow and capacity of a patch that 60 robots cannot empty."""
 NEUTRAL = "docs.studies.ecosystem.neutral:NeutralRules"
 WALKING_BIRTHS = 200
-LONG_S, SHORT_S = 1800.0, 900.0
-END_S = {"gain": SHORT_S, "zones": SHORT_S, "chemostat": SHORT_S}
-"""Simulated time of the runs of a part, if it is not ``LONG_S`` [s]."""
+END_S = 1800.0
+"""Simulated time of a run [s]."""
 AT_ONCE = 2
 _writing = Lock()
 
@@ -121,7 +120,7 @@ def make(own: Planned, place: Path) -> None:
     """Make a run, and a control's neutral twin; keep the rows."""
     folder = place / "-".join(own.names.values())
     shutil.rmtree(folder, ignore_errors=True)
-    swept = {"parameters": own.parameters, "end_s": END_S.get(own.part, LONG_S)}
+    swept = {"parameters": own.parameters, "end_s": END_S}
     experiment = rv.Experiment.read("ecosystem", arena=swept)
     if own.part == "walkers":
         experiment = experiment.replace(founders=_walkers(own.seed, folder))
