@@ -20,6 +20,8 @@ from schema.wire.codec import Message
 
 Births = Annotated[tuple[BirthId, ...], Meta(max_length=MOST_LIVING)]
 Digest = Annotated[bytes, Meta(min_length=32, max_length=32)]
+Box = tuple[Finite, Finite, Finite, Finite]
+"""Least x, y, then greatest x, y of a box seen from above, world frame [m]."""
 
 
 class Insertion(Message, frozen=True):

@@ -3,7 +3,10 @@
 A digest is the same however the robots were distributed when they were simulated.
 """
 
+from collections.abc import Collection
 from hashlib import sha256
+
+from msgspec import structs
 
 from schema.experiment.section import Count
 from schema.limits import ADVANCE_BYTES
@@ -52,3 +55,13 @@ def state_digest(snapshot: bytes) -> bytes:
         MalformedMessage: no snapshot.
     """
     return decode(ArenaState, snapshot, ADVANCE_BYTES).digest
+
+
+def states_of(whole: ArenaState, births: Collection[BirthId]) -> ArenaState:
+    """Return the state of some robots, whole clusters."""
+    return structs.replace(
+        whole,
+        robots=tuple(each for each in whole.robots if each[0] in births),
+        clusters=tuple(each for each in whole.clusters if each[0] in births),
+        casualties=(),
+    )

@@ -1,6 +1,6 @@
 """Poses of an arena's robots: as they travel, as arrays, as rows of their table."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -96,6 +96,37 @@ class PoseArrays(NamedTuple):
         # -1 for the number of samples would be undefined without robots.
         samples = len(by_robot) // max(1, len(births))
         return by_robot.reshape(len(births), samples, 2)
+
+    def of(self, births: Collection[BirthId]) -> Self:
+        """Return the samples of some robots."""
+        is_kept = np.array([robot in births for robot in self.robots], dtype=bool)
+        return type(self)(
+            self.islands[is_kept],
+            self.births[is_kept],
+            self.times_s[is_kept],
+            self.cores[is_kept],
+            self.joints[is_kept],
+            self.angles[np.repeat(is_kept, self.joints)],
+        )
+
+    @classmethod
+    def joined(cls, parts: Iterable[Self]) -> Self:
+        """Return the samples of several parts of an arena, by time and robot."""
+        islands, births, times_s, cores, joints, angles = (
+            np.concatenate(columns) for columns in zip(*parts, strict=True)
+        )
+        order = np.lexsort((births, islands, times_s))
+        counts, starts = joints[order], (np.cumsum(joints) - joints)[order]
+        # Angle k of a sample that begins at s, and now at t, is number s - t + k.
+        moved = np.repeat(starts - (np.cumsum(counts) - counts), counts)
+        return cls(
+            islands[order],
+            births[order],
+            times_s[order],
+            cores[order],
+            counts,
+            angles[moved + np.arange(len(angles))],
+        )
 
     @property
     def are_finite(self) -> bool:

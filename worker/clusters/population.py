@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
+from schema.robot.groups import Group, Links, connected_components
 from schema.robot.ids import BirthId
 from schema.robot.trace import Floats
 from worker.clusters.cluster import Cluster
@@ -25,10 +26,6 @@ from worker.clusters.states import (
     Schedule,
     StateColumns,
 )
-
-Group = tuple[BirthId, ...]
-"""Members of one cluster, ascending."""
-Links = list[tuple[BirthId, BirthId]]
 
 
 class ArenaPopulation:
@@ -248,24 +245,3 @@ def _touching(
             if first in index_of and second in index_of:
                 pairs.append((index_of[first], index_of[second]))
     return sorted(pairs)
-
-
-def connected_components(groups: Iterable[Group], links: Links) -> list[Group]:
-    """Return groups joined along links, each and all ascending."""
-    parent: dict[BirthId, BirthId] = {}
-    for group in groups:
-        for birth in group:
-            parent[birth] = group[0]
-
-    def root(birth: BirthId) -> BirthId:
-        while parent[birth] != birth:
-            birth = parent[birth]
-        return birth
-
-    for first, second in links:
-        ends = sorted((root(first), root(second)))
-        parent[ends[1]] = ends[0]
-    found: dict[BirthId, list[BirthId]] = {}
-    for birth in sorted(parent):
-        found.setdefault(root(birth), []).append(birth)
-    return [tuple(found[first]) for first in sorted(found)]

@@ -1,0 +1,1 @@
+"""One arena over several workers: parts of its robots, exchanges, their results."""

@@ -1,0 +1,95 @@
+"""Results of parts of an arena as the one result that one worker would return."""
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from itertools import chain
+
+from msgspec import structs
+
+from coordinator.parts.exchange import PartResult
+from schema.robot.ids import BirthId
+from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.arena_state import ArenaState
+from schema.wire.poses import PoseArrays
+
+Chosen = Sequence[tuple[PartResult, Collection[BirthId]]]
+"""Results, each with the robots for which it is valid."""
+
+
+def joined(chosen: Chosen) -> PartResult:
+    """Return the result of all robots of an exchange."""
+    judged: list[tuple[Judgement, float | None]] = []
+    casualties: list[Casualty] = []
+    touches: list[Touch] = []
+    poses: list[PoseArrays] = []
+    for result, births in chosen:
+        advance = result.advance
+        works = advance.work_j or [None] * len(advance.judgements)
+        pairs = zip(advance.judgements, works, strict=True)
+        judged += [pair for pair in pairs if pair[0].birth in births]
+        casualties += [lost for lost in advance.casualties if lost.birth in births]
+        touches += [touch for touch in advance.touches if touch.first in births]
+        poses.append(PoseArrays.received(advance.poses).of(births))
+    judged.sort(key=lambda pair: pair[0].birth)
+    state = _joined_states(chosen)
+    return PartResult(
+        Advance(
+            step=state.step,
+            digest=state.digest,
+            judgements=tuple(judgement for judgement, _ in judged),
+            casualties=tuple(
+                sorted(casualties, key=lambda lost: (lost.step, lost.birth))
+            ),
+            touches=tuple(sorted(touches, key=lambda one: (one.first, one.second))),
+            poses=PoseArrays.joined(poses).message(),
+            work_j=tuple(work_j for _, work_j in judged if work_j is not None),
+        ),
+        state,
+        {
+            birth: box
+            for result, births in chosen
+            for birth, box in result.boxes.items()
+            if birth in births
+        },
+    )
+
+
+def _joined_states(chosen: Chosen) -> ArenaState:
+    return structs.replace(
+        chosen[0][0].state,
+        robots=tuple(
+            sorted(
+                each
+                for result, births in chosen
+                for each in result.state.robots
+                if each[0] in births
+            )
+        ),
+        clusters=tuple(
+            sorted(
+                each
+                for result, births in chosen
+                for each in result.state.clusters
+                if each[0] in births
+            )
+        ),
+    )
+
+
+def continued(before: Advance, after: Advance, interval_s: float) -> Advance:
+    """Return an advance that two exchanges made, one after the other.
+
+    Durations of touches are multiples of an interval, and so are their sums [s].
+    """
+    counts = Counter[tuple[BirthId, BirthId]]()
+    for touch in chain(before.touches, after.touches):
+        counts[touch.first, touch.second] += round(touch.duration_s / interval_s)
+    poses = [PoseArrays.received(each.poses) for each in (before, after)]
+    return structs.replace(
+        after,
+        casualties=before.casualties + after.casualties,
+        touches=tuple(
+            Touch(*pair, count * interval_s) for pair, count in sorted(counts.items())
+        ),
+        poses=PoseArrays.joined(poses).message(),
+    )

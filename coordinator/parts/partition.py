@@ -1,0 +1,121 @@
+"""Division of an arena's robots into parts that several workers advance.
+
+Robots whose boxes do not overlap cannot act on each other, so groups that overlaps
+connect may be advanced apart. What parts there are has no influence on any result.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from schema.robot.groups import Group, connected_components
+from schema.robot.ids import BirthId
+from schema.wire.arena import Box
+
+GROWTH_M = 0.05
+"""A robot may leave the box that it swept before by this without a repeat [m]."""
+MOVE_COST = 0.3
+"""Least gain of a move, as a share of the cost of the robots that move.
+
+To build a robot's model takes as long as about three simulated seconds of it, and a
+division lasts for about ten exchanges.
+"""
+LEAST_GAIN = 0.02
+"""Least gain of a move, as a share of the most expensive part."""
+
+
+def overlapping(boxes: Mapping[BirthId, Box]) -> list[tuple[BirthId, BirthId]]:
+    """Return the pairs of robots whose boxes overlap or meet."""
+    if not boxes:
+        return []
+    births = list(boxes)
+    west, south, east, north = np.array([boxes[birth] for birth in births]).T
+    is_near = (west[:, None] <= east) & (south[:, None] <= north)
+    first, second = np.triu(is_near & is_near.T, 1).nonzero()
+    pairs = zip(first.tolist(), second.tolist(), strict=True)
+    return [(births[a], births[b]) for a, b in pairs]
+
+
+def groups_of(
+    boxes: Mapping[BirthId, Box], clusters: Sequence[Group], growth_m: float = 0.0
+) -> list[Group]:
+    """Return the robots that must be advanced together, group by group.
+
+    Args:
+        boxes: of all robots.
+        clusters: robots of one model; those that are in none are alone.
+        growth_m: by which each box is grown on each side [m].
+    """
+    grown = {
+        birth: (west - growth_m, south - growth_m, east + growth_m, north + growth_m)
+        for birth, (west, south, east, north) in boxes.items()
+    }
+    alone = grown.keys() - {birth for members in clusters for birth in members}
+    return connected_components(
+        [*clusters, *((birth,) for birth in alone)], overlapping(grown)
+    )
+
+
+def divide(
+    groups: Sequence[Group],
+    costs: Mapping[BirthId, float],
+    held: Mapping[BirthId, int],
+    parts: int,
+) -> list[list[Group]]:
+    """Return the groups of each part, with few moves.
+
+    A group stays where most of it is, until moving it lowers the cost of the most
+    expensive part by more than the move costs.
+
+    Args:
+        groups: robots that stay together, each at least one.
+        costs: of an exchange of each robot, in any unit.
+        held: present part of each robot that has one.
+        parts: their number.
+    """
+    cost_of = {group: sum(costs[birth] for birth in group) for group in groups}
+    divided: list[list[Group]] = [[] for _ in range(parts)]
+    loads = [0.0] * parts
+    for group in sorted(groups, key=lambda group: (-cost_of[group], group)):
+        part = _present(group, costs, held, parts)
+        if part is None:
+            part = loads.index(min(loads))
+        divided[part].append(group)
+        loads[part] += cost_of[group]
+    while True:
+        heavy, light = loads.index(max(loads)), loads.index(min(loads))
+        difference = loads[heavy] - loads[light]
+        gains = {
+            group: min(cost_of[group], difference - cost_of[group])
+            - MOVE_COST * cost_of[group]
+            for group in divided[heavy]
+        }
+        group = max(gains, key=gains.__getitem__, default=())
+        if not group or gains[group] <= LEAST_GAIN * loads[heavy]:
+            return [sorted(each) for each in divided]
+        divided[heavy].remove(group)
+        divided[light].append(group)
+        loads[heavy] -= cost_of[group]
+        loads[light] += cost_of[group]
+
+
+def _present(
+    group: Group,
+    costs: Mapping[BirthId, float],
+    held: Mapping[BirthId, int],
+    parts: int,
+) -> int | None:
+    """Return the part that has most of a group; None if none has any of it."""
+    shares = [0.0] * parts
+    is_held = False
+    for birth in group:
+        part = held.get(birth, parts)
+        if part < parts:
+            is_held = True
+            shares[part] += costs[birth]
+    return shares.index(max(shares)) if is_held else None
+
+
+def held_by(parts: Sequence[Collection[BirthId]]) -> dict[BirthId, int]:
+    """Return the part of each robot."""
+    return {birth: part for part, births in enumerate(parts) for birth in births}
