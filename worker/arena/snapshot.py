@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import chain
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -104,8 +105,19 @@ def read_snapshot(
 
 @lru_cache(maxsize=8)
 def _digest(settings: ArenaSettings) -> bytes:
-    """Return the SHA-256 of an arena's settings."""
-    return hashlib.sha256(msgspec.json.encode(settings)).digest()
+    """Return the SHA-256 of an arena's settings, which new keys do not change."""
+    return hashlib.sha256(msgspec.json.encode(_without_defaults(settings))).digest()
+
+
+def _without_defaults(value: Any) -> Any:  # noqa: ANN401 - any value of a section
+    """Return a section as a table without keys at their defaults and empty tables."""
+    if isinstance(value, tuple):
+        return tuple(map(_without_defaults, value))
+    if not isinstance(value, Struct):
+        return value
+    keys = [(key, getattr(value, key.name)) for key in msgspec.structs.fields(value)]
+    others = [(key, given) for key, given in keys if given not in (key.default, {})]
+    return {key.name: _without_defaults(given) for key, given in others}
 
 
 def _robot_state(robot: ArenaRobot) -> _RobotState:

@@ -8,6 +8,10 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import MalformedMessage
+from schema.experiment.changes import SettingChange
+from schema.experiment.document import ArenaWorld
+from schema.experiment.environment import Environment
+from schema.experiment.identity import Origin
 from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -83,6 +87,28 @@ def test_a_digest_depends_on_the_state_only(robot_of: Robots) -> None:
     assert changed.digest != state.digest
     joined = (*state.clusters[2:], state.clusters[0] + state.clusters[1])
     assert replace(state, clusters=joined).digest != state.digest
+
+
+def test_a_key_at_its_default_does_not_change_the_digest() -> None:
+    """An arena has the digest that it had before its sections got a new key."""
+    before = replace(SETTINGS, arena=ArenaWorld())
+    snapshot = World(before).snapshot()
+    # The keys of its rules stand for new ones.
+    assert World.restore(SETTINGS, snapshot).digest() == World(before).digest()
+    change = SettingChange(setting="simulation.friction", at=(0,), values=(1.0,))
+    others = [
+        settings_of(end_s=1.0),
+        settings_of(parameters={"share": 0.5}),
+        replace(SETTINGS, environment=Environment(slope_deg=1.0)),
+        replace(SETTINGS, changes=(change,)),
+        replace(SETTINGS, changes=(replace(change, period=10.0),)),
+        replace(SETTINGS, origin=Origin(seed=1)),
+    ]
+    digests = {World(settings).digest() for settings in (SETTINGS, *others)}
+    assert len(digests) == 1 + len(others)
+    for settings in others:
+        with pytest.raises(MalformedMessage, match="other settings"):
+            World.restore(settings, snapshot)
 
 
 def test_snapshot_right_after_changes_continues_equally(robot_of: Robots) -> None:
