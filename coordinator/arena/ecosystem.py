@@ -4,7 +4,7 @@ No robot is selected centrally. Source: the idea is that of Weel et al. 2014 (ro
 reproduce from within); the energy and the patches are our own.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import cos, sin, sqrt, tau
 from types import MappingProxyType
 from typing import Annotated, Literal
@@ -20,7 +20,6 @@ from schema.plugins.arena_rules import (
     Death,
     Decisions,
     Patch,
-    Place,
     Resident,
 )
 from schema.robot.ids import BirthId
@@ -105,14 +104,7 @@ class EcosystemRules:
         """Feed the robots, and return who mates and who dies."""
         if view.parameters is not None:
             self._rules = view.parameters
-        rules = self._rules
-        energy = {robot.birth: robot.stores[ENERGY] for robot in view.robots}
-        self._refund(view, energy)
-        for birth, taken in self._feed(view).items():
-            energy[birth] += taken
-        for robot in view.robots:
-            lost = rules.energy_per_s * lived_s(robot, view)
-            energy[robot.birth] -= lost + rules.energy_per_j * robot.work_j
+        rules, energy = self._rules, self._balance(view)
         deaths = tuple(
             Death(robot.birth, "age" if energy[robot.birth] > 0.0 else "no energy")
             for robot in view.robots
@@ -124,22 +116,28 @@ class EcosystemRules:
         }
         births, rests = self._mate(view, living, energy)
         self._place_patches(view.time_s, rng)
-        return Decisions(
-            births,
-            deaths,
-            {
-                birth: {ENERGY: energy[birth], **rests.get(birth, {})}
-                for birth in living
-            },
-            tuple(self._patches),
-        )
+        stores = {
+            birth: {ENERGY: energy[birth], **rests.get(birth, {})} for birth in living
+        }
+        return Decisions(births, deaths, stores, tuple(self._patches))
 
-    def _refund(self, view: ArenaView, energy: dict[BirthId, float]) -> None:
-        """Give back the energy for children that were not born."""
+    def _balance(self, view: ArenaView) -> dict[BirthId, float]:
+        """Return the energy of each robot, after what it took and lost.
+
+        Parents get back the energy for children that were not born.
+        """
+        rules = self._rules
+        energy = {robot.birth: robot.stores[ENERGY] for robot in view.robots}
         for couple, child in zip(self._couples, view.born, strict=True):
             for birth in couple:
                 if child is None and birth in energy:
-                    energy[birth] += self._rules.child_energy / 2
+                    energy[birth] += rules.child_energy / 2
+        for birth, taken in self._feed(view).items():
+            energy[birth] += taken
+        for robot in view.robots:
+            lost = rules.energy_per_s * lived_s(robot, view)
+            energy[robot.birth] -= lost + rules.energy_per_j * robot.work_j
+        return energy
 
     def _feed(self, view: ArenaView) -> dict[BirthId, float]:
         """Let patches grow, and return what each robot takes from them."""
@@ -172,11 +170,8 @@ class EcosystemRules:
         Parents pay at once.
         """
         rules, before = self._rules, self._met_s
-        self._met_s = {
-            (one.first, one.second): before.get((one.first, one.second), 0.0)
-            + one.duration_s
-            for one in view.meetings
-        }
+        met_s = {(one.first, one.second): one.duration_s for one in view.meetings}
+        self._met_s = {pair: before.get(pair, 0.0) + met_s[pair] for pair in met_s}
         price = rules.child_energy / 2 + rules.mating_cost
         ready = {
             birth
@@ -197,7 +192,8 @@ class EcosystemRules:
             for birth in pair:
                 energy[birth] += rules.mating_gain - price
                 rests[birth] = {RESTS_UNTIL: view.time_s + rules.rest_s}
-            near = _middle(living[birth].place for birth in pair)
+            (ax, ay), (bx, by) = (living[birth].place for birth in pair)
+            near = (ax + bx) / 2, (ay + by) / 2
             stores = {ENERGY: rules.child_energy}
             births.append(Conception(pair, near, rules.mating_distance_m, stores))
         return tuple(births), rests
@@ -211,20 +207,14 @@ class EcosystemRules:
             is_empty = content <= _EMPTY * rules.patch_capacity
             if rules.patch_motion == "circling":
                 angle = tau * (number / rules.patches + time_s / rules.patch_period_s)
-                x, y = (
-                    rules.patch_spread_m * cos(angle),
-                    rules.patch_spread_m * sin(angle),
-                )
+                radius_m = rules.patch_spread_m
             elif is_new or (is_empty and rules.patch_motion == "regrowing"):
                 angle, share = rng.uniform(0.0, tau), rng.uniform()
                 radius_m = rules.patch_spread_m * sqrt(share)
-                x, y = radius_m * cos(angle), radius_m * sin(angle)
             else:
                 continue
-            patches[number:] = [
-                Patch(x, y, rules.patch_radius_m, content),
-                *patches[number + 1 :],
-            ]
+            x, y = radius_m * cos(angle), radius_m * sin(angle)
+            patches[number : number + 1] = [Patch(x, y, rules.patch_radius_m, content)]
 
 
 def lived_s(robot: Resident, view: ArenaView) -> float:
@@ -241,8 +231,3 @@ def share_within(robot: Resident, patch: Patch) -> float:
         return 0.0
     away = robot.track.astype(np.float64) - (patch.x, patch.y)
     return float(np.mean(np.hypot(away[:, 0], away[:, 1]) <= patch.radius_m))
-
-
-def _middle(places: Iterable[Place]) -> Place:
-    (ax, ay), (bx, by) = places
-    return (ax + bx) / 2, (ay + by) / 2

@@ -9,7 +9,6 @@ from coordinator.arena.ecosystem import (
     RESTS_UNTIL,
     Ecosystem,
     EcosystemRules,
-    lived_s,
 )
 from schema.experiment.document import Experiment
 from schema.plugins.arena_rules import (
@@ -54,14 +53,7 @@ class NeutralRules(EcosystemRules):
 
     def decide(self, view: ArenaView, rng: np.random.Generator) -> Decisions:
         """Feed the robots as the twin does; draw who mates and who dies."""
-        rules = self._twin
-        energy = {robot.birth: robot.stores[ENERGY] for robot in view.robots}
-        self._refund(view, energy)
-        for birth, taken in self._feed(view).items():
-            energy[birth] += taken
-        for robot in view.robots:
-            lost = rules.energy_per_s * lived_s(robot, view)
-            energy[robot.birth] -= lost + rules.energy_per_j * robot.work_j
+        rules, energy = self._twin, self._balance(view)
         self._children += sum(child is not None for child in view.born)
         gone = view.births - len(view.robots)
         due = sum(time_s <= view.time_s for time_s in rules.deaths_s) - gone
