@@ -61,7 +61,7 @@ class Arena:
         living: its living robots; only the arena changes them.
         step: physics step of the last decision.
         is_finished: all births of the experiment are done, or ``is_extinct``.
-        is_extinct: too few robots are left to mate, and none can arrive.
+        is_extinct: no robot can be born any more, and none can arrive.
     """
 
     def __init__(

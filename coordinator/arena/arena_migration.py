@@ -21,7 +21,7 @@ class ArenaMigration:
 
     Attributes:
         epochs: when the arena sends migrants, and what its neighbours sent.
-        is_starving: too few robots live to mate, so the epoch ends early.
+        is_starving: no robot can be born any more, so the epoch ends early.
         is_extinct: the end of the epoch brought a starving arena no immigrant.
     """
 

@@ -1,7 +1,7 @@
 """Summary of a finished run: best robots, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -79,7 +79,7 @@ def restore_best(folder: Path) -> None:
     try:
         allow_plugins_of(folder, is_resumed=False)
         experiment = experiment_from_text(read_details(folder).document, is_own=True)
-        if _is_extinct(experiment, births_of(folder)):
+        if _is_extinct(folder, experiment):
             return
         _, robot = _read_best(folder, best, experiment)
         done = _write_best(robot, folder, experiment)
@@ -90,14 +90,21 @@ def restore_best(folder: Path) -> None:
     tell_user(f"{folder}: {BEST} was missing; {_BEST}: {done}")
 
 
-def _is_extinct(experiment: Experiment, births: Mapping[int, int]) -> bool:
+def _is_extinct(folder: Path, experiment: Experiment) -> bool:
     """Return whether all islands of a finished run are extinct arenas.
 
     An arena with all births of the experiment is none, even if its last robots are
-    too few to mate.
+    too few to mate, and neither is one with robots at its ``end_s``.
     """
+    births, names = births_of(folder), ["island", "sim_time_s"]
+    rows = [read_table(folder, table, names) for table in ("births", "fitness")]
+    lived = pa.concat_tables(rows, promote_options="default").group_by("island")
+    latest = lived.aggregate([("sim_time_s", "max")]).to_pylist()
+    last_s = {row["island"]: row["sim_time_s_max"] for row in latest}
     return all(
-        own.arena is not None and births[number] < own.births
+        (arena := own.arena) is not None
+        and births[number] < own.births
+        and not 0.0 < arena.end_s < last_s.get(number, 0.0) + arena.sample_interval_s
         for number, own in enumerate(island_experiments(experiment))
     )
 
@@ -121,10 +128,10 @@ def _results(folder: Path, experiment: Experiment) -> list[str]:
     The tables, not the living: robots of an arena have newer windows at the end of a
     run than the last population has, which status and report show.
     """
-    born, islands = births_of(folder), island_experiments(experiment)
-    births = counted(born.total(), "birth")
-    if _is_extinct(experiment, born):
-        return [f"extinct after {births}: too few robots are left to mate"]
+    births = counted(births_of(folder).total(), "birth")
+    if _is_extinct(folder, experiment):
+        return [f"extinct after {births}: no robot is left that can have a child"]
+    islands = island_experiments(experiment)
     last = last_populations(folder)
     best = best_of(last)
     if best is None:

@@ -130,7 +130,7 @@ def test_arena_without_any_fitness_reports_the_reason(workspace: Workspace) -> N
     (workspace.folder / "judge.py").write_text(FITNESS)
     (workspace.folder / "arena.toml").write_text(ARENA)
     output = workspace.run("run", "arena.toml", *QUIET, "--out", "a", code=1)
-    assert "too few robots are left to mate" in output
+    assert "no robot is left that can have a child" in output
     assert "deaths were failures, all: " in output
     assert "nobody looked" in output
     assert "already finished" in workspace.run("resume", "a", "--in-process", code=1)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from coordinator.arena.arena import Arena
 from coordinator.arena.check_rules import check_rules
@@ -30,6 +31,7 @@ from tests.coordinator.arena_world import (
 
 A, B, GONE = born(0, 1, 7)
 NAN = float("nan")
+FOUNDERS = experiment().selection.population
 
 
 class Scripted:
@@ -189,10 +191,16 @@ def twins_at(second: float, *parents: tuple[int, ...]) -> Any:  # noqa: ANN401
     return staticmethod(answer)
 
 
-def lived(verdict: Verdict = viable, births: int = 40, **arena: Any) -> ArenaRun:  # noqa: ANN401
-    rules = {"rules": "scripted", **arena}
-    run = ArenaRun(Arena(experiment(births, **rules), 1, 0), World(), verdict)
-    return run.live(62)
+def lived(
+    verdict: Verdict = viable,
+    births: int = 40,
+    world: World | None = None,
+    parents: str = "tournament",
+    **arena: Any,  # noqa: ANN401
+) -> ArenaRun:
+    given = experiment(births, **{"rules": "scripted", **arena})
+    given = replace(given, selection=replace(given.selection, parents=parents))
+    return ArenaRun(Arena(given, 1, 0), world or World(), verdict).live(62)
 
 
 def outcomes(run: ArenaRun) -> list[tuple[list[int], int | None, str]]:
@@ -259,16 +267,32 @@ def test_children_are_born_near_the_wished_place(scripted: type[Scripted]) -> No
     assert child.stores == {"food": 4.0}
 
 
-def test_rules_end_a_run_that_is_extinct(scripted: type[Scripted]) -> None:
-    scripted.answer = staticmethod(
-        lambda seen, _rng: Decisions(
-            deaths=tuple(Death(one.birth, "flood") for one in seen.robots)
-        )
-    )
-    run = lived()
+def flood(seen: ArenaView, _rng: object) -> Decisions:
+    return Decisions(deaths=tuple(Death(one.birth, "flood") for one in seen.robots))
+
+
+@pytest.mark.parametrize("parents", ["tournament", "none"])
+def test_rules_that_bear_no_robot_end_an_empty_arena(
+    scripted: type[Scripted], parents: str
+) -> None:
+    scripted.answer = staticmethod(flood)
+    run = lived(parents=parents)
     assert {row["reason"] for row in run.rows("deaths")} == {"flood"}
     assert run.is_done
     assert run.arena.is_extinct
+    assert run.arena.births == FOUNDERS
+
+
+def test_an_arena_that_all_robots_left_goes_on_if_random_ones_are_born() -> None:
+    """The thesis's rules need no parents where none are selected."""
+    world = World(diverges=lambda birth, _: birth.number < FOUNDERS)
+    run = lived(births=FOUNDERS + 2, world=world, parents="none", rules="thesis")
+    assert [row["reason"] for row in run.rows("deaths")] == ["diverged"] * FOUNDERS
+    children = run.rows("births")[FOUNDERS:]
+    assert [row["sim_time_s"] for row in children] == [15.0, 30.0]
+    assert not any(row["parents"] for row in children)
+    assert run.is_done
+    assert not run.arena.is_extinct
 
 
 def test_thesis_rules_need_enough_mature_and_room() -> None:

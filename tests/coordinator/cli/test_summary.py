@@ -70,6 +70,13 @@ def test_windows_of_all_arenas_are_said() -> None:
     assert "last 6 s before" in line
 
 
+def write_tables(folder: Path, rows: dict[str, list[dict[str, Any]]]) -> None:
+    for name, own in rows.items():
+        path = parquet_path(folder, "e", 0, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(table(name, own), path)
+
+
 @pytest.mark.parametrize(
     ("births", "islands", "is_extinct"),
     [
@@ -80,26 +87,41 @@ def test_windows_of_all_arenas_are_said() -> None:
     ],
 )
 def test_run_is_extinct_if_all_of_its_arenas_have_too_few_births(
-    births: int, islands: tuple[Islands, ...], *, is_extinct: bool
+    tmp_path: Path, births: int, islands: tuple[Islands, ...], *, is_extinct: bool
 ) -> None:
     experiment = Experiment("e", births=births, arena=ArenaSection(), islands=islands)
-    assert summary._is_extinct(experiment, {0: 2, 1: 0}) is is_extinct
+    write_tables(tmp_path, {"births": [{"birth": 0}, {"birth": 1}]})
+    assert summary._is_extinct(tmp_path, experiment) is is_extinct
     off_line = structs.replace(experiment, arena=None)
-    assert not summary._is_extinct(off_line, {0: 2, 1: 0})
+    assert not summary._is_extinct(tmp_path, off_line)
 
 
-def write_tables(folder: Path, rows: dict[str, list[dict[str, Any]]]) -> None:
-    for name, own in rows.items():
-        path = parquet_path(folder, "e", 0, name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        pq.write_table(table(name, own), path)
+@pytest.mark.parametrize(
+    ("sampled_s", "end_s", "is_extinct"),
+    [
+        pytest.param(95.0, 100.0, True, id="no sample at the end"),
+        pytest.param(100.0, 100.0, False, id="sampled at the end"),
+        pytest.param(100.0, 103.0, False, id="no sample is due at the end"),
+        pytest.param(None, 20.0, False, id="founders until then"),
+        pytest.param(100.0, 0.0, True, id="no end"),
+    ],
+)
+def test_an_arena_with_robots_at_its_end_is_not_extinct(
+    tmp_path: Path, sampled_s: float | None, end_s: float, *, is_extinct: bool
+) -> None:
+    """The rows of robots tell until when an arena lived."""
+    founders = [{"birth": number, "sim_time_s": 10.0 * number} for number in (1, 2)]
+    samples = [{"birth": 1, "sim_time_s": sampled_s}] if sampled_s else []
+    write_tables(tmp_path, {"births": founders, "fitness": samples})
+    experiment = Experiment("e", births=3, arena=ArenaSection(end_s=end_s))
+    assert summary._is_extinct(tmp_path, experiment) is is_extinct
 
 
 @pytest.mark.parametrize(
     ("births", "line"),
     [
         (3, "3 births; no robot of the last population has a fitness"),
-        (2, "extinct after 2 births: too few robots are left to mate"),
+        (2, "extinct after 2 births: no robot is left that can have a child"),
     ],
 )
 def test_a_run_with_all_of_its_births_is_not_extinct(
