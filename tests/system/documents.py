@@ -34,8 +34,14 @@ share = 0.4
 [selection.culling]
 population_limit = 12
 population_floor = 6
+[[changes]]
+setting = "simulation.friction"
+at = [0, 6]
+values = [1.0, 0.2]
+between = "linear"
+period = 12
 """
-"""Evaluations of 2 s to 4 s; a quarter of them are re-evaluations."""
+"""Evaluations of 2 s to 4 s, a quarter of them re-evaluations; friction changes."""
 
 SMALL_ARENA = """
 name = "hamlet"
@@ -54,6 +60,21 @@ birth_radius_m = 0.4
 record_touches = true
 """
 """Arena of little more than half a minute that covers all kinds of events."""
+
+SEASONS = f"""{SMALL_ARENA}
+[[changes]]
+setting = "simulation.friction"
+at = [0, 6]
+values = [1.0, 0.3]
+period = 12
+[[changes]]
+setting = "environment.slope_deg"
+at = [0, 8]
+values = [0.0, 4.0]
+between = "linear"
+period = 16
+"""
+"""The same arena, in which friction and slope change."""
 
 CROWDED_ARENA = """
 name = "crowd"
@@ -158,3 +179,43 @@ epoch = 7
 epoch_s = 10.0
 handling = "evict"
 """
+
+POND_RULES = """mating_s = 1.0
+mating_distance_m = 0.5
+rest_s = 10.0
+maturity_s = 5.0
+energy_per_s = 0.15
+lifespan_s = 120.0
+patch_motion = "regrowing"
+patch_radius_m = 0.8
+patch_capacity = 12.0
+patch_spread_m = 0.8
+start_energy = 12.0
+child_energy = 6.0
+"""
+_POND_ARENA = """rules = "ecosystem"
+birth_interval_s = 1.0
+cull_interval_s = 1.0
+sample_interval_s = 1.0
+snapshot_interval_s = 6.0
+birth_radius_m = 0.8
+population_limit = 40
+"""
+_SMALL = """name = "pond"
+births = 45
+[selection]
+population = 14
+[simulation]
+warmup_steps = 200
+window_steps = 800
+"""
+POND = f"{_SMALL}[arena]\n{_POND_ARENA}[arena.parameters]\n{POND_RULES}"
+PONDS = f"""{_SMALL}[[islands]]
+count = 2
+[islands.arena]
+{_POND_ARENA}[islands.arena.parameters]
+{POND_RULES}[migration]
+topology = "ring"
+epoch = 20
+"""
+"""Two ecosystems between which robots migrate."""

@@ -12,67 +12,22 @@ import pytest
 from coordinator.arena.ecosystem import Ecosystem
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
+from tests.system.documents import POND, POND_RULES, PONDS
 from tests.system.fleet import kill_beyond, size
 from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
-PARAMETERS = """mating_s = 1.0
-mating_distance_m = 0.5
-rest_s = 10.0
-maturity_s = 5.0
-energy_per_s = 0.15
-lifespan_s = 120.0
-patch_motion = "regrowing"
-patch_radius_m = 0.8
-patch_capacity = 12.0
-patch_spread_m = 0.8
-start_energy = 12.0
-child_energy = 6.0
-"""
-ARENA = """rules = "ecosystem"
-birth_interval_s = 1.0
-cull_interval_s = 1.0
-sample_interval_s = 1.0
-snapshot_interval_s = 6.0
-birth_radius_m = 0.8
-population_limit = 40
-"""
-START = """name = "pond"
-births = 45
-[selection]
-population = 14
-[simulation]
-warmup_steps = 200
-window_steps = 800
-"""
-ECOSYSTEM = f"{START}[arena]\n{ARENA}[arena.parameters]\n{PARAMETERS}"
-ISLANDS = f"""{START}[[islands]]
-count = 2
-[islands.arena]
-{ARENA}[islands.arena.parameters]
-{PARAMETERS}[migration]
-topology = "ring"
-epoch = 20
-"""
 ALONE = ("--in-process", "--quiet")
 Pair = tuple[int, int]
-
-
-def begin(workspace: Workspace, document: str, births: int, name: str) -> Path:
-    """Run a document to its end, in one process; return the run's folder."""
-    (workspace.folder / "x.toml").write_text(document)
-    words = ("--seed", "3", "--births", str(births), *ALONE)
-    workspace.run("run", "x.toml", *words, "--out", name)
-    return workspace.folder / name
 
 
 @pytest.mark.parametrize(
     ("document", "before", "births"),
     [
-        pytest.param(ECOSYSTEM, 30, 45, id="ecosystem"),
-        pytest.param(ISLANDS, 30, 40, id="ring of two"),
+        pytest.param(POND, 30, 45, id="ecosystem"),
+        pytest.param(PONDS, 30, 40, id="ring of two"),
         pytest.param((EXAMPLES / "predators.toml").read_text(), 20, 40, id="predators"),
     ],
 )
@@ -80,8 +35,8 @@ def test_run_is_equal_with_kills_on_two_workers_and_lengthened(
     workspace: Workspace, document: str, before: int, births: int
 ) -> None:
     shutil.copy(EXAMPLES / "predators.py", workspace.folder)
-    wanted = begin(workspace, document, births, "wanted")
-    killed = begin(workspace, document, before, "killed")
+    wanted = workspace.finished(document, births, "wanted")
+    killed = workspace.finished(document, before, "killed")
     shorter = size(killed)
     words: tuple[str, ...] = ("resume", "killed", "--births", str(births))
     for share in (0.3, 0.7):
@@ -248,8 +203,8 @@ class Second:
 def test_stores_meetings_matings_and_deaths_are_recomputed_from_tables(
     workspace: Workspace,
 ) -> None:
-    run = begin(workspace, ECOSYSTEM, 45, "a")
-    keys = dict(line.split(" = ") for line in PARAMETERS.splitlines())
+    run = workspace.finished(POND, 45, "a")
+    keys = dict(line.split(" = ") for line in POND_RULES.splitlines())
     text = {"patch_motion"}
     given: Any = {k: v.strip('"') if k in text else float(v) for k, v in keys.items()}
     tables = Tables(run)

@@ -19,7 +19,7 @@ from tests.system.documents import (
     MIXED,
     OFF_LINE,
     RING,
-    SMALL_ARENA,
+    SEASONS,
 )
 from tests.system.fleet import kill_beyond, size
 from tests.system.workspace import Workspace
@@ -35,22 +35,14 @@ HOLDS = (
 )
 
 
-def begin(workspace: Workspace, document: str, births: int, name: str) -> Path:
-    """Run a document to its end, in one process; return the run's folder."""
-    (workspace.folder / "x.toml").write_text(document)
-    words = ("--seed", "3", "--births", str(births), *ALONE)
-    workspace.run("run", "x.toml", *words, "--out", name)
-    return workspace.folder / name
-
-
 @pytest.mark.parametrize(
     ("document", "before", "after"),
     [
         pytest.param(OFF_LINE, 21, 40, id="a brood cut short"),
-        pytest.param(BRIDGE, 15, 24, id="re-evaluations"),
+        pytest.param(BRIDGE, 15, 24, id="re-evaluations in a world that changes"),
         pytest.param(LEARNING, 6, 9, id="learning"),
         pytest.param(RING, 34, 64, id="a ring whose islands had closed"),
-        pytest.param(SMALL_ARENA, 8, 12, id="an arena"),
+        pytest.param(SEASONS, 8, 12, id="an arena in a world that changes"),
         pytest.param(ARENAS, 6, 10, id="arenas with migration"),
         pytest.param(MIXED, 21, 26, id="an island and an arena"),
     ],
@@ -58,8 +50,8 @@ def begin(workspace: Workspace, document: str, births: int, name: str) -> Path:
 def test_longer_run_equals_one_begun_with_as_many_births(
     workspace: Workspace, document: str, before: int, after: int
 ) -> None:
-    wanted = begin(workspace, document, after, "wanted")
-    longer = begin(workspace, document, before, "longer")
+    wanted = workspace.finished(document, after, "wanted")
+    longer = workspace.finished(document, before, "longer")
     shorter = size(longer)
     words = ("resume", "longer", "--births", str(after), "--quiet", "--workers", "2")
     process = workspace.start(*words)
@@ -73,7 +65,7 @@ def test_longer_run_equals_one_begun_with_as_many_births(
 def test_stopped_run_is_lengthened_without_computing_anything_again(
     workspace: Workspace,
 ) -> None:
-    wanted = begin(workspace, OFF_LINE, 40, "wanted")
+    wanted = workspace.finished(OFF_LINE, 40, "wanted")
     words = ("run", "x.toml", "--seed", "3", "--births", "30", "--quiet")
     process = workspace.start(*words, "--out", "longer", "--workers", "1")
     longer = workspace.folder / "longer"
@@ -90,7 +82,7 @@ def test_an_arena_keeps_its_state_from_before_an_island_has_closed(
 ) -> None:
     often = "record_touches = true\nsnapshot_interval_s = 5.0"
     document = MIXED.replace("record_touches = true", often)
-    run = begin(workspace, document, 21, "a")
+    run = workspace.finished(document, 21, "a")
     lengthen(run, 26)
     _, rebuild = arena_history(run, 1, from_s=1e6)
     assert rebuild.snapshot
@@ -161,7 +153,7 @@ def test_each_mistake_is_one_line(
 
 
 def test_mistakes_change_nothing(workspace: Workspace) -> None:
-    run = begin(workspace, OFF_LINE, 18, "a")
+    run = workspace.finished(OFF_LINE, 18, "a")
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     again = ("run", "x.toml", *ALONE, "--out", "a", "--births")
     for words, line in (

@@ -21,8 +21,10 @@ from tests.system.documents import (
     LEARNING,
     MIXED,
     OFF_LINE,
+    POND,
+    PONDS,
     RING,
-    SMALL_ARENA,
+    SEASONS,
 )
 
 pytestmark = [
@@ -35,12 +37,14 @@ KILLING = Path(__file__).with_name("killing.py")
 DOCUMENTS = {
     "off": OFF_LINE,
     "bridge": BRIDGE,
-    "arena": SMALL_ARENA,
+    "arena": SEASONS,
     "mixed": MIXED,
     "learning": LEARNING,
     "crowd": CROWDED_ARENA,
     "ring": RING,
     "arenas": ARENAS,
+    "pond": POND,
+    "ponds": PONDS,
 }
 KILLS = int(os.environ.get("REVOLVE_KILLS", "1000"))
 OF_COORDINATORS = {"instants": 0.7, "fleet": 0.3}

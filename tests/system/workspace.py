@@ -104,6 +104,13 @@ class Workspace:
         """Run ``revolve`` to its end; return standard output and standard error."""
         return self.python("-m", "revolve", *words, code=code)
 
+    def finished(self, document: str, births: int, name: str) -> Path:
+        """Run a document to its end, in one process; return the run's folder."""
+        (self.folder / "x.toml").write_text(document)
+        words = ("--seed", "3", "--births", str(births), "--in-process", "--quiet")
+        self.run("run", "x.toml", *words, "--out", name)
+        return self.folder / name
+
     def python(self, *words: str, code: int = 0) -> str:
         """Run Python with arguments to its end; return all that it writes."""
         process = self.start_command(sys.executable, *words)
