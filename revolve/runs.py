@@ -47,7 +47,7 @@ from schema.wire.updates import individual, read_birth
 Folder = str | Path
 
 _OF_ROBOTS = ("island", "birth", "genome", "robot")
-"""Columns of births that the robots are made from."""
+"""Columns of births that robots are made from, of any run."""
 
 
 def _table(name: str, rows: str) -> property:
@@ -166,7 +166,9 @@ class Run:
             RevolveError: not a ``pyarrow.Table``, or without a column that is needed.
         """
         rows = self.births if births is None else births
-        _check_births(rows)
+        islands = island_experiments(document_of(self.experiment))
+        needs_time = any(own.arena and own.changes for own in islands)
+        _check_births(rows, (*_OF_ROBOTS, "sim_time_s") if needs_time else _OF_ROBOTS)
         return self._robots(rows, rows["island"].to_pylist())
 
     def _robots(self, births: pa.Table, homes: Sequence[int]) -> list[Robot]:
@@ -182,7 +184,7 @@ class Run:
             for island in set(homes)
         }
         own = {island: Experiment(each) for island, each in documents.items()}
-        # Only an arena's births have a time.
+        # Only changes of an arena need the time.
         named = [name for name in rows.column_names if name in ("birth", "sim_time_s")]
         points = map(birth_point, rows.select(named).to_pylist())
         columns = (rows[name].to_pylist() for name in ("genome", "robot"))
@@ -263,16 +265,16 @@ def _named(row: Row | None) -> str:
     return f"{individual(row).name}, fitness {rounded(row['fitness'])}" if row else "-"
 
 
-def _check_births(rows: object) -> None:
+def _check_births(rows: object, needed: Sequence[str]) -> None:
     """Raise unless an argument has rows of the table ``births``."""
     if not isinstance(rows, pa.Table):
         kind = type(rows).__name__
         raise RevolveError(f"births: must be a pyarrow.Table, got a {kind}")
-    missing = [name for name in _OF_ROBOTS if name not in rows.column_names]
+    missing = [name for name in needed if name not in rows.column_names]
     if missing:
         raise RevolveError(
             "births: must be rows of the table births with the columns "
-            f"{', '.join(_OF_ROBOTS)}, has no {', '.join(missing)}"
+            f"{', '.join(needed)}, has no {', '.join(missing)}"
         )
 
 

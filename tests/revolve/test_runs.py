@@ -14,6 +14,7 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder_status import folder_status
 from revolve.command import main
 from schema.tables.columns import TABLES
+from tests.system.documents import SEASONS
 
 pytestmark = pytest.mark.system
 
@@ -47,6 +48,21 @@ def test_rows_of_another_table_are_not_births(done: rv.Run) -> None:
     ):
         with pytest.raises(rv.RevolveError, match=expected):
             done.robots(rows)
+
+
+def test_robots_of_an_arena_have_the_settings_of_the_time_of_their_birth(
+    tmp_path: Path,
+) -> None:
+    """A number of births, which rows without a time have, is no point of an arena."""
+    seasons = rv.Experiment.from_toml(SEASONS)
+    done = rv.run(seasons, seed=4, births=7, out=tmp_path / "a", workers=1)
+    births = done.births
+    times_s = births["sim_time_s"].to_pylist()
+    worlds = [robot.experiment for robot in done.robots(births)]
+    assert worlds == [done.experiment.at(time_s) for time_s in times_s]
+    assert worlds != [done.experiment.at(number) for number in range(len(worlds))]
+    with pytest.raises(rv.RevolveError, match=r"sim_time_s, has no sim_time_s$"):
+        done.robots(births.drop_columns(["sim_time_s"]))
 
 
 def test_run_has_every_table(done: rv.Run) -> None:
