@@ -7,13 +7,11 @@ from operator import index
 from typing import TypeVar
 
 from schema.errors import RevolveError, shown
+from schema.limits import MOST_NUMBER
 
 T = TypeVar("T")
 _TLS = re.compile(r"--tls-(\w+)")
 _FLAG = re.compile(r"--(births|connect|experiment|fleet|out|plugins|seed|workers)\b")
-
-MOST_NUMBER = 2**32 - 1
-"""Greatest number of a birth, or of a robot of a seed."""
 
 
 def whole_number(

@@ -1,6 +1,8 @@
 """The runs of a folder, such as a campaign, as the Python API has them."""
 
 from collections.abc import Iterator
+from contextlib import suppress
+from os import PathLike
 from pathlib import Path
 
 import pyarrow as pa
@@ -10,6 +12,7 @@ from analysis.measures.load import LoadedRun, read_runs
 from revolve.children import run_command
 from revolve.runs import Folder, Run, check_table
 from schema.agent.log import warn_user
+from schema.errors import RevolveError, shown
 from schema.tables.description import DETAILS
 from schema.tables.files import read_table
 
@@ -49,6 +52,7 @@ class Runs:
     births, evaluations, learning = Run.births, Run.evaluations, Run.learning
     population, fitness, poses = Run.population, Run.fitness, Run.poses
     deaths, touches, migrations = Run.deaths, Run.touches, Run.migrations
+    meetings, matings, patches = Run.meetings, Run.matings, Run.patches
     audits, drifts, runs = Run.audits, Run.drifts, Run.runs
 
     def table(self, name: str) -> pa.Table:
@@ -106,10 +110,14 @@ def read(folder: Folder) -> Run | Runs:
 
     Raises:
         RunFolderError: there is no run, or its description is damaged.
+        RevolveError: no path.
     """
-    path = Path(folder)
-    is_single = (path / DETAILS).exists() or not path.is_dir()
-    return Run(path) if is_single else Runs(path)
+    if folder == "" or not isinstance(folder, str | PathLike):
+        raise RevolveError(f"folder: must be the path of a run, got {shown(folder)}")
+    path, has_several = Path(folder), False
+    with suppress(OSError):  # ``Run`` says which
+        has_several = path.is_dir() and not (path / DETAILS).exists()
+    return Runs(path) if has_several else Run(path)
 
 
 def _named(rows: pa.Table, run: LoadedRun) -> pa.Table:

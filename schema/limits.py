@@ -156,6 +156,8 @@ MOST_LINE = 1000
 """Characters of a line in RoboGen's text."""
 MOST_COUNT = 2**63 - 1
 """Greatest whole number in an experiment."""
+MOST_NUMBER = 2**32 - 1
+"""Greatest number of an island, of a birth in flags, or of a robot of a seed."""
 MOST_GEOMS = 10_000
 """Geoms of scenery, replicated ones included."""
 MOST_OBJECTS = 100

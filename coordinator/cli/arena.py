@@ -12,8 +12,9 @@ from schema.agent.command import NETWORK, add_shared
 from schema.agent.flags import Flags, add_count, number
 from schema.agent.flags import birth_name as flagged_birth
 from schema.agent.log import tell_user
-from schema.errors import NetworkError
+from schema.errors import NetworkError, cut
 from schema.formats.run_settings import read_with_settings
+from schema.limits import MOST_NUMBER
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.operator import (
@@ -145,7 +146,8 @@ def coordinator_of(options: argparse.Namespace) -> tuple[str, str]:
         return name, f"arena of {chosen[0] if len(chosen) == 1 else name}"
     raise NetworkError(
         f"{options.connect}: exactly one coordinator must have a run "
-        f"{options.run!r}, got {len(folders)} of {len(statuses)}; choose one by --run"
+        f"{options.run!r}, got {len(folders)} of {len(statuses)}; choose one by "
+        f"--run: {cut(', '.join(map(_name, runs)))}"
     )
 
 
@@ -240,6 +242,6 @@ def parser(_command: str = "arena") -> Flags:
             help="run whose folder is named NAME, else whose folder name ends with "
             "NAME (default: the only run)",
         )  # fmt: skip
-        add_count(action, "--island", 0, "island number", least=0)
+        add_count(action, "--island", 0, "island number", least=0, most=MOST_NUMBER)
         add_shared(action, *NETWORK)
     return flags

@@ -91,7 +91,8 @@ def reply_to(request: OperatorRequest, loop: Loop) -> OperatorReply:
 def _arena(loop: Loop, number: int) -> Arena:
     arena = loop.islands.get(number)
     if not isinstance(arena, Arena):
-        raise Refused(f"island {number}: no arena of this run")
+        arenas = [i for i, own in loop.islands.items() if isinstance(own, Arena)]
+        raise Refused(f"island {number}: no arena of this run; arenas are {arenas}")
     if arena.is_finished:
         raise Refused(f"arena {number}: has finished")
     return arena

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from schema.errors import nearest
-from schema.limits import MOST_SEED
+from schema.limits import MOST_NUMBER, MOST_SEED
 
 # Those of 2^64; the interpreter reads no number of more than 4300.
 _MOST_DIGITS = 20
@@ -37,6 +37,7 @@ class Flags(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print the error and where to find help; exit with status 2."""
+        message = message.replace("ignored explicit argument", "takes no value, got")
         Flags.last_error = f"{self.prog}: {message} (see {self.prog} --help)"
         self.exit(2, f"{self.last_error}\n")
 
@@ -87,7 +88,7 @@ def add_seed(flags: argparse.ArgumentParser, default: int) -> None:
 def birth_name(text: str) -> tuple[int | None, int]:
     """Return island and number of a birth; the island is None if it is not given."""
     island, colon, number = text.rpartition(":")
-    read = whole_number(0)
+    read = whole_number(0, MOST_NUMBER)
     try:
         return read(island) if colon else None, read(number)
     except argparse.ArgumentTypeError:

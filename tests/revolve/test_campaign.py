@@ -39,7 +39,7 @@ def export(*words: object) -> None:
     assert main(["export", *map(str, words)]) == 0
 
 
-@pytest.mark.parametrize("name", ["births", "population", "fitness", "deaths", "runs"])
+@pytest.mark.parametrize("name", TABLES)
 def test_table_has_the_rows_of_all_runs(campaign: Path, name: str) -> None:
     runs = rv.read(campaign)
     assert isinstance(runs, rv.Runs)
@@ -47,6 +47,7 @@ def test_table_has_the_rows_of_all_runs(campaign: Path, name: str) -> None:
         each.name for each in campaign.iterdir()
     )
     table = runs.table(name)
+    assert getattr(runs, name).equals(table)
     assert table.schema.names[: len(TABLES[name])] == TABLES[name].names
     assert set(NAMED) < set(table.schema.names)
     first = 0
@@ -85,6 +86,40 @@ def test_single_runs_copies_and_unreadable_folders(
     assert runs.births.num_rows == BIRTHS
     assert re.search(r"left out: \S+/b: the same run as \S+/a\n", said)
     assert re.search(r"left out: \S+/c: .*damaged", said)
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ("gone", "gone: no such folder"),
+        ("empty", "empty: no run in or below this folder"),
+        ("file", "file: must be a folder, got a file"),
+        ("torn", "torn/run.json: damaged: "),
+        ("several", "no run can be read: several/torn: run.json: damaged: "),
+        ("loop", "loop/run.json: cannot be read: Too many levels of symbolic links"),
+        ("x" * 300, "/run.json: cannot be read: File name too long"),
+        ("", "folder: must be the path of a run, got ''"),
+        (3, "folder: must be the path of a run, got 3"),
+        (["a", "b"], "folder: must be the path of a run, got ['a', 'b']"),
+    ],
+)
+def test_each_mistake_in_what_is_read_is_one_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    given: Any,  # noqa: ANN401 - wrong types
+    line: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for torn in (Path("torn"), Path("several", "torn")):
+        torn.mkdir(parents=True)
+        (torn / "run.json").write_text("{")
+    Path("empty").mkdir()
+    Path("file").touch()
+    Path("loop").symlink_to("loop")
+    with pytest.raises(rv.RevolveError) as caught:
+        rv.read(given)
+    assert line in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_csv_is_read_by_others(campaign: Path, tmp_path: Path) -> None:

@@ -92,7 +92,26 @@ MISTAKES = [
     ("view nowhere --follow x", "must be N or ISLAND:N in whole numbers >= 0"),
     ("view nowhere --ancestry", "needs --robot best"),
     ("view --connect tcp/127.0.0.1:1 --robot best", "a run folder only"),
-    ("arena list --connect tcp/127.0.0.1:1", "no hub at tcp/127.0.0.1:1"),
+    # Documents about arenas
+    ("arena lst --json", "invalid choice: 'lst' (choose from 'list', "),
+    ("arena --json list", "no flag '--json' (see revolve arena --help)"),
+    ("arena pause --json", "arena pause: no flag '--json'"),
+    *(
+        (f"arena list --json{words}", line)
+        for words, line in (
+            ("s", "no flag '--jsons'; did you mean '--json'?"),
+            ("=yes", "argument --json: takes no value, got 'yes'"),
+            (" run", "unexpected argument 'run'"),
+            (" --island -1", "--island: must be a whole number in 0..4294967295, got"),
+            (f" --island {2**64}", f"in 0..4294967295, got '{2**64}'"),
+            (" --run", "--run: expected one argument"),
+            (" --connect gone", "folder of an active run; no such folder: 'gone'"),
+            (" --connect run", "run: no coordinator is running (address is missing)"),
+            (" --connect tcp/h:70000", "an address must be tcp/HOST:PORT, "),
+            (" --connect tcp/127.0.0.1:1", "no hub at tcp/127.0.0.1:1"),
+        )
+    ),
+    (f"arena remove 0:{2**64}", "must be N or ISLAND:N in whole numbers >= 0, got"),
     # Robots
     ("robot check nowhere.yaml", "nowhere.yaml: cannot be read"),
     ("robot check exp.yaml", "exp.yaml"),

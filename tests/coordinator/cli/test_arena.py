@@ -75,5 +75,6 @@ def test_a_run_is_named_by_its_whole_name_or_the_end_of_it(
 @pytest.mark.usefixtures("coordinators")
 @pytest.mark.parametrize("name", ["-0", "", "pond"])
 def test_a_name_of_several_runs_or_of_none_is_refused(name: str) -> None:
-    with pytest.raises(NetworkError, match="exactly one coordinator must have a run"):
+    choices = r"choose one by --run: zoo-0, wet-zoo-0, zoo-1$"
+    with pytest.raises(NetworkError, match=f"must have a run '{name}', .*{choices}"):
         coordinator_of(parser().parse_args(["list", "--run", name]))

@@ -56,8 +56,8 @@ def started(*runs: Planned) -> Iterator[RunScheduler]:
         scheduler.close()
 
 
-def ask(scheduler: RunScheduler, name: str) -> OperatorReply:
-    request = OperatorRequest("x", 0, PauseArena(), name)
+def ask(scheduler: RunScheduler, name: str, island: int = 0) -> OperatorReply:
+    request = OperatorRequest("x", island, PauseArena(), name)
     data = answer_operator(scheduler, encode(request), 0.0)
     return decode_operator_reply(data)
 
@@ -77,6 +77,8 @@ def test_a_run_is_named_by_its_folder_without_links(
         assert refused.is_refused
         reply = ask(scheduler, "real")
         assert not reply.is_refused, reply.text
+        refused = ask(scheduler, "real", 7)
+        assert refused.text == "island 7: no arena of this run; arenas are [0]"
 
 
 def test_a_run_is_named_by_its_whole_name_or_the_end_of_it(tmp_path: Path) -> None:
