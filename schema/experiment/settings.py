@@ -24,6 +24,7 @@ from schema.experiment.document import (
     Simulation,
     Space,
     Vetting,
+    body_space,
     light_of,
 )
 from schema.experiment.environment import FLAT, Environment, ground_problems
@@ -31,8 +32,9 @@ from schema.experiment.identity import Origin
 from schema.experiment.robust import Calibration, Robust, range_problems
 from schema.experiment.section import Count, Section, multiple_problems
 from schema.limits import MOST_SETTINGS_BYTES
-from schema.parts import Vector
-from schema.plugins.load import load_function, unknown
+from schema.parts import Sensor, Vector
+from schema.plugins.load import load_function, load_object, unknown
+from schema.plugins.needs import channels_of
 from schema.plugins.parameters import known_keys, parameters_type, read_parameters
 
 T = TypeVar("T")
@@ -225,6 +227,25 @@ def arena_problems(settings: Experiment | ArenaSettings) -> Iterator[str]:
         value = getattr(holder, name, None)
         if any(value) if isinstance(value, tuple) else value:
             yield f"{key}: is for off-line islands, as {why}; remove it"
+
+
+def split_problems(settings: ArenaSettings) -> Iterator[str]:
+    """Yield why an arena cannot be simulated in parts, by several processes.
+
+    Robots that may touch are in one part, so contacts, touch sensors and work are
+    exact. What sees robots from afar is not: it would miss those of other parts.
+    """
+    for kind in body_space(settings.space).values():
+        for sensor in kind.sensors:
+            if not isinstance(sensor, Sensor):
+                yield f"{kind.name}: own sensors may look at other robots"
+            elif sensor.kind == "light":
+                yield f"{kind.name}: other robots hide the light from its sensor"
+    functions = [fitness_function(settings.fitness)]
+    for path in settings.measures.names:
+        functions += [load_object(path, "measures.names", {})] if ":" in path else []
+    if "neighbours" in channels_of(functions):
+        yield "fitness or a measure needs trace.neighbours, a count of other robots"
 
 
 read_vetting_settings = lru_cache(maxsize=64)(partial(_from_json, VettingSettings))

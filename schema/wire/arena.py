@@ -207,7 +207,7 @@ class Advance(Message, frozen=True, tag="advance"):
         step: at its end.
         digest: SHA-256 of the state at that step, as of a snapshot of it.
         judgements: of all living robots, by birth.
-        casualties: in the order in which they diverged.
+        casualties: by step and birth.
         touches: by pair; empty unless the experiment records them.
         poses: samples of the robots' poses; empty in a journal.
         snapshot: the state at that step; empty if it was not wanted, and in a journal.

@@ -65,10 +65,10 @@ class FakeWorld(World):
             self._record(repr(change))
         self._record(repr((changes.removals, [i.place for i in changes.insertions])))
 
-    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
+    def advance(self, until: int, **ways: object) -> Advance:
         assert until > self.step
         assert not self.is_closed
-        assert not measures_work
+        assert ways.get("work_j") is None
         samples = range(self.step // POSE_STEPS + 1, until // POSE_STEPS + 1)
         self.step = until
         self._record(str(until))
@@ -121,6 +121,6 @@ class FakeWorld(World):
 class OddWorld(FakeWorld):
     """World on a machine whose results differ."""
 
-    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
+    def advance(self, until: int, **ways: object) -> Advance:
         self._record("different")
-        return super().advance(until, measures_work=measures_work)
+        return super().advance(until, **ways)

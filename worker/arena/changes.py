@@ -21,6 +21,8 @@ from worker.robot.placed import warning_names
 FASTEST_CORE = 20.0
 """Core speed above which the physics is broken [m/s]; a fall from the thesis's
 0.25 m ends at 2.2."""
+_CALM = FASTEST_CORE / math.sqrt(3.0)
+"""A core is not faster than ``FASTEST_CORE`` if no velocity is greater than this."""
 
 
 def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> None:
@@ -119,25 +121,21 @@ def newborn(
 def diverged(
     population: ArenaPopulation, rollout: Rollout, step: int, *, reads_warnings: bool
 ) -> list[Casualty]:
-    """Return the robots whose physics diverged, by birth.
+    """Return the robots whose physics diverged.
 
-    In a cluster, only members whose own state is implausible are lost. If there is
-    none, an error or a warning of the engine removes all members.
+    Each cluster decides for itself. Only members whose own state is implausible are
+    lost. If there is none, an error or a warning of the engine removes all members;
+    without ``reads_warnings``, warnings count only beside a great velocity.
     """
-    is_plausible = _is_plausible(rollout.max_velocity)
-    if not is_plausible:
-        velocities = rollout.velocities[rollout.moment]
-        is_plausible = _is_plausible(float(velocities.max(initial=0.0)))
-    if is_plausible and not reads_warnings and not rollout.has_failures:
+    moment, are_calm = rollout.moment, rollout.max_velocity <= _CALM
+    if are_calm and not reads_warnings and not rollout.has_failures:
         return []
-    moment = rollout.moment
     found: list[Casualty] = []
     for cluster in population.clusters:
-        reasons, problem = {}, ""
-        if cluster.failed_at <= moment:
-            problem = cluster.failure
-        if reads_warnings or not is_plausible:
-            reasons = {} if is_plausible else _reasons(cluster, moment)
+        problem = cluster.failure if cluster.failed_at <= moment else ""
+        reasons, is_calm = {}, are_calm or _is_calm(cluster, moment)
+        if reads_warnings or not is_calm:
+            reasons = {} if is_calm else _reasons(cluster, moment)
             warnings = cluster.history.warnings[moment]
             if not problem and warnings.any():
                 problem = warning_names(warnings)
@@ -156,8 +154,8 @@ def _distinct(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
     return births
 
 
-def _is_plausible(max_velocity: float) -> bool:
-    return math.isfinite(max_velocity) and max_velocity <= FASTEST_CORE
+def _is_calm(cluster: Cluster, moment: int) -> bool:
+    return bool(np.abs(cluster.history.qvel[moment]).max() <= _CALM)
 
 
 def _reasons(cluster: Cluster, moment: int) -> dict[BirthId, str]:

@@ -1,7 +1,7 @@
 """Records of an arena: samples for fitness windows, poses, contact durations."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -94,11 +94,13 @@ class MotorWork:
         self._interval_s = steps * settings.simulation.timestep_s
         self._layout: Layout | None = None
 
-    def begin(self, robots: Sequence[ArenaRobot]) -> None:
-        """Begin an advance of robots."""
+    def begin(
+        self, robots: Sequence[ArenaRobot], work_j: Mapping[BirthId, float]
+    ) -> None:
+        """Begin an advance of robots; some have worked before [J]."""
         self.read_motors(robots)
         for robot in robots:
-            robot.work_j = 0.0
+            robot.work_j = work_j.get(robot.birth, 0.0)
 
     def read_motors(self, robots: Sequence[ArenaRobot]) -> None:
         """Take the motors as they are now: their torques may change."""

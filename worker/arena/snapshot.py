@@ -61,46 +61,47 @@ def state_of(
     step: int,
     population: ArenaPopulation,
     casualties: Sequence[Casualty],
+    births: frozenset[BirthId],
 ) -> ArenaState:
-    """Return an arena's whole state; equal states give equal bytes."""
+    """Return the state of some robots, whole clusters; equal ones give equal bytes."""
+    clusters = [each.members for each in population.clusters]
     return ArenaState(
         settings=_digest(settings),
         step=step,
         robots=tuple(
-            (robot.birth, encode(_robot_state(robot))) for robot in population.robots
+            (robot.birth, encode(_robot_state(robot)))
+            for robot in population.robots
+            if robot.birth in births
         ),
-        clusters=tuple(cluster.members for cluster in population.clusters),
+        clusters=tuple(each for each in clusters if not births.isdisjoint(each)),
         casualties=tuple(casualties),
     )
 
 
-def read_snapshot(
-    settings: ArenaSettings, data: bytes, population: ArenaPopulation
-) -> tuple[int, list[Casualty]]:
-    """Fill an empty population from a snapshot.
-
-    Returns:
-        The arena's step, and the casualties not yet reported.
+def take_in(
+    settings: ArenaSettings, state: ArenaState, population: ArenaPopulation
+) -> None:
+    """Add the robots of a state to a population, in their clusters.
 
     Raises:
-        MalformedMessage: not a snapshot's bytes, of an arena with other settings, or
-            a robot that breaks their rules.
+        MalformedMessage: of an arena with other settings, or a robot that breaks their
+            rules.
     """
-    state = decode(ArenaState, data, ADVANCE_BYTES)
     if state.settings != _digest(settings):
         raise MalformedMessage("snapshot: of an arena with other settings")
     births = [birth for birth, _ in state.robots]
     if sorted(chain.from_iterable(state.clusters)) != births:
         raise MalformedMessage("snapshot: every robot must be in one cluster")
+    clusters = [each.members for each in population.clusters]
+    merges = population.merges
     population.add(
         [
             _restored(birth, decode(_RobotState, robot, ADVANCE_BYTES), population)
             for birth, robot in state.robots
         ]
     )
-    population.regroup(list(state.clusters))
-    population.merges = population.splits = 0
-    return state.step, list(state.casualties)
+    population.regroup([*clusters, *state.clusters])
+    population.merges = merges
 
 
 @lru_cache(maxsize=8)

@@ -9,16 +9,18 @@ advances.
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from typing import Self
 
 from schema.errors import SimulationDiverged, UnexpectedEvent
 from schema.experiment.changes import settings_at
 from schema.experiment.settings import ArenaSettings
+from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
 from schema.wire.arena import (
     Advance,
+    Box,
     BrainChange,
     Casualty,
     Changes,
@@ -26,12 +28,12 @@ from schema.wire.arena import (
     Judgement,
 )
 from schema.wire.arena_state import ArenaState
-from schema.wire.codec import encode
+from schema.wire.codec import decode, encode
 from schema.wire.poses import PoseArrays
 from worker.arena.batched_control import BatchedControllers, look
 from worker.arena.changes import check_changes, diverged, newborn
 from worker.arena.records import Contacts, MotorWork, PoseLog, Samples
-from worker.arena.snapshot import read_snapshot, state_of
+from worker.arena.snapshot import state_of, take_in
 from worker.arena.threads import ThreadTeam
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
@@ -45,9 +47,15 @@ _FEW = 5
 class World:
     """One arena shard; a pure function of its settings, changes and advances.
 
+    An arena may be simulated in parts: worlds that hold whole clusters each. They are
+    equal to the whole if, after each advance, no box swept by a robot of one part
+    overlaps that of a robot of another.
+
     Attributes:
         step: physics steps since the start.
         population: the living robots and their clusters; read only.
+        swept: boxes of the robots that lived during the last advance, from the changes
+            before it on.
     """
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
@@ -70,6 +78,7 @@ class World:
         self._samples = Samples(settings, self.population)
         self._work = MotorWork(settings)
         self._measures_work = False
+        self.swept: dict[BirthId, Box] = {}
         self._change()
 
     def close(self) -> None:
@@ -113,8 +122,22 @@ class World:
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 
-    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
-        """Advance the arena to a step; measure the work of the motors if asked to.
+    def check_merges(self) -> None:
+        """Merge clusters as births do, where robots are born in another part."""
+        self.population.kinematics()
+        self.population.merge()
+
+    def advance(
+        self,
+        until: int,
+        *,
+        work_j: Mapping[BirthId, float] | None = None,
+        judges: bool = True,
+    ) -> Advance:
+        """Advance the arena to a step; judge the robots, or go on without it.
+
+        The work of the motors is added to that of robots so far, 0 if it has none [J];
+        None measures none.
 
         Raises:
             UnexpectedEvent: ``until`` is not later than the present step.
@@ -123,11 +146,11 @@ class World:
             raise UnexpectedEvent(
                 f"advance: until must be > step = {self.step}, got {until}"
             )
-        self._measures_work = measures_work
-        if measures_work:
-            self._work.begin(self.population.robots)
+        self._measures_work = work_j is not None
+        if work_j is not None:
+            self._work.begin(self.population.robots, work_j)
         self.step_to(until)
-        return self._report()
+        return self._report(judges=judges)
 
     def step_to(self, until: int) -> None:
         """Begin an advance: go to a step before its end, without judging robots."""
@@ -136,14 +159,31 @@ class World:
 
     def snapshot(self) -> bytes:
         """Return the whole state, for ``restore``."""
-        return encode(self._state())
+        return encode(self.state())
 
     def digest(self) -> bytes:
         """Return the digest of the state."""
-        return self._state().digest
+        return self.state().digest
 
-    def _state(self) -> ArenaState:
-        return state_of(self._settings, self.step, self.population, self._casualties)
+    def state(self, births: Collection[BirthId] | None = None) -> ArenaState:
+        """Return the whole state, or that of some robots, for ``take_in``."""
+        chosen = frozenset(self.births if births is None else births)
+        lost = self._casualties if births is None else ()
+        return state_of(self._settings, self.step, self.population, lost, chosen)
+
+    def take_in(self, state: ArenaState) -> None:
+        """Add robots of another part of the arena, in whole clusters.
+
+        Raises:
+            MalformedMessage: of other settings, or not whole clusters.
+            UnexpectedEvent: of another step, or robots that live here already.
+        """
+        living = [birth for birth, _ in state.robots if birth in self.population]
+        if state.step != self.step or living:
+            got = f"step {state.step}, {living} live here"
+            raise UnexpectedEvent(f"take in: must be of step {self.step}, got {got}")
+        take_in(self._settings, state, self.population)
+        self._controllers.gather(self.population.robots)
 
     @classmethod
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
@@ -152,10 +192,11 @@ class World:
         Raises:
             MalformedMessage: not a snapshot, or of other settings.
         """
+        state = decode(ArenaState, data, ADVANCE_BYTES)
         world = cls(settings, threads)
-        world.step, world._casualties = read_snapshot(settings, data, world.population)
-        world._controllers.gather(world.population.robots)
+        world.step, world._casualties = state.step, list(state.casualties)
         world._change()
+        world.take_in(state)
         return world
 
     # --- time -------------------------------------------------------------------
@@ -259,8 +300,7 @@ class World:
         for robot in robots:
             if robot.birth in self.population:
                 self._samples.first(self.step, robot)
-        self.population.kinematics()
-        self.population.merge()
+        self.check_merges()
 
     def _replace_brain(self, change: BrainChange) -> None:
         robot = self.population.find(change.birth)
@@ -285,15 +325,17 @@ class World:
         """Remove robots whose brains broke, each with the reason."""
         self._remove([Casualty(r.birth, self.step, why, r.place) for r, why in broken])
 
-    def _report(self) -> Advance:
-        found = [r.judgement(self.step, self._present) for r in self.population.robots]
+    def _report(self, *, judges: bool) -> Advance:
+        robots = self.population.robots if judges else ()
+        found = [robot.judgement(self.step, self._present) for robot in robots]
         self._remove([each for each in found if isinstance(each, Casualty)])
-        casualties, self._casualties = tuple(self._casualties), []
+        casualties = sorted(self._casualties, key=lambda lost: (lost.step, lost.birth))
+        self._casualties, self.swept = [], self.population.proximity.take_swept()
         return Advance(
             step=self.step,
             digest=self.digest(),
             judgements=tuple(each for each in found if isinstance(each, Judgement)),
-            casualties=casualties,
+            casualties=tuple(casualties),
             touches=() if self._contacts is None else self._contacts.take(),
             poses=self._poses.take().message(),
             work_j=tuple(robot.work_j for robot in self.population.robots)

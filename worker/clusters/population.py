@@ -36,6 +36,7 @@ class ArenaPopulation:
         clusters: of all of them.
         by_cost: the same clusters, most expensive first.
         rollout: the interval that is being handled; None between two intervals.
+        proximity: the test for merges and splits.
         merges, splits: numbers of merges and splits of clusters.
     """
 
@@ -49,7 +50,7 @@ class ArenaPopulation:
         self.layout = Layout((), self.robot_rows, self._columns)
         self.rollout: Rollout | None = None
         self.merges = self.splits = 0
-        self._proximity = Proximity(settings)
+        self.proximity = Proximity(settings)
         self._new: list[Cluster] = []
 
     def __contains__(self, birth: BirthId) -> bool:
@@ -118,7 +119,7 @@ class ArenaPopulation:
         """Merge the clusters of robots that may touch before the next check."""
         if self.rollout is None:
             bounds = RobotBounds(self.layout, self.layout.read()[np.newaxis])
-            pairs = self._proximity.pairs_to_merge(bounds)[0]
+            pairs = self.proximity.pairs_to_merge(bounds)[0]
         else:
             pairs = self._merge_pairs(self.rollout)
         if pairs:
@@ -147,7 +148,7 @@ class ArenaPopulation:
             )
         if pairs:
             bounds = RobotBounds(self.layout, state[np.newaxis])
-            near = self._proximity.pairs_to_keep(bounds, pairs)
+            near = self.proximity.pairs_to_keep(bounds, pairs)
             self.regroup(connected_components(groups, self._links(near)))
 
     def regroup(self, groups: Iterable[Group]) -> None:
@@ -224,7 +225,7 @@ class ArenaPopulation:
             bounds = RobotBounds(
                 self.layout, rollout.states[span], rollout.velocities[span]
             )
-            found = self._proximity.pairs_to_merge(bounds)
+            found = self.proximity.pairs_to_merge(bounds)
             rollout.merge_pairs = dict(zip(ahead, found, strict=True))
         return rollout.merge_pairs[rollout.moment]
 

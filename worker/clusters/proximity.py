@@ -13,9 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from schema.experiment.settings import ArenaSettings
+from schema.robot.ids import BirthId
 from schema.robot.trace import Floats
+from schema.wire.arena import Box
 from worker.clusters.models import Indices
-from worker.clusters.states import Layout, Pairs
+from worker.clusters.states import Layout, Pairs, RobotRows
 
 FASTEST = 10.0
 """Speed above which the physics is broken; bounds the margin of a robot [m/s]."""
@@ -29,6 +31,7 @@ class RobotBounds:
     """Bounds of R robots at L moments.
 
     Attributes:
+        robot_rows: the robots.
         speeds: (L, R) upper bound on the speed of each robot's points [m/s].
     """
 
@@ -37,6 +40,7 @@ class RobotBounds:
     ) -> None:
         """Compute the speeds in states (L, W), whose velocities (L, V) may be known."""
         self._layout, self._states = layout, states
+        self.robot_rows = layout.robot_rows
         if velocities is None:
             velocities = layout.velocities(states)
         self.speeds = layout.speeds(velocities)
@@ -106,37 +110,43 @@ class RobotBounds:
         distances -= radii[second]
         return distances
 
-    def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
-        """Return pairs of different clusters whose bounding boxes overlap.
+    def boxes(self, margins: Floats) -> Floats:
+        """Return the boxes around R robots at all moments, seen from above.
 
-        Each robot's box is extended by its margin, (R,) [m].
+        Each is extended by its margin, (R,) [m].
+
+        Returns:
+            (2, 2, R): least x, y, then greatest x, y [m].
+        """
+        robot_rows = self.robot_rows
+        low = self._hulls.min(axis=0) - robot_rows.hulls[3]
+        high = self._hulls.max(axis=0) + robot_rows.hulls[3]
+        low = np.minimum.reduceat(low, robot_rows.first_bodies, axis=1)
+        high = np.maximum.reduceat(high, robot_rows.first_bodies, axis=1)
+        return np.stack((low - margins, high + margins))
+
+    def neighbours(self, boxes: Floats) -> tuple[list[int], list[int]]:
+        """Return pairs of different clusters whose boxes, (2, 2, R), overlap.
 
         Returns:
             Rows of the first and of the second robots, ascending by both.
         """
         cluster_indices = self._layout.cluster_indices
-        if not len(cluster_indices):
-            return [], []
-        is_near = self.overlaps(margins)
+        is_near = overlaps(boxes)
         is_near &= cluster_indices[:, None] != cluster_indices
         first, second = is_near.nonzero()
         is_once = first < second
         return first[is_once].tolist(), second[is_once].tolist()
 
-    def overlaps(self, margins: Floats) -> Mask:
-        """Return whether the bounding boxes of R > 0 robots overlap, (R, R)."""
-        robot_rows = self._layout.robot_rows
-        low = self._hulls.min(axis=0) - robot_rows.hulls[3]
-        high = self._hulls.max(axis=0) + robot_rows.hulls[3]
-        low = np.minimum.reduceat(low, robot_rows.first_bodies, axis=1)
-        high = np.maximum.reduceat(high, robot_rows.first_bodies, axis=1)
-        low -= margins
-        high += margins
-        is_near = low[0][:, None] <= high[0]
-        is_beside = low[1][:, None] <= high[1]
-        is_near &= is_beside
-        is_near &= is_near.T.copy()
-        return np.asarray(is_near)
+
+def overlaps(boxes: Floats) -> Mask:
+    """Return whether the boxes of R robots, (2, 2, R), overlap, (R, R)."""
+    low, high = boxes
+    is_near = low[0][:, None] <= high[0]
+    is_beside = low[1][:, None] <= high[1]
+    is_near &= is_beside
+    is_near &= is_near.T.copy()
+    return np.asarray(is_near)
 
 
 class Proximity:
@@ -144,6 +154,7 @@ class Proximity:
 
     def __init__(self, settings: ArenaSettings) -> None:
         arena, clock = settings.arena, settings.simulation
+        self._swept: dict[RobotRows, Floats] = {}
         self._merge_m = arena.merge_distance_m
         self._split_m = max(arena.split_distance_m, arena.merge_distance_m)
         # Frames of bodies are one step old.
@@ -156,16 +167,36 @@ class Proximity:
         """
         margins = self._margins(bounds)
         most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
-        pairs = list(zip(*bounds.neighbours(most), strict=True))
+        boxes = bounds.boxes(most)
+        low, high = self._swept.get(bounds.robot_rows, boxes)
+        around = np.minimum(low, boxes[0]), np.maximum(high, boxes[1])
+        self._swept[bounds.robot_rows] = np.stack(around)
+        pairs = list(zip(*bounds.neighbours(boxes), strict=True))
         is_near = bounds.are_near(pairs, margins, self._merge_m)
         return [list(compress(pairs, row)) for row in is_near.tolist()]
+
+    def take_swept(self) -> dict[BirthId, Box]:
+        """Return the boxes around all that checks for merges looked at, by robot.
+
+        Of the checks since the last call, also of robots that are gone. Robots whose
+        boxes do not overlap were not near each other at any of them.
+        """
+        swept: dict[BirthId, Box] = {}
+        for robot_rows, boxes in self._swept.items():
+            columns = boxes.reshape(4, -1).T.tolist()
+            for birth, (w, s, e, n) in zip(robot_rows.rows, columns, strict=True):
+                west, south, east, north = swept.get(birth, (w, s, e, n))
+                box = min(w, west), min(s, south), max(e, east), max(n, north)
+                swept[birth] = box
+        self._swept = {}
+        return swept
 
     def pairs_to_keep(self, bounds: RobotBounds, pairs: Pairs) -> Pairs:
         """Return which pairs of one cluster must stay in one cluster."""
         margins = self._margins(bounds)
         most = margins[0] + (0.5 * self._split_m + _ROUNDING_M)
-        overlaps = bounds.overlaps(most)[*zip(*pairs, strict=True)]
-        pairs = list(compress(pairs, overlaps.tolist()))
+        are_near = overlaps(bounds.boxes(most))[*zip(*pairs, strict=True)]
+        pairs = list(compress(pairs, are_near.tolist()))
         is_near = bounds.are_near(pairs, margins, self._split_m)[0]
         return list(compress(pairs, is_near.tolist()))
 

@@ -98,8 +98,8 @@ class Shards:
             return StateMissing()
         with _closed_on_error(held.world) as world:
             world.apply(changes)
-            wants = work.wants_tracks
-            advance = world.advance(work.until, measures_work=wants)
+            work_j: dict[BirthId, float] | None = {} if work.wants_tracks else None
+            advance = world.advance(work.until, work_j=work_j)
             snapshot = world.snapshot() if work.wants_snapshot else b""
         held.digest = advance.digest
         self._keep(key, held)

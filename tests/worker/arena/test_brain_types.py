@@ -226,7 +226,7 @@ def test_robot_whose_brain_cannot_be_made_is_a_casualty(
     assert world.births == (a,)
     found = seconds(world, 1.0).casualties
     reason = "brain failed: KeyError: 'gone'"
-    assert [(one.birth, one.reason) for one in found] == [(c, reason), (b, reason)]
+    assert [(one.birth, one.reason) for one in found] == [(b, reason), (c, reason)]
     with pytest.raises(SimulationDiverged, match=f"^{reason}$"):
         simulate(second, off_line(settings))
 

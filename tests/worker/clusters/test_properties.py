@@ -18,7 +18,7 @@ from tests.worker.arena_cases import SETTINGS, crowd, populated, settings_of, st
 from tests.worker.clusters.invariants import check_population
 from tests.worker.conftest import random_robot
 from worker.arena.world import World
-from worker.clusters.proximity import Proximity, RobotBounds
+from worker.clusters.proximity import Proximity, RobotBounds, overlaps
 from worker.clusters.states import MERGES_PER_SPLIT, Schedule, StateColumns, runs
 
 BIRTHS = [BirthId(number % 2, number) for number in range(8)]
@@ -218,13 +218,13 @@ def test_overlaps_are_symmetric_and_hold_whatever_is_near(margins: list[float]) 
     layout = world.population.layout
     bounds = RobotBounds(layout, layout.read()[np.newaxis])
     wide = np.array(margins)
-    boxes = bounds.overlaps(wide)
+    boxes = overlaps(bounds.boxes(wide))
     assert (boxes == boxes.T).all()
     assert boxes.diagonal().all()
     pairs = list(combinations(range(6), 2))
     is_near = bounds.are_near(pairs, wide[np.newaxis], 0.0)[0]
     assert all(boxes[pair] for pair, near in zip(pairs, is_near, strict=True) if near)
-    first, second = bounds.neighbours(wide)
+    first, second = bounds.neighbours(bounds.boxes(wide))
     assert all(a < b for a, b in zip(first, second, strict=True))
     apart = {
         (a, b)

@@ -54,10 +54,10 @@ def server(compute: Compute) -> Server:
 class NearWorld(FakeWorld):
     """World that is never advanced far, whatever a mutated request says."""
 
-    def advance(self, until: int, *, measures_work: bool = False) -> Advance:
+    def advance(self, until: int, **ways: object) -> Advance:
         if until > LAST:
             raise UnexpectedEvent("too far")
-        return super().advance(until, measures_work=measures_work)
+        return super().advance(until, **ways)
 
 
 def working(request: Request) -> Result:
