@@ -145,12 +145,13 @@ class Parts:
     def _settle(self, runs: Sequence[Run], home: Home) -> None:
         """Give robots that were advanced again to a part."""
         for run in runs[len(self.worlds) :]:
-            living = run.births & {*run.world.births}
             for world in self.worlds:
-                gone = tuple(sorted(living & {*world.births}))
-                world.apply(Changes(removals=gone))
-            clusters = run.world.state(living)
-            self.worlds[home(clusters.clusters[0])].take_in(clusters)
+                held = run.births.intersection(world.births)
+                world.apply(Changes(removals=tuple(sorted(held))))
+            living = run.births.intersection(run.world.births)
+            if living:
+                state = run.world.state(living)
+                self.worlds[home(state.clusters[0])].take_in(state)
 
 
 def _run(world: World, births: Collection[BirthId], changes: Changes, go: Go) -> Run:

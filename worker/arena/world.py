@@ -54,8 +54,8 @@ class World:
     Attributes:
         step: physics steps since the start.
         population: the living robots and their clusters; read only.
-        swept: boxes of the robots that lived during the last advance, from the changes
-            before it on.
+        swept: boxes of the robots that lived in the last advance, from the changes
+            before it on; points where no check for merges was made.
     """
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
@@ -330,7 +330,11 @@ class World:
         found = [robot.judgement(self.step, self._present) for robot in robots]
         self._remove([each for each in found if isinstance(each, Casualty)])
         casualties = sorted(self._casualties, key=lambda lost: (lost.step, lost.birth))
-        self._casualties, self.swept = [], self.population.proximity.take_swept()
+        places = {robot.birth: robot.place for robot in self.population.robots}
+        places |= {lost.birth: lost.place for lost in casualties}
+        self.swept = {birth: (x, y, x, y) for birth, (x, y, _) in places.items()}
+        self.swept |= self.population.proximity.take_swept()
+        self._casualties = []
         return Advance(
             step=self.step,
             digest=self.digest(),
