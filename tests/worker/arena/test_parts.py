@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from schema.errors import MalformedMessage, UnexpectedEvent
 from schema.experiment.document import Fitness, Measures, Space
+from schema.experiment.environment import Environment
 from schema.experiment.settings import split_problems
 from schema.plugins.needs import needs
 from schema.plugins.permission import allow
@@ -80,13 +81,17 @@ def test_parts_are_equal_to_the_whole(
 ) -> None:
     """Crowds, throws, births, deaths and divergence, while clusters change parts.
 
-    Robots are put into parts at random, so that many are advanced again together.
+    Robots are put into parts at random, so that many are advanced again together;
+    exchanges end at any step.
     """
+    wall = {"wall_diameter_m": random.choice((0.0, 4.0))}
+    arena = settings_of(drop_m=drop_m, record_touches=True, **wall).arena
+    ground = Environment(slope_deg=random.choice((0.0, 10.0)))
     own = replace(
-        changing(FRICTION),
+        changing(FRICTION, environment=ground),
         simulation=CLOCK,
         measures=ENERGY,
-        arena=settings_of(drop_m=drop_m, record_touches=True).arena,
+        arena=arena,
     )
     spares = [*crowd(random_robot, 12, radius_m, seed=random.randrange(99))]
     world, parts = World(own), Parts(own, 3)
@@ -98,9 +103,10 @@ def test_parts_are_equal_to_the_whole(
         for birth in kept:
             throw([world, *parts.worlds], birth, random.choice(VELOCITIES))
         changes = Changes(gone, tuple(born), tuple(map(BrainChange, kept, brains)))
-        ticks = sorted(random.sample(range(1, 16), random.randrange(1, 4)))
-        stops = [world.step + 25 * tick for tick in ticks]
-        expected = whole(world, changes, stops[-1])
+        end = world.step + 25 * random.randrange(1, 16)
+        stops = random.sample(range(world.step + 1, end), random.randrange(3))
+        stops = [*sorted(stops), end]
+        expected = whole(world, changes, end)
         assert parts.advance(changes, stops, homes(random, 3)) == expected
     assert parts.state() == world.state()
 
