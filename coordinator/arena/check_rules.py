@@ -4,25 +4,27 @@ The points walk at random instead of simulated robots. Rules must depend on noth
 their arguments and the decisions before.
 """
 
-from math import tau
-
 import numpy as np
-from msgspec.structs import replace
 
-from coordinator.arena.activity import Activity
-from coordinator.arena.rules import CheckedRules
+from coordinator.arena.candidates import Mating
+from coordinator.arena.decisions import ArenaDecisions, matings_of
+from coordinator.arena.living import NO_WISH, LivingRobots, Moment
+from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.random_streams import Purpose
 from schema.experiment.document import Experiment
-from schema.plugins.arena_rules import ArenaView, Decisions, Resident, Stores
 from schema.plugins.contract import broken, content_of
 from schema.plugins.state import own_modules, unchanged
 from schema.robot.ids import BirthId
+from schema.robot.robot import Part, Robot
 from schema.wire.arena import Advance, Judgement
 
 _IN_DECIDE = "keep its memory in self, as arenas share modules and classes"
 _ROBOTS, _DECISIONS = 12, 40
 _SAMPLES = 5
 _STEP_M = 0.1
+_POINT = Part("Core", -1, -1, -1, 0, ())
 _PARTS = 5
+_YOUNG = 3
 
 
 class _PointArena:
@@ -33,102 +35,72 @@ class _PointArena:
 
     def __init__(self, experiment: Experiment, island: int) -> None:
         assert experiment.arena is not None
-        self.rules = CheckedRules(experiment)
         self._arena, self._island = experiment.arena, island
-        self._rng = np.random.default_rng(island)
+        self._decisions = ArenaDecisions(experiment, island, seed=0, run=0)
         self._labels = experiment.measures.labels
-        self._interval_s = self._arena.birth_interval_s
-        distance_m = self.rules.meeting_distance_m or 0.0
-        self._activity = Activity(distance_m, self._interval_s / _SAMPLES)
-        self._living: dict[BirthId, tuple[float, Stores, tuple[BirthId, ...]]] = {}
-        self._places: dict[BirthId, np.ndarray] = {}
-        self._births = 0
-        self._time_s = 0.0
-        self._born: list[BirthId | None] = []
+        stores = self._decisions.rules.stores
+        self._living = LivingRobots(
+            self._arena, self._labels, seed=0, run=0, stores=stores
+        )
+        self._rng = np.random.default_rng(island)
+        self._born: list[int] = []
+        self._number = 0
         for _ in range(_ROBOTS):
-            self._bear((), {})
+            self._bear(Mating(NO_WISH, ()))
 
     def decide(self) -> object:
         """Walk, let the rules decide, do so, and return the content of the decision."""
-        births = tuple(sorted(self._living))
-        steps = self._rng.normal(0.0, _STEP_M, (len(births), _SAMPLES, 2))
-        starts = np.array([self._places[birth] for birth in births]).reshape(-1, 1, 2)
-        tracks = (starts + steps.cumsum(axis=1)).astype(np.float32)
-        self._places = {b: track[-1] for b, track in zip(births, tracks, strict=True)}
-        works = tuple(self._rng.uniform(0.0, 0.1, len(births)).tolist())
-        if self.rules.meeting_distance_m is not None:
-            judged = tuple(
-                Judgement(b, 0.0, 0.0, 0.0, 0.0, is_mature=True, place=(0.0, 0.0, 0.0))
-                for b in births
-            )
-            advance = Advance(0, bytes(32), judged, (), ())
-            advance = replace(advance, work_j=works, tracks=tracks.tobytes())
-            self._activity.add(advance)
-        self._time_s += self._interval_s
-        seed = self._island, round(self._time_s / self._interval_s)
-        view = self._view(births)
-        decisions = self.rules.decide(view, np.random.default_rng(seed))
-        self._activity.clear()
-        self._apply(decisions)
+        self._number += 1
+        self._walk()
+        interval_s = self._arena.birth_interval_s
+        time_s = self._number * interval_s
+        moment = Moment(self._island, len(self._born), time_s)
+        is_due = time_s % self._arena.cull_interval_s < interval_s
+        decisions, _ = self._decisions.decide(
+            self._living, moment, self._number, births=True, deaths=is_due
+        )
+        matings = matings_of(decisions, self._living)
+        for birth, stores in decisions.stores.items():
+            self._living.store(birth, stores)
+        for death in decisions.deaths:
+            self._living.remove(death.birth)
+        for number, mating in enumerate(matings):
+            # Every third body is not viable.
+            is_born = number % 3 < 2 and self._living.room  # noqa: PLR2004
+            child = self._bear(mating) if is_born else None
+            self._decisions.end_mating(mating, child, "", moment)
         return content_of(decisions)
 
-    def _view(self, births: tuple[BirthId, ...]) -> ArenaView:
-        interval_s = self._interval_s
-        deaths_are_due = self._time_s % self._arena.cull_interval_s < interval_s
-        return ArenaView(
-            self._time_s,
-            interval_s,
-            self._births,
-            max(0, self._arena.population_limit - len(births)),
-            births_are_due=True,
-            deaths_are_due=deaths_are_due,
-            robots=tuple(map(self._resident, births)),
-            meetings=self._activity.meetings(),
-            born=tuple(self._born),
-            parameters=self.rules.parameters(self._time_s),
+    def _walk(self) -> None:
+        starts = np.array([one.position[:2] for one in self._living]).reshape(-1, 1, 2)
+        steps = self._rng.normal(0.0, _STEP_M, (len(starts), _SAMPLES, 2))
+        tracks = (starts + steps.cumsum(axis=1)).astype(np.float32)
+        works = tuple(self._rng.uniform(0.0, 0.1, len(starts)).tolist())
+        judged = []
+        for one, track in zip(self._living, tracks, strict=True):
+            number, (x, y) = one.birth.number, track[-1].tolist()
+            age = self._number - self._born[number]
+            age_s, fitness = age * self._arena.birth_interval_s, number * 7 % 11 / 11
+            measures = (number / 7,) * len(self._labels)
+            # Robots that are younger than a few decisions are immature.
+            rest = fitness, age > _YOUNG, (x, y, 0.0), measures
+            judged.append(Judgement(one.birth, age_s, 0.0, 0.0, *rest))
+        advance = Advance(
+            0, bytes(32), tuple(judged), (), (), work_j=works, tracks=tracks.tobytes()
         )
+        self._living.update(advance)
+        self._decisions.note(advance)
 
-    def _resident(self, birth: BirthId) -> Resident:
-        born_s, stores, parents = self._living[birth]
-        age_s = self._time_s - born_s
-        x, y = self._places[birth].tolist()
-        # Robots that are younger than a few decisions are immature.
-        is_mature = age_s > 3 * self._interval_s
-        return Resident(
-            birth,
-            parents,
-            age_s,
-            (x, y),
-            self._activity.track(birth),
-            self._activity.work_j(birth),
-            (birth.number * 7 % 11) / 11 if is_mature else None,
-            dict.fromkeys(self._labels, birth.number / 7),
-            _PARTS,
-            is_infant=False,
-            stores=stores,
-        )
-
-    def _apply(self, decisions: Decisions) -> None:
-        for birth, stores in decisions.stores.items():
-            born_s, before, parents = self._living[birth]
-            self._living[birth] = born_s, {**before, **stores}, parents
-        for death in decisions.deaths:
-            del self._living[death.birth]
-        self._born = []
-        for number, child in enumerate(decisions.births):
-            # Some bodies are not viable.
-            is_viable = number % 3 < 2  # noqa: PLR2004 - every third is not
-            has_room = len(self._living) < self._arena.population_limit
-            born = is_viable and has_room and self._bear(child.parents, child.stores)
-            self._born.append(born or None)
-
-    def _bear(self, parents: tuple[BirthId, ...], stores: Stores) -> BirthId:
-        birth = BirthId(self._island, self._births)
-        self._births += 1
-        angle, radius_m = self._rng.uniform(0.0, (tau, self._arena.birth_radius_m))
-        self._places[birth] = radius_m * np.array((np.cos(angle), np.sin(angle)))
-        self._living[birth] = self._time_s, {**self.rules.stores, **stores}, parents
-        return birth
+    def _bear(self, mating: Mating) -> Candidate:
+        birth = BirthId(self._island, len(self._born))
+        self._born.append(self._number)
+        couple = mating.parents[:2] if mating.parents_are_named else ()
+        robot = Robot((_POINT,) * (1 + birth.number % _PARTS))
+        child = Candidate(birth, 0, couple, None, robot)
+        place = self._living.random_place(birth, Purpose.PLACE, mating.wish)
+        individual = child.individual(generation=None)
+        self._living.insert(individual, robot, place, mating.wish.stores)
+        return child
 
 
 def check_rules(experiment: Experiment) -> None:
