@@ -5,9 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from coordinator.arena.living import Moment
-from coordinator.islands.events import Record
-from coordinator.islands.rows import named
 from schema.plugins.arena_rules import Meeting
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance
@@ -77,24 +74,3 @@ class Activity:
         """Begin again, after a decision."""
         for each in (self._tracks, self._work_j, self._samples, self._nearest_m):
             each.clear()
-
-
-def meeting_records(
-    meetings: Sequence[Meeting], moment: Moment, over_s: float
-) -> list[Record]:
-    """Return the meetings rows of a decision, ``over_s`` after the one before."""
-    return [
-        Record(
-            "meetings",
-            {
-                **named(one.first, moment.island),
-                "other_island": one.second.island,
-                "other_birth": one.second.number,
-                "sim_time_s": moment.sim_time_s,
-                "over_s": over_s,
-                "duration_s": one.duration_s,
-                "nearest_m": one.nearest_m,
-            },
-        )
-        for one in meetings
-    ]

@@ -19,7 +19,7 @@ from coordinator.arena.living import (
     LivingRobots,
     Moment,
     death_record,
-    touch_records,
+    pair_records,
 )
 from coordinator.arena.orders import Orders, inserted
 from coordinator.evolution.breeding import Breeder, Candidate, Individual
@@ -221,7 +221,7 @@ class Arena:
         commands: list[ArenaCommand] = []
         if event.pose_rows:
             commands.append(Append(event))
-        commands += touch_records(advance.touches, self._moment, over_s)
+        commands += pair_records("touches", advance.touches, self._moment, over_s)
         for casualty in advance.casualties:
             died_s = self.clock.seconds(casualty.step)
             moment = self._moment._replace(sim_time_s=died_s)

@@ -2,9 +2,14 @@
 
 from functools import partial
 
-from coordinator.arena.activity import Activity, meeting_records
+from coordinator.arena.activity import Activity
 from coordinator.arena.candidates import Mating
-from coordinator.arena.living import LivingRobot, LivingRobots, Moment
+from coordinator.arena.living import (
+    LivingRobot,
+    LivingRobots,
+    Moment,
+    pair_records,
+)
 from coordinator.arena.rules import CheckedRules
 from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.random_streams import Purpose, stream
@@ -85,7 +90,7 @@ class ArenaDecisions:
         self._activity.clear()
         self._before_s, self._born = moment.sim_time_s, []
         self.patches = decisions.patches
-        return decisions, meeting_records(meetings, moment, over_s)
+        return decisions, pair_records("meetings", meetings, moment, over_s)
 
     def end_mating(
         self, mating: Mating, child: Candidate | None, outcome: str, moment: Moment

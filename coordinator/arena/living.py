@@ -24,7 +24,7 @@ from coordinator.islands.rows import (
     population_records,
 )
 from schema.experiment.document import ArenaSection
-from schema.plugins.arena_rules import Conception, Place, Stores
+from schema.plugins.arena_rules import Conception, Meeting, Place, Stores
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import (
@@ -349,21 +349,20 @@ def death_record(dead: LivingRobot | Casualty, reason: str, moment: Moment) -> R
     return Record("deaths", row)
 
 
-def touch_records(
-    touches: Iterable[Touch], moment: Moment, over_s: float
+def pair_records(
+    table: str, pairs: Iterable[Touch | Meeting], moment: Moment, over_s: float
 ) -> list[Record]:
-    """Return the touches rows of an advance that lasted ``over_s``."""
-    return [
-        Record(
-            "touches",
-            {
-                **named(touch.first, moment.island),
-                "other_island": touch.second.island,
-                "other_birth": touch.second.number,
-                "sim_time_s": moment.sim_time_s,
-                "over_s": over_s,
-                "duration_s": touch.duration_s,
-            },
-        )
-        for touch in touches
-    ]
+    """Return the rows of touches, or meetings, in a time that lasted ``over_s``."""
+    records = []
+    for pair in pairs:
+        row = {
+            **named(pair.first, moment.island),
+            "other_island": pair.second.island,
+            "other_birth": pair.second.number,
+            "sim_time_s": moment.sim_time_s,
+            "over_s": over_s,
+            "duration_s": pair.duration_s,
+        }
+        nearest = {"nearest_m": pair.nearest_m} if isinstance(pair, Meeting) else {}
+        records.append(Record(table, row | nearest))
+    return records
