@@ -4,10 +4,13 @@
 pose and disappear at its death. Data that arrives twice is recorded once.
 """
 
+from bisect import bisect_right, insort
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, partial
+from math import inf
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -34,31 +37,6 @@ _BLINK_S = 0.1
 
 
 @dataclass(slots=True)
-class _Clock:
-    """Time of each birth on one island [s], by its number there; both ascend.
-
-    After a lost message births arrive late, and are sorted at the next question.
-    """
-
-    times_s: dict[int, float] = field(default_factory=dict)
-    is_sorted: bool = True
-
-    def add(self, births: int, time_s: float) -> None:
-        """Add a birth."""
-        last = next(reversed(self.times_s), 0)
-        self.is_sorted = self.is_sorted and births > last
-        self.times_s[births] = time_s
-
-    def births_at(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-        """Return the numbers of births up to some times."""
-        if not self.is_sorted:
-            self.times_s = dict(sorted(self.times_s.items()))
-            self.is_sorted = True
-        after = np.searchsorted(list(self.times_s.values()), times_s, side="right")
-        return np.array([0, *self.times_s], dtype=np.int64)[after]
-
-
-@dataclass(slots=True)
 class _ShownRobot:
     """A robot in an arena: its entity, times of its last boxes and pose [s]."""
 
@@ -78,7 +56,8 @@ class Show:
         self._space = space
         # Each model is made at the first call.
         self._models: dict[BirthId, Callable[[], BoxModel]] = {}
-        self._clocks: defaultdict[int, _Clock] = defaultdict(_Clock)
+        # Number and time of each birth on an island [s], ascending.
+        self._clocks = defaultdict[int, list[tuple[int, float]]](lambda: [(0, -inf)])
         self._shown: dict[tuple[int, BirthId], _ShownRobot] = {}
         self._gone: dict[tuple[int, BirthId], Death] = {}
         self._levels: set[tuple[int, int]] = set()
@@ -123,7 +102,7 @@ class Show:
             times = rows["sim_time_s"].to_numpy()
             path = self._settle(arena, birth, times)
             centres, attitudes = place_rows(self._models[birth](), rows)
-            births = self._clocks[arena].births_at(times)
+            births = self._births_at(arena, times)
             coarse = _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
             self._recording.log_poses(path, times, births, *coarse)
         if has_all:
@@ -132,8 +111,14 @@ class Show:
 
     def _at(self, island: int, time_s: float) -> TimePoint:
         """Return a time of an arena, with its births so far."""
-        births = self._clocks[island].births_at(np.array([time_s]))
-        return TimePoint(time_s, int(births[0]))
+        return TimePoint(time_s, int(self._births_at(island, np.array([time_s]))[0]))
+
+    def _births_at(
+        self, island: int, times_s: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.int64]:
+        clock, born_s = self._clocks[island], itemgetter(1)
+        after = (bisect_right(clock, time_s, key=born_s) for time_s in times_s)
+        return np.array([clock[at - 1][0] for at in after], dtype=np.int64)
 
     def _settle(
         self, arena: int, birth: BirthId, times_s: npt.NDArray[np.float64]
@@ -179,7 +164,8 @@ class Show:
         if not self._lineage.add(one):
             return
         if one.sim_time_s is not None:
-            self._clocks[one.birth.island].add(one.births, one.sim_time_s)
+            # After a lost message births arrive late.
+            insort(self._clocks[one.birth.island], (one.births, one.sim_time_s))
         parents = " and ".join(parent.name for parent in one.parents)
         text = f"{one.birth.name} is born{' to ' if parents else ''}{parents}"
         self._recording.log_line(text, TimePoint(one.sim_time_s, one.births), "INFO")
@@ -197,8 +183,11 @@ class Show:
         if (level.island, level.births) in self._levels:
             return
         self._levels.add((level.island, level.births))
-        time_s = self._clocks[level.island].times_s.get(level.births)
-        when = TimePoint(time_s, level.births)
+        clock = self._clocks[level.island]
+        # The last birth is that of the level, unless it is off-line.
+        births, born_s = clock[bisect_right(clock, (level.births, inf)) - 1]
+        is_known = births == level.births
+        when = TimePoint(born_s if is_known else None, level.births)
         fitness = (level.mean, level.best) if level.judged else ()
         self._recording.level(level.island, when, level.size, fitness)
         if when.sim_time_s is None and level.members:
