@@ -1,5 +1,7 @@
 """Checks of live messages before they are shown: any process can publish them."""
 
+from typing import Any
+
 import numpy as np
 import pyarrow as pa
 
@@ -9,7 +11,7 @@ from schema.limits import GREATEST_COORDINATE, LONGEST_REASON, LONGEST_WALL_S
 from schema.robot.robot import check_body, check_tree
 from schema.wire.arena import Live
 from schema.wire.poses import PoseArrays
-from schema.wire.updates import Birth, Death, Level, Migrant, Update
+from schema.wire.updates import Update
 
 _LATEST_S = LONGEST_WALL_S
 """Simulated time; the recording has 64 bits of nanoseconds [s]."""
@@ -23,11 +25,11 @@ def check_update(news: Update, scene: Scene) -> None:
             time beyond the limit, a text that is too long.
     """
     islands = {one.birth.island for one in news.births}
-    placed: list[Death | Level | Migrant] = [*news.deaths, *news.levels, *news.migrants]
+    placed: list[Any] = [*news.deaths, *news.levels, *news.migrants, *news.samples]
     islands |= {one.island for one in placed} | {one.to for one in news.migrants}
     if unknown := islands - set(scene.islands):
         raise MalformedMessage(f"update: the run has no island {min(unknown)}")
-    dated: list[Birth | Death | Migrant] = [*news.births, *news.deaths, *news.migrants]
+    dated: list[Any] = [*news.births, *news.deaths, *news.migrants, *news.samples]
     for one in dated:
         if one.sim_time_s is not None and not 0.0 <= one.sim_time_s <= _LATEST_S:
             raise MalformedMessage(

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
+from analysis.render.overlay import Colour, Rod
 from analysis.viewer.body import BoxModel, Float32s
 from analysis.viewer.entities import AncestryNode, TimePoint, island_path
 from analysis.viewer.ground import Relief, Surface
@@ -29,7 +30,7 @@ BIRTHS = "births"
 
 _ALIVE = (70, 160, 90)
 _DEAD = (150, 150, 155)
-_WALL = (190, 190, 195)
+_WALL, _WORDS = (190, 190, 195), (255, 255, 255)
 _LINES = ((40, 110, 190), (225, 120, 40))
 _HUES = (
     (0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167),
@@ -88,6 +89,7 @@ class Recording(AbstractContextManager["Recording"]):
 
     def add_scene(self, scene: Scene) -> None:
         """Log the islands of a run, before any robot."""
+        self._far = 0.0, scene.extent_m, 0.0
         grounds = zip(scene.islands, scene.walls, scene.surfaces, strict=True)
         for island, walls, surfaces in grounds:
             path = island_path(island)
@@ -131,6 +133,28 @@ class Recording(AbstractContextManager["Recording"]):
             half_sizes=model.half_sizes, colors=model.colours, fill_mode="solid"
         )
         self._stream.log(path, boxes)
+
+    def paint(self, path: str, colour: Colour, when: TimePoint) -> None:
+        """Log one colour of all boxes of a robot."""
+        self._at(when)
+        self._stream.log(path, rr.Boxes3D.from_fields(colors=[colour]))
+
+    def overlay(
+        self, island: int, rods: Sequence[Rod], text: str, when: TimePoint
+    ) -> None:
+        """Log discs and lines of an arena, and a text beyond its wall."""
+        path = f"{island_path(island)}/ground"
+        self.remove(f"{path}/overlay", when)
+        if rods:
+            centres, halves, turns, radii, colours = zip(*rods, strict=True)
+            cylinders = rr.Cylinders3D(
+                lengths=np.multiply(2.0, halves), radii=radii, colors=colours,
+                centers=centres, quaternions=np.roll(turns, -1, axis=1),
+                fill_mode="solid",
+            )  # fmt: skip
+            self._stream.log(f"{path}/overlay", cylinders)
+        words = rr.Points3D([self._far], radii=0, labels=text, colors=_WORDS)
+        self._stream.log(f"{path}/text", words)
 
     def log_poses(
         self,

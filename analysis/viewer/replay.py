@@ -8,22 +8,26 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import LoadedRun
+from analysis.measures.load import LoadedRun, has_rules
 from schema.errors import RevolveError, RunFolderError
 from schema.robot.ids import BirthId
+from schema.robot.trace import Floats
 from schema.tables.files import read_table
 from schema.wire.updates import (
+    SAMPLED,
     Update,
     arenas_of,
     read_birth,
     read_death,
     read_levels,
     read_migrant,
+    read_samples,
 )
 
 CHUNK_S = 20.0
 """Simulated time of the poses that are read and shown at once [s]."""
 
+_POSE = ("sim_time_s", "angles", "x", "y", "z", "qw", "qx", "qy", "qz")
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
 
 
@@ -52,6 +56,13 @@ def read_news(run: LoadedRun) -> Update:
         deaths=tuple(map(read_death, read_table(folder, "deaths").to_pylist())),
         levels=tuple(read_levels(population, arenas_of(births))),
         migrants=tuple(map(read_migrant, read_table(folder, "migrations").to_pylist())),
+        samples=tuple(
+            read_samples(
+                (name, row)
+                for name in (SAMPLED if has_rules(run.islands) else ())
+                for row in read_table(folder, name).to_pylist()
+            )
+        ),
         document=run.document,
     )
 
@@ -98,6 +109,16 @@ def read_poses(
         for island in sorted(pc.unique(now["island"]).to_pylist()):
             rows = now.filter(pc.equal(now["island"], island))
             yield island, rows.sort_by("sim_time_s")
+
+
+def frames_of(poses: pa.Table) -> dict[float, dict[BirthId, Floats]]:
+    """Return x, y, z, w, x, y, z and angles of each robot, by time, ascending."""
+    frames: dict[float, dict[BirthId, Floats]] = {}
+    for birth, rows in rows_by_robot(poses):
+        columns = (rows[name].to_pylist() for name in _POSE)
+        for time_s, angles, *core in zip(*columns, strict=True):
+            frames.setdefault(time_s, {})[birth] = np.array([*core, *angles])
+    return dict(sorted(frames.items()))
 
 
 def rows_by_robot(poses: pa.Table) -> Iterator[tuple[BirthId, pa.Table]]:

@@ -16,11 +16,12 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from analysis.render.overlay import Overlay
 from analysis.viewer.body import BoxModel, Float32s, box_model, place_rows
 from analysis.viewer.entities import TimePoint, robot_path
 from analysis.viewer.populations import Gallery, Lineage
 from analysis.viewer.recording import Recording
-from analysis.viewer.replay import rows_by_robot
+from analysis.viewer.replay import frames_of, rows_by_robot
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -63,6 +64,7 @@ class Show:
         self._levels: set[tuple[int, int]] = set()
         self._moves: set[tuple[BirthId, int, int]] = set()
         self._workers: tuple[WorkerInfo, ...] | None = None
+        self._overlays: defaultdict[int, Overlay] = defaultdict(Overlay)
 
     def tell(self, news: Update) -> None:
         """Record everything new in a message."""
@@ -77,6 +79,8 @@ class Show:
             self._departed(gone)
         for migrant in news.migrants:
             self._migrated(migrant)
+        for sample in news.samples:
+            self._overlays[sample.island].samples.append(sample)
         self._lineage.draw()
         if news.workers != self._workers:
             self._workers = news.workers
@@ -106,8 +110,23 @@ class Show:
             coarse = _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
             self._recording.log_poses(path, times, births, *coarse)
         if has_all:
+            if arena in self._overlays:
+                self._lay_over(arena, self._overlays[arena], poses)
             self._remove_absent(arena, shown)
         return pa.concat_tables(unknown) if unknown else None
+
+    def _lay_over(self, arena: int, overlay: Overlay, poses: pa.Table) -> None:
+        """Record what the rules of an arena keep, at the times of its poses."""
+        frames = frames_of(poses)
+        for time_s, places in frames.items():
+            when = self._at(arena, time_s)
+            # Boxes may just have been logged again.
+            if overlay.advance(time_s) or time_s == min(frames):
+                for birth in overlay.colours.keys() & places.keys():
+                    path = robot_path(arena, birth)
+                    self._recording.paint(path, overlay.colours[birth], when)
+            rods = overlay.rods(time_s, places)
+            self._recording.overlay(arena, rods, overlay.text, when)
 
     def _at(self, island: int, time_s: float) -> TimePoint:
         """Return a time of an arena, with its births so far."""

@@ -15,6 +15,7 @@ from coordinator.islands.events import Record
 from schema.robot.ids import BirthId
 from schema.tables.description import RunDetails
 from schema.wire.updates import (
+    SAMPLED,
     Birth,
     Level,
     Migrant,
@@ -25,7 +26,11 @@ from schema.wire.updates import (
     read_death,
     read_levels,
     read_migrant,
+    read_samples,
 )
+
+_MOST_SAMPLED = 20_000
+"""Rows of arenas with own rules in an update; the last ones after a replay."""
 
 
 class Feed:
@@ -70,6 +75,9 @@ class Feed:
                     new.append(read_death(row))
                 case "migrations":
                     new.append(read_migrant(row))
+                case table if table in SAMPLED and row.get("stores", True):
+                    self._new["samples"].append((table, row))
+        del self._new["samples"][:-_MOST_SAMPLED]
         self.unread.clear()
 
     def update(self, workers: tuple[WorkerInfo, ...]) -> Update | None:
@@ -88,6 +96,7 @@ class Feed:
             deaths=tuple(new["deaths"]),
             levels=tuple(read_levels(new["population"], self._arenas)),
             migrants=tuple(new["migrations"]),
+            samples=tuple(read_samples(new["samples"])),
         )
         self._remember(update)
         return update

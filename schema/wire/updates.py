@@ -4,6 +4,7 @@ A live run sends an ``Update`` a few times per second. A replay builds the same 
 the tables, through the functions of this file, so that a viewer shows both alike.
 """
 
+from collections import defaultdict
 from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import groupby
 from math import fsum
@@ -100,6 +101,26 @@ class Migrant(Message, frozen=True):
     sim_time_s: Finite | None
 
 
+class ArenaSample(Message, frozen=True):
+    """What the rules of an arena keep, and which robots met, at a time.
+
+    Attributes:
+        island, sim_time_s: number of the arena's island, and the time [s].
+        store, stores: first store of its robots, and its values.
+        over_s: time since the decision before, in which the pairs met [s].
+        pairs: robots that met, and whether they have just had a child.
+        patches: centre x, y [m], radius [m] and content of each.
+    """
+
+    island: IslandNumber
+    sim_time_s: Finite
+    store: str = ""
+    stores: tuple[tuple[BirthId, Finite], ...] = ()
+    over_s: Finite = 0.0
+    pairs: tuple[tuple[BirthId, BirthId, bool], ...] = ()
+    patches: tuple[tuple[Finite, Finite, Finite, Finite], ...] = ()
+
+
 class WorkerInfo(Message, frozen=True):
     """A connected worker.
 
@@ -126,6 +147,7 @@ class Update(Message, frozen=True):
         births, deaths, levels, migrants: in the order of their tables.
         workers: all that are connected now.
         document: JSON of the experiment, if is_whole.
+        samples: of arenas with own rules; a whole of a live run has none.
     """
 
     run: str
@@ -139,6 +161,7 @@ class Update(Message, frozen=True):
     migrants: tuple[Migrant, ...] = ()
     workers: tuple[WorkerInfo, ...] = ()
     document: str = ""
+    samples: tuple[ArenaSample, ...] = ()
 
 
 class Page(Message, frozen=True):
@@ -160,7 +183,10 @@ class Page(Message, frozen=True):
     pages: Annotated[int, Meta(ge=0, le=UPDATE_BYTES // PAGE_BYTES)] = 0
 
 
+SAMPLED = ("fitness", "meetings", "matings", "patches")
+"""Tables of an arena with rules of its own that viewers show."""
 _MIGRANT = itemgetter("island", "to", "epoch", "births", "sim_time_s")
+_PATCH = itemgetter("x", "y", "radius_m", "content")
 _PART = itemgetter(
     "kind", "parent", "parent_slot", "child_slot", "rot", "params", "gene"
 )
@@ -257,6 +283,26 @@ def _level(
 def read_migrant(row: Mapping[str, Any]) -> Migrant:
     """Return the migration of a row of the migrations table."""
     return Migrant(individual(row), *_MIGRANT(row))
+
+
+def read_samples(rows: Iterable[tuple[str, Mapping[str, Any]]]) -> list[ArenaSample]:
+    """Return the samples of rows of the tables ``SAMPLED``, with their names."""
+    samples = defaultdict[tuple[float, int], Any](lambda: defaultdict(list))
+    for table, row in rows:
+        sample = samples[row["sim_time_s"], row["island"]]
+        if table == "patches":
+            sample["patches"].append(_PATCH(row))
+        elif table == "meetings":
+            other = BirthId(row["other_island"], row["other_birth"])
+            sample["pairs"].append((individual(row), other, False))
+            sample["over_s"] = row["over_s"]
+        elif table == "fitness":
+            for sample["store"], value in (row["stores"] or ())[:1]:
+                sample["stores"].append((individual(row), value))
+        elif row["birth"] is not None and len(row["parents"]) > 1:
+            parents = (BirthId(one["island"], one["birth"]) for one in row["parents"])
+            sample["pairs"].append((*parents, True))
+    return [ArenaSample(at[1], at[0], **samples[at]) for at in sorted(samples)]
 
 
 def _part(row: Mapping[str, Any]) -> Part:

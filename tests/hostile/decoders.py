@@ -104,6 +104,7 @@ from schema.wire.operator import (
 from schema.wire.protobuf import decode_genome, decode_robot, encode_robot
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 from schema.wire.updates import (
+    ArenaSample,
     Birth,
     Death,
     Level,
@@ -287,6 +288,7 @@ def update() -> Update:
         (Migrant(BIRTH, 0, 1, 1, 2, 3.0),),
         (WorkerInfo("w", "platform", (0,)),),
         "{}",
+        (ArenaSample(0, 2.0, "e", ((BIRTH, 1.0),), 1.0, ((BIRTH, BIRTH, True),)),),
     )
 
 

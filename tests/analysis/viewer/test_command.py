@@ -34,7 +34,7 @@ from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
-from schema.wire.updates import Birth, Death, Level, Update
+from schema.wire.updates import ArenaSample, Birth, Death, Level, Update
 from tests.coordinator.arena_world import poses
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
@@ -240,3 +240,30 @@ def test_births_so_far_are_right_after_a_lost_message() -> None:
     show.move(0, rows.rows())
     births = recording.log_poses.call_args.args[2]
     assert births.tolist() == [0, 1, 2, 3, 4, 5, 6]
+
+
+def test_robots_are_painted_when_they_appear_and_at_samples() -> None:
+    recording = MagicMock()
+    show = Show(recording, BUILT_IN)
+    first, second = BirthId(0, 0), BirthId(0, 1)
+    stores = ((first, 4.0), (second, 2.0))
+    samples = (
+        ArenaSample(0, 20.4, "energy", stores),
+        ArenaSample(0, 21.0, "energy", stores),
+    )
+    show.tell(replace(news(1, 1, 2), samples=samples))
+    for times_s in ((20.0, 20.2, 20.4, 20.6), (20.8, 21.0, 21.2)):
+        rows = poses([first, second], *times_s, joints={first: 0, second: 0})
+        show.move(0, rows.rows())
+    painted = [call.args for call in recording.paint.call_args_list]
+    times = [when.sim_time_s for _, _, when in painted]
+    assert sorted(times) == [20.4] * 2 + [20.8] * 2 + [21.0] * 2
+    assert {path for path, _, _ in painted} == {
+        f"islands/0/robots/0-{n}" for n in (0, 1)
+    }
+    shown = [call.args for call in recording.overlay.call_args_list]
+    assert [when.sim_time_s for *_, when in shown] == [
+        20.0, 20.2, 20.4, 20.6, 20.8, 21.0, 21.2
+    ]  # fmt: skip
+    texts = [text for _, _, text, _ in shown]
+    assert texts == [""] * 2 + ["energy: blue 0, yellow 4"] * 5

@@ -19,7 +19,7 @@ from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part
 from schema.wire.arena import Advance, Live, Poses
-from schema.wire.updates import Birth, Death, Migrant, Update, WorkerInfo
+from schema.wire.updates import ArenaSample, Birth, Death, Migrant, Update, WorkerInfo
 from tests.coordinator.arena_world import poses
 
 
@@ -164,6 +164,8 @@ FORGED: dict[str, Update] = {
         news(3), deaths=(Death(0, BirthId(0, 1), 1, -1e300, "culled"),)
     ),
     "unknown island": news(3, (4_000_000_000, 0)),
+    "sample of no island": replace(news(3), samples=(ArenaSample(99, 1.0),)),
+    "sample beyond 64 bits": replace(news(3), samples=(ArenaSample(0, 1e308),)),
     "migrant to nowhere": replace(
         news(3), migrants=(Migrant(BirthId(0, 1), 0, 99, 1, 1, None),)
     ),

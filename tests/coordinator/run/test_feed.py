@@ -12,7 +12,7 @@ from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row
 from schema.tables.description import RunDetails
 from schema.wire.codec import decode, encode
-from schema.wire.updates import Birth, Update, WorkerInfo
+from schema.wire.updates import ArenaSample, Birth, Update, WorkerInfo
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 BODY = CORE.parts
@@ -124,6 +124,32 @@ def test_bodies_of_robots_that_were_not_selected_are_dropped_off_line() -> None:
     feed.update(())
     bodies = {one.birth.number: one.body for one in whole(feed).births}
     assert bodies == {0: None, 1: BODY, 2: None, 3: BODY, 4: BODY}
+
+
+def test_samples_of_arenas_with_own_rules_are_sent_once_and_not_kept() -> None:
+    fitness: Row = {"island": 0, "birth": 1, "sim_time_s": 5.0, "stores": None}
+    feed = _feed(Record("fitness", fitness))
+    assert feed.update(()) is None
+    stores = [("energy", 3.0)]
+    feed.unread.append(Record("fitness", {**fitness, "stores": stores}))
+    sent = decode(Update, encode(_sent(feed.update(()))), UPDATE_BYTES)
+    stored = ((BirthId(0, 1), 3.0),)
+    assert sent.samples == (ArenaSample(0, 5.0, "energy", stored),)
+    assert feed.update(()) is None
+    assert not whole(feed).samples
+
+
+def test_of_a_long_replay_the_last_samples_are_sent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("coordinator.run.feed._MOST_SAMPLED", 3)
+    feed, place = _feed(), {"x": 0.0, "y": 0.0, "radius_m": 1.0, "content": 2.0}
+    for second in range(9):
+        row = {"island": 0, "sim_time_s": float(second), **place}
+        feed.unread.append(Record("patches", row))
+        feed.read()
+    times = [one.sim_time_s for one in _sent(feed.update(())).samples]
+    assert times == [6.0, 7.0, 8.0]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from schema.robot.robot import Part
 from schema.tables.columns import Row
 from schema.wire.codec import decode, encode
 from schema.wire.updates import (
+    ArenaSample,
     Birth,
     Death,
     Level,
@@ -20,6 +21,7 @@ from schema.wire.updates import (
     decode_page,
     pages_of,
     read_levels,
+    read_samples,
 )
 
 CORE = (Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),)
@@ -42,6 +44,7 @@ UPDATE = Update(
     ),
     workers=(WorkerInfo("w-1", "x86", (0, 2)), WorkerInfo("w-2", "arm", ())),
     document='{"name": "scenario3"}',
+    samples=(ArenaSample(0, 9.0, "energy", ((BirthId(0, 1), 2.0),)),),
 )
 
 
@@ -85,3 +88,35 @@ def test_level_counts_failed_robots_off_line_and_no_immature_ones_of_arenas() ->
     # A user's function may give any finite number.
     rows = [{**row, "fitness": 1.5e308} for row in rows[:2]]
     assert read_levels(rows, arenas={1}) == [Level(0, 2, 2, 2, 1.5e308, 1.5e308, two)]
+
+
+def test_samples_of_arenas_gather_rows_of_a_time() -> None:
+    robot = {"island": 1, "birth_island": None, "birth": 4, "sim_time_s": 5.0}
+    migrant = {**robot, "birth_island": 0}
+    other = {"other_island": 1, "other_birth": 7, "over_s": 0.5}
+    patch = {"island": 1, "sim_time_s": 5.0, "x": 1.0, "y": 2.0, "radius_m": 0.5}
+    two, one = (
+        [{"island": 1, "birth": number} for number in n] for n in ((4, 7), (4,))
+    )
+    mating = {"island": 1, "sim_time_s": 5.0, "parents": two, "birth": 9}
+    rows: list[tuple[str, Row]] = [
+        ("meetings", {**robot, **other, "sim_time_s": 5.5}),
+        ("fitness", {**robot, "stores": [("energy", 3.0), ("rests_until_s", 9.0)]}),
+        ("fitness", {**migrant, "stores": [("energy", 4.0), ("rests_until_s", 0.0)]}),
+        ("fitness", {**robot, "birth": 5, "stores": None}),
+        ("patches", {**patch, "patch": 0, "content": 20.0}),
+        ("meetings", {**robot, **other}),
+        ("matings", mating),
+        ("matings", {**mating, "birth": None}),
+        ("matings", {**mating, "parents": one}),
+        ("patches", {**patch, "island": 0, "patch": 0, "content": 1.0}),
+    ]
+    pair = BirthId(1, 4), BirthId(1, 7)
+    stores = (pair[0], 3.0), (BirthId(0, 4), 4.0)
+    pairs, patches = ((*pair, False), (*pair, True)), ((1.0, 2.0, 0.5, 20.0),)
+    update = replace(UPDATE, samples=tuple(read_samples(rows)))
+    assert decode(Update, encode(update), UPDATE_BYTES).samples == (
+        ArenaSample(0, 5.0, patches=((1.0, 2.0, 0.5, 1.0),)),
+        ArenaSample(1, 5.0, "energy", stores, 0.5, pairs, patches),
+        ArenaSample(1, 5.5, over_s=0.5, pairs=pairs[:1]),
+    )
