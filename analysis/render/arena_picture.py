@@ -6,7 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from analysis.render.stage import AZIMUTH, HIGH, Picture, Stage, choose_engine, furnish
+from analysis.render.overlay import Overlay
+from analysis.render.stage import (
+    AZIMUTH,
+    HIGH,
+    Picture,
+    Stage,
+    add_rods,
+    choose_engine,
+    furnish,
+)
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
@@ -31,6 +40,9 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
     """Renders robots on the ground of their arena; a context manager.
 
     The camera stands still, so that it sees all robots of some frames.
+
+    Attributes:
+        overlay: as of the last picture.
     """
 
     def __init__(
@@ -38,6 +50,7 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
         robots: Mapping[BirthId, Robot],
         settings: ArenaSettings,
         frames: Sequence[Poses],
+        overlay: Overlay,
         *,
         size: tuple[int, int],
     ) -> None:
@@ -58,6 +71,7 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
         def furnish_arena(spec: Any) -> None:  # noqa: ANN401 - imported late
             mjcf.add_walls(spec, walls)
             furnish(size, settings.light, reach_m, spec)
+            add_rods(overlay.most_rods, reach_m, spec)
 
         specs = [
             (f"{birth.name}/", mjcf.robot_spec(one, space, world).spec)
@@ -71,13 +85,32 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
             birth: int(model.joint(f"{prefix}free").qposadr[0])
             for birth, (prefix, _) in zip(robots, specs, strict=True)
         }
+        self.overlay = overlay
+        self._rods = [model.geom(f"rod{n}").id for n in range(overlay.most_rods)]
+        self._paint = model.geom_rgba.copy()
         self._camera = self._framing(frames)
 
     def __exit__(self, *_: object) -> None:
         self._stage.close()
 
-    def picture(self, poses: Poses) -> Picture:
-        """Return a picture of robots in their poses; the others are not shown."""
+    def picture(self, poses: Poses, time_s: float = 0.0) -> Picture:
+        """Return a picture of robots in their poses; the others are not shown.
+
+        The time is that of the overlay [s], which goes on.
+        """
+        model, overlay = self._stage.model, self.overlay
+        overlay.advance(time_s)
+        model.geom_rgba[:] = self._paint
+        for birth in self._starts.keys() & overlay.colours.keys():
+            root = model.body(f"{birth.name}/root").id
+            own = model.body_rootid[model.geom_bodyid] == root
+            model.geom_rgba[own, :3] = np.divide(overlay.colours[birth], 255.0)
+        model.geom_pos[self._rods, 2] = _HIDDEN_M
+        shown = zip(self._rods, overlay.rods(time_s, poses), strict=False)
+        for geom, (centre, half_m, turn, radius_m, colour) in shown:
+            model.geom_pos[geom], model.geom_quat[geom] = centre, turn
+            model.geom_size[geom, :2] = radius_m, half_m
+            model.geom_rgba[geom, :3] = np.divide(colour, 255.0)
         self._pose(poses)
         return self._stage.picture(*self._camera)
 

@@ -97,4 +97,4 @@ def _draw_motion(
     if gait is None:
         save_animation(pictures, out, tick_s)
     else:
-        save_picture(gait_strip(pictures, times_s), out)
+        save_picture(gait_strip(pictures, [f"{one:.2f} s" for one in times_s]), out)

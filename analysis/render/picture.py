@@ -123,15 +123,15 @@ class RobotRenderer(AbstractContextManager["RobotRenderer"]):
 
 
 def gait_strip(
-    pictures: Sequence[Picture], times_s: Sequence[float] = (), *, columns: int = 5
+    pictures: Sequence[Picture], texts: Sequence[str] = (), *, columns: int = 5
 ) -> Picture:
     """Return pictures of one size in rows; the rest of the last row is white.
 
-    The simulated time of each [s] is written below it, if given.
+    The text of each, such as its simulated time, is written below it, if given.
     """
-    if times_s:
-        marked = zip(pictures, times_s, strict=True)
-        pictures = [_with_time(picture, time_s) for picture, time_s in marked]
+    if texts:
+        marked = zip(pictures, texts, strict=True)
+        pictures = [_with_text(picture, text) for picture, text in marked]
     height, width, _ = pictures[0].shape
     columns = min(columns, len(pictures))
     rows = -(-len(pictures) // columns)
@@ -141,14 +141,13 @@ def gait_strip(
     return strip.reshape(rows * height, columns * width, 3)
 
 
-def _with_time(picture: Picture, time_s: float) -> Picture:
+def _with_text(picture: Picture, text: str) -> Picture:
     height, width, _ = picture.shape
     size = max(10, width // 16)
     image = Image.new("RGB", (width, height + 3 * size // 2), "white")
     image.paste(Image.fromarray(picture))
-    font = ImageFont.load_default(size)
+    font = ImageFont.load_default(min(size, 5 * width // (3 * len(text))))
     middle = (width / 2, height + 3 * size / 4)
-    text = f"{time_s:.2f} s"
     ImageDraw.Draw(image).text(middle, text, "black", font, anchor="mm")
     return np.asarray(image)
 

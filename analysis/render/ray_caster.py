@@ -57,7 +57,7 @@ class RayCaster:
         *,
         floor: tuple[str, Shades, float],
     ) -> None:
-        """Prepare the colours of a model with one white spot light.
+        """Prepare the rays to a model with one white spot light.
 
         ``floor`` is the name of the material that has a checker, its two colours,
         (2, 3) from 0 to 1, and the side of its tiles [m].
@@ -65,10 +65,6 @@ class RayCaster:
         self._model = model
         self._size = height, width
         name, self._tiles, self._tile_m = floor
-        self._colours = model.geom_rgba[:, :3].copy()
-        is_plain = (model.geom_rgba == (*[_DEFAULT_COLOUR] * 3, 1.0)).all(axis=1)
-        painted = is_plain & (model.geom_matid >= 0)
-        self._colours[painted] = model.mat_rgba[model.geom_matid[painted], :3]
         self._is_floor = model.geom_matid == model.material(name).id
         self._rows, self._columns = np.indices(self._size).reshape(2, -1)
         # Half of the picture's height at distance 1, divided by half of its pixels.
@@ -78,6 +74,11 @@ class RayCaster:
 
     def update_scene(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> None:
         """Set what ``render`` draws: a state and a free camera."""
+        model = self._model
+        self._colours = model.geom_rgba[:, :3].copy()
+        is_plain = (model.geom_rgba == (*[_DEFAULT_COLOUR] * 3, 1.0)).all(axis=1)
+        painted = is_plain & (model.geom_matid >= 0)
+        self._colours[painted] = model.mat_rgba[model.geom_matid[painted], :3]
         self._draw = lambda: self._picture(data, camera)
 
     def render(self) -> npt.NDArray[np.uint8]:

@@ -212,3 +212,15 @@ def furnish(
         diffuse=(0.5, 0.5, 0.5),
         specular=(0.1, 0.1, 0.1),
     )
+
+
+def add_rods(count: int, size_m: float, spec: Any) -> None:  # noqa: ANN401 - imported late
+    """Add cylinders ``rod0``, ``rod1`` and so on, of a size at most, to be placed."""
+    import mujoco  # noqa: PLC0415 - after its engine is chosen
+
+    for number in range(count):
+        rod = spec.worldbody.add_geom(name=f"rod{number}", contype=0, conaffinity=0)
+        rod.type = mujoco.mjtGeom.mjGEOM_CYLINDER
+        # MuJoCo ignores later turns of a geom that is parallel to its body, and rays
+        # what is beyond its first size.
+        rod.quat, rod.size = (0.8, 0.6, 0.0, 0.0), (size_m, size_m, 0.0)

@@ -5,19 +5,18 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
-import numpy as np
-
 from analysis.measures.load import read_run
 from analysis.progress import bars
 from analysis.render.arena_picture import ArenaRenderer, Poses
+from analysis.render.overlay import Overlay
 from analysis.render.picture import NoPictures, gait_strip, save_animation
 from analysis.render.stage import Picture
 from analysis.viewer.flags import FILM_S
 from analysis.viewer.replay import (
+    frames_of,
     last_time,
     read_news,
     read_poses,
-    rows_by_robot,
     span_of,
 )
 from analysis.viewer.scene import scene_of
@@ -27,15 +26,15 @@ from schema.experiment.file import experiment_from_text
 from schema.experiment.settings import arena_settings_of
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
-from schema.robot.robot import Part, Robot
+from schema.robot.robot import Robot
 from schema.tables.description import allow_plugins_of
+from schema.wire.updates import Update
 
 SPEED = 2.0
 """Simulated time by time of the film."""
 _SIZE = 640, 480
 _COLUMNS = 2
 """Arenas side by side."""
-_POSE = ("sim_time_s", "angles", "x", "y", "z", "qw", "qx", "qy", "qz")
 
 Frames = Mapping[float, Poses]
 """Poses of an arena's robots by simulated time [s], ascending."""
@@ -90,7 +89,7 @@ def draw_film(
     run = read_run(folder)
     allow_plugins_of(folder)
     experiment = experiment_from_text(run.document, is_own=True)
-    bodies = {one.birth: one.body for one in read_news(run).births}
+    news = read_news(run)
     islands = read_frames(folder, *span)
     if not islands:
         if scene_of(experiment).arenas:
@@ -106,48 +105,49 @@ def draw_film(
     with ExitStack() as stack, bars(f"rendering {len(times_s)} pictures") as bar:
         renderers = {
             island: stack.enter_context(
-                _renderer(experiment, island, frames, bodies, size)
+                _renderer(experiment, island, frames, news, size)
             )
             for island, frames in islands.items()
         }
         pictures = []
         for time_s in bar.track(times_s, description="rendering"):
             beside = [
-                renderers[island].picture(frames.get(time_s, {}))
+                renderers[island].picture(frames.get(time_s, {}), time_s)
                 for island, frames in islands.items()
             ]
-            times = [time_s] * len(beside)
-            pictures.append(gait_strip(beside, times, columns=_COLUMNS))
+            texts = [
+                f"{time_s:.2f} s   {one.overlay.text}".rstrip()
+                for one in renderers.values()
+            ]
+            pictures.append(gait_strip(beside, texts, columns=_COLUMNS))
     return pictures, times_s
 
 
-def read_frames(folder: Path, start_s: float, end_s: float) -> dict[int, Frames]:
+def read_frames(folder: Path, start_s: float, end_s: float) -> Mapping[int, Frames]:
     """Return the poses of a span, by island and time.
 
     Raises:
         RunFolderError: the table cannot be read.
     """
-    islands: dict[int, dict[float, dict[BirthId, np.ndarray]]] = {}
+    islands: dict[int, dict[float, Poses]] = {}
     for island, table in read_poses(folder, start_s, end_s):
-        frames = islands.setdefault(island, {})
-        for birth, rows in rows_by_robot(table):
-            columns = [rows[name].to_pylist() for name in _POSE]
-            for time_s, angles, *core in zip(*columns, strict=True):
-                frames.setdefault(time_s, {})[birth] = np.array([*core, *angles])
-    return {island: dict(sorted(frames.items())) for island, frames in islands.items()}
+        islands.setdefault(island, {}).update(frames_of(table))
+    return islands
 
 
 def _renderer(
     experiment: Experiment,
     island: int,
     frames: Frames,
-    bodies: Mapping[BirthId, tuple[Part, ...] | None],
+    news: Update,
     size: tuple[int, int],
 ) -> ArenaRenderer:
+    bodies = {one.birth: one.body for one in news.births}
     robots: dict[BirthId, Robot] = {}
     for birth in sorted({birth for poses in frames.values() for birth in poses}):
         body = bodies[birth]
         assert body is not None
         robots[birth] = Robot(body)
     settings = arena_settings_of(island_experiment(experiment, island))
-    return ArenaRenderer(robots, settings, list(frames.values()), size=size)
+    overlay = Overlay(one for one in news.samples if one.island == island)
+    return ArenaRenderer(robots, settings, list(frames.values()), overlay, size=size)

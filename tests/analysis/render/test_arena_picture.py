@@ -5,11 +5,13 @@ import pytest
 from msgspec.structs import replace
 
 from analysis.render.arena_picture import ArenaRenderer, Poses
+from analysis.render.overlay import Overlay
 from schema.experiment.document import ArenaSection
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import arena_settings_of
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
+from schema.wire.updates import ArenaSample
 from tests.analysis.render.test_picture import mostly
 
 SETTINGS = arena_settings_of(read_experiment("scenario3"))
@@ -43,7 +45,7 @@ def test_robots_are_at_their_places_while_they_live() -> None:
         {BLUE: pose(0.5, 0.0, 1.0)},
         {},
     ]
-    with ArenaRenderer(ROBOTS, SETTINGS, frames, size=SIZE) as renderer:
+    with ArenaRenderer(ROBOTS, SETTINGS, frames, Overlay(), size=SIZE) as renderer:
         both, alone, empty = map(renderer.picture, frames)
         again = renderer.picture(frames[0])
     red, blue = mostly(both, 0), mostly(both, 2)
@@ -61,6 +63,37 @@ def test_robots_are_at_their_places_while_they_live() -> None:
     assert mostly(again, 2).tolist() == blue.tolist()
 
 
+@pytest.mark.usefixtures("_engine")
+def test_patches_lie_below_painted_robots_and_lines_join_them() -> None:
+    frame = {RED: pose(-0.4, 0.0), BLUE: pose(0.4, 0.0)}
+    patch = (-0.4, 0.0, 0.3, 5.0)
+    sample = ArenaSample(0, 2.0, "energy", ((BLUE, 7.0),), 1.0, patches=(patch,))
+    pairs = ((RED, BLUE, True),)
+    pictures = []
+    for samples in ((), (sample,), (replace(sample, pairs=pairs),)):
+        overlay = Overlay(samples)
+        with ArenaRenderer(ROBOTS, SETTINGS, [frame], overlay, size=SIZE) as renderer:
+            before, shown = (renderer.picture(frame, time_s) for time_s in (1.9, 2.0))
+        pictures += [before, shown]
+    plain, _, unfed, fed, unmet, met = pictures
+    assert (plain == unfed).all()
+    assert (plain == unmet).all()
+    red, blue = mostly(plain, 0), mostly(plain, 2)
+    # The robot whose store is known is yellow, the other one keeps its colours.
+    assert len(mostly(fed, 0)) == pytest.approx(len(red), rel=0.1)
+    assert not len(mostly(fed, 2))
+    row, column = blue[len(blue) // 2]
+    assert fed[row, column, 0] > 3 * fed[row, column, 2]
+    # The patch is around the first robot, and hides none of it.
+    green = np.argwhere((plain != fed).any(axis=2) & (fed.argmax(axis=2) == 1))
+    assert (green.min(axis=0) < red.min(axis=0)).all()
+    assert (green.max(axis=0) > red.max(axis=0)).all()
+    # The line begins and ends above the robots.
+    line = np.argwhere((fed != met).any(axis=2))
+    assert line[:, 1].min() == pytest.approx(red[:, 1].mean(), abs=6)
+    assert line[:, 1].max() == pytest.approx(blue[:, 1].mean(), abs=6)
+
+
 @pytest.mark.parametrize(
     ("place", "arena"),
     [
@@ -75,7 +108,8 @@ def test_the_wall_is_rendered_and_hides_no_robot(
     frame = {RED: pose(*place)}
     pictures = []
     for settings in (SETTINGS, replace(SETTINGS, arena=arena)):
-        with ArenaRenderer({RED: ROBOTS[RED]}, settings, [frame], size=SIZE) as made:
+        alone = {RED: ROBOTS[RED]}
+        with ArenaRenderer(alone, settings, [frame], Overlay(), size=SIZE) as made:
             pictures.append(made.picture(frame))
     assert (pictures[0] != pictures[1]).any()
     plain, walled = (mostly(picture, 0) for picture in pictures)

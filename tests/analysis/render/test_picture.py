@@ -127,7 +127,7 @@ def test_a_pose_moves_the_robot_before_a_fixed_camera(renderer: RobotRenderer) -
 
 def test_a_strip_has_rows_of_five_pictures_with_their_times_below() -> None:
     pictures = [np.full((20, 80, 3), 10 * number, np.uint8) for number in range(7)]
-    strip = gait_strip(pictures, [1.25, 1.5, 1.25, *range(4)])
+    strip = gait_strip(pictures, ["1.25 s", "1.50 s", "1.25 s", *map(str, range(4))])
     assert strip.shape == (2 * 35, 5 * 80, 3)
     assert strip[0, ::80, 0].tolist() == [0, 10, 20, 30, 40]
     assert strip[35, ::80, 0].tolist() == [50, 60, 255, 255, 255]
@@ -284,3 +284,12 @@ def test_points_at_the_left_end_and_nearer_to_the_camera_are_seen() -> None:
     point, distance = framed(points, np.zeros(2), 0.0, 0.0, (1.0, 1.0, 0.5))
     assert point == pytest.approx([10, 0, 0])
     assert distance == pytest.approx(1 + 2 / 0.5)
+
+
+def test_texts_of_any_length_leave_room_for_themselves() -> None:
+    picture = np.zeros((30, 160, 3), np.uint8)
+    short, long = (gait_strip([picture], [text]) for text in ("1.0 s", "energy " * 5))
+    assert short.shape == long.shape
+    for strip in (short, long):
+        columns = np.flatnonzero((strip[30:] < 128).any(axis=(0, 2)))
+        assert 0 < columns.min() < columns.max() < 159
