@@ -2,6 +2,8 @@
 
 from functools import partial
 
+from msgspec.structs import asdict
+
 from coordinator.arena.activity import Activity
 from coordinator.arena.candidates import Mating
 from coordinator.arena.living import (
@@ -113,19 +115,9 @@ class ArenaDecisions:
 
     def sample(self, moment: Moment) -> list[Record]:
         """Return the rows of all patches."""
+        at = {"island": moment.island, "sim_time_s": moment.sim_time_s}
         return [
-            Record(
-                "patches",
-                {
-                    "island": moment.island,
-                    "sim_time_s": moment.sim_time_s,
-                    "patch": number,
-                    "x": patch.x,
-                    "y": patch.y,
-                    "radius_m": patch.radius_m,
-                    "content": patch.content,
-                },
-            )
+            Record("patches", {**at, "patch": number, **asdict(patch)})
             for number, patch in enumerate(self.patches)
         ]
 
