@@ -206,9 +206,7 @@ def _deployment(
     from worker.serve.jobs import Jobs
     from worker.serve.shards import Shards
 
-    if options.speed is not None and not any(map(_has_arena, experiments)):
-        names = ", ".join(experiment.name for experiment in experiments)
-        raise ExperimentError(f"--speed: limits arenas, and there is none in {names}")
+    _refuse_flags_of_arenas(options, experiments)
     if options.view:
         _check_window(folder)
     if options.connect and options.listen:
@@ -226,7 +224,7 @@ def _deployment(
     workers: int | None = options.workers
     if workers is None:
         workers = 0 if options.connect else cores()
-    # One arena runs in one process; several arenas, or robots, spread over them.
+    # An arena that is small runs in one process; several arenas spread over them.
     is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
     threads = options.threads or (cores() if is_one_arena else 1)
     most_held = shards_that_fit(memory_bytes(), processes=1)
@@ -250,12 +248,31 @@ def _deployment(
         quiet=options.quiet,
         fsync=options.fsync,
         speed=options.speed,
+        arena_workers=options.arena_workers,
         view=options.view,
         checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
         metrics=options.metrics,
         resume_flags=tuple(resume_flags(options)),
     )
+
+
+def _refuse_flags_of_arenas(
+    options: argparse.Namespace, experiments: tuple[Experiment, ...]
+) -> None:
+    """Raise if a flag is for arenas, and there is none.
+
+    Raises:
+        ExperimentError: there is none.
+    """
+    if any(map(_has_arena, experiments)):
+        return
+    names = ", ".join(experiment.name for experiment in experiments)
+    for flag in ("speed", "arena-workers"):
+        if getattr(options, flag.replace("-", "_")) is not None:
+            raise ExperimentError(
+                f"--{flag}: is for arenas, and there is none in {names}"
+            )
 
 
 def _check_window(folder: Path) -> None:

@@ -40,6 +40,7 @@ class Deployment:
         connect: address of an existing hub; None: this process is the hub.
         certificates: those that may connect to this hub; None: all of the authority.
         speed: limit of simulated seconds per second for arenas; None: no limit.
+        arena_workers: workers that advance one arena; None: as many as pay.
         resume_flags: with which ``revolve resume`` has the same agents again.
     """
 
@@ -52,6 +53,7 @@ class Deployment:
     quiet: bool
     fsync: bool
     speed: float | None = None
+    arena_workers: int | None = None
     view: bool = False
     checks: Checks = NO_CHECKS
     certificates: tuple[Certificate, ...] | None = None

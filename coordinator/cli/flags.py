@@ -56,6 +56,7 @@ _COMMANDS = {
 _KEPT = (
     *("--workers", "--listen", "--connect", "--fleet", "--access"),
     *("--tls-ca", "--tls-certificate", "--tls-key", "--speed", "--threads"),
+    "--arena-workers",
     *("--cpu-limit", "--wait-limit", "--give-up-after", "--audit", "--on-quarantine"),
     *("--in-process", "--allow-drift", "--fsync", "--oversubscribe"),
 )
@@ -206,6 +207,13 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         metavar="X",
         help="limit arenas to X simulated seconds per second; refused if there is no "
         "arena (default: no limit)",
+    )
+    add_count(
+        flags,
+        "--arena-workers",
+        None,
+        "number of workers that advance one arena together, as far as there are; "
+        "results do not depend on it (default: as many as pay)",
     )
     flags.add_argument(
         "--view", action="store_true", help="open a viewer, as revolve view does"

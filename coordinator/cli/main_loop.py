@@ -61,6 +61,7 @@ def execute_runs(
                 scheduler.fleet,
                 fsync=deployment.fsync,
                 speed=deployment.speed,
+                parts=deployment.arena_workers,
                 is_watched=is_watched and network is not None,
                 checks=deployment.checks,
             ),

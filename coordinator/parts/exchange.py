@@ -6,7 +6,7 @@ their states before the exchange. What is left is equal to the advance of the wh
 arena, to the last bit.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from coordinator.parts.partition import groups_of
@@ -24,11 +24,16 @@ class PartResult:
         advance: without state.
         state: of the robots at the end.
         boxes: that all of them swept, also those that diverged.
+        costs: of each of them, in any unit.
+        works: motor work so far in the advance, of those that live [J]; empty if it is
+            not measured.
     """
 
     advance: Advance
     state: ArenaState
-    boxes: Mapping[BirthId, Box]
+    boxes: dict[BirthId, Box]
+    costs: dict[BirthId, float]
+    works: dict[BirthId, float]
 
 
 @dataclass(slots=True)
@@ -36,13 +41,13 @@ class Exchange:
     """The results of the parts, and which of their robots must be advanced again.
 
     Attributes:
-        clusters: before the exchange, newborns included.
+        clusters: before the exchange; newborns may be missing.
         parts: robots of each part, newborns included.
         repeated: robots that are advanced again, together.
     """
 
     clusters: Sequence[Group]
-    parts: Sequence[Collection[BirthId]]
+    parts: Mapping[int, frozenset[BirthId]]
     repeated: frozenset[BirthId] = frozenset()
     _results: dict[int, PartResult] = field(default_factory=dict)
     _again: PartResult | None = None
@@ -58,7 +63,7 @@ class Exchange:
     @property
     def missing(self) -> list[int]:
         """Parts without a result."""
-        return [part for part in range(len(self.parts)) if part not in self._results]
+        return [part for part in self.parts if part not in self._results]
 
     def overlap(self) -> bool:
         """Look for robots of different results in reach of each other.
@@ -89,7 +94,7 @@ class Exchange:
     def chosen(self) -> list[tuple[PartResult, frozenset[BirthId]]]:
         """Return the results, each with the robots for which it is valid."""
         valid = [
-            (self._results[part], frozenset(births) - self.repeated)
-            for part, births in enumerate(self.parts)
+            (self._results[part], births - self.repeated)
+            for part, births in self.parts.items()
         ]
         return valid if self._again is None else [*valid, (self._again, self.repeated)]

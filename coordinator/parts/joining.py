@@ -8,7 +8,7 @@ from msgspec import structs
 
 from coordinator.parts.exchange import PartResult
 from schema.robot.ids import BirthId
-from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.arena import Advance, Box, Casualty, Judgement, Touch
 from schema.wire.arena_state import ArenaState
 from schema.wire.poses import PoseArrays
 
@@ -18,40 +18,33 @@ Chosen = Sequence[tuple[PartResult, Collection[BirthId]]]
 
 def joined(chosen: Chosen) -> PartResult:
     """Return the result of all robots of an exchange."""
-    judged: list[tuple[Judgement, float | None]] = []
+    judgements: list[Judgement] = []
     casualties: list[Casualty] = []
     touches: list[Touch] = []
     poses: list[PoseArrays] = []
+    boxes: dict[BirthId, Box] = {}
+    costs: dict[BirthId, float] = {}
+    works: dict[BirthId, float] = {}
     for result, births in chosen:
         advance = result.advance
-        works = advance.work_j or [None] * len(advance.judgements)
-        pairs = zip(advance.judgements, works, strict=True)
-        judged += [pair for pair in pairs if pair[0].birth in births]
+        judgements += [one for one in advance.judgements if one.birth in births]
         casualties += [lost for lost in advance.casualties if lost.birth in births]
         touches += [touch for touch in advance.touches if touch.first in births]
         poses.append(PoseArrays.received(advance.poses).of(births))
-    judged.sort(key=lambda pair: pair[0].birth)
+        boxes |= {birth: result.boxes[birth] for birth in births}
+        costs |= {birth: result.costs[birth] for birth in births}
+        works |= {b: work_j for b, work_j in result.works.items() if b in births}
     state = _joined_states(chosen)
-    return PartResult(
-        Advance(
-            step=state.step,
-            digest=state.digest,
-            judgements=tuple(judgement for judgement, _ in judged),
-            casualties=tuple(
-                sorted(casualties, key=lambda lost: (lost.step, lost.birth))
-            ),
-            touches=tuple(sorted(touches, key=lambda one: (one.first, one.second))),
-            poses=PoseArrays.joined(poses).message(),
-            work_j=tuple(work_j for _, work_j in judged if work_j is not None),
-        ),
-        state,
-        {
-            birth: box
-            for result, births in chosen
-            for birth, box in result.boxes.items()
-            if birth in births
-        },
+    advance = Advance(
+        step=state.step,
+        digest=state.digest,
+        judgements=tuple(sorted(judgements, key=lambda one: one.birth)),
+        casualties=tuple(sorted(casualties, key=lambda lost: (lost.step, lost.birth))),
+        touches=tuple(sorted(touches, key=lambda one: (one.first, one.second))),
+        poses=PoseArrays.joined(poses).message(),
+        work_j=tuple(works[birth] for birth in state.births) if works else (),
     )
+    return PartResult(advance, state, boxes, costs, works)
 
 
 def _joined_states(chosen: Chosen) -> ArenaState:

@@ -4,7 +4,7 @@ Robots whose boxes do not overlap cannot act on each other, so groups that overl
 connect may be advanced apart. What parts there are has no influence on any result.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -114,8 +114,3 @@ def _present(
             is_held = True
             shares[part] += costs[birth]
     return shares.index(max(shares)) if is_held else None
-
-
-def held_by(parts: Sequence[Collection[BirthId]]) -> dict[BirthId, int]:
-    """Return the part of each robot."""
-    return {birth: part for part, births in enumerate(parts) for birth in births}

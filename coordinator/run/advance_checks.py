@@ -10,10 +10,14 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise
 
+from msgspec.structs import replace
+
 from coordinator.run.requests import check_count, impossible
+from schema.errors import NO_MESSAGE
 from schema.experiment.document import Experiment
+from schema.limits import LONGEST_REASON, printable
 from schema.robot.ids import BirthId
-from schema.wire.arena import Advance, Touch
+from schema.wire.arena import Advance, Casualty, Touch
 from schema.wire.arena_state import state_digest
 from schema.wire.poses import PoseArrays
 
@@ -30,6 +34,7 @@ class ExpectedAdvance:
         living: robots that live after the requested changes.
         wants_snapshot: the result must hold the state at the end.
         wants_tracks: the result must hold the work of the motors.
+        judges: the advance ends, so each robot is judged.
     """
 
     from_step: int
@@ -38,6 +43,7 @@ class ExpectedAdvance:
     experiment: Experiment
     wants_snapshot: bool
     wants_tracks: bool = False
+    judges: bool = True
 
     @property
     def samples(self) -> range:
@@ -64,15 +70,16 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
         raise impossible(f"advance: {wanted} snapshot was wanted, got {got}")
     if advance.snapshot and state_digest(advance.snapshot) != advance.digest:
         raise impossible("advance: the snapshot must have the digest of the state")
-    _check_robots(advance, expected.living)
+    judged = [judgement.birth for judgement in advance.judgements]
+    if expected.judges:
+        check_robots(judged, advance.casualties, expected.living)
+    elif judged:
+        raise impossible(f"advance: no robot is judged yet, got {_names(judged)}")
     measures = len(expected.experiment.measures.names)
     for judgement in advance.judgements:
         if judgement.measures or judgement.is_mature:
             check_count(judgement.measures, measures)
-    worked = len(advance.judgements) if expected.wants_tracks else 0
-    if len(advance.work_j) != worked or advance.tracks:
-        got = f"{len(advance.work_j)} and {len(advance.tracks)} bytes of tracks"
-        raise impossible(f"advance: must have {worked} works and no tracks, got {got}")
+    _check_work(advance, expected)
     last = expected.from_step
     for casualty in advance.casualties:
         if not last <= casualty.step <= expected.until:
@@ -84,23 +91,46 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
     _check_touches(advance.touches, expected)
 
 
-def _check_robots(advance: Advance, living: AbstractSet[BirthId]) -> None:
-    """Raise unless exactly the living robots are reported, each once."""
-    judged = [judgement.birth for judgement in advance.judgements]
-    if any(a >= b for a, b in pairwise(judged)):
-        raise impossible("advance: judgements must ascend by birth")
-    reported = {*judged, *(casualty.birth for casualty in advance.casualties)}
+def printable_reasons(casualties: Iterable[Casualty]) -> tuple[Casualty, ...]:
+    """Return casualties whose reasons can be shown."""
+    return tuple(
+        replace(one, reason=printable(one.reason, LONGEST_REASON) or NO_MESSAGE)
+        for one in casualties
+    )
+
+
+def check_robots(
+    births: Sequence[BirthId],
+    casualties: Sequence[Casualty],
+    living: AbstractSet[BirthId],
+) -> None:
+    """Raise unless exactly the living robots are reported, each once.
+
+    Raises:
+        MalformedMessage: they are not; ``births`` do not ascend.
+    """
+    if any(a >= b for a, b in pairwise(births)):
+        raise impossible("advance: robots must ascend by birth")
+    reported = {*births, *(casualty.birth for casualty in casualties)}
     problems = []
     if unknown := reported - living:
         problems.append(f"unknown {_names(unknown)}")
     if missing := living - reported:
         problems.append(f"missing {_names(missing)}")
-    if len(reported) < len(advance.judgements) + len(advance.casualties):
+    if len(reported) < len(births) + len(casualties):
         problems.append("a robot is reported twice")
     if problems:
         raise impossible(
             "advance: must report each living robot once: " + ", ".join(problems)
         )
+
+
+def _check_work(advance: Advance, expected: ExpectedAdvance) -> None:
+    alive = len(expected.living) - len(advance.casualties)
+    worked = alive if expected.wants_tracks else 0
+    if len(advance.work_j) != worked or advance.tracks:
+        got = f"{len(advance.work_j)} and {len(advance.tracks)} bytes of tracks"
+        raise impossible(f"advance: must have {worked} works and no tracks, got {got}")
 
 
 def _check_touches(touches: Sequence[Touch], expected: ExpectedAdvance) -> None:
@@ -145,11 +175,11 @@ def check_poses(advance: Advance, expected: ExpectedAdvance) -> int:
     if len(set(zip(robots, times, strict=True))) < len(robots):
         raise impossible("poses: must have one row per robot and time")
     counts = Counter(robots)
-    for judgement in advance.judgements:
-        if counts[judgement.birth] != len(samples):
+    for birth in expected.living - {lost.birth for lost in advance.casualties}:
+        if counts[birth] != len(samples):
             raise impossible(
-                f"poses: robot {_names([judgement.birth])} must have {len(samples)}, "
-                f"got {counts[judgement.birth]}"
+                f"poses: robot {_names([birth])} must have {len(samples)}, "
+                f"got {counts[birth]}"
             )
     return len(robots)
 

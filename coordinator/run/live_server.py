@@ -78,7 +78,8 @@ class LiveServer:
         shards: dict[str, list[int]] = {}
         for number, island in sorted(self._loop.islands.items()):
             if isinstance(island, Arena):
-                shards.setdefault(requests.holder(number), []).append(number)
+                for holder in requests.holders(number):
+                    shards.setdefault(holder, []).append(number)
         return tuple(
             WorkerInfo(name, dispatch.platform(name), tuple(shards.get(name, ())))
             for name in dispatch.names("worker")

@@ -41,7 +41,7 @@ from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, descr
 from coordinator.run.learners import Learners
 from coordinator.run.requests import Key, Requests, island_of, key_of
 from coordinator.run.run_context import RunContext
-from coordinator.run.shard_requests import Reached, ShardRequests
+from coordinator.run.shard_requests import ShardRequests
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
@@ -75,6 +75,7 @@ class Loop:
         rows: the tables; None if nothing is to be written.
         snapshot_store: the snapshots of arenas.
         throttle: limits the speed of arenas; None: no limit.
+        parts: of an arena, for as many workers; None: as many as pay.
         checks: cross-checks to make.
         confirm: raises if this process may no longer write to the run.
         watch: called with each row, for viewers; None without any.
@@ -89,6 +90,7 @@ class Loop:
     rows: Recorder | None
     snapshot_store: Snapshots
     throttle: RealTimeThrottle | None = None
+    parts: int | None = None
     checks: Checks = NO_CHECKS
     confirm: Callable[[], None] = lambda: None
     watch: Callable[[Record], None] | None = None
@@ -97,7 +99,9 @@ class Loop:
         """Connect the state machines; ``start`` starts them."""
         context, fleet = self.context, self.fleet
         self.client = context.client
-        self.shard_requests = ShardRequests(context, self.snapshot_store, fleet)
+        self.shard_requests = ShardRequests(
+            context, self.snapshot_store, fleet, self.parts
+        )
         self._requests = Requests(context, fleet, self.checks.audit)
         self._learners = Learners(context.experiments, context.origin)
         self._now_s = 0.0
@@ -185,10 +189,8 @@ class Loop:
         for end in ends:
             if end.job.shard < 0:
                 events += self._requests.events(end)
-            elif not isinstance(end.answer, Reached):
-                raise self.shard_requests.refusal(end)
-            else:
-                event, snapshot = end.answer.event, end.answer.snapshot
+            elif reached := self.shard_requests.take(end):
+                event, snapshot = reached.event, reached.snapshot
                 if snapshot:
                     # It must be on disk before the journal has the advance.
                     step = event.advance.step

@@ -14,7 +14,8 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced, JournalledEvent
 from coordinator.run.history import begun_loop
 from coordinator.run.run_context import RunContext
-from coordinator.run.shard_requests import Reached, ShardRequests
+from coordinator.run.shard_answers import Reached
+from coordinator.run.shard_requests import ShardRequests
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.tables.description import RunDetails
@@ -126,9 +127,8 @@ class PoseRecovery:
             RunFolderError: the disk is full or failed.
         """
         for end in ends:
-            if not isinstance(end.answer, Reached):
-                raise self._requests.refusal(end)
-            self._take(end.answer)
+            if reached := self._requests.take(end):
+                self._take(reached)
         if self.is_done:
             self._fleet.leave(self._client)
 

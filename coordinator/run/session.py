@@ -81,6 +81,7 @@ class RunSession:
         *,
         fsync: bool = False,
         speed: float | None = None,
+        parts: int | None = None,
         is_watched: bool = False,
         checks: Checks = NO_CHECKS,
     ) -> None:
@@ -88,7 +89,7 @@ class RunSession:
 
         ``held``: the folder; closed with the run, or at once if this fails. ``fsync``:
         survive power loss, too. ``speed``: simulated seconds per second at most, of
-        arenas; None: no limit.
+        arenas; None: no limit. ``parts``: of an arena; None: as many as pay.
 
         Raises:
             RunFolderError: a damaged journal, or a disk that fails.
@@ -126,6 +127,7 @@ class RunSession:
                 rows=self._recorder,
                 snapshot_store=Snapshots(held.path),
                 throttle=RealTimeThrottle(speed) if speed else None,
+                parts=parts,
                 checks=checks,
                 confirm=held.confirm,
                 watch=self.feed.unread.append if self.feed else None,
@@ -239,7 +241,8 @@ class RunSession:
     def status(self, now_s: float) -> RunStatus:
         """Return the progress of the run."""
         islands = tuple(
-            _island_status(island) for _, island in sorted(self.loop.islands.items())
+            self._island_status(number, island)
+            for number, island in sorted(self.loop.islands.items())
         )
         self._births.note(now_s, sum(island.births for island in islands))
         simulated_s = sum(island.simulated_s or 0.0 for island in islands)
@@ -258,6 +261,20 @@ class RunSession:
             simulated_per_s=self._simulated.per_s,
         )
 
+    def _island_status(self, number: int, island: Island | Arena) -> IslandStatus:
+        arena = island if isinstance(island, Arena) else None
+        parts, repeats = self.loop.shard_requests.divided(number) if arena else ((), 0)
+        return IslandStatus(
+            births=island.births,
+            wanted=island.births if island.is_finished else island.experiment.births,
+            best=max((one.fitness for one in island.judged), default=None),
+            alive=len(island.population),
+            simulated_s=arena.clock.seconds(arena.step) if arena else None,
+            is_paused=bool(arena and arena.is_paused),
+            parts=parts,
+            repeats=repeats,
+        )
+
 
 def check_journal(folder: Path) -> None:
     """Raise if a run has lost its journal; call it before any file is changed.
@@ -271,18 +288,6 @@ def check_journal(folder: Path) -> None:
             f"{folder / JOURNAL}: is lost: put a sound copy of it in its place, or "
             "begin anew in another folder"
         )
-
-
-def _island_status(island: Island | Arena) -> IslandStatus:
-    arena = island if isinstance(island, Arena) else None
-    return IslandStatus(
-        births=island.births,
-        wanted=island.births if island.is_finished else island.experiment.births,
-        best=max((one.fitness for one in island.judged), default=None),
-        alive=len(island.population),
-        simulated_s=arena.clock.seconds(arena.step) if arena else None,
-        is_paused=bool(arena and arena.is_paused),
-    )
 
 
 def _runs_row(held: RunFolder) -> Record:

@@ -4,7 +4,7 @@ The changes and advances since a shard's newest snapshot are kept, so that anoth
 worker can rebuild its state. Nothing here decides what happens in an arena.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -13,27 +13,43 @@ from msgspec import structs
 from coordinator.dispatch.events import Assign, Deliver, Read
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
-from coordinator.run.advance_checks import ExpectedAdvance, check_advance, check_poses
+from coordinator.parts.arena_parts import EXCHANGE_S
+from coordinator.run.advance_checks import (
+    ExpectedAdvance,
+)
 from coordinator.run.drift import Drift, with_losses
-from coordinator.run.requests import Expected, impossible, read_answer
+from coordinator.run.part_requests import PartRequests
 from coordinator.run.run_context import RunContext
+from coordinator.run.shard_answers import (
+    PartReached,
+    Reached,
+    read_advance,
+    with_tracks,
+)
 from coordinator.storage.snapshots import Snapshots
+from schema.agent.log import tell_user, warn_user
 from schema.errors import (
-    NO_MESSAGE,
     JobRefused,
-    MalformedMessage,
     RunFolderError,
     UnexpectedEvent,
 )
-from schema.limits import ADVANCE_BYTES, LONGEST_REASON, printable
+from schema.experiment.settings import read_arena_settings, split_problems
+from schema.limits import ADVANCE_BYTES
 from schema.parts import Vector
 from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.arena import Advance, AdvanceShard, Changes, PastAdvance, Rebuild
-from schema.wire.codec import encode
-from schema.wire.messages import Request, StateMissing
+from schema.wire.arena_state import ArenaState
+from schema.wire.codec import decode, encode
+from schema.wire.messages import Request
 from schema.wire.poses import PoseArrays
+from schema.wire.status import PartStatus
+
+LEAST_PART_S = 0.1
+"""An arena has as many parts as its exchanges take multiples of this [s]."""
+Place = tuple[int, int]
+"""A shard's island, and a part of it."""
 
 
 @dataclass(slots=True)
@@ -59,6 +75,11 @@ class _Past:
     repeats: Advanced | None = None
     wants_snapshot: bool = False
     may_be_kept: bool = True
+    in_parts: PartRequests | None = None
+    wall_s: float = 0.0
+    state: bytes = b""
+    undivided: str | None = None
+    was_divided: bool = False
 
     def living_after(self, changes: Changes) -> set[BirthId]:
         """Return the robots that live after changes."""
@@ -70,47 +91,60 @@ class _Past:
         return self.platform not in ("", platform)
 
 
-@dataclass(frozen=True, slots=True)
-class Reached:
-    """A decoded answer to a request to advance a shard.
-
-    Attributes:
-        snapshot: the state that was reached; empty if it was not wanted.
-    """
-
-    event: Advanced
-    snapshot: bytes
-
-
 class ShardRequests:
     """The advances of all arenas of a run."""
 
     def __init__(
-        self, context: RunContext, snapshot_store: Snapshots, fleet: JobRouter
+        self,
+        context: RunContext,
+        snapshot_store: Snapshots,
+        fleet: JobRouter,
+        parts: int | None = None,
     ) -> None:
-        """Initialise without shards; ``fleet`` has the workers."""
+        """Initialise without shards; ``fleet`` has the workers.
+
+        ``parts``: of an arena, as far as there are workers; None: as many as pay.
+        """
+        self._parts = parts
         self._context = context
         self._snapshot_store = snapshot_store
         self._fleet = fleet
         self._pasts: dict[int, _Past] = {}
-        # A shard has its island's number here and another one in the fleet.
-        self._numbers: dict[int, int] = {}
-        self._islands: dict[int, int] = {}
+        # A part of a shard has its island's number here and another one in the fleet.
+        self._numbers: dict[Place, int] = {}
+        self._places: dict[int, Place] = {}
         self._repeated_on: dict[int, str] = {}
 
     @property
     def waiting(self) -> dict[int, str]:
         """Platforms of the shards that wait for a worker; "" is any platform."""
         return {
-            self._islands[number]: platform
+            self._places[number][0]: platform
             for number, platform in self._fleet.homes.waiting.items()
-            if number in self._islands
+            if number in self._places
         }
 
-    def holder(self, shard: int) -> str:
-        """Return the name of the worker that holds a shard; empty if none does."""
-        number = self._numbers.get(shard)
-        return "" if number is None else self._fleet.homes.holder(number)
+    def holders(self, shard: int) -> list[str]:
+        """Return the names of the workers that hold the parts of a shard."""
+        numbers = [n for (island, _), n in self._numbers.items() if island == shard]
+        return sorted({self._fleet.homes.holder(number) for number in numbers} - {""})
+
+    def divided(self, shard: int) -> tuple[tuple[PartStatus, ...], int]:
+        """Return the parts of a shard, if it has several, and their repeats."""
+        in_parts = self._past(shard).in_parts
+        if in_parts is None:
+            return (), 0
+        arena, homes = in_parts.parts, self._fleet.homes
+        parts = [
+            PartStatus(
+                homes.holder(self._numbers.get((shard, part), -1)),
+                len(arena.robots(part)),
+                share,
+                arena.came[part],
+            )
+            for part, share in sorted(arena.shares().items())
+        ]
+        return tuple(parts), arena.repeats
 
     def step(self, shard: int) -> int:
         """Return the step that a shard has reached."""
@@ -157,15 +191,141 @@ class ShardRequests:
             platform = repeats.provenance.platform
             if self._repeated_on.setdefault(shard, platform) != platform:
                 self._repeated_on[shard] = platform
-                self._fleet.release(self._numbers.pop(shard))
-        if shard not in self._numbers:
-            number = self._fleet.new_shard(
-                self._context.client, self._encode, platform, may_drift=repeats is None
-            )
-            self._numbers[shard], self._islands[number] = number, shard
+                self._release(shard, 0)
+        self._drop_parts(shard)
+        count = 1 if repeats else self._count(shard)
+        state, past.state = past.state, b""
+        if count > 1 and past.in_parts is None and state:
+            whole = decode(ArenaState, state, ADVANCE_BYTES)
+            past.in_parts = PartRequests(self._context, shard, whole, past.wall_s)
+            if not past.was_divided:
+                past.was_divided = True
+                tell_user(f"arena {shard}: {count} workers advance it together")
+        if past.in_parts is not None:
+            past.in_parts.begin(command, past.places, count)
+            self._send_parts(shard, past.in_parts.parts.missing)
+            return
+        # An arena is divided from a state that is known here.
+        past.wants_snapshot |= count > 1
         timestep_s = self._context.experiments[shard].simulation.timestep_s
         simulated_s = (command.until - past.step) * timestep_s
-        self._fleet.advance(self._numbers[shard], simulated_s)
+        number = self._number(shard, 0, platform, may_drift=repeats is None)
+        self._fleet.advance(number, simulated_s)
+
+    def _number(
+        self, shard: int, part: int, platform: str, *, may_drift: bool = False
+    ) -> int:
+        """Return the number of a part of a shard in the fleet, which may be new."""
+        if (shard, part) not in self._numbers:
+            client = self._context.client
+            number = self._fleet.new_shard(
+                client, self._encode, platform, may_drift=may_drift
+            )
+            self._numbers[shard, part], self._places[number] = number, (shard, part)
+        return self._numbers[shard, part]
+
+    def _release(self, shard: int, part: int) -> None:
+        """Take a part of a shard from its worker."""
+        if (shard, part) in self._numbers:
+            self._fleet.release(self._numbers.pop((shard, part)))
+
+    def _count(self, shard: int) -> int:
+        """Return how many parts a shard is to have, as far as there are workers."""
+        number, past = self._numbers.get((shard, 0)), self._past(shard)
+        if number is None:
+            return 1
+        homes = self._fleet.homes
+        able = len(homes.fit(homes.of(number))) // len(self._pasts)
+        wanted = self._parts or int(past.wall_s / LEAST_PART_S)
+        count = max(1, min(able, wanted))
+        return count if count == 1 or self._is_divisible(shard) else 1
+
+    def _is_divisible(self, shard: int) -> bool:
+        """Return whether an arena may have parts; say once why not."""
+        past = self._past(shard)
+        if past.undivided is None:
+            settings = read_arena_settings(self._context.arena[shard])
+            past.undivided = next(split_problems(settings), "")
+            if past.undivided:
+                warn_user(
+                    f"arena {shard}: one worker advances it, whatever others there "
+                    f"are: {past.undivided}"
+                )
+        return not past.undivided
+
+    def _send_parts(self, shard: int, parts: Iterable[int]) -> None:
+        """Request parts of an arena."""
+        past = self._past(shard)
+        assert past.in_parts is not None
+        for part in parts:
+            number = self._number(shard, part, past.platform)
+            self._fleet.advance(number, past.in_parts.simulated_s())
+
+    def _drop_parts(self, shard: int) -> None:
+        """Take parts that are not used any more from their workers."""
+        in_parts = self._past(shard).in_parts
+        used = {0} if in_parts is None else in_parts.parts.used
+        for island, part in list(self._numbers):
+            if island == shard and part not in used:
+                self._release(shard, part)
+
+    def take(self, end: Deliver) -> Reached | None:
+        """Take the end of an advance, or of a part of one.
+
+        Returns:
+            The advance; None if parts of it are still missing.
+
+        Raises:
+            JobRefused: several workers cannot advance it.
+            RunFolderError: its snapshot cannot be read.
+        """
+        shard, part = self._places[end.job.shard]
+        past = self._past(shard)
+        if isinstance(end.answer, Reached):
+            reached = end.answer
+            past.wall_s = self._exchange_s(reached.event)
+        elif not isinstance(end.answer, PartReached):
+            raise self._refusal(end)
+        elif past.in_parts is None:
+            return None
+        else:
+            count = self._count(shard)
+            advance = past.in_parts.take(part, end.answer, count)
+            past.wall_s = past.in_parts.wall_s
+            if not isinstance(advance, Advance):
+                self._send_parts(shard, advance)
+                return None
+            reached = self._joined(past, advance)
+            if count == 1:
+                past.in_parts = None
+        past.state = reached.snapshot
+        return reached
+
+    def _exchange_s(self, event: Advanced) -> float:
+        """Return the time that an exchange of the whole arena would have taken [s]."""
+        clock = self._context.experiments[event.island].simulation
+        steps = event.advance.step - self._past(event.island).step
+        simulated_s = steps * clock.timestep_s
+        return event.provenance.wall_s * min(1.0, EXCHANGE_S / simulated_s)
+
+    def _joined(self, past: _Past, advance: Advance) -> Reached:
+        """Return an advance that all parts have made."""
+        requested, in_parts = past.requested, past.in_parts
+        assert requested is not None
+        assert in_parts is not None
+        wants_snapshot = requested.wants_snapshot or past.wants_snapshot
+        past.wants_snapshot, past.may_be_kept = False, wants_snapshot
+        poses = PoseArrays.received(advance.poses)
+        if requested.wants_tracks:
+            advance = with_tracks(advance, poses)
+        event = Advanced(
+            requested.island,
+            requested.number,
+            advance,
+            len(poses.births),
+            in_parts.provenance,
+        )
+        return Reached(event, encode(in_parts.parts.state) if wants_snapshot else b"")
 
     def keep_snapshots(self) -> None:
         """Keep the newest snapshot of each shard, unless an earlier one is kept.
@@ -211,26 +371,38 @@ class ShardRequests:
         past.may_be_kept = True
         return drift
 
-    def refusal(self, end: Deliver) -> JobRefused | RunFolderError:
+    def _refusal(self, end: Deliver) -> JobRefused | RunFolderError:
         """Return the error that stops a run whose arena cannot be advanced."""
         if not end.agent:
             return RunFolderError(end.reason)
-        arena = self._islands[end.job.shard]
+        arena, _ = self._places[end.job.shard]
         return JobRefused(
             f"arena {arena}: several workers cannot advance it, the "
             f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
+
+    def _leave_parts(self, shard: int, part: int) -> None:
+        """Let the worker of a part advance the whole arena, on another platform."""
+        self._past(shard).in_parts = None
+        numbers = self._numbers
+        first, last = numbers[shard, 0], numbers[shard, part]
+        numbers[shard, 0], numbers[shard, part] = last, first
+        self._places[first], self._places[last] = (shard, part), (shard, 0)
 
     def _past(self, shard: int) -> _Past:
         return self._pasts.setdefault(shard, _Past())
 
     def _encode(self, command: Assign) -> tuple[bytes, Read]:
         """Return the request for a worker, and what reads the answer."""
-        shard = self._islands[command.job.shard]
+        shard, part = self._places[command.job.shard]
         past, settings = self._past(shard), self._context.arena[shard]
         requested = past.requested
         assert requested is not None
         is_drift = past.drifts_to(command.platform)
+        if past.in_parts is not None and is_drift:
+            self._leave_parts(shard, part)
+        if past.in_parts is not None:
+            return past.in_parts.encode(part, command)
         # Nothing from before a drift is ever repeated.
         wants_snapshot = requested.wants_snapshot or past.wants_snapshot or is_drift
         past.wants_snapshot, past.may_be_kept = False, wants_snapshot
@@ -259,7 +431,7 @@ class ShardRequests:
                 removals=requested.changes.removals,
             )
         read = partial(
-            _read_answer,
+            read_advance,
             requested=requested,
             job=(epoch, command.job.number),
             is_whole=command.is_whole,
@@ -276,67 +448,3 @@ class ShardRequests:
             complete=complete,
         )
         return encode(request), read
-
-
-def _read_answer(
-    data: bytes,
-    *,
-    requested: AdvanceShard,
-    job: Expected,
-    is_whole: bool,
-    repeats: Advanced | None,
-    expected: ExpectedAdvance,
-    provenance: Provenance,
-    complete: Callable[[Advance], Advance] | None,
-) -> Reached | None:
-    """Return the decoded answer to a request; None if the worker lacks the state.
-
-    ``repeats``: past result that the answer must have; None for a new advance.
-    ``provenance``: of the answer, but for the time that it took. ``complete``: adds
-    what a drift between platforms lost; None without a drift.
-
-    Raises:
-        MalformedMessage: no answer, the answer to another request, or one that
-            contradicts the request or the state of the arena.
-    """
-    answer = read_answer(data, job, Advance | StateMissing, ADVANCE_BYTES)
-    advance = answer.result
-    if isinstance(advance, StateMissing) and not is_whole:
-        return None
-    if not isinstance(advance, Advance):
-        raise impossible("answer: lacks the state that came with the request")
-    if complete is not None:
-        advance = complete(advance)
-    check_advance(advance, expected)
-    rows = check_poses(advance, expected)
-    if requested.wants_tracks:
-        robots = [judgement.birth for judgement in advance.judgements]
-        tracks = PoseArrays.received(advance.poses).tracks(robots)
-        advance = structs.replace(advance, tracks=tracks.tobytes())
-    if repeats is not None:
-        _check_repeated(advance, rows, repeats)
-    casualties = tuple(
-        structs.replace(one, reason=printable(one.reason, LONGEST_REASON) or NO_MESSAGE)
-        for one in advance.casualties
-    )
-    snapshot = advance.snapshot
-    advance = structs.replace(advance, casualties=casualties, snapshot=b"")
-    signed = structs.replace(provenance, wall_s=answer.wall_s)
-    event = Advanced(requested.island, requested.number, advance, rows, signed)
-    return Reached(event, snapshot)
-
-
-def _check_repeated(advance: Advance, rows: int, repeats: Advanced) -> None:
-    """Raise unless an advance has a past result.
-
-    Raises:
-        MalformedMessage: another digest or number of poses.
-    """
-    got, must = (advance.digest, rows), (repeats.advance.digest, repeats.pose_rows)
-    if got != must:
-        raise MalformedMessage(
-            f"advance to step {advance.step}: the digest of its state and its "
-            f"number of poses must be {must[0].hex()[:16]}... and {must[1]}, got "
-            f"{got[0].hex()[:16]}... and {got[1]}: this machine's results differ",
-            "differs",
-        )

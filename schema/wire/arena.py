@@ -97,6 +97,27 @@ class Rebuild(Message, frozen=True):
     living: Births | None = None
 
 
+class Part(Message, frozen=True):
+    """What is different for a worker that advances only a part of an arena's robots.
+
+    Attributes:
+        number: of the part; a worker holds each part by itself.
+        departures: robots that leave first: other workers advance them, or they died.
+        arrivals: state of robots that come then, an ``ArenaState``; empty if none does.
+        checks_merges: robots are born in some part, so merges are checked in all.
+        judges: the advance ends, so robots are judged.
+        work_j: work of the motors of the part's robots so far in this advance, by
+            birth [J]; empty at its start.
+    """
+
+    number: Count
+    departures: Births
+    arrivals: bytes
+    checks_merges: bool
+    judges: bool
+    work_j: Annotated[tuple[Finite, ...], Meta(max_length=MOST_LIVING)] = ()
+
+
 class AdvanceShard(Message, frozen=True, tag="advance"):
     """Change an arena shard, then advance it.
 
@@ -111,6 +132,7 @@ class AdvanceShard(Message, frozen=True, tag="advance"):
         from_digest: of the state at that step; empty before the first advance.
         rebuild: data to rebuild the state at the start; None for a worker that
             holds it.
+        part: that is advanced; None for the whole arena.
     """
 
     island: IslandNumber
@@ -122,6 +144,7 @@ class AdvanceShard(Message, frozen=True, tag="advance"):
     from_step: Count = 0
     from_digest: Annotated[bytes, Meta(max_length=32)] = b""
     rebuild: Rebuild | None = None
+    part: Part | None = None
 
 
 class Judgement(Message, frozen=True, array_like=True):
@@ -216,6 +239,9 @@ class Advance(Message, frozen=True, tag="advance"):
         tracks: positions of their cores in the ground plane at the S samples of poses
             [m], R x S x 2 float32; empty unless wanted. The coordinator takes them
             from the poses.
+        boxes: swept by the robots of a part, by birth, also by those that diverged;
+            empty for a whole arena, and in a journal.
+        costs: of these robots, in a unit of the worker.
     """
 
     step: Count
@@ -227,6 +253,8 @@ class Advance(Message, frozen=True, tag="advance"):
     snapshot: bytes = b""
     work_j: Annotated[tuple[Finite, ...], Meta(max_length=MOST_LIVING)] = ()
     tracks: bytes = b""
+    boxes: Annotated[tuple[Box, ...], Meta(max_length=MOST_LIVING)] = ()
+    costs: Annotated[tuple[Finite, ...], Meta(max_length=MOST_LIVING)] = ()
 
 
 class Live(Message, frozen=True):
@@ -236,8 +264,10 @@ class Live(Message, frozen=True):
         run: name of the run.
         shard: number of the arena's island.
         advance: the result, poses included.
+        is_part: of some of the arena's robots only.
     """
 
     run: str
     shard: IslandNumber
     advance: Advance
+    is_part: bool = False

@@ -33,6 +33,11 @@ class ArenaState(Message, frozen=True, array_like=True):
     casualties: tuple[Casualty, ...]
 
     @property
+    def births(self) -> list[BirthId]:
+        """The robots, ascending."""
+        return [birth for birth, _ in self.robots]
+
+    @property
     def digest(self) -> bytes:
         """SHA-256 of the content, in an order that depends on births and steps only."""
         return sha256(

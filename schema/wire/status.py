@@ -10,6 +10,22 @@ from schema.limits import MOST_SHOWN, Finite
 from schema.wire.codec import Message
 
 
+class PartStatus(Message, frozen=True):
+    """A part of an arena that several workers advance.
+
+    Attributes:
+        worker: that holds it.
+        robots: number of its robots.
+        cost: its share of the cost of all parts, as far as that is known.
+        came: number of robots that it took from others since the arena was divided.
+    """
+
+    worker: str
+    robots: Count
+    cost: Finite
+    came: Count
+
+
 class IslandStatus(Message, frozen=True):
     """Progress of an island.
 
@@ -20,6 +36,9 @@ class IslandStatus(Message, frozen=True):
         alive: number of living robots.
         simulated_s: simulated time of an arena [s]; None off-line.
         is_paused: an operator has paused the arena.
+        parts: of an arena that several workers advance.
+        repeats: number of exchanges between these after which robots were advanced
+            again, because those of two parts came near each other.
     """
 
     births: Count
@@ -28,6 +47,8 @@ class IslandStatus(Message, frozen=True):
     alive: Count
     simulated_s: Finite | None = None
     is_paused: bool = False
+    parts: tuple[PartStatus, ...] = ()
+    repeats: Count = 0
 
 
 class RunStatus(Message, frozen=True):

@@ -11,8 +11,8 @@ after some CPU time. Before a kill in the recovery of poses the segment is cut, 
 power loss does.
 
 ``fleet``: coordinators at a hub, with an analyzer and three worker processes that their
-pool restarts. All kills are at sizes of the journal or times after the last kill. Some
-coordinators find cut poses when they resume.
+pool restarts; arenas are divided over these. All kills are at sizes of the journal or
+times after the last kill. Some coordinators find cut poses when they resume.
 """
 
 from tests.system import warm  # first: it prepares the process before NumPy's import
@@ -190,6 +190,8 @@ class FleetKills:
 
     def _resume(self, reference: Reference, folder: Path) -> int:
         words = [*words_of(reference.document, folder), "--quiet"]
+        if "[arena]" in Path(reference.document).read_text("utf-8"):
+            words += ["--arena-workers", str(PROCESSES)]
         return warm.start([*words, "--connect", self._address], log_of(folder))
 
     def _draw(self, left: Counter[str]) -> str:

@@ -151,7 +151,8 @@ MISTAKES = [
     ("run scenario1 --listen tcp/0.0.0.0:1", "tcp/0.0.0.0:1 would listen beyond this"),
     ("run scenario1 --metrics here", "--metrics: must be PORT or HOST:PORT"),
     ("run scenario1 --fleet a/b", "--fleet: must be 1 to 96 letters, digits"),
-    ("run scenario1 --speed 2", "--speed: limits arenas, and there is none in"),
+    ("run scenario1 --speed 2", "--speed: is for arenas, and there is none in"),
+    ("run scenario1 --arena-workers 2", "--arena-workers: is for arenas, and there"),
     ("run scenario1 --in-process --workers 3", "starts no other processes"),
     *(
         (

@@ -171,6 +171,14 @@ class World:
         lost = self._casualties if births is None else ()
         return state_of(self._settings, self.step, self.population, lost, chosen)
 
+    def costs(self) -> dict[BirthId, float]:
+        """Return the share of each robot in the cost of its cluster."""
+        return {
+            birth: cluster.cost / len(cluster.members)
+            for cluster in self.population.clusters
+            for birth in cluster.members
+        }
+
     def take_in(self, state: ArenaState) -> None:
         """Add robots of another part of the arena, in whole clusters.
 

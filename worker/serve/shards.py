@@ -17,17 +17,27 @@ from schema.agent.service import Outlet
 from schema.errors import MalformedMessage, StateDiffers
 from schema.experiment.brains import types_of
 from schema.experiment.settings import ArenaSettings, read_arena_settings
+from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
-from schema.wire.arena import Advance, AdvanceShard, Changes, Live, PastAdvance, Rebuild
-from schema.wire.codec import encode
+from schema.wire.arena import (
+    Advance,
+    AdvanceShard,
+    Changes,
+    Live,
+    Part,
+    PastAdvance,
+    Rebuild,
+)
+from schema.wire.arena_state import ArenaState
+from schema.wire.codec import decode, encode
 from schema.wire.messages import Request, StateMissing
 from worker.arena.changes import possible
 from worker.arena.world import World
 from worker.serve.checks import checked_arena
 
-Key = tuple[str, int]
-"""Name of a shard: its run and its number."""
+Key = tuple[str, int, int]
+"""Name of a shard: its run, its number, and the number of a part of it."""
 
 
 @dataclass(slots=True)
@@ -85,7 +95,8 @@ class Shards:
             raise MalformedMessage(
                 f"until: must be >= from_step = {work.from_step}, got {work.until}"
             )
-        settings, key = request.settings, (request.run, work.island)
+        settings, part = request.settings, work.part
+        key = (request.run, work.island, part.number if part else 0)
         _check_robots(work.changes, checked_arena(settings))
         # Not kept while it changes, so that an error below leaves no broken shard.
         held, changes = self._taken(key, settings, work), work.changes
@@ -97,14 +108,17 @@ class Shards:
         if held is None:
             return StateMissing()
         with _closed_on_error(held.world) as world:
+            if part is not None:
+                _exchange(world, part)
             world.apply(changes)
-            work_j: dict[BirthId, float] | None = {} if work.wants_tracks else None
-            advance = world.advance(work.until, work_j=work_j)
-            snapshot = world.snapshot() if work.wants_snapshot else b""
+            if part is not None and part.checks_merges and not changes.insertions:
+                world.check_merges()
+            advance = _advance(world, work)
         held.digest = advance.digest
         self._keep(key, held)
-        self._publish(Live(request.run, work.island, advance))
-        return replace(advance, snapshot=snapshot)
+        live = replace(advance, snapshot=b"", boxes=(), costs=())
+        self._publish(Live(request.run, work.island, live, part is not None))
+        return advance
 
     def _publish(self, live: Live) -> None:
         """Publish an advance; it is encoded only for viewers."""
@@ -155,6 +169,53 @@ class Shards:
             if is_only_snapshot and work.from_digest:
                 _check_digest(world.step, world.digest(), work.from_digest)
         return world
+
+
+def _exchange(world: World, part: Part) -> None:
+    """Give robots to other parts, and take in robots of them."""
+    world.apply(Changes(part.departures))
+    if part.arrivals:
+        world.take_in(decode(ArenaState, part.arrivals, ADVANCE_BYTES))
+
+
+def _advance(world: World, work: AdvanceShard) -> Advance:
+    """Advance an arena, or a part of it, after its changes.
+
+    Raises:
+        MalformedMessage: a part with works of another number of robots.
+    """
+    part, work_j = work.part, None
+    if work.wants_tracks:
+        work_j = _work_before(world, part)
+    costs = {} if part is None else world.costs()
+    judges = part is None or part.judges
+    advance = world.advance(work.until, work_j=work_j, judges=judges)
+    snapshot = world.snapshot() if work.wants_snapshot else b""
+    if part is None:
+        return replace(advance, snapshot=snapshot)
+    births = sorted({*world.births, *(lost.birth for lost in advance.casualties)})
+    return replace(
+        advance,
+        snapshot=snapshot,
+        boxes=tuple(world.swept[birth] for birth in births),
+        costs=tuple(costs.get(birth, 0.0) for birth in births),
+    )
+
+
+def _work_before(world: World, part: Part | None) -> dict[BirthId, float]:
+    """Return the work of robots earlier in an advance [J].
+
+    Raises:
+        MalformedMessage: it is of another number of robots.
+    """
+    if part is None or not part.work_j:
+        return {}
+    births = world.births
+    if len(part.work_j) != len(births):
+        raise MalformedMessage(
+            f"part: must have {len(births)} works, got {len(part.work_j)}"
+        )
+    return dict(zip(births, part.work_j, strict=True))
 
 
 @contextmanager

@@ -22,6 +22,7 @@ def _no_certificates(monkeypatch: pytest.MonkeyPatch) -> None:
         ("run scenario1 --workers 2 --quiet", "--workers 2"),
         ("run scenario1 --in-process", "--in-process"),
         ("run scenario3 --speed 2 --listen hub", "--listen hub --speed 2"),
+        ("run scenario3 --arena-workers 3", "--arena-workers 3"),
         ("resume runs/a --fleet lab --connect hub", "--connect hub --fleet lab"),
         ("coordinator scenario1", "--workers 0 --listen hub"),
         (

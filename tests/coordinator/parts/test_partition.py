@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.parts.partition import divide, groups_of, held_by
+from coordinator.parts.partition import divide, groups_of
 from schema.robot.groups import Group
 from schema.robot.ids import BirthId
 from schema.wire.arena import Box
@@ -103,5 +103,5 @@ def test_no_move_pays_in_what_is_divided(
         cost = sum(costs[birth] for birth in group)
         after = max(max(loads) - cost, min(loads) + cost)
         assert max(loads) - after <= 0.3 * cost + 0.02 * max(loads) + 1e-9
-    births = [[birth for group in part for birth in group] for part in divided]
-    assert divide(groups, costs, held_by(births), parts) == divided
+    held = {b: n for n, part in enumerate(divided) for group in part for b in group}
+    assert divide(groups, costs, held, parts) == divided

@@ -17,7 +17,8 @@ from coordinator.dispatch.events import Client, Deliver, Joined, Read
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Advanced
 from coordinator.run.run_context import RunContext
-from coordinator.run.shard_requests import Reached, ShardRequests
+from coordinator.run.shard_answers import Reached
+from coordinator.run.shard_requests import ShardRequests
 from coordinator.storage.snapshots import Snapshots
 from schema.agent.request_handler import answer as answer_to
 from schema.errors import MalformedMessage
