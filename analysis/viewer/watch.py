@@ -145,7 +145,7 @@ class LiveView:
                 except MalformedMessage:
                     self.dropped += 1
                     continue
-                self._move(each.shard, poses, has_all=True)
+                self._move(each.shard, poses, has_all=not each.is_part)
             self.has_ended = self.has_ended or isinstance(each, Ended)
 
     def _move(self, arena: int, poses: pa.Table, *, has_all: bool) -> None:

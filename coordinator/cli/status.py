@@ -13,6 +13,7 @@ from coordinator.cli.status_text import (
     births_done,
     missing_agents,
     pace,
+    part_lines,
     run_table,
     runs_done,
     show,
@@ -186,7 +187,7 @@ def show_source(source: Source) -> None:
         else:
             lines.append(waiting_text(missing_agents(status)))
     table = run_table(status, name_of, is_live=is_live)
-    show(*lines, *trouble_lines(status), table)
+    show(*lines, *part_lines(status), *trouble_lines(status), table)
 
 
 def _without_coordinator(status: Status, root: Path) -> str:

@@ -100,6 +100,22 @@ def state_of(run: RunStatus, status: Status, *, is_live: bool) -> str:
     return waiting_text(missing) if is_waiting else run.state
 
 
+def part_lines(status: Status) -> list[str]:
+    """Return a line for each arena that several workers advance."""
+    lines = []
+    for run in status.runs:
+        for number, island in enumerate(run.islands):
+            if island.parts:
+                parts = ", ".join(
+                    f"{one.worker} {counted(one.robots, 'robot')} "
+                    f"({one.cost:.0%} of the cost, {one.came} came)"
+                    for one in island.parts
+                )
+                again = counted(island.repeats, "repeated exchange")
+                lines.append(f"arena {number}: {parts}; {again}")
+    return [printable(line, _WIDEST) for line in lines]
+
+
 def trouble_lines(status: Status) -> list[str]:
     """Return lines about agents that do not answer, and about faults of peers."""
     held = ", ".join(
