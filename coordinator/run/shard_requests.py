@@ -12,6 +12,7 @@ from msgspec import structs
 
 from coordinator.dispatch.events import Assign, Deliver, Read
 from coordinator.dispatch.fleet import JobRouter
+from coordinator.dispatch.shard_places import ShardPlaces
 from coordinator.islands.events import Advanced
 from coordinator.parts.arena_parts import EXCHANGE_S
 from coordinator.run.advance_checks import (
@@ -48,8 +49,6 @@ from schema.wire.status import PartStatus
 
 LEAST_PART_S = 0.1
 """An arena has as many parts as its exchanges take multiples of this [s]."""
-Place = tuple[int, int]
-"""A shard's island, and a part of it."""
 
 
 @dataclass(slots=True)
@@ -110,34 +109,27 @@ class ShardRequests:
         self._snapshot_store = snapshot_store
         self._fleet = fleet
         self._pasts: dict[int, _Past] = {}
-        # A part of a shard has its island's number here and another one in the fleet.
-        self._numbers: dict[Place, int] = {}
-        self._places: dict[int, Place] = {}
+        self._places = ShardPlaces(fleet, context.client, self._encode)
         self._repeated_on: dict[int, str] = {}
 
     @property
     def waiting(self) -> dict[int, str]:
         """Platforms of the shards that wait for a worker; "" is any platform."""
-        return {
-            self._places[number][0]: platform
-            for number, platform in self._fleet.homes.waiting.items()
-            if number in self._places
-        }
+        return self._places.waiting
 
     def holders(self, shard: int) -> list[str]:
         """Return the names of the workers that hold the parts of a shard."""
-        numbers = [n for (island, _), n in self._numbers.items() if island == shard]
-        return sorted({self._fleet.homes.holder(number) for number in numbers} - {""})
+        return self._places.holders(shard)
 
     def divided(self, shard: int) -> tuple[tuple[PartStatus, ...], int]:
         """Return the parts of a shard, if it has several, and their repeats."""
         in_parts = self._past(shard).in_parts
         if in_parts is None:
             return (), 0
-        arena, homes = in_parts.parts, self._fleet.homes
+        arena = in_parts.parts
         parts = [
             PartStatus(
-                homes.holder(self._numbers.get((shard, part), -1)),
+                self._places.holder((shard, part)),
                 len(arena.robots(part)),
                 share,
                 arena.came[part],
@@ -191,8 +183,7 @@ class ShardRequests:
             platform = repeats.provenance.platform
             if self._repeated_on.setdefault(shard, platform) != platform:
                 self._repeated_on[shard] = platform
-                self._release(shard, 0)
-        self._drop_parts(shard)
+                self._places.keep(shard, ())
         count = 1 if repeats else self._count(shard)
         state, past.state = past.state, b""
         if count > 1 and past.in_parts is None and state:
@@ -203,39 +194,23 @@ class ShardRequests:
                 tell_user(f"arena {shard}: {count} workers advance it together")
         if past.in_parts is not None:
             past.in_parts.begin(command, past.places, count)
-            self._send_parts(shard, past.in_parts.parts.missing)
+            parts = past.in_parts.parts.missing
+            self._places.keep(shard, {0, *parts})
+            self._send_parts(shard, parts)
             return
+        self._places.keep(shard, (0,))
         # An arena is divided from a state that is known here.
         past.wants_snapshot |= count > 1
         timestep_s = self._context.experiments[shard].simulation.timestep_s
         simulated_s = (command.until - past.step) * timestep_s
-        number = self._number(shard, 0, platform, may_drift=repeats is None)
+        place, may_drift = (shard, 0), repeats is None
+        number = self._places.number(place, platform, may_drift=may_drift)
         self._fleet.advance(number, simulated_s)
-
-    def _number(
-        self, shard: int, part: int, platform: str, *, may_drift: bool = False
-    ) -> int:
-        """Return the number of a part of a shard in the fleet, which may be new."""
-        if (shard, part) not in self._numbers:
-            client = self._context.client
-            number = self._fleet.new_shard(
-                client, self._encode, platform, may_drift=may_drift
-            )
-            self._numbers[shard, part], self._places[number] = number, (shard, part)
-        return self._numbers[shard, part]
-
-    def _release(self, shard: int, part: int) -> None:
-        """Take a part of a shard from its worker."""
-        if (shard, part) in self._numbers:
-            self._fleet.release(self._numbers.pop((shard, part)))
 
     def _count(self, shard: int) -> int:
         """Return how many parts a shard is to have, as far as there are workers."""
-        number, past = self._numbers.get((shard, 0)), self._past(shard)
-        if number is None:
-            return 1
-        homes = self._fleet.homes
-        able = len(homes.fit(homes.of(number))) // len(self._pasts)
+        past = self._past(shard)
+        able = self._places.able(shard) // len(self._pasts)
         wanted = self._parts or int(past.wall_s / LEAST_PART_S)
         count = max(1, min(able, wanted))
         return count if count == 1 or self._is_divisible(shard) else 1
@@ -258,16 +233,8 @@ class ShardRequests:
         past = self._past(shard)
         assert past.in_parts is not None
         for part in parts:
-            number = self._number(shard, part, past.platform)
+            number = self._places.number((shard, part), past.platform)
             self._fleet.advance(number, past.in_parts.simulated_s())
-
-    def _drop_parts(self, shard: int) -> None:
-        """Take parts that are not used any more from their workers."""
-        in_parts = self._past(shard).in_parts
-        used = {0} if in_parts is None else in_parts.parts.used
-        for island, part in list(self._numbers):
-            if island == shard and part not in used:
-                self._release(shard, part)
 
     def take(self, end: Deliver) -> Reached | None:
         """Take the end of an advance, or of a part of one.
@@ -279,7 +246,7 @@ class ShardRequests:
             JobRefused: several workers cannot advance it.
             RunFolderError: its snapshot cannot be read.
         """
-        shard, part = self._places[end.job.shard]
+        shard, part = self._places.place(end.job.shard)
         past = self._past(shard)
         if isinstance(end.answer, Reached):
             reached = end.answer
@@ -296,7 +263,7 @@ class ShardRequests:
                 self._send_parts(shard, advance)
                 return None
             reached = self._joined(past, advance)
-            if count == 1:
+            if past.in_parts.parts.used == {0} and count == 1:
                 past.in_parts = None
         past.state = reached.snapshot
         return reached
@@ -375,32 +342,25 @@ class ShardRequests:
         """Return the error that stops a run whose arena cannot be advanced."""
         if not end.agent:
             return RunFolderError(end.reason)
-        arena, _ = self._places[end.job.shard]
+        arena, _ = self._places.place(end.job.shard)
         return JobRefused(
             f"arena {arena}: several workers cannot advance it, the "
             f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
-
-    def _leave_parts(self, shard: int, part: int) -> None:
-        """Let the worker of a part advance the whole arena, on another platform."""
-        self._past(shard).in_parts = None
-        numbers = self._numbers
-        first, last = numbers[shard, 0], numbers[shard, part]
-        numbers[shard, 0], numbers[shard, part] = last, first
-        self._places[first], self._places[last] = (shard, part), (shard, 0)
 
     def _past(self, shard: int) -> _Past:
         return self._pasts.setdefault(shard, _Past())
 
     def _encode(self, command: Assign) -> tuple[bytes, Read]:
         """Return the request for a worker, and what reads the answer."""
-        shard, part = self._places[command.job.shard]
+        shard, part = self._places.place(command.job.shard)
         past, settings = self._past(shard), self._context.arena[shard]
         requested = past.requested
         assert requested is not None
         is_drift = past.drifts_to(command.platform)
         if past.in_parts is not None and is_drift:
-            self._leave_parts(shard, part)
+            past.in_parts = None
+            self._places.make_whole((shard, part))
         if past.in_parts is not None:
             return past.in_parts.encode(part, command)
         # Nothing from before a drift is ever repeated.

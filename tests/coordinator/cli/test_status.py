@@ -6,12 +6,19 @@ from pathlib import Path
 import pytest
 
 from coordinator.cli.status import Source, main, show_source, status_json
-from coordinator.cli.status_text import fault_lines, state_of
+from coordinator.cli.status_text import fault_lines, part_lines, state_of
 from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.folder import RunFolder
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.description import RunDetails
-from schema.wire.status import IslandStatus, PeerFault, Queue, RunStatus, Status
+from schema.wire.status import (
+    IslandStatus,
+    PartStatus,
+    PeerFault,
+    Queue,
+    RunStatus,
+    Status,
+)
 
 EXPERIMENT = read_experiment("scenario1")
 DETAILS = RunDetails("scenario1", 0, 1, experiment_text(EXPERIMENT))
@@ -78,10 +85,24 @@ def test_the_document_has_these_keys_and_values() -> None:
         "folder": "/x/half", "name": "scenario1", "run": 1, "state": "running",
         "births": 10, "wanted": 20, "left_s": 20.0, "births_per_s": 0.5,
         "simulated_per_s": 3.0,
-        "islands": [{**island, "simulated_s": None, "is_paused": False}],
+        "islands": [
+            {**island, "simulated_s": None, "is_paused": False, "parts": [],
+             "repeats": 0}
+        ],
     }  # fmt: skip
     assert (done["state"], done["left_s"]) == ("finished", 0.0)
     assert done["islands"][0]["best"] is None
+
+
+def test_an_arena_in_parts_has_a_line() -> None:
+    parts = (PartStatus("w0", 1, 0.25, 0), PartStatus("w1", 9, 0.75, 3))
+    island = IslandStatus(10, 20, None, 10, 4.0, parts=parts, repeats=1)
+    run = RunStatus("/x/a", "scenario3", 0, "running", islands=(island,))
+    (line,) = part_lines(Status((run,), 2, 1, 0.0))
+    assert line == (
+        "arena 0: w0 1 robot (25% of the cost, 0 came), "
+        "w1 9 robots (75% of the cost, 3 came); 1 repeated exchange"
+    )
 
 
 def test_a_damaged_run_is_shown_beside_the_others(
