@@ -23,7 +23,9 @@ from schema.wire.codec import encode
 AGAIN = 1 << 16
 """Number of the part that is advanced again."""
 EXCHANGE_S = 1.0
-"""Longest exchange [s]."""
+"""Longest duration of an exchange at first, and after a repeat [s]."""
+MOST_TIMES = 4
+"""After exchanges without a repeat they may become longer, up to so many times."""
 REACH_M = 0.2
 """Half the side of the box of a robot that has swept none yet [m]."""
 NO_ROBOTS = frozenset[BirthId]()
@@ -58,13 +60,13 @@ class ArenaParts:
         came: number of robots that each part took from others.
     """
 
-    def __init__(self, state: ArenaState, interval_s: float, longest: int) -> None:
+    def __init__(self, state: ArenaState, interval_s: float, steps: int) -> None:
         """Begin with a state, which one worker holds as part 0.
 
         Args:
             state: of all robots.
             interval_s: between checks for contacts [s].
-            longest: steps of the longest exchange.
+            steps: of an exchange at first, at most.
         """
         self.state = state
         self.repeats, self.came = 0, Counter[int]()
@@ -72,7 +74,7 @@ class ArenaParts:
         self._boxes: dict[BirthId, Box] = {}
         self._costs: dict[BirthId, float] = {}
         self._works: dict[BirthId, float] = {}
-        self._interval_s, self._longest = interval_s, longest
+        self._interval_s, self._least, self._steps = interval_s, steps, steps
         self._requested: AdvanceShard | None = None
         self._changes = Changes()
         self._so_far: Advance | None = None
@@ -109,7 +111,7 @@ class ArenaParts:
         """Divide the robots, and begin an exchange."""
         changes, gone = self._changes, set(self._changes.removals)
         assert self._requested is not None
-        self.until = min(self._requested.until, self.state.step + self._longest)
+        self.until = min(self._requested.until, self.state.step + self._steps)
         boxes = {birth: box for birth, box in self._boxes.items() if birth not in gone}
         boxes |= {each.birth: _around(*each.place) for each in changes.insertions}
         self._before = without(self.state, gone)
@@ -204,6 +206,9 @@ class ArenaParts:
         """
         requested, again = self._requested, self._exchange.repeated
         assert requested is not None
+        self._steps = (
+            self._least if again else min(2 * self._steps, MOST_TIMES * self._least)
+        )
         self._held = {
             part: replace(self._held[part], stale=again & self._held[part].births)
             for part in self._exchange.parts

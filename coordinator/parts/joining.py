@@ -30,7 +30,9 @@ def joined(chosen: Chosen) -> PartResult:
         judgements += [one for one in advance.judgements if one.birth in births]
         casualties += [lost for lost in advance.casualties if lost.birth in births]
         touches += [touch for touch in advance.touches if touch.first in births]
-        poses.append(PoseArrays.received(advance.poses).of(births))
+        sampled = PoseArrays.received(advance.poses)
+        is_all = births == result.boxes.keys()
+        poses.append(sampled if is_all else sampled.of(births))
         boxes |= {birth: result.boxes[birth] for birth in births}
         costs |= {birth: result.costs[birth] for birth in births}
         works |= {b: work_j for b, work_j in result.works.items() if b in births}

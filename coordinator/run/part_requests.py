@@ -27,7 +27,8 @@ class PartRequests:
 
     Attributes:
         parts: the state of the arena.
-        wall_s: time that the workers of all parts took in the last exchange [s].
+        wall_s: time that the workers of all parts took for a simulated ``EXCHANGE_S``
+            in the last exchange [s].
     """
 
     def __init__(
@@ -39,8 +40,8 @@ class PartRequests:
         arena, clock = self._experiment.arena, self._experiment.simulation
         assert arena is not None
         checks_s = arena.proximity_steps * clock.timestep_s
-        longest = round(EXCHANGE_S / clock.timestep_s)
-        self.parts = ArenaParts(state, checks_s, max(1, longest))
+        steps = max(1, round(EXCHANGE_S / clock.timestep_s))
+        self.parts = ArenaParts(state, checks_s, steps)
         self.wall_s = wall_s
         self._waited_s, self._walls_s = 0.0, list[float]()
         self._provenance = Provenance()
@@ -101,7 +102,7 @@ class PartRequests:
             return ()
         if self.parts.overlap():
             return (AGAIN,)
-        self.wall_s = sum(self._walls_s)
+        self.wall_s = sum(self._walls_s) * EXCHANGE_S / self.simulated_s()
         self._waited_s += max(self._walls_s)
         self._walls_s = []
         return self.parts.end(count) or self.parts.missing

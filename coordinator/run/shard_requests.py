@@ -269,11 +269,11 @@ class ShardRequests:
         return reached
 
     def _exchange_s(self, event: Advanced) -> float:
-        """Return the time that an exchange of the whole arena would have taken [s]."""
+        """Return the time that workers take for an exchange of the whole arena [s]."""
         clock = self._context.experiments[event.island].simulation
         steps = event.advance.step - self._past(event.island).step
         simulated_s = steps * clock.timestep_s
-        return event.provenance.wall_s * min(1.0, EXCHANGE_S / simulated_s)
+        return event.provenance.wall_s * EXCHANGE_S / simulated_s
 
     def _joined(self, past: _Past, advance: Advance) -> Reached:
         """Return an advance that all parts have made."""

@@ -5,14 +5,15 @@ Its advances depend on all earlier ones, and its snapshot contains them.
 
 import hashlib
 import json
+from collections.abc import Collection
 from typing import Self
 
 from schema.experiment.settings import ArenaSettings
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Changes, Judgement
-from schema.wire.arena_state import ArenaState, state_digest
-from schema.wire.codec import decode, encode
+from schema.wire.arena_state import ArenaState
+from schema.wire.codec import decode
 from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, WINDOW, poses
 from worker.arena.world import World
 
@@ -76,9 +77,10 @@ class FakeWorld(World):
         for one in lost:
             del self.born[one]
         living = sorted(self.born)
+        self.reached = self.state()
         return Advance(
             step=until,
-            digest=self.digest(),
+            digest=self.reached.digest,
             judgements=tuple(map(self._judgement, living)),
             casualties=tuple(Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in lost),
             touches=(),
@@ -87,18 +89,14 @@ class FakeWorld(World):
             ).message(),
         )
 
-    def snapshot(self) -> bytes:
+    def state(self, births: Collection[BirthId] | None = None) -> ArenaState:
+        assert births is None
         born = [
             (*b, step, self.joints[b], self.windows[b])
             for b, step in sorted(self.born.items())
         ]
         data = json.dumps([self.step, born, self.past]).encode()
-        return encode(
-            ArenaState(bytes(32), self.step, ((BirthId(0, 0), data),), (), ())
-        )
-
-    def digest(self) -> bytes:
-        return state_digest(self.snapshot())
+        return ArenaState(bytes(32), self.step, ((BirthId(0, 0), data),), (), ())
 
     def close(self) -> None:
         self.is_closed = True

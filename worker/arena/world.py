@@ -54,6 +54,7 @@ class World:
     Attributes:
         step: physics steps since the start.
         population: the living robots and their clusters; read only.
+        reached: state at the end of the last advance.
         swept: boxes of the robots that lived in the last advance, from the changes
             before it on; points where no check for merges was made.
     """
@@ -79,6 +80,7 @@ class World:
         self._work = MotorWork(settings)
         self._measures_work = False
         self.swept: dict[BirthId, Box] = {}
+        self.reached = self.state()
         self._change()
 
     def close(self) -> None:
@@ -343,9 +345,10 @@ class World:
         self.swept = {birth: (x, y, x, y) for birth, (x, y, _) in places.items()}
         self.swept |= self.population.proximity.take_swept()
         self._casualties = []
+        self.reached = self.state()
         return Advance(
             step=self.step,
-            digest=self.digest(),
+            digest=self.reached.digest,
             judgements=tuple(each for each in found if isinstance(each, Judgement)),
             casualties=tuple(casualties),
             touches=() if self._contacts is None else self._contacts.take(),

@@ -190,7 +190,7 @@ def _advance(world: World, work: AdvanceShard) -> Advance:
     costs = {} if part is None else world.costs()
     judges = part is None or part.judges
     advance = world.advance(work.until, work_j=work_j, judges=judges)
-    snapshot = world.snapshot() if work.wants_snapshot else b""
+    snapshot = encode(world.reached) if work.wants_snapshot else b""
     if part is None:
         return replace(advance, snapshot=snapshot)
     births = sorted({*world.births, *(lost.birth for lost in advance.casualties)})

@@ -39,7 +39,7 @@ class Fleet:
         """Let a worker advance a part."""
         place = 0 if part == AGAIN else part % len(self.shards)
         self.asked += 1
-        if self.asked % 7 == 0:
+        if self.asked % 4 == 0:
             self.shards[place] = Shards(World)
             self.forgotten += 1
         for is_whole in (part == AGAIN, True):
