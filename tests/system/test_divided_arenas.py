@@ -4,7 +4,6 @@ test_many_kills.py kills workers and coordinators of divided arenas.
 """
 
 import os
-import re
 import signal
 from pathlib import Path
 
@@ -19,17 +18,11 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 WORDS = ("crowd.toml", "--seed", "4", "--quiet", "--arena-workers", "4")
 
 
-@pytest.mark.parametrize(("workers", "threads"), [(2, 1), (4, 2)])
 def test_divided_arena_is_equal_to_one_in_one_process(
-    crowded_arena_workspace: Workspace,
-    crowded_arena_run: Path,
-    workers: int,
-    threads: int,
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path
 ) -> None:
-    flags = ("--workers", f"{workers}", "--threads", f"{threads}")
-    told = crowded_arena_workspace.run("run", *WORDS, *flags, "--out", "run")
-    # Some workers may join later.
-    assert re.search("arena 0: [234] workers advance it together", told)
+    told = crowded_arena_workspace.run("run", *WORDS, "--workers", "2", "--out", "run")
+    assert "arena 0: 2 workers advance it together" in told
     assert compare(crowded_arena_run, crowded_arena_workspace.folder / "run") == []
 
 
