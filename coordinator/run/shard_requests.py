@@ -248,13 +248,14 @@ class ShardRequests:
         """
         shard, part = self._places.place(end.job.shard)
         past = self._past(shard)
+        if part and past.in_parts is None:
+            # Since a drift the worker of part 0 advances the whole arena.
+            return None
         if isinstance(end.answer, Reached):
             reached = end.answer
             past.wall_s = self._exchange_s(reached.event)
-        elif not isinstance(end.answer, PartReached):
+        elif past.in_parts is None or not isinstance(end.answer, PartReached):
             raise self._refusal(end)
-        elif past.in_parts is None:
-            return None
         else:
             count = self._count(shard)
             advance = past.in_parts.take(part, end.answer, count)
