@@ -5,7 +5,7 @@ here, and robots may change their part. Nothing that happens in the arena depend
 """
 
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -113,9 +113,9 @@ class ArenaParts:
         assert self._requested is not None
         self.until = min(self._requested.until, self.state.step + self._steps)
         boxes = {birth: box for birth, box in self._boxes.items() if birth not in gone}
-        boxes |= {each.birth: _around(*each.place) for each in changes.insertions}
-        self._before = without(self.state, gone)
+        self._before = states_of(self.state, boxes.keys())
         clusters = self._before.clusters
+        boxes |= {each.birth: _around(*each.place) for each in changes.insertions}
         mean = sum(self._costs.values()) / max(1, len(self._costs)) or 1.0
         costs = {birth: self._costs.get(birth, mean) for birth in boxes}
         held = {
@@ -228,19 +228,6 @@ class ArenaParts:
             return self._so_far
         self._divide(parts)
         return None
-
-
-def without(state: ArenaState, gone: Collection[BirthId]) -> ArenaState:
-    """Return a state without some robots; those of their clusters stay together."""
-    clusters = (
-        tuple(birth for birth in members if birth not in gone)
-        for members in state.clusters
-    )
-    return structs.replace(
-        state,
-        robots=tuple(each for each in state.robots if each[0] not in gone),
-        clusters=tuple(members for members in clusters if members),
-    )
 
 
 def _around(x: float, y: float) -> Box:

@@ -9,7 +9,7 @@ from msgspec import structs
 from coordinator.parts.exchange import PartResult
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Box, Casualty, Judgement, Touch
-from schema.wire.arena_state import ArenaState
+from schema.wire.arena_state import joined_states, states_of
 from schema.wire.poses import PoseArrays
 
 Chosen = Sequence[tuple[PartResult, Collection[BirthId]]]
@@ -36,7 +36,7 @@ def joined(chosen: Chosen) -> PartResult:
         boxes |= {birth: result.boxes[birth] for birth in births}
         costs |= {birth: result.costs[birth] for birth in births}
         works |= {b: work_j for b, work_j in result.works.items() if b in births}
-    state = _joined_states(chosen)
+    state = joined_states([states_of(each.state, births) for each, births in chosen])
     advance = Advance(
         step=state.step,
         digest=state.digest,
@@ -47,28 +47,6 @@ def joined(chosen: Chosen) -> PartResult:
         work_j=tuple(works[birth] for birth in state.births) if works else (),
     )
     return PartResult(advance, state, boxes, costs, works)
-
-
-def _joined_states(chosen: Chosen) -> ArenaState:
-    return structs.replace(
-        chosen[0][0].state,
-        robots=tuple(
-            sorted(
-                each
-                for result, births in chosen
-                for each in result.state.robots
-                if each[0] in births
-            )
-        ),
-        clusters=tuple(
-            sorted(
-                each
-                for result, births in chosen
-                for each in result.state.clusters
-                if each[0] in births
-            )
-        ),
-    )
 
 
 def continued(before: Advance, after: Advance, interval_s: float) -> Advance:

@@ -3,8 +3,9 @@
 A digest is the same however the robots were distributed when they were simulated.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from hashlib import sha256
+from itertools import chain
 
 from msgspec import structs
 
@@ -63,10 +64,20 @@ def state_digest(snapshot: bytes) -> bytes:
 
 
 def states_of(whole: ArenaState, births: Collection[BirthId]) -> ArenaState:
-    """Return the state of some robots, whole clusters."""
+    """Return the state of some robots; those of a cluster stay together."""
+    clusters = (tuple(b for b in each if b in births) for each in whole.clusters)
     return structs.replace(
         whole,
         robots=tuple(each for each in whole.robots if each[0] in births),
-        clusters=tuple(each for each in whole.clusters if each[0] in births),
+        clusters=tuple(filter(None, clusters)),
         casualties=(),
+    )
+
+
+def joined_states(parts: Sequence[ArenaState]) -> ArenaState:
+    """Return the state of the robots of several parts of an arena."""
+    return structs.replace(
+        parts[0],
+        robots=tuple(sorted(chain.from_iterable(part.robots for part in parts))),
+        clusters=tuple(sorted(chain.from_iterable(part.clusters for part in parts))),
     )

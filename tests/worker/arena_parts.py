@@ -13,7 +13,7 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.groups import Group, connected_components
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Box, Casualty, Changes, Judgement
-from schema.wire.arena_state import ArenaState
+from schema.wire.arena_state import ArenaState, states_of
 from schema.wire.codec import encode
 from schema.wire.poses import PoseArrays
 from worker.arena.world import World
@@ -116,7 +116,7 @@ class Parts:
         for number, world in enumerate(self.worlds):
             for cluster in world.state().clusters:
                 if home(cluster) != number:
-                    state = world.state(cluster)
+                    state = states_of(world.state(), cluster)
                     world.apply(Changes(removals=cluster))
                     self.worlds[home(cluster)].take_in(state)
 
@@ -150,7 +150,7 @@ class Parts:
                 world.apply(Changes(removals=tuple(sorted(held))))
             living = run.births.intersection(run.world.births)
             if living:
-                state = run.world.state(living)
+                state = states_of(run.world.state(), living)
                 self.worlds[home(state.clusters[0])].take_in(state)
 
 

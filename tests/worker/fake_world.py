@@ -5,7 +5,6 @@ Its advances depend on all earlier ones, and its snapshot contains them.
 
 import hashlib
 import json
-from collections.abc import Collection
 from typing import Self
 
 from schema.experiment.settings import ArenaSettings
@@ -89,8 +88,7 @@ class FakeWorld(World):
             ).message(),
         )
 
-    def state(self, births: Collection[BirthId] | None = None) -> ArenaState:
-        assert births is None
+    def state(self) -> ArenaState:
         born = [
             (*b, step, self.joints[b], self.windows[b])
             for b, step in sorted(self.born.items())

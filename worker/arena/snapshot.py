@@ -61,19 +61,15 @@ def state_of(
     step: int,
     population: ArenaPopulation,
     casualties: Sequence[Casualty],
-    births: frozenset[BirthId],
 ) -> ArenaState:
-    """Return the state of some robots, whole clusters; equal ones give equal bytes."""
-    clusters = [each.members for each in population.clusters]
+    """Return an arena's whole state; equal states give equal bytes."""
     return ArenaState(
         settings=_digest(settings),
         step=step,
         robots=tuple(
-            (robot.birth, encode(_robot_state(robot)))
-            for robot in population.robots
-            if robot.birth in births
+            (robot.birth, encode(_robot_state(robot))) for robot in population.robots
         ),
-        clusters=tuple(each for each in clusters if not births.isdisjoint(each)),
+        clusters=tuple(cluster.members for cluster in population.clusters),
         casualties=tuple(casualties),
     )
 

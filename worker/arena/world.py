@@ -9,7 +9,7 @@ advances.
 """
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Self
 
@@ -167,11 +167,9 @@ class World:
         """Return the digest of the state."""
         return self.state().digest
 
-    def state(self, births: Collection[BirthId] | None = None) -> ArenaState:
-        """Return the whole state, or that of some robots, for ``take_in``."""
-        chosen = frozenset(self.births if births is None else births)
-        lost = self._casualties if births is None else ()
-        return state_of(self._settings, self.step, self.population, lost, chosen)
+    def state(self) -> ArenaState:
+        """Return the whole state."""
+        return state_of(self._settings, self.step, self.population, self._casualties)
 
     def costs(self) -> dict[BirthId, float]:
         """Return the share of each robot in the cost of its cluster."""

@@ -20,6 +20,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from schema.wire.arena import BrainChange, Changes
+from schema.wire.arena_state import states_of
 from tests.worker.arena.test_changing_world import change, changing
 from tests.worker.arena_cases import SETTINGS, crowd, placed, populated, settings_of
 from tests.worker.arena_parts import Home, Outcome, Parts, Run
@@ -198,14 +199,15 @@ def test_states_of_other_steps_or_half_clusters_are_not_taken_in(
     world.advance(25)
     other, late = World(SETTINGS), World(SETTINGS)
     other.advance(25)
-    other.take_in(world.state((C,)))
+    other.take_in(states_of(world.state(), (C,)))
     assert other.births == (C,)
     with pytest.raises(UnexpectedEvent, match="live here"):
         other.take_in(world.state())
     with pytest.raises(UnexpectedEvent, match="of step 0, got step 25"):
         late.take_in(world.state())
+    half = replace(world.state(), robots=world.state().robots[:1], clusters=((A, B),))
     with pytest.raises(MalformedMessage, match="one cluster"):
-        other.take_in(world.state((A,)))
+        other.take_in(half)
     assert other.births == (C,)
 
 
