@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from schema.robot.groups import Group, connected_components
+from schema.robot.groups import Group, connected_components, overlaps
 from schema.robot.ids import BirthId
 from schema.wire.arena import Box
 
@@ -29,9 +29,8 @@ def overlapping(boxes: Mapping[BirthId, Box]) -> list[tuple[BirthId, BirthId]]:
     if not boxes:
         return []
     births = list(boxes)
-    west, south, east, north = np.array([boxes[birth] for birth in births]).T
-    is_near = (west[:, None] <= east) & (south[:, None] <= north)
-    first, second = np.triu(is_near & is_near.T, 1).nonzero()
+    sides = np.array(list(boxes.values())).T.reshape(2, 2, -1)
+    first, second = np.triu(overlaps(sides), 1).nonzero()
     pairs = zip(first.tolist(), second.tolist(), strict=True)
     return [(births[a], births[b]) for a, b in pairs]
 

@@ -10,9 +10,9 @@ from functools import cached_property
 from itertools import compress
 
 import numpy as np
-import numpy.typing as npt
 
 from schema.experiment.settings import ArenaSettings
+from schema.robot.groups import Mask, overlaps
 from schema.robot.ids import BirthId
 from schema.robot.trace import Floats
 from schema.wire.arena import Box
@@ -23,8 +23,6 @@ FASTEST = 10.0
 """Speed above which the physics is broken; bounds the margin of a robot [m/s]."""
 _ROUNDING_M = 1e-9
 """Upper bound on the rounding error of sums of distances."""
-
-Mask = npt.NDArray[np.bool_]
 
 
 class RobotBounds:
@@ -137,16 +135,6 @@ class RobotBounds:
         first, second = is_near.nonzero()
         is_once = first < second
         return first[is_once].tolist(), second[is_once].tolist()
-
-
-def overlaps(boxes: Floats) -> Mask:
-    """Return whether the boxes of R robots, (2, 2, R), overlap, (R, R)."""
-    low, high = boxes
-    is_near = low[0][:, None] <= high[0]
-    is_beside = low[1][:, None] <= high[1]
-    is_near &= is_beside
-    is_near &= is_near.T.copy()
-    return np.asarray(is_near)
 
 
 class Proximity:

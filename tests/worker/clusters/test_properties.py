@@ -11,14 +11,14 @@ from hypothesis.strategies import DataObject
 from msgspec.structs import replace
 
 from schema.parts import Vector
-from schema.robot.groups import Group, connected_components
+from schema.robot.groups import Group, connected_components, overlaps
 from schema.robot.ids import BirthId
 from schema.wire.arena import Changes
 from tests.worker.arena_cases import SETTINGS, crowd, populated, settings_of, state_of
 from tests.worker.clusters.invariants import check_population
 from tests.worker.conftest import random_robot
 from worker.arena.world import World
-from worker.clusters.proximity import Proximity, RobotBounds, overlaps
+from worker.clusters.proximity import Proximity, RobotBounds
 from worker.clusters.states import MERGES_PER_SPLIT, Schedule, StateColumns, runs
 
 BIRTHS = [BirthId(number % 2, number) for number in range(8)]
