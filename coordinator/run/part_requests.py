@@ -7,19 +7,14 @@ from msgspec import structs
 
 from coordinator.dispatch.events import Assign, Read
 from coordinator.parts.arena_parts import AGAIN, EXCHANGE_S, ArenaParts
-from coordinator.run.advance_checks import (
-    ExpectedAdvance,
-)
+from coordinator.run.advance_checks import ExpectedAdvance
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_answers import PartReached, read_part
 from schema.parts import Vector
-from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.arena import Advance, AdvanceShard
 from schema.wire.arena_state import ArenaState
-from schema.wire.codec import encode
-from schema.wire.messages import Request
 
 
 class PartRequests:
@@ -35,7 +30,7 @@ class PartRequests:
         self, context: RunContext, island: int, state: ArenaState, wall_s: float
     ) -> None:
         """Begin with a state that the arena's worker holds."""
-        self._context, self._island = context, island
+        self._context = context
         self._experiment = context.experiments[island]
         arena, clock = self._experiment.arena, self._experiment.simulation
         assert arena is not None
@@ -62,14 +57,11 @@ class PartRequests:
         """Return the request for a worker, and what reads the answer."""
         is_whole = command.is_whole or part == AGAIN
         work = self.parts.request(part, is_whole=is_whole)
-        settings = self._context.arena[self._island]
-        run, epoch = self._context.client
         number = command.job.number
-        request = Request(run, epoch, number, work, settings, plugins_of(settings))
         assert work.part is not None
         read = partial(
             read_part,
-            job=(epoch, number),
+            job=(self._context.client.epoch, number),
             is_whole=is_whole,
             expected=ExpectedAdvance(
                 work.from_step,
@@ -82,7 +74,7 @@ class PartRequests:
             ),
             provenance=Provenance(command.agent, command.platform),
         )
-        return encode(request), read
+        return self._context.arena_request(number, work), read
 
     def take(
         self, part: int, reached: PartReached, count: int

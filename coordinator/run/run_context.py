@@ -15,6 +15,10 @@ from schema.experiment.settings import (
     vetting_settings,
 )
 from schema.parts import BodySpace
+from schema.plugins.source import plugins_of
+from schema.wire.arena import AdvanceShard
+from schema.wire.codec import encode
+from schema.wire.messages import Request
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +40,12 @@ class RunContext:
     arena: Mapping[int, bytes]
     experiments: Mapping[int, Experiment]
     space: BodySpace
+
+    def arena_request(self, number: int, work: AdvanceShard) -> bytes:
+        """Return the request of a job that advances an arena, or a part of one."""
+        run, epoch = self.client
+        settings = self.arena[work.island]
+        return encode(Request(run, epoch, number, work, settings, plugins_of(settings)))
 
     @classmethod
     def of(cls, run: str, epoch: int, experiment: Experiment, origin: Origin) -> Self:

@@ -37,13 +37,11 @@ from schema.errors import (
 from schema.experiment.settings import read_arena_settings, split_problems
 from schema.limits import ADVANCE_BYTES
 from schema.parts import Vector
-from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.arena import Advance, AdvanceShard, Changes, PastAdvance, Rebuild
 from schema.wire.arena_state import ArenaState
 from schema.wire.codec import decode, encode
-from schema.wire.messages import Request
 from schema.wire.poses import PoseArrays
 from schema.wire.status import PartStatus
 
@@ -355,7 +353,7 @@ class ShardRequests:
     def _encode(self, command: Assign) -> tuple[bytes, Read]:
         """Return the request for a worker, and what reads the answer."""
         shard, part = self._places.place(command.job.shard)
-        past, settings = self._past(shard), self._context.arena[shard]
+        past = self._past(shard)
         requested = past.requested
         assert requested is not None
         is_drift = past.drifts_to(command.platform)
@@ -373,15 +371,11 @@ class ShardRequests:
             rebuild = self.past(shard)
             if is_drift:
                 rebuild = structs.replace(rebuild, living=tuple(past.places))
-        run, epoch = self._context.client
         work = structs.replace(
             past.requested,
             from_step=past.step,
             from_digest=past.digest,
             rebuild=rebuild,
-        )
-        request = Request(
-            run, epoch, command.job.number, work, settings, plugins_of(settings)
         )
         complete: Callable[[Advance], Advance] | None = None
         if is_drift:
@@ -394,7 +388,7 @@ class ShardRequests:
         read = partial(
             read_advance,
             requested=requested,
-            job=(epoch, command.job.number),
+            job=(self._context.client.epoch, command.job.number),
             is_whole=command.is_whole,
             repeats=past.repeats,
             expected=ExpectedAdvance(
@@ -408,4 +402,4 @@ class ShardRequests:
             provenance=Provenance(command.agent, command.platform),
             complete=complete,
         )
-        return encode(request), read
+        return self._context.arena_request(command.job.number, work), read
