@@ -12,7 +12,9 @@ power loss does.
 
 ``fleet``: coordinators at a hub, with an analyzer and three worker processes that their
 pool restarts; arenas are divided over these. All kills are at sizes of the journal or
-times after the last kill. Some coordinators find cut poses when they resume.
+times after the last kill. Some coordinators are killed together with all workers, and
+some find cut poses when they resume. Some workers are stopped instead: they keep their
+connection and are silent until the next kill of a worker, which is theirs.
 """
 
 from tests.system import warm  # first: it prepares the process before NumPy's import
@@ -57,6 +59,10 @@ BY_JOURNAL = 0.7
 """Share of the kills of a fleet that are at a size of the journal."""
 MEAN_GROWTH = 0.04
 """Mean growth of the journal between these kills, as a share of a whole one."""
+TOGETHER = 0.2
+"""Share of the kills of a coordinator that are of all workers, too."""
+STOPPED = 0.2
+"""Share of the kills of a worker that stop one."""
 LONGEST_WAIT_S = 0.3
 """Longest time from a kill to one of the others [s]."""
 
@@ -152,6 +158,7 @@ class FleetKills:
         short = tempfile.TemporaryDirectory(prefix="hub")
         self._address = f"unixsock-stream/{self._stack.enter_context(short)}/hub"
         self._log = Path("fleet.log")
+        self._stopped: int | None = None
         self._start("hub", "--listen", self._address)
         warm.wait_for("listening on ", self._log)
         flags = ("--connect", self._address, "--processes")
@@ -164,6 +171,8 @@ class FleetKills:
         return child
 
     def close(self) -> None:
+        if self._stopped is not None:
+            self._signal(self._stopped, signal.SIGKILL)
         self._stack.close()
 
     def run(self, reference: Reference, folder: Path, left: Counter[str]) -> None:
@@ -177,6 +186,9 @@ class FleetKills:
                 if code == 0:
                     break
                 assert code == -signal.SIGKILL, warm.tail(log_of(folder))
+                if self._rng.random() < TOGETHER:
+                    for agent in warm.agents(self._workers):
+                        self._signal(agent, signal.SIGKILL)
                 if self._rng.random() < 0.2:
                     cut_poses(folder, self._rng.uniform(0.2, 0.9))
                 child = self._resume(reference, folder)
@@ -200,12 +212,22 @@ class FleetKills:
         return "coordinator" if self._rng.random() < share else "worker"
 
     def _kill_worker(self) -> bool:
-        """Kill a worker process; return whether there was one."""
+        """Kill or stop a worker process; return whether there was one."""
         agents = warm.agents(self._workers)
         if not agents:
             return False
+        agent, how = agents[self._rng.integers(len(agents))], signal.SIGKILL
+        if self._stopped in agents:
+            agent = self._stopped
+        elif self._rng.random() < STOPPED:
+            self._stopped, how = agent, signal.SIGSTOP
+        return self._signal(agent, how)
+
+    @staticmethod
+    def _signal(agent: int, number: signal.Signals) -> bool:
+        """Send a signal to a worker process; return whether it was there."""
         with suppress(ProcessLookupError):
-            os.kill(agents[self._rng.integers(len(agents))], signal.SIGKILL)
+            os.kill(agent, number)
             return True
         return False
 
