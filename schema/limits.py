@@ -65,6 +65,7 @@ MOST_NEURON_PARAMETERS = 32
 MOST_NEURON_STATES = 16
 """State variables of a neuron."""
 MOST_LIVING = 100_000
+MOST_PATCHES = 1000
 """Living robots of an arena."""
 MOST_TOUCHES = 500_000
 """Pairs of robots that touch in one advance."""

@@ -10,6 +10,8 @@ of the original.
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from msgspec.structs import replace
+
 from coordinator.arena.arena_migration import ArenaMigration
 from coordinator.arena.candidates import VettingQueue
 from coordinator.arena.decisions import ArenaDecisions, matings_of
@@ -347,7 +349,7 @@ class Arena:
         until = clock.next_decision(step, is_founding=bool(self._founders))
         if self._infancy is not None:
             until = self._infancy.next_end(until)
-        changes = self.living.take_changes()
+        changes = replace(self.living.take_changes(), lights=self._rules.lights)
         is_saved = clock.is_snapshot_due(step, until)
         self._awaited = AdvanceShard(
             self._number,

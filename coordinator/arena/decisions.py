@@ -18,9 +18,13 @@ from coordinator.evolution.random_streams import Purpose, stream
 from coordinator.islands.events import Record
 from coordinator.islands.rows import parent_column
 from schema.experiment.document import Experiment
+from schema.parts import Vector
 from schema.plugins.arena_rules import ArenaView, Decisions, Patch, Resident
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance
+
+_EMPTY = 1e-9
+"""Content up to which a patch does not shine."""
 
 
 class ArenaDecisions:
@@ -48,9 +52,18 @@ class ArenaDecisions:
         )
         self._stream = partial(stream, seed, run)
         self._number = number
+        self._light_m = experiment.arena.patch_light_m if experiment.arena else 0.0
         self._before_s = 0.0
         self._born: list[BirthId | None] = []
         self.patches: tuple[Patch, ...] = ()
+
+    @property
+    def lights(self) -> tuple[Vector, ...]:
+        """Positions of the lights of the patches, if they have some [m]."""
+        if not self._light_m:
+            return ()
+        shining = (patch for patch in self.patches if patch.content > _EMPTY)
+        return tuple((patch.x, patch.y, self._light_m) for patch in shining)
 
     def note(self, advance: Advance) -> None:
         """Remember what robots did in an advance."""

@@ -14,6 +14,7 @@ from msgspec import Meta, Struct
 
 from schema.experiment.document import Experiment
 from schema.experiment.section import Extent, Length, NotNegative, Positive
+from schema.limits import MOST_PATCHES
 from schema.plugins.arena_rules import (
     ArenaView,
     Conception,
@@ -28,7 +29,6 @@ ENERGY, RESTS_UNTIL = "energy", "rests_until_s"
 """Stores of a robot."""
 _EMPTY = 0.01
 """Share of its capacity below which a patch is empty."""
-_MOST_PATCHES = 1000
 
 
 class Ecosystem(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -70,7 +70,7 @@ class Ecosystem(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     energy_per_s: NotNegative = 0.1
     energy_per_j: NotNegative = 2.0
     lifespan_s: NotNegative = 600.0
-    patches: Annotated[int, Meta(ge=0, le=_MOST_PATCHES)] = 4
+    patches: Annotated[int, Meta(ge=0, le=MOST_PATCHES)] = 4
     patch_radius_m: Extent = 0.6
     patch_inflow: NotNegative = 0.5
     patch_capacity: Positive = 30.0

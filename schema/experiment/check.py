@@ -83,7 +83,8 @@ def _light_sensor_problems(experiment: Experiment, types: BodySpace) -> Iterator
     needs = "needs environment.light = [x, y, z], got none"
     problem = f"space.part_types: the light sensor of {shown(sensing[0])} {needs}"
     for where, own in _each_island(experiment):
-        if not light_of(own.environment, own.arena):
+        shines = own.arena is not None and own.arena.patch_light_m
+        if not (shines or light_of(own.environment, own.arena)):
             yield f"{where}{problem}"
 
 

@@ -436,6 +436,9 @@ class ArenaWorld(PluginSection, frozen=True):
         wall_height_m: height of the wall [m].
         wall_thickness_m: thickness of the wall [m].
         light: as ``environment.light`` [m]; only one of the two is needed.
+        patch_light_m: height of a light at the centre of each patch of the rules that
+            is not empty [m]; 0: patches do not shine. A robot that is evaluated alone
+            has one such light, at the origin.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
         merge_distance_m: robots that may come nearer than this before the next check
@@ -461,6 +464,7 @@ class ArenaWorld(PluginSection, frozen=True):
     wall_height_m: Extent = 1.0
     wall_thickness_m: Extent = 0.05
     light: Place | None = None
+    patch_light_m: Length = 0.0
     record_touches: bool = False
     proximity_steps: AtLeastOne = 8
     merge_distance_m: Length = 0.02

@@ -115,6 +115,11 @@ class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
         """Position of the light [m]; None is no light."""
         return self.environment.light
 
+    @property
+    def is_lit(self) -> bool:
+        """There is a light."""
+        return self.light is not None
+
 
 class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
     """Settings of a request to advance an arena; hashed once, as those above."""
@@ -134,6 +139,11 @@ class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
         """Position of the light [m]; None is no light."""
         return light_of(self.environment, self.arena)
 
+    @property
+    def is_lit(self) -> bool:
+        """There is a light, or patches may shine."""
+        return self.light is not None or self.arena.patch_light_m > 0
+
 
 def vetting_settings(experiment: Experiment) -> bytes:
     """Return the JSON that every vetting request of an experiment holds."""
@@ -152,7 +162,10 @@ def evaluation_settings_of(
 
 def _changing_settings(experiment: Experiment) -> EvaluationSettings:
     settings = _sections(experiment, EvaluationSettings)
-    light = light_of(experiment.environment, experiment.arena)
+    arena = experiment.arena
+    light = light_of(experiment.environment, arena)
+    if light is None and arena is not None and arena.patch_light_m:
+        light = 0.0, 0.0, arena.patch_light_m
     if light == settings.environment.light:
         return settings
     return replace(settings, environment=replace(settings.environment, light=light))

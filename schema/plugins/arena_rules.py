@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Meta, Struct
 
+from schema.limits import MOST_PATCHES
 from schema.robot.ids import BirthId
 
 LONGEST_CAUSE = 40
@@ -131,6 +132,8 @@ class Death(Struct, frozen=True):
 class Patch(Struct, frozen=True):
     """Place that rules keep, such as one with food; it is shown and recorded.
 
+    With ``arena.patch_light_m``, light sensors see it while it holds more than 1e-9.
+
     Attributes:
         x, y: its centre, world frame [m].
         radius_m: its radius [m].
@@ -157,7 +160,7 @@ class Decisions(Struct, frozen=True):
     births: tuple[Conception, ...] = ()
     deaths: tuple[Death, ...] = ()
     stores: Mapping[BirthId, Stores] = {}
-    patches: tuple[Patch, ...] = ()
+    patches: Annotated[tuple[Patch, ...], Meta(max_length=MOST_PATCHES)] = ()
     is_extinct: bool = False
 
 

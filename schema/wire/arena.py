@@ -10,7 +10,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from schema.experiment.section import Count
-from schema.limits import MOST_LIVING, MOST_TOUCHES, Finite
+from schema.limits import MOST_LIVING, MOST_PATCHES, MOST_TOUCHES, Finite
 from schema.parts import Vector
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId, IslandNumber
@@ -61,11 +61,14 @@ class Changes(Message, frozen=True):
         removals: robots that leave, first of all.
         insertions: robots that come.
         brains: new brains of robots that live then.
+        lights: positions of the patches that shine until the next changes, world frame
+            [m].
     """
 
     removals: Births = ()
     insertions: Annotated[tuple[Insertion, ...], Meta(max_length=MOST_LIVING)] = ()
     brains: Annotated[tuple[BrainChange, ...], Meta(max_length=MOST_LIVING)] = ()
+    lights: Annotated[tuple[Vector, ...], Meta(max_length=MOST_PATCHES)] = ()
 
 
 class PastAdvance(Message, frozen=True):

@@ -210,12 +210,20 @@ warmup_steps = 200
 window_steps = 800
 """
 POND = f"{_SMALL}[arena]\n{_POND_ARENA}[arena.parameters]\n{POND_RULES}"
-PONDS = f"""{_SMALL}[[islands]]
+PONDS = f"""{_SMALL}[space]
+part_types = [
+    "schema.parts:CORE",
+    "schema.parts:FIXED_BRICK",
+    "schema.parts:ACTIVE_HINGE",
+    "schema.parts:LIGHT_SENSOR",
+]
+[[islands]]
 count = 2
 [islands.arena]
-{_POND_ARENA}[islands.arena.parameters]
+{_POND_ARENA}patch_light_m = 0.1
+[islands.arena.parameters]
 {POND_RULES}[migration]
 topology = "ring"
 epoch = 20
 """
-"""Two ecosystems between which robots migrate."""
+"""Two ecosystems between which robots migrate; their robots see the patches."""

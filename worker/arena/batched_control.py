@@ -124,6 +124,7 @@ def look(
             [(c.model, c.data) for c in population.clusters if c is not cluster],
             np.delete(places, rows[robot.birth], axis=0),
             settings.light,
+            population.patch_lights,
         )
         try:
             sensors.look(around)

@@ -82,6 +82,7 @@ def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
             for change in changes.brains
             if change.birth in living or change.birth in coming
         ),
+        changes.lights,
     )
 
 

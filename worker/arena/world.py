@@ -115,6 +115,7 @@ class World:
                 fit its body; nothing is changed.
         """
         check_changes(changes, self.population, self.step)
+        self.population.patch_lights = changes.lights
         self.population.remove(changes.removals)
         if changes.insertions:
             self._insert(changes.insertions)

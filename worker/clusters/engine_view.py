@@ -30,8 +30,8 @@ class EngineView(PlacedRobot):
         prefix: str = "",
     ) -> None:
         super().__init__(robot, body_space(settings.space), model, data, prefix)
-        width, has_light = settings.space.max_inputs, settings.light is not None
-        self.sensors = Sensors(self, width=width, has_light=has_light)
+        width = settings.space.max_inputs
+        self.sensors = Sensors(self, width=width, has_light=settings.is_lit)
         self.servos = Servos(self)
         self.probe = Probe(self) if probed_channels(settings) else None
         self.qpos: Floats = data.qpos[self.joints]

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
+from schema.parts import Vector
 from schema.robot.groups import Group, Links, connected_components
 from schema.robot.ids import BirthId
 from schema.robot.trace import Floats
@@ -38,6 +39,7 @@ class ArenaPopulation:
         rollout: the interval that is being handled; None between two intervals.
         proximity: the test for merges and splits.
         merges, splits: numbers of merges and splits of clusters.
+        patch_lights: positions of the lights of patches [m].
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
@@ -50,6 +52,7 @@ class ArenaPopulation:
         self.layout = Layout((), self.robot_rows, self._columns)
         self.rollout: Rollout | None = None
         self.merges = self.splits = 0
+        self.patch_lights: tuple[Vector, ...] = ()
         self.proximity = Proximity(settings)
         self._new: list[Cluster] = []
 

@@ -141,9 +141,14 @@ class Sensors:
         Frames of all bodies must be those of the state.
         """
         for geom, place in self.lights:
-            assert around.light is not None
             state = self._model, self._data
-            self._cells[place] = brightness(around.light, state, geom, around.states)
+            lights = (around.light, *around.patch_lights)
+            seen = (
+                brightness(light, state, geom, around.states)
+                for light in lights
+                if light is not None
+            )
+            self._cells[place] = min(1.0, sum(seen))
         if self.own is not None:
             self.own.read(self._row, around)
 

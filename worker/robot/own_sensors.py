@@ -41,6 +41,7 @@ class Surroundings:
         states: other models of the same world, which rays meet, too.
         others: (N, 3) centres of the cores of all other robots, world frame [m].
         light: position of the light, world frame [m].
+        patch_lights: positions of further lights, which own sensors do not see [m].
     """
 
     age_s: float
@@ -48,6 +49,7 @@ class Surroundings:
     states: Sequence[State] = ()
     others: Floats | None = None
     light: Vector | None = None
+    patch_lights: tuple[Vector, ...] = ()
 
 
 class PartView:

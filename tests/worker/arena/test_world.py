@@ -246,3 +246,28 @@ def test_light_decreases_with_distance_and_can_be_hidden(
     reading = world.population.find(A).view.sensors.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.1)
     assert World.restore(settings, world.snapshot()).digest() == world.digest()
+
+
+def test_patches_shine_until_the_next_changes() -> None:
+    space = Space(
+        part_types=(*EXPERIMENT.space.part_types, "schema.parts:LIGHT_SENSOR")
+    )
+    settings = replace(settings_of(patch_light_m=0.0225, drop_m=0.0), space=space)
+    lights = ((2.0, 0.0, 0.0225), (2.0, 0.0, 0.0225), (-0.5, 0.0, 0.0225))
+    world = World(settings)
+    newborn = Insertion(A, light_robot(), (0.0, 0.0))
+    world.apply(Changes(insertions=(newborn,), lights=lights))
+    reading = world.population.find(A).view.sensors.readings[0, 6]
+    assert reading == pytest.approx(2 * (1.0 / 1.9525) ** 2, abs=0.02)
+    world.advance(SECOND)
+    again = World.restore(settings, world.snapshot())
+    for later in (world, again):
+        later.apply(Changes(lights=lights[:1]))
+        later.advance(2 * SECOND)
+    assert again.digest() == world.digest()
+    dark = World.restore(settings, world.snapshot())
+    dark.advance(3 * SECOND)
+    assert dark.population.find(A).view.sensors.readings[0, 6] == 0.0
+    world.apply(Changes(lights=lights[:1]))
+    world.advance(3 * SECOND)
+    assert dark.digest() != world.digest()
