@@ -20,8 +20,8 @@ MOVE_COST = 0.3
 To build a robot's model takes as long as about three simulated seconds of it, and a
 division lasts for about ten exchanges.
 """
-LEAST_GAIN = 0.02
-"""Least gain of a move, as a share of the most expensive part."""
+BALANCED = 0.04
+"""Difference of two parts that is left as it is, as a share of the more expensive."""
 
 
 def overlapping(boxes: Mapping[BirthId, Box]) -> list[tuple[BirthId, BirthId]]:
@@ -64,7 +64,7 @@ def divide(
     """Return the groups of each part, with few moves.
 
     A group stays where most of it is, until moving it lowers the cost of the most
-    expensive part by more than the move costs.
+    expensive part by more than the move costs. Parts that hardly differ stay.
 
     Args:
         groups: robots that stay together, each at least one.
@@ -90,7 +90,8 @@ def divide(
             for group in divided[heavy]
         }
         group = max(gains, key=gains.__getitem__, default=())
-        if not group or gains[group] <= LEAST_GAIN * loads[heavy]:
+        is_balanced = difference <= BALANCED * loads[heavy]
+        if is_balanced or not group or gains[group] <= 0.0:
             return [sorted(each) for each in divided]
         divided[heavy].remove(group)
         divided[light].append(group)
