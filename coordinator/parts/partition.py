@@ -20,7 +20,7 @@ MOVE_COST = 0.3
 To build a robot's model takes as long as about three simulated seconds of it, and a
 division lasts for about ten exchanges.
 """
-BALANCED = 0.04
+BALANCED = 0.02
 """Difference of two parts that is left as it is, as a share of the more expensive."""
 
 

@@ -101,7 +101,7 @@ def test_no_move_pays_in_what_is_divided(
     loads = [sum(costs[b] for group in part for b in group) for part in divided]
     again = {b: n for n, part in enumerate(divided) for group in part for b in group}
     assert divide(groups, costs, again, parts) == divided
-    if max(loads) - min(loads) <= 0.04 * max(loads):
+    if max(loads) - min(loads) <= 0.02 * max(loads):
         return
     for group in divided[loads.index(max(loads))]:
         cost = sum(costs[birth] for birth in group)
