@@ -173,6 +173,10 @@ def _types_in_words(found: re.Match[str]) -> str:
     return " or ".join(_TYPES[kind] for kind in kinds)
 
 
+FAILURES = (SimulationDiverged, SensorFailed, FitnessUndefined)
+"""Errors of a robot, with which its evaluation is a failed result."""
+
+
 def counted(number: int, noun: str) -> str:
     """Return a number and a noun, whose plural ends in "s", such as "2 workers"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

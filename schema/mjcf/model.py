@@ -85,9 +85,10 @@ def solo_spec(
     simulation: Simulation,
     environment: Environment,
     *,
+    place: tuple[float, float] = (0.0, 0.0),
     furnish: Furnish | None = None,
 ) -> mujoco.MjSpec:
-    """Return the spec of one robot in a world, at the origin.
+    """Return the spec of one robot in a world, at a place in the ground plane [m].
 
     The robot touches the ground, or stands on the rough ground or scenery below it.
 
@@ -103,7 +104,7 @@ def solo_spec(
     attitude = _attitude(simulation)
     if attitude is not None or not environment.is_even:
         boxes = footprint(spec.compile(), attitude)
-        height = standing_height(boxes, simulation, environment, (0.0, 0.0), 0.0)
+        height = standing_height(boxes, simulation, environment, place, 0.0)
     set_options(spec, simulation, environment, is_single=True)
     add_ground(spec, simulation, environment)
     if furnish is not None:
@@ -111,7 +112,7 @@ def solo_spec(
     objects = object_count(environment, simulation) if environment.scenery else 0
     spec.memory = memory + OBJECT_BYTES * objects
     root = spec.body("root")
-    root.pos = (0.0, 0.0, height + simulation.drop_m)
+    root.pos = (*place, height + simulation.drop_m)
     if attitude is not None:
         root.quat = attitude
     return spec

@@ -15,13 +15,7 @@ from rich.console import Console
 from rich.progress import track
 
 from schema.agent.flags import Flags, add_count
-from schema.errors import (
-    FitnessUndefined,
-    RevolveError,
-    SensorFailed,
-    SimulationDiverged,
-    counted,
-)
+from schema.errors import FAILURES, RevolveError, counted
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -75,7 +69,7 @@ def time_evaluations(robots: Iterable[Robot], settings: EvaluationSettings) -> T
                     wholes.append(_whole(robot, settings))
                 else:
                     bares.append(_replay(robot, settings, commands))
-        except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
+        except FAILURES as error:
             failures.append(str(error))
             continue
         count += 1

@@ -82,7 +82,7 @@ HELD, MEAN, DEAD = "input at 0", "input at its mean", "motor dead"
 
 def all_ablations(robot: Robot, space: BodySpace) -> tuple[AblationCase, ...]:
     """Return the ablations of a robot: one by one, by kind, and all together."""
-    inputs, motors = _inputs(robot, space), _motors(robot, space)
+    inputs, motors = inputs_of(robot, space), motors_of(robot, space)
 
     def held(value: float | None) -> Callable[[Sequence[int]], Ablation]:
         return lambda numbers: Ablation(inputs=tuple((n, value) for n in numbers))
@@ -97,14 +97,14 @@ def all_ablations(robot: Robot, space: BodySpace) -> tuple[AblationCase, ...]:
     )
 
 
-_Channel = tuple[str, int, str]
+Channel = tuple[str, int, str]
 """Kind, index of the part and name of an input or motor."""
 
 
 def _changes(
     group: str,
     what: str,
-    channels: Sequence[_Channel],
+    channels: Sequence[Channel],
     ablation: Callable[[Sequence[int]], Ablation],
 ) -> Iterator[AblationCase]:
     for number, (kind, part, name) in enumerate(channels):
@@ -121,9 +121,9 @@ def _changes(
         yield AblationCase(group, "all", "", None, None, f"all {what}", ablation(every))
 
 
-def _inputs(robot: Robot, space: BodySpace) -> list[_Channel]:
+def inputs_of(robot: Robot, space: BodySpace) -> list[Channel]:
     """Return the inputs of a brain, in its order."""
-    found: list[_Channel] = []
+    found: list[Channel] = []
     for index, part in enumerate(robot.parts):
         for sensor in space[part.kind].sensors:
             if not isinstance(sensor, Sensor):
@@ -139,7 +139,7 @@ def _inputs(robot: Robot, space: BodySpace) -> list[_Channel]:
     return found
 
 
-def _motors(robot: Robot, space: BodySpace) -> list[_Channel]:
+def motors_of(robot: Robot, space: BodySpace) -> list[Channel]:
     """Return the motors of a robot, in the order of the brain's outputs."""
     return [
         (part.kind, index, f"motor of part {index}")

@@ -18,6 +18,7 @@ from schema.mjcf.model import solo_spec
 from schema.robot.brain import Brain
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats, Trace
+from worker.filters.calibration import NEUTRAL
 from worker.filters.filters import (
     filtered_outputs,
     filtered_readings,
@@ -36,13 +37,15 @@ Watch = Callable[[mujoco.MjData], None]
 
 
 class ControlLoop:
-    """Simulation of one robot that starts at the origin: sensors, brain, motors.
+    """Simulation of one robot, alone: sensors, brain, motors.
 
     Sensors, brain and commands are updated every ``brain_steps`` from step 0 on. The
     position of the core's centre is sampled every ``pose_steps`` of the window, both
     ends included, and so are the channels that fitness and measures declare.
 
     Attributes:
+        model, data: of the engine.
+        done: whether the window is over.
         now: physics steps since the start.
         watch: called with the state at each tick, after the commands; may be None.
     """
@@ -53,8 +56,9 @@ class ControlLoop:
         settings: EvaluationSettings,
         identity: Identity = NO_IDENTITY,
         means: Sequence[float] = (),
+        place: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """Build the model and start.
+        """Build the model and start at a place in the ground plane [m].
 
         The robot may have more neurons than ``[space]`` allows in a search; ``means``
         are values for the inputs that ``settings.ablation`` holds at their mean.
@@ -67,39 +71,25 @@ class ControlLoop:
         """
         silence_engine()
         self._settings = settings = _with_room(settings, robot.brain)
-        self._robot, self._identity, self._means = robot, identity, means
+        self._robot = robot
         self._clock, self._light = settings.simulation, settings.environment.light
         self._end = self._clock.evaluation_steps
         self._tick_steps = self._clock.brain_steps
         self.watch: Watch | None = None
-        self._space = body_space(settings.space)
+        space, ground = body_space(settings.space), settings.environment
         try:
-            spec = solo_spec(robot, self._space, self._clock, settings.environment)
+            spec = solo_spec(robot, space, self._clock, ground, place=place)
             self.model: mujoco.MjModel = spec.compile()
         except ValueError as error:
             raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
-        self.reset()
-
-    def reset(self) -> None:
-        """Start again, equal to the last bit."""
-        robot, settings, model = self._robot, self._settings, self.model
-        self.data = data = mujoco.MjData(model)
+        self.data = data = mujoco.MjData(self.model)
         self._core, self._velocities = data.qpos[:3].data, data.qvel.data
-        self._placed = placed = PlacedRobot(robot, self._space, model, data)
-        width, has_light = settings.space.max_inputs, self._light is not None
-        self._sensors = Sensors(placed, width=width, has_light=has_light)
-        self._servos = Servos(placed)
-        ticks = self._end // self._tick_steps + 1
-        self._brain = solo_brain(controls_of(settings), robot.brain, ticks)
-        if isinstance(self._brain, SoloNetwork):
-            self._sensors.write_to(self._brain.readings)
-        self._is_guarded = isinstance(self._brain, GuardedBank)
-        self._readings = self._sensors.readings
-        self._inputs = self._readings[:, : robot.brain.count("input")]
+        self._placed = placed = PlacedRobot(robot, space, self.model, data)
+        self._start_control(placed)
         self._filters = None
         if has_filters(settings):
-            identity, means = self._identity, self._means
-            self._filters = filters_of(robot, settings, identity, (model, data), means)
+            state = self.model, data
+            self._filters = filters_of(robot, settings, identity, state, means)
         self._channels, self._probe, self._has_work = None, None, False
         if functions_of(settings).channels:
             self._channels = Channels(placed, settings)
@@ -108,14 +98,23 @@ class ControlLoop:
         self._positions: list[float] = []
         self._rows: list[Floats] = []
         self._undisturbed: Floats = self._inputs
-        self._outputs: Floats = np.zeros((1, 0))
         self.now, self._next_sample = 0, self._clock.warmup_steps
-        self._tick, self._is_unread = 0, True
+        self._tick, self._is_unread, self.done = 0, True, False
 
-    @property
-    def done(self) -> bool:
-        """Whether the window is over."""
-        return self.now >= self._end
+    def _start_control(self, placed: PlacedRobot) -> None:
+        """Find sensors and motors, and start the brain."""
+        settings, brain = self._settings, self._robot.brain
+        width, has_light = settings.space.max_inputs, self._light is not None
+        self._sensors = Sensors(placed, width=width, has_light=has_light)
+        self._servos = Servos(placed)
+        ticks = self._end // self._tick_steps + 1
+        self._brain = solo_brain(controls_of(settings), brain, ticks)
+        if isinstance(self._brain, SoloNetwork):
+            self._sensors.write_to(self._brain.readings)
+        self._is_guarded = isinstance(self._brain, GuardedBank)
+        self._readings = self._sensors.readings
+        self._inputs = self._readings[:, : brain.count("input")]
+        self._outputs: Floats = np.zeros((1, settings.space.max_outputs))
 
     def observe(self) -> Floats:
         """Return what the brain receives at the present tick, (1, I).
@@ -144,7 +143,7 @@ class ControlLoop:
 
         Args:
             action: (M,) of the motors, -1 to 1 over their ranges; None is the robot's
-                own brain. Filters act on both.
+                own brain, which does not tick otherwise. Filters act on both.
 
         Raises:
             SimulationDiverged: the state is not finite, the engine warned or failed,
@@ -152,7 +151,11 @@ class ControlLoop:
             SensorFailed: as of ``observe``.
         """
         self.observe()
-        outputs = self._think() if action is None else 0.5 + 0.5 * action[np.newaxis]
+        if action is None:
+            outputs = self._think()
+        else:
+            outputs = np.full((1, self._settings.space.max_outputs), NEUTRAL)
+            outputs[0, : len(action)] += 0.5 * action
         self._outputs = outputs
         if self._filters:
             outputs = filtered_outputs(self._filters, self._tick, outputs)
@@ -170,7 +173,7 @@ class ControlLoop:
             self._finish()
 
     def trace(self) -> Trace:
-        """Return the samples of the window, once it is over."""
+        """Return the samples of the window so far."""
         interval_s = self._clock.pose_steps * self._clock.timestep_s
         positions = np.array(self._positions).reshape(-1, 3)
         if self._channels is None:
@@ -222,6 +225,7 @@ class ControlLoop:
 
         That may be the end, where the brain does not tick.
         """
+        self.done = True
         if self._channels is not None:
             self.observe()
         self._sample()

@@ -5,40 +5,17 @@ workers.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from msgspec.structs import replace
 
-from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import Simulation
 from schema.experiment.identity import Identity
 from schema.experiment.robust import RANGES, Robust
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
 from worker.filters.random_streams import DrawPurpose, stream
-
-
-def evaluate_disturbed(
-    once: Callable[[EvaluationSettings, Identity], Evaluation],
-    settings: EvaluationSettings,
-    rules: Robust,
-    identity: Identity,
-) -> Evaluation:
-    """Return one evaluation of several disturbed simulations.
-
-    Raises:
-        SimulationDiverged, SensorFailed, FitnessUndefined: of one simulation, with
-            its number.
-    """
-    evaluations: list[Evaluation] = []
-    for drawn, drawn_identity in disturbances(settings, rules, identity):
-        try:
-            evaluations.append(once(drawn, drawn_identity))
-        except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
-            number = f"draw {len(evaluations) + 1} of {rules.draws}"
-            raise type(error)(f"{number}: {error}") from None
-    return combined(evaluations, rules)
 
 
 def disturbances(

@@ -120,7 +120,7 @@ class Channels:
         table = np.array(list(rows)).reshape(len(positions), self.width)
         found: dict[str, Any] = {n: table[:, span] for n, span in self._spans.items()}
         if "energy" in found:
-            found["energy"] = found["energy"][:, 0] - found["energy"][0, 0]
+            found["energy"] = found["energy"][:, 0] - found["energy"][:1, 0]
         if "contact" in found:
             found["contact"] = found["contact"] != 0.0
         if "neighbours" in found:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
+from schema.errors import FAILURES
 from schema.experiment.document import Simulation
 from schema.experiment.robust import Robust
 from schema.experiment.settings import EvaluationSettings
@@ -161,7 +161,7 @@ def rejudge(
     for change in changes:
         try:
             yield change, evaluator(robot, change.settings).fitness
-        except (SimulationDiverged, SensorFailed, FitnessUndefined):
+        except FAILURES:
             yield change, None
 
 

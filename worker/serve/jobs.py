@@ -2,12 +2,7 @@
 
 from dataclasses import dataclass
 
-from schema.errors import (
-    FitnessUndefined,
-    MalformedMessage,
-    SensorFailed,
-    SimulationDiverged,
-)
+from schema.errors import FAILURES, MalformedMessage
 from schema.experiment.changes import settings_at
 from schema.experiment.document import body_space
 from schema.experiment.identity import Identity
@@ -72,5 +67,5 @@ def answer_evaluation(
         return evaluate_traced(robot, settings, identity)
     try:
         return evaluate(robot, settings, identity)
-    except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
+    except FAILURES as error:
         return Failure(str(error))

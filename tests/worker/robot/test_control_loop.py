@@ -44,16 +44,14 @@ def digest(trace: Trace) -> str:
 def test_evaluation_is_the_loop_to_the_last_bit(
     robot_of: Callable[[int], Robot], settings: EvaluationSettings
 ) -> None:
-    """Observations between the ticks change nothing, and a reset starts again."""
+    """Observations between the ticks change nothing."""
     for seed in range(3):
         expected = digest(simulate(robot_of(seed), settings, identity=IDENTITY))
         loop = ControlLoop(robot_of(seed), settings, IDENTITY)
-        for _ in range(2):
-            while not loop.done:
-                assert loop.observe() is loop.observe()
-                loop.step()
-            assert digest(loop.trace()) == expected
-            loop.reset()
+        while not loop.done:
+            assert loop.observe() is loop.observe()
+            loop.step()
+        assert digest(loop.trace()) == expected
 
 
 def test_each_filter_changes_the_motion(turtle: Robot) -> None:
@@ -70,6 +68,27 @@ def test_each_filter_changes_the_motion(turtle: Robot) -> None:
         )
     }
     assert len(kinds) == 6
+
+
+def test_outputs_of_the_brain_as_actions_change_nothing(turtle: Robot) -> None:
+    """Filters act on actions as on the robot's own brain."""
+    settings = replace(FILTERED, record=("outputs",))
+    expected = simulate(turtle, settings, identity=IDENTITY)
+    loop, teacher = (ControlLoop(turtle, settings, IDENTITY) for _ in range(2))
+    while not loop.done:
+        teacher.step()
+        loop.step(2.0 * teacher._outputs[0, :2] - 1.0)
+    assert np.allclose(loop.trace().outputs, expected.outputs, atol=1e-9)
+    assert np.allclose(loop.trace().core_position, expected.core_position, atol=1e-6)
+
+
+def test_robot_starts_at_a_place_on_the_ground(turtle: Robot) -> None:
+    hills = replace(PLAIN, environment=Environment(roughness_m=0.05, ground_seed=3))
+    places = (0.0, 0.0), (1.0, -0.5)
+    for settings, is_even in ((PLAIN, True), (hills, False)):
+        starts = [ControlLoop(turtle, settings, place=at).data.qpos for at in places]
+        assert starts[1][:2].tolist() == [1.0, -0.5]
+        assert bool(starts[0][2] == starts[1][2]) == is_even
 
 
 def test_actions_replace_the_brain(turtle: Robot) -> None:

@@ -1,7 +1,6 @@
 """Evaluation under drawn disturbances."""
 
 import math
-from collections.abc import Iterator
 
 import pytest
 from msgspec.structs import replace
@@ -14,11 +13,10 @@ from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
-from schema.robot.trace import Trace
 from tests.worker.evaluations import with_simulation
-from worker.robot import evaluation
+from worker.robot.control_loop import ControlLoop
 from worker.robot.disturbances import combined, disturbances
-from worker.robot.evaluation import evaluate, simulate
+from worker.robot.evaluation import EvaluationLoop, evaluate
 
 SETTINGS = with_simulation(Simulation(window_steps=400, friction=0.5, drop_m=0.01))
 STILL = Robust(
@@ -152,14 +150,13 @@ def test_fitness_is_that_of_the_draws(turtle: Robot) -> None:
 def test_a_failed_draw_is_a_failure_with_its_number(
     turtle: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    outcomes: Iterator[Trace | None] = iter([simulate(turtle, SETTINGS), None])
+    start, starts = EvaluationLoop._start, iter(range(2))
 
-    def fake(*_: object, **__: object) -> Trace:
-        trace = next(outcomes)
-        if trace is None:
+    def fake(self: EvaluationLoop) -> ControlLoop:
+        if next(starts):
             raise SimulationDiverged("physics diverged by 1.000 s")
-        return trace
+        return start(self)
 
-    monkeypatch.setattr(evaluation, "simulate", fake)
+    monkeypatch.setattr(EvaluationLoop, "_start", fake)
     with pytest.raises(SimulationDiverged, match=r"^draw 2 of 4: physics diverged"):
         evaluate(turtle, replace(SETTINGS, robust=Robust()))
