@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 
 import revolve
 from docs.struct_tables import linked
@@ -29,22 +29,30 @@ _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 def reference() -> str:
     """Return the page."""
     names = sorted(dir(revolve), key=lambda name: (_order(name), name.lower()))
-    text = "\n".join(line for name in names for line in _entry(name))
+    text = "\n".join(line for name in names for line in _entry(name, revolve))
     return _HEAD + linked(text)
 
 
 def _order(name: str) -> int:
-    """Return the place of a kind of name: functions, classes, errors."""
+    """Return the place of a kind of name: functions, classes, errors, modules."""
     found = getattr(revolve, name)
+    if inspect.ismodule(found):
+        return 3
     if not inspect.isclass(found):
         return 0
     return 2 if issubclass(found, Exception) else 1
 
 
-def _entry(name: str) -> Iterator[str]:
-    """Yield the lines about a public name."""
-    found = getattr(revolve, name)
+def _entry(name: str, module: ModuleType) -> Iterator[str]:
+    """Yield the lines about a public name of a module."""
+    found = getattr(module, name.rpartition(".")[2])
     yield f"## `{name}`"
+    if inspect.ismodule(found):
+        yield from ("", inspect.getdoc(found) or "", "")
+        for inner in found.__all__:
+            if callable(getattr(found, inner)):
+                yield from _entry(f"{name}.{inner}", found)
+        return
     yield from _text(found, f"{name}{_signature(found)}")
     if not inspect.isclass(found) or issubclass(found, Exception):
         return

@@ -28,6 +28,8 @@ _NAMES = {
     "revolve.genome": "Genome",
     "revolve.experiment": "Experiment",
     "revolve.evaluation": "Result evaluate simulate",
+    "revolve.simulation": "Simulation Simulations",
+    "revolve.gym": "gym",
     "schema.robot.trace": "Trace",
     "revolve.bodies": "vet body_distance",
     "schema.robot.results": "Report",
@@ -79,7 +81,8 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public object
     if line := stranger():
         raise ImportError(line)
     import_module("schema.agent.import_path").check_graphics()
-    value = globals()[name] = getattr(import_module(home), name)
+    module = import_module(home)
+    value = globals()[name] = module if name == "gym" else getattr(module, name)
     return value
 
 

@@ -1,3 +1,4 @@
+from revolve import gym as gym
 from revolve.arena import Arena as Arena
 from revolve.bodies import body_distance as body_distance
 from revolve.bodies import vet as vet
@@ -16,6 +17,8 @@ from revolve.robot import Robot as Robot
 from revolve.runs import Run as Run
 from revolve.runs import resume as resume
 from revolve.runs import run as run
+from revolve.simulation import Simulation as Simulation
+from revolve.simulation import Simulations as Simulations
 from schema.errors import ExperimentError as ExperimentError
 from schema.errors import FitnessUndefined as FitnessUndefined
 from schema.errors import InvalidRobot as InvalidRobot

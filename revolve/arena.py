@@ -1,16 +1,20 @@
 """Active arenas as the Python API has them: what lives there, and orders."""
 
 from argparse import Namespace
-from math import isfinite
 from os import fspath
 from pathlib import Path
 
 from coordinator.cli.arena import coordinator_of, send
-from revolve.arguments import in_order, naming_arguments, whole_number
+from revolve.arguments import (
+    finite_numbers,
+    in_order,
+    naming_arguments,
+    whole_number,
+)
 from revolve.robot import Robot, plain
 from revolve.runs import Run
 from schema.agent.network import DEFAULT_FLEET
-from schema.errors import RevolveError, shown
+from schema.errors import RevolveError
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot as PlainRobot
 from schema.wire.operator import (
@@ -108,7 +112,10 @@ class Arena:
         if len(names) > MOST_PARENTS:
             rule = f"parents: must be at most {MOST_PARENTS} robots"
             raise RevolveError(f"{rule}, got {len(names)}")
-        return self._order(InsertRobot(plain(robot), _place(place), names))
+        if place is not None:
+            x, y = finite_numbers("place", place, 2, ", x and y [m]").tolist()
+            place = x, y
+        return self._order(InsertRobot(plain(robot), place, names))
 
     def remove(self, robot: int | ListedRobot) -> float:
         """Remove a robot; returns and raises as ``insert``."""
@@ -147,18 +154,3 @@ class Arena:
         if isinstance(robot, ListedRobot):
             return robot.birth
         return BirthId(self._options.island, whole_number("birth", robot))
-
-
-def _place(place: tuple[float, float] | None) -> tuple[float, float] | None:
-    """Return a place as plain numbers; ``RevolveError`` if it is none."""
-    if place is None:
-        return None
-    try:
-        x, y = place
-        is_finite = isfinite(x) and isfinite(y)
-    except (TypeError, ValueError):
-        is_finite = False
-    if not is_finite:
-        rule = "place: must be two finite numbers, x and y [m]"
-        raise RevolveError(f"{rule}, got {shown(place)}")
-    return float(x), float(y)

@@ -6,8 +6,11 @@ from contextlib import contextmanager
 from operator import index
 from typing import TypeVar
 
-from schema.errors import RevolveError, shown
-from schema.limits import MOST_NUMBER
+import numpy as np
+
+from schema.errors import RevolveError, counted, shown
+from schema.limits import MOST_NUMBER, MOST_PIXELS
+from schema.robot.trace import Floats
 
 T = TypeVar("T")
 _TLS = re.compile(r"--tls-(\w+)")
@@ -31,6 +34,31 @@ def whole_number(
     raise RevolveError(
         f"{name}: must be a whole number from {least} to {most}, got {shown(value)}"
     )
+
+
+def picture_size(width: int, height: int) -> tuple[int, int]:
+    """Return the size of a picture [pixels]; raises as ``whole_number``."""
+    return (
+        whole_number("width", width, 1, MOST_PIXELS),
+        whole_number("height", height, 1, MOST_PIXELS),
+    )
+
+
+def finite_numbers(name: str, values: object, count: int, unit: str) -> Floats:
+    """Return an argument that is an array of numbers, (count,).
+
+    Raises:
+        RevolveError: anything else.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError:  # lists of different lengths
+        array = np.empty(0)
+    is_number = array.shape == (count,) and array.dtype.kind in "fiu"
+    if is_number and np.isfinite(array).all():
+        return array.astype(np.float64)
+    rule = f"must be {counted(count, 'finite number')}{unit}"
+    raise RevolveError(f"{name}: {rule}, got {shown(values)}")
 
 
 @contextmanager

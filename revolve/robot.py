@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from coordinator.evolution.breeding import Breeder
-from revolve.arguments import whole_number
+from revolve.arguments import picture_size, whole_number
 from revolve.children import SIMULATOR
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
@@ -29,7 +29,7 @@ from schema.formats.files import settings_of, types_for, write_bytes, write_robo
 from schema.formats.packed import packed_robot
 from schema.formats.run_settings import read_with_settings
 from schema.formats.yaml_reader import OTHER_TYPES
-from schema.limits import MOST_PIXELS, MOST_SEED
+from schema.limits import MOST_SEED
 from schema.parts import BodySpace
 from schema.plugins.permission import allowed
 from schema.robot.archive import PACKED, RobotOrigin, read_archive
@@ -183,10 +183,7 @@ class Robot:
             RevolveError: this machine cannot render, or another size.
             InvalidRobot: the robot is not well formed.
         """
-        size = (
-            whole_number("width", width, 1, MOST_PIXELS),
-            whole_number("height", height, 1, MOST_PIXELS),
-        )
+        size = picture_size(width, height)
         task = task_of(self, _settings(self.experiment), size=size)
         outcome = SIMULATOR.do(task)
         if outcome.failure:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.page_runner import PageError, blocks, run_page
+from tests.docs.page_runner import PageError, blocks, blocks_of, run_page
 from tests.system.workspace import runtime_directory
 
 TOP = Path(__file__).parents[2]
@@ -61,10 +61,25 @@ def test_tutorial_runs(name: str, tmp_path: Path) -> None:
     _run(TUTORIALS / f"{name}.md", tmp_path)
 
 
-@pytest.mark.parametrize("page", ["gallery/README.md", "growing.md", "founders.md"])
+@pytest.mark.parametrize(
+    "page", ["gallery/README.md", "growing.md", "founders.md", "simulation.md"]
+)
 def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
     (tmp_path / "docs").symlink_to(DOCS)
     _run(DOCS / page, tmp_path)
+
+
+@pytest.mark.timeout(900)
+def test_ppo_of_the_simulation_page_trains(tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3", reason="a library of gigabytes")
+    (block,) = blocks_of(DOCS / "simulation.md", "py")
+    code = "import revolve as rv\nbody = rv.Robot.random(seed=1, number=7)\n"
+    told = subprocess.run(
+        [sys.executable, "-c", code + block],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(TOP)},
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    assert float(told.split()[-1]) > 0.0
 
 
 def test_every_tutorial_is_in_the_list_of_tutorials() -> None:

@@ -10,7 +10,7 @@ import revolve as rv
 from revolve import arena as orders
 
 ROBOT = rv.Robot((rv.Part("Core", -1, -1, -1, 0, ()),))
-PLACE = "place: must be two finite numbers, x and y [m], got "
+PLACE = "place: must be 2 finite numbers, x and y [m], got "
 BIRTH = "birth: must be a whole number from 0 to 4294967295, got "
 
 

@@ -27,7 +27,7 @@ pytestmark = [pytest.mark.system, pytest.mark.long, pytest.mark.timeout(3600)]
 
 ROOT = Path(__file__).parents[2]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-EXTRAS = ("pictures", "analysis", "view", "cluster")
+EXTRAS = ("pictures", "analysis", "view", "cluster", "gym")
 EXAMPLE = """
 import revolve as rv
 run = rv.read("one")
