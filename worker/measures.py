@@ -18,6 +18,7 @@ from schema.plugins.needs import channels_of, needs
 from schema.plugins.parameters import parameters_type, read_parameters
 from schema.plugins.protocols import MeasureFunction
 from schema.robot.trace import Trace
+from worker import descriptors
 from worker.fitness import (
     Functions,
     TraceFunction,
@@ -148,6 +149,15 @@ BUILT_IN: dict[str, MeasureFunction] = {
         body_symmetry,
         joint_effort,
         contact_share,
+        descriptors.body_size,
+        descriptors.body_proportion,
+        descriptors.body_limbs,
+        descriptors.body_limb_length,
+        descriptors.body_branching,
+        descriptors.body_coverage,
+        descriptors.body_joints,
+        descriptors.duty_factor,
+        descriptors.periodicity,
     )
 }
 """Measures by short name."""
