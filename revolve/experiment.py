@@ -9,11 +9,11 @@ from typing import Any, Self
 import msgspec
 
 from schema.errors import ExperimentError
-from schema.experiment.bounded import parse_toml
 from schema.experiment.changes import settings_at
 from schema.experiment.document import Experiment as Document
 from schema.experiment.document import island_experiment
 from schema.experiment.file import read_experiment, source_text
+from schema.plugins.bounded import parse_toml
 
 _GIVEN = "experiment"
 """Name of a text without a file, in messages."""

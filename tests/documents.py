@@ -3,9 +3,9 @@
 import pytest
 
 from schema.errors import ExperimentError
-from schema.experiment.bounded import parse_toml
 from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
+from schema.plugins.bounded import parse_toml
 
 
 def parse_experiment(text: str, where: str) -> Experiment:

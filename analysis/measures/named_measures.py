@@ -8,8 +8,8 @@ import pyarrow as pa
 from analysis.measures.load import LoadedRun
 from analysis.measures.population_table import individual_ids, rows_of
 from analysis.measures.run_tables import RunTables
-from schema.experiment.bounded import read_bytes
 from schema.limits import LONGEST_NAME, MOST_PLUGIN_BYTES, printable
+from schema.plugins.bounded import read_bytes
 from schema.plugins.kept import PLUGINS
 from schema.plugins.source import PATH
 

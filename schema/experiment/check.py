@@ -18,6 +18,7 @@ from schema.experiment.document import (
     island_experiments,
     light_of,
 )
+from schema.experiment.grid import grid_problems
 from schema.experiment.migration import Migration, migrant_count
 from schema.experiment.robust import calibration_problems
 from schema.experiment.selection_rules import rule_problems
@@ -58,6 +59,8 @@ def _problems(experiment: Experiment) -> Iterator[str]:
     yield from _name_problems(experiment.name)
     yield from _migration_problems(experiment)
     yield from _measures_problems(experiment.measures)
+    if experiment.grid is not None:
+        yield from grid_problems(experiment.grid, experiment.measures.labels)
     types = body_space(experiment.space)
     core = next(kind for kind in types.values() if kind.is_root)
     if core.inputs > experiment.space.max_inputs:

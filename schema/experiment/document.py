@@ -15,6 +15,7 @@ from msgspec import Meta, field, structs, to_builtins
 from schema.errors import ExperimentError
 from schema.experiment.changes import SettingChange
 from schema.experiment.environment import FLAT, Environment
+from schema.experiment.grid import Grid
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.experiment.robust import Calibration, NoiseLevel, Robust
@@ -564,6 +565,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
             that they inherit.
         founders: given founders of each island; without them all are random.
         changes: of settings, during the run.
+        grid: cells over measures, for rules of selection and figures, on all islands.
     """
 
     name: str
@@ -588,6 +590,7 @@ class Experiment(Section, frozen=True, dict=True, cache_hash=True):
     learning: Learning | None = None
     founders: Founders | None = None
     changes: tuple[SettingChange, ...] = ()
+    grid: Grid | None = None
 
     @cached_property
     def window(self) -> int:

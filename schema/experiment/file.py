@@ -10,11 +10,11 @@ from typing import NamedTuple
 import msgspec
 
 from schema.errors import ExperimentError, nearest
-from schema.experiment.bounded import near_files, parse_toml, text_of
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, references
 from schema.experiment.sweep import sweep_problems
 from schema.experiment.tables import Tables, at_point, converted, swept
+from schema.plugins.bounded import near_files, parse_toml, text_of
 from schema.plugins.parameters import known_keys
 from schema.plugins.permission import allow_references
 

@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 
 from schema.errors import ExperimentError, cut, one_line, shown
-from schema.experiment.bounded import is_finite, parse_xml
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.limits import MOST_GEOMS, MOST_OBJECTS, MOST_OTHERS, MOST_SCENERY_DEPTH
+from schema.plugins.bounded import is_finite, parse_xml
 from schema.robot.trace import Floats
 
 _ALLOWED = (

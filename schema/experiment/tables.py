@@ -9,11 +9,11 @@ import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError, check_most, cut, shown
-from schema.experiment.bounded import near_files, parse_toml, text_of
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.environment import scenery_problem
 from schema.experiment.sweep import Point, settings_problem, sweep_points, with_point
 from schema.limits import MOST_ISLANDS
+from schema.plugins.bounded import near_files, parse_toml, text_of
 from schema.plugins.parameters import read_parameters
 
 Tables = dict[str, Any]

@@ -10,7 +10,6 @@ import os
 from pathlib import Path
 
 from schema.errors import InvalidRobot, MalformedMessage, check_most, unreadable
-from schema.experiment.bounded import read_bytes
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -22,6 +21,7 @@ from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_reader import Reader
 from schema.limits import MOST_MJCF_BYTES, MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
+from schema.plugins.bounded import read_bytes
 from schema.robot.archive import PACKED, PROTOBUF, read_archive
 from schema.robot.brain import NeuronKinds
 from schema.robot.cpg import BUILT_IN_KINDS

@@ -17,12 +17,12 @@ from xml.etree import ElementTree as ET
 import msgspec
 
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage, one_line
-from schema.experiment.bounded import parse_xml, text_of
 from schema.experiment.brains import types_of
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.formats.mjcf_export import add_limits, add_sensors, exact_xml, portable
 from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import solo_spec
+from schema.plugins.bounded import parse_xml, text_of
 from schema.robot.robot import Robot, check_number, check_robot
 from schema.wire.protobuf import decode_robot, encode_robot
 

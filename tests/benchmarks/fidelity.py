@@ -26,7 +26,6 @@ from schema.errors import (
     SensorFailed,
     SimulationDiverged,
 )
-from schema.experiment.bounded import parse_toml
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     Experiment,
@@ -36,6 +35,7 @@ from schema.experiment.document import (
 )
 from schema.experiment.file import experiment_from_text, read_experiment
 from schema.experiment.settings import evaluation_settings_of, lasting
+from schema.plugins.bounded import parse_toml
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats

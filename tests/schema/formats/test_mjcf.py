@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from msgspec.structs import replace
 
 from schema.errors import InvalidRobot
-from schema.experiment.bounded import parse_xml
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.formats.files import settings_of
@@ -21,6 +20,7 @@ from schema.formats.mjcf_export import add_sensors
 from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN, CORE, Box, Sensor, Shape, constant_shape
+from schema.plugins.bounded import parse_xml
 from schema.robot.robot import Part, Robot
 from tests.schema.robots import GREY, random_robots, robot_of
 

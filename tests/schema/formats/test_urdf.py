@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from msgspec.structs import replace as changed
 
 from schema.errors import InvalidRobot
-from schema.experiment.bounded import parse_xml
 from schema.experiment.document import Simulation
 from schema.formats.files import read_robot, write_robot
 from schema.formats.urdf import robot_to_urdf
 from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import robot_spec
 from schema.parts import BUILT_IN
+from schema.plugins.bounded import parse_xml
 from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
 from schema.robot.robot import Part, Robot
 from tests.schema.robots import GREY, random_robots, robot_of

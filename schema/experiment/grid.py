@@ -1,0 +1,83 @@
+"""The section ``[grid]``: cells over a few measures, in which robots differ.
+
+Rules of selection keep the fittest robot of each cell; coverage and archive maps count
+the same cells.
+"""
+
+from collections.abc import Iterator, Mapping
+from math import prod
+from typing import Annotated
+
+from msgspec import Meta
+
+from schema.errors import nearest, shown
+from schema.experiment.section import AtLeastOne, Number, Section
+
+MOST_CELLS = 10_000
+"""Most cells of a grid: a population may have an individual in each."""
+_EPSILON = 1e-6
+"""Added to each value in units of bins, as pyribs does: 0.3 / 0.1 is less than 3."""
+
+Cell = tuple[int, ...]
+"""Numbers of the bins of a cell, in the order of the grid's measures, from 0."""
+
+
+class Grid(Section, frozen=True):
+    """Cells over one to four measures.
+
+    Values beyond the bounds of a measure count to its first or last bin.
+
+    Attributes:
+        measures: names of measures, of ``measures.names``.
+        bounds: least and greatest value of each [unit of the measure].
+        bins: number of equal intervals of each.
+    """
+
+    measures: Annotated[tuple[str, ...], Meta(min_length=1, max_length=4)]
+    bounds: tuple[tuple[Number, Number], ...]
+    bins: tuple[AtLeastOne, ...]
+
+
+def cell_of(grid: Grid, measures: Mapping[str, float]) -> Cell:
+    """Return the cell of an individual.
+
+    Args:
+        grid: the cells.
+        measures: of the individual by name, finite, at least those of the grid.
+
+    Source: ``GridArchive.index_of`` of pyribs 0.12, whose cells they are.
+    """
+    cell = []
+    for name, (low, high), bins in zip(
+        grid.measures, grid.bounds, grid.bins, strict=True
+    ):
+        place = (bins * (measures[name] - low) + _EPSILON) / (high - low)
+        cell.append(int(min(max(place, 0), bins - 1)))
+    return tuple(cell)
+
+
+def cell_name(cell: Cell) -> str:
+    """Return the name of a cell in tables: ``3/7``."""
+    return "/".join(map(str, cell))
+
+
+def grid_problems(grid: Grid, labels: tuple[str, ...]) -> Iterator[str]:
+    """Yield what is wrong with a grid over measures that have these labels."""
+    names = grid.measures
+    for name in names:
+        if name not in labels:
+            rule = f"{shown(name)} is not in measures.names"
+            yield f"grid.measures: {rule}{nearest(name, labels)}"
+        if names.count(name) > 1:
+            yield f"grid.measures: must differ, got {shown(name)} twice"
+    for key in ("bounds", "bins"):
+        count = len(getattr(grid, key))
+        if count != len(names):
+            rule = f"must have {len(names)}, one of each measure"
+            yield f"grid.{key}: {rule}, got {count}"
+    for low, high in grid.bounds:
+        if low >= high:
+            yield f"grid.bounds: must be [least, greatest], got [{low:g}, {high:g}]"
+    if prod(grid.bins) > MOST_CELLS:
+        cells = f"must make <= {MOST_CELLS} cells"
+        yield f"grid.bins: {cells}, got {prod(grid.bins)}"
