@@ -132,6 +132,7 @@ def _plugins() -> Iterator[str]:
     tables: list[tuple[str, str, type[Struct]]] = [
         *_with_parameters(every["fitness"], "fitness.parameters"),
         *_with_parameters(every["measure"], "measures.parameters.NAME"),
+        *_with_parameters(every["survivors"], "selection.survivors_parameters"),
         *_with_parameters(every["encoding"], "encoding.parameters"),
         *_with_parameters(every["learner"], "learning.parameters"),
         ("brain.parameters", "cpg", CpgParameters),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from revolve.arguments import in_order, whole_number
 from revolve.children import run_command
@@ -24,6 +25,7 @@ from schema.limits import MOST_SEED
 from schema.plugins.permission import allowed
 from schema.robot.archive import RobotOrigin
 from schema.robot.ids import BirthId
+from schema.tables.archives import archive_at
 from schema.tables.columns import TABLES
 from schema.tables.description import (
     allow_plugins_of,
@@ -233,6 +235,27 @@ class Run:
             self._born(birth, row["island"], row["fitness"])
             for birth, row in chosen.items()
         ]
+
+    def archive(self, at: int | None = None) -> list[tuple[Row, Robot]]:
+        """Return what the archives of all islands held, by island and entry.
+
+        Args:
+            at: births on each island at which to look; None: the last.
+
+        Returns:
+            Rows of the table ``archive``, with ``replaced_at``, and their robots.
+
+        Raises:
+            RunFolderError: a table is damaged.
+            RevolveError: another number.
+        """
+        rows = archive_at(self.folder, None if at is None else whole_number("at", at))
+        is_wanted = pc.field("birth").isin([row["birth"] for row in rows])
+        table = read_table(self.folder, "births", where=is_wanted)
+        places = {individual(row): at for at, row in enumerate(table.to_pylist())}
+        born = table.take([places[individual(row)] for row in rows])
+        robots = self._robots(born, [row["island"] for row in rows])
+        return list(zip(rows, robots, strict=True))
 
     def __repr__(self) -> str:
         return f"<Run {self.name}, seed {self.seed}: {self.state}, {self.folder}>"

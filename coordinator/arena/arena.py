@@ -46,6 +46,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.islands.migration import MigrationEpochs
+from coordinator.islands.rows import ArchiveRows
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, steps_of
 from schema.plugins.arena_rules import Conception, Decisions, Place
@@ -115,6 +116,7 @@ class Arena:
         )
         if epochs:
             epochs.emigrants = self._breeder.emigrants
+        self._archive_rows = ArchiveRows(number)
         self._founders: list[Candidate] = []
         self._advances = 0
         self._awaited: AdvanceShard | None = None
@@ -242,7 +244,7 @@ class Arena:
                 commands += self._insert(self._founders.pop())
             return commands + self._conclude()
         if matured := self.living.take_matured(self._number):
-            self._breeder.update(self.living.mature(), matured)
+            commands += self._remember(matured)
         if self.step % self.clock.sample == 0:
             commands += self.living.sample(self._moment)
             commands += self._rules.sample(self._moment)
@@ -251,6 +253,13 @@ class Arena:
         if self.is_finished or self._vetting_queue.is_busy:
             return commands
         return [*commands, *self._bear(), *self._conclude()]
+
+    def _remember(self, matured: Sequence[Individual]) -> list[Record]:
+        """Let rules of selection remember the mature; return the archive's new rows."""
+        mature, moment = self.living.mature(), self._moment
+        self._breeder.update(mature, matured)
+        archive = self._breeder.archive(mature)
+        return self._archive_rows.changes(archive, moment.births, moment.sim_time_s)
 
     def _apply_rules(self) -> list[ArenaCommand]:
         """Let the rules decide; end the run if it is over."""

@@ -31,6 +31,7 @@ from schema.plugins.source import digest_in_use, modules_named
 from schema.robot.ids import BirthId
 from schema.robot.results import Report
 from schema.robot.robot import Robot
+from schema.tables.archives import archive_at
 from schema.tables.columns import Row
 from schema.tables.description import KeptFounder, read_description, run_columns
 from schema.tables.files import read_table
@@ -158,8 +159,11 @@ def _difference(robot: Robot, stored: bytes | None, others: dict[str, str]) -> s
 def _births(folder: Path, given: Founders, most: int) -> Iterator[tuple[BirthId, Row]]:
     """Yield the births of a run that are founders, in order, with their rows."""
     if isinstance(given.population, str):
-        is_last = given.population == "last"
-        rows = fittest(last_populations(folder)) if is_last else best_ever(folder)
+        rows = best_ever(folder)
+        if given.population == "last":
+            rows = iter(fittest(last_populations(folder)))
+        elif given.population == "archive":
+            rows = iter(fittest(archive_at(folder)))
         own = (row for row in rows if given.island in (None, row["island"]))
         # Copies of a migrant count once.
         births = list(islice(dict.fromkeys(map(individual, own)), most))

@@ -162,12 +162,12 @@ class Breeder:
         self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
         self._relatives = relatives = Relatives(self._encoding.develop)
-        self._parents_rule = rule_of(experiment.selection, "parents", relatives)
-        self._survivors_rule = rule_of(experiment.selection, "survivors", relatives)
+        self._parents_rule = rule_of(experiment, "parents", relatives)
+        self._survivors_rule = rule_of(experiment, "survivors", relatives)
         self.emigrants: Rule | None = None
         migration = experiment.migration
         if migration is not None and ":" in migration.emigrants:
-            self.emigrants = rule_of(migration, "emigrants", relatives)
+            self.emigrants = rule_of(experiment, "emigrants", relatives)
         rules = (self._parents_rule, self._survivors_rule, self.emigrants)
         self._own = [rule for rule in rules if rule is not None and rule.relatives]
 
@@ -300,6 +300,21 @@ class Breeder:
         rule = self._survivors_rule
         with at_birth(last):
             return select_survivors(parents, children, rng, selection, rule)
+
+    def settle(
+        self, pool: Sequence[Individual], epoch: BirthId
+    ) -> tuple[Individual, ...]:
+        """Return who of natives and immigrants survives; the epoch names a stream."""
+        rng = self._stream(epoch, 0, Purpose.REPLACED)
+        selection, rule = self._experiment.selection, self._survivors_rule
+        return select_survivors((), failed_last(pool), rng, selection, rule)
+
+    def archive(self, population: Sequence[Individual]) -> Mapping[str, Individual]:
+        """Return the archive of the rule for survivors, else that for parents."""
+        archive = self._survivors_rule.archive(population)
+        if archive is None:
+            archive = self._parents_rule.archive(population)
+        return archive or {}
 
     def update(
         self, population: Sequence[Individual], brood: Sequence[Individual]

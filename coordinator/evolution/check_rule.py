@@ -108,6 +108,7 @@ def _live(
                 must = _IN_FUNCTION if rule.memory is None else _IN_SELECT
                 with unchanged(must, modules, rule.memory):
                     places()
+                    rule.archive(samples[island][number])
                 answers[island][brood, number] = repeated("", places)
     return answers
 

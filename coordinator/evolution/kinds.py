@@ -16,7 +16,7 @@ from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
-from coordinator.evolution.rules import rule_of
+from coordinator.evolution.rules import RULE_CLASSES, rule_of
 from coordinator.evolution.selection import PARENT_RULES, SURVIVOR_RULES
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
@@ -30,7 +30,7 @@ from schema.experiment.kinds import Kind, is_class, sections_of, takes
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from schema.experiment.selection_rules import METHODS as RULE_METHODS
-from schema.experiment.selection_rules import own_rule, rule_key
+from schema.experiment.selection_rules import NAMES, own_rule, rule_key
 from schema.plugins.load import load_object
 
 
@@ -41,10 +41,11 @@ class _Ruled(NamedTuple):
     labels: Labels
 
 
-def _selection_kind(name: str, built_in: Mapping[str, object], arguments: int) -> Kind:
+def _selection_kind(name: str, functions: Mapping[str, object], arguments: int) -> Kind:
     key = rule_key(name)
     part = key.partition(".")[0]
     of_key = attrgetter(key)
+    classes = {at: rule for at, rule in RULE_CLASSES.items() if at in NAMES[name]}
     empty = Migration() if name == "emigrants" else SelectionSection()
 
     def rules(whole: Experiment) -> Iterator[_Ruled]:
@@ -66,7 +67,7 @@ def _selection_kind(name: str, built_in: Mapping[str, object], arguments: int) -
     return Kind(
         name,
         key,
-        built_in,
+        {**functions, **classes},
         is_one=lambda plugin: (
             takes(arguments, plugin) or is_class(RULE_METHODS, plugin)
         ),
@@ -74,9 +75,7 @@ def _selection_kind(name: str, built_in: Mapping[str, object], arguments: int) -
         sections=rules,
         path=lambda ruled: str(of_key(ruled.island)),
         load=load,
-        check=lambda ruled: check_rule(
-            partial(rule_of, getattr(ruled.island, part), name), *ruled
-        ),
+        check=lambda ruled: check_rule(partial(rule_of, ruled.island, name), *ruled),
     )
 
 

@@ -11,7 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from coordinator.evolution.members import Relatives
+from coordinator.evolution.diversity.cells import Curiosity, MapElites
+from coordinator.evolution.diversity.fronts import AgeLayered, Nsga2
+from coordinator.evolution.diversity.novelty import DominatedNovelty, Novelty
+from coordinator.evolution.diversity.ranking import RankSelection
+from coordinator.evolution.members import Member, Relatives
 from coordinator.evolution.selection import (
     PARENT_RULES,
     SURVIVOR_RULES,
@@ -20,11 +24,23 @@ from coordinator.evolution.selection import (
     random_parents,
 )
 from schema.errors import ExperimentError, shown
-from schema.experiment.document import SelectionSection
-from schema.experiment.selection_rules import RuleSection, own_rule, rule_key
+from schema.experiment.brains import NoParameters
+from schema.experiment.check import naming
+from schema.experiment.document import Experiment, SelectionSection
+from schema.experiment.selection_rules import own_rule, rule_key
 from schema.plugins.contract import broken
 from schema.plugins.origin import naming_plugin
+from schema.plugins.parameters import read_parameters
 
+RULE_CLASSES: dict[str, type[Any]] = {
+    "curiosity": Curiosity,
+    "map-elites": MapElites,
+    "dominated-novelty": DominatedNovelty,
+    "novelty": Novelty,
+    "nsga2": Nsga2,
+    "age-layered": AgeLayered,
+}
+"""Built-in rankings; they get the experiment beside their parameters."""
 Select = Callable[[Any, int, np.random.Generator], Any]
 """Gets a population, a number and a stream; returns as many places."""
 
@@ -74,13 +90,34 @@ class Rule:
                     "must not replace individuals of the population"
                 ) from None
             places = _whole_numbers(answer)
-            if not len(places) == len(set(places)) == count or not (
+            most, number = (len(left), "at least ") if self.varies else (count, "")
+            if not count <= len(set(places)) == len(places) <= most or not (
                 min(places) >= 0 and max(places) < len(left)
             ):
-                highest = len(left) - 1
-                rule = f"return {count} different whole numbers from 0 to {highest}"
+                number = f"{number}{count} different whole numbers"
+                rule = f"return {number} from 0 to {len(left) - 1}"
                 raise broken("", rule, came=shown(answer))
             return [left[at] for at in places]
+
+    @property
+    def varies(self) -> bool:
+        """It selects at least the number that it is given."""
+        return getattr(self.plugin, "varies", False) is True
+
+    def archive(self, population: Sequence[S]) -> dict[str, S] | None:
+        """Return the archive of the rule by entry; None if it has none.
+
+        Raises:
+            ExperimentError: it raises, or returns anything else.
+        """
+        method = getattr(self.memory, "archive", None)
+        if self.relatives is None or not callable(method):
+            return None
+        with naming_plugin(self.key, self.plugin):
+            archive = dict(method(self.relatives.members(population)))
+            if not all(isinstance(one, Member) for one in archive.values()):
+                raise broken("archive", "return individuals by entry", archive)
+            return {str(entry): one for entry, one in archive.items()}
 
     def update(self, brood: Sequence[S]) -> None:
         """Change the memory of the rule, if it has one.
@@ -104,15 +141,21 @@ def _whole_numbers(answer: object) -> list[int]:
     return [int(at) for at in answer] if is_whole else []
 
 
-def rule_of(section: RuleSection, name: str, relatives: Relatives) -> Rule:
-    """Return a new rule that selects ``parents``, ``survivors`` or ``emigrants``.
+def rule_of(experiment: Experiment, name: str, relatives: Relatives) -> Rule:
+    """Return a new rule of an island for ``parents``, ``survivors`` or ``emigrants``.
 
     That of the parents of ``none`` is never called. Built-in emigrants have no rule.
 
     Raises:
-        ExperimentError: as of ``own_rule``, or its class raises.
+        ExperimentError: as of ``own_rule``, its class raises, or a built-in one lacks
+            a section or gets wrong parameters.
     """
     key = rule_key(name)
+    section: Any = getattr(experiment, key.partition(".")[0])
+    named = getattr(section, name)
+    if kind := RULE_CLASSES.get(named):
+        ranking = _ranking(kind, experiment, name)
+        return Rule(key, kind, ranking.select, relatives, ranking)
     if own := own_rule(section, name):
         plugin, parameters = own
         if not isinstance(plugin, type):
@@ -121,12 +164,28 @@ def rule_of(section: RuleSection, name: str, relatives: Relatives) -> Rule:
         with naming_plugin(key, plugin):
             memory = plugin(parameters)
         return Rule(key, plugin, memory.select, relatives, memory)
-    assert isinstance(section, SelectionSection)
     rules: Mapping[str, Any] = SURVIVOR_RULES if name == "survivors" else PARENT_RULES
-    rule = rules.get(getattr(section, name), random_parents)
+    rule = rules.get(named, random_parents)
     # The only parameters that any of them reads.
     size = Tournament(section.tournament_size)
     return Rule(key, rule, _with_parameters(name, rule, size))
+
+
+def check_rules(experiment: Experiment) -> None:
+    """Raise ``ExperimentError`` if built-in rules of an island lack what they need."""
+    for name in ("parents", "survivors"):
+        if kind := RULE_CLASSES.get(getattr(experiment.selection, name)):
+            _ranking(kind, experiment, name)
+
+
+def _ranking(kind: type[Any], experiment: Experiment, name: str) -> RankSelection:
+    key, section = rule_key(name), experiment.selection
+    table = getattr(section, f"{name}_parameters")
+    declared = getattr(kind, "Parameters", NoParameters)
+    parameters = read_parameters(table, declared, f"{key}_parameters")
+    size = section.tournament_size if name == "parents" else None
+    with naming(key):
+        return RankSelection(kind(parameters, experiment), size)
 
 
 def _with_parameters(
@@ -159,18 +218,18 @@ def select_survivors(
     selection: SelectionSection,
     rule: Rule,
 ) -> tuple[S, ...]:
-    """Return the next population of constant size, in birth order.
+    """Return the next population, in birth order.
 
-    A brood cut short by the end of the run always competes with its parents, or the
-    population would shrink.
+    Its size is constant, or as a rule that ``varies`` likes. A brood cut short by the
+    end of the run always competes with its parents, or the population would shrink.
 
     Raises:
         ExperimentError: the rule raises, or returns other than that many places.
     """
-    size = selection.population
+    size = max(1, selection.parents_needed) if rule.varies else selection.population
     pool = list(children)
     if selection.keep_parents or len(pool) < size:
         pool = [*parents, *pool]
-    if len(pool) > size:
+    if rule.varies or len(pool) > size:
         pool = [pool[at] for at in rule.places(size, pool, rng)]
     return tuple(sorted(pool, key=lambda one: one.birth))

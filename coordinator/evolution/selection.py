@@ -3,9 +3,9 @@
 Source: Hupkes 2016, sections 5.3 and 8.2; the code of the original.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import fsum
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from msgspec import Struct
@@ -55,15 +55,23 @@ def tournament(
     Each parent is the fittest of a few drawn without replacement, the second from the
     rest of the population. Of equals the elder wins.
     """
+    return winners(
+        len(population), lambda at: _order(population[at]), parameters.size, rng
+    )
+
+
+def winners(
+    count: int, order: Callable[[int], Any], size: int, rng: np.random.Generator
+) -> tuple[int, int]:
+    """Return the places of the winners of two tournaments, those of least order.
+
+    The second is drawn from the rest of the ``count`` places.
+    """
     draws = BufferedRng(rng)
-    places = list(range(len(population)))
-
-    def order(place: int) -> tuple[float, object]:
-        return _order(population[place])
-
-    first = min(draws.sample(places, parameters.size), key=order)
+    places = list(range(count))
+    first = min(draws.sample(places, size), key=order)
     places.remove(first)
-    return first, min(draws.sample(places, parameters.size), key=order)
+    return first, min(draws.sample(places, size), key=order)
 
 
 def random_parents(

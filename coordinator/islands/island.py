@@ -40,7 +40,12 @@ from coordinator.islands.reevaluation import (
     with_durations,
     with_points,
 )
-from coordinator.islands.rows import birth_record, evaluation_record, population_records
+from coordinator.islands.rows import (
+    ArchiveRows,
+    birth_record,
+    evaluation_record,
+    population_records,
+)
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
@@ -107,9 +112,12 @@ class Island:
         self._learning = (
             IslandLearning(experiment, self._encoding) if experiment.learning else None
         )
-        self._migration = IslandMigration(experiment, epochs) if epochs else None
+        self._migration = (
+            IslandMigration(experiment, epochs, self._breeder) if epochs else None
+        )
         if epochs:
             epochs.emigrants = self._breeder.emigrants
+        self._archive_rows = ArchiveRows(number)
         self._generation = 0
         self._begun = 0
         # Founders have no parents: all of them are in flight together.
@@ -325,6 +333,8 @@ class Island:
         commands: list[IslandCommand] = []
         fitness = [(one.birth, one.known_fitness) for one in self.population]
         commands += population_records(self._number, self.births, fitness)
+        archive = self._breeder.archive(self.population)
+        commands += self._archive_rows.changes(archive, self.births)
         if self.is_finished:
             migration = self._migration
             neighbours = migration.epochs.links.neighbours if migration else ()

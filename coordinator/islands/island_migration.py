@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from coordinator.evolution.breeding import Individual, failed_last
+from coordinator.evolution.breeding import Breeder, Individual, failed_last
 from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.events import Emigrate, MigrationEvent, Outcome, Record
 from coordinator.islands.migration import MigrationEpochs
@@ -24,8 +24,12 @@ class IslandMigration:
         epochs: when the island sends migrants, and what its neighbours sent.
     """
 
-    def __init__(self, experiment: Experiment, epochs: MigrationEpochs) -> None:
-        selection = experiment.selection
+    def __init__(
+        self, experiment: Experiment, epochs: MigrationEpochs, breeder: Breeder
+    ) -> None:
+        selection, migration = experiment.selection, experiment.migration
+        assert migration is not None
+        self._breeder = breeder if migration.replaced == "rule" else None
         self.epochs = epochs
         self._labels = experiment.measures.labels
         self._develop = encoding_of(experiment).develop
@@ -111,7 +115,11 @@ class IslandMigration:
     def _settle(
         self, population: Sequence[Individual], immigrants: Iterable[Individual]
     ) -> tuple[Individual, ...]:
-        """Return the population with all immigrants that there is room for."""
+        """Return the population with all immigrants for whom the island has room."""
+        if self._breeder is not None:
+            arrived = sorted(immigrants, key=lambda one: one.birth)
+            epoch = BirthId(self.epochs.island, self.epochs.epoch)
+            return self._breeder.settle([*population, *arrived], epoch)
         natives, settled = list(population), list[Individual]()
         for immigrant in immigrants:
             if len(natives) + len(settled) >= self._limit:

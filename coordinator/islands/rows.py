@@ -1,6 +1,6 @@
 """Table rows of off-line islands, and those that arenas share with them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from coordinator.evolution.breeding import Candidate, Individual, at_birth
@@ -177,6 +177,38 @@ def population_records(
         {**now, **named(birth, island), "fitness": value} for birth, value in fitness
     )
     return [Record("population", row) for row in rows]
+
+
+class ArchiveRows:
+    """Rows of the table ``archive``: what changed in the archive of an island."""
+
+    def __init__(self, island: int) -> None:
+        self._island = island
+        self._last: dict[str, Row] = {}
+
+    def changes(
+        self,
+        archive: Mapping[str, Individual],
+        births: int,
+        sim_time_s: float | None = None,
+    ) -> list[Record]:
+        """Return rows of entries that are empty now, then of new and changed ones."""
+        rows: dict[str, Row] = {
+            entry: {
+                **named(one.birth, self._island),
+                "fitness": one.known_fitness,
+                "measures": list(one.measures.items()) or None,
+            }
+            for entry, one in archive.items()
+        }
+        empty = dict.fromkeys(("birth_island", "birth", "fitness", "measures"))
+        changed = [(at, empty) for at in self._last if at not in rows]
+        changed += [at for at in rows.items() if at[1] != self._last.get(at[0])]
+        self._last = rows
+        now = {"island": self._island, "births": births, "sim_time_s": sim_time_s}
+        return [
+            Record("archive", {**now, "entry": entry, **row}) for entry, row in changed
+        ]
 
 
 def migration_records(

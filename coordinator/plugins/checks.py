@@ -18,6 +18,7 @@ from typing import IO
 
 from coordinator.arena.rules import load_rules
 from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.rules import check_rules
 from coordinator.islands.learning import IslandLearning
 from coordinator.storage.campaign import (
     campaign_plugins,
@@ -131,6 +132,7 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
     for own in island_experiments(experiment):
         if own.arena is not None and not is_own(own.arena.rules):
             load_rules(own)
+        check_rules(own)
         if not is_own(own.fitness.function):
             check_fitness_keys(own)
         if own.learning is not None:

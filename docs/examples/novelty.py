@@ -19,7 +19,7 @@ class Novelty:
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
-        self.archive: list[rv.Selectable] = []
+        self.known: list[rv.Selectable] = []
 
     def select(
         self, population: list[rv.Selectable], count: int, rng: np.random.Generator
@@ -31,10 +31,14 @@ class Novelty:
     def update(self, brood: list[rv.Selectable]) -> None:
         """Archive the novel individuals of a brood."""
         novelty = dict(zip(brood, self.novelty(brood), strict=True))
-        self.archive += [e for e in brood if novelty[e] >= self.parameters.archived]
+        self.known += [e for e in brood if novelty[e] >= self.parameters.archived]
+
+    def archive(self, _population: list[rv.Selectable]) -> dict[str, rv.Selectable]:
+        """Return the archive for the table of that name, by entry."""
+        return {e.birth.name: e for e in self.known}
 
     def novelty(self, some: list[rv.Selectable]) -> list[float]:
         """Return the mean distance to the nearest others, the first is to itself."""
-        known = list({e.birth: e for e in [*some, *self.archive]}.values())
+        others = list({e.birth: e for e in [*some, *self.known]}.values())
         nearest = slice(1, 1 + self.parameters.nearest)
-        return [float(np.sort(e.distances(known))[nearest].mean()) for e in some]
+        return [float(np.sort(e.distances(others))[nearest].mean()) for e in some]

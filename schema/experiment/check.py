@@ -21,7 +21,7 @@ from schema.experiment.document import (
 from schema.experiment.grid import grid_problems
 from schema.experiment.migration import Migration, migrant_count
 from schema.experiment.robust import calibration_problems
-from schema.experiment.selection_rules import rule_problems
+from schema.experiment.selection_rules import rule_problems, varies
 from schema.parts import BodySpace, Sensor
 
 _UNCONNECTED = """migration.topology: unconnected islands cannot exchange migrants; \
@@ -214,5 +214,9 @@ def _exchange_problems(own: Experiment, migration: Migration) -> Iterator[str]:
             f"and at most {living} live there"
         )
     if migration.replaced == "none" and not (arena or selection.culling):
-        varies = "off-line it varies only with selection.culling"
-        yield f'migration.replaced: "none" needs a varying population; {varies}'
+        only = "off-line it varies only with selection.culling"
+        yield f'migration.replaced: "none" needs a varying population; {only}'
+    if migration.replaced == "rule" and (arena or selection.culling):
+        yield 'migration.replaced: "rule" is for islands off-line without culling'
+    if migration.replaced != "rule" and varies(selection):
+        yield f'migration.replaced: must be "rule" with {shown(selection.survivors)}'

@@ -81,7 +81,7 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
 def _by(selection: SelectionSection) -> str:
     """Return how many robots are needed to choose parents from, and why."""
     rule = f"must be >= {selection.parents_needed}, to choose two parents"
-    if selection.parents != "tournament":
+    if selection.parents_needed != selection.tournament_size + 1:
         return rule
     return f"{rule} with tournament_size = {selection.tournament_size}"
 
@@ -179,7 +179,8 @@ def _founders_problems(founders: Founders, population: int) -> Iterator[str]:
         yield f"founders.population: must be 1 to {rule} births, got {len(given)}"
     if isinstance(given, str) and given not in FOUNDERS:
         got = f"got {shown(given)}{nearest(given, FOUNDERS)}"
-        yield f"founders.population: must be 'last', 'best' or a list of births, {got}"
+        names = ", ".join(map(repr, FOUNDERS))
+        yield f"founders.population: must be {names} or a list of births, {got}"
     if len(founders.files) > population:
         yield f"founders.files: must be <= {rule}, got {len(founders.files)}"
 

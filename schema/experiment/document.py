@@ -208,10 +208,11 @@ class Reevaluation(Section, frozen=True):
     fitness: Literal["replace", "mean"] = "replace"
 
 
-PARENTS = ("tournament", "random", "none")
-SURVIVORS = ("best", "random")
+_OF_BOTH = ("novelty", "nsga2", "age-layered")
+PARENTS = ("tournament", "random", "none", "curiosity", *_OF_BOTH)
+SURVIVORS = ("best", "random", "map-elites", "dominated-novelty", *_OF_BOTH)
 """Names of the built-in rules of selection."""
-FOUNDERS = ("last", "best")
+FOUNDERS = ("last", "best", "archive")
 """Names of the populations of another run that may be founders."""
 UNNAMED = ".founder.pb"
 """Ending of temporary files of given robots, whose paths say nothing."""
@@ -221,15 +222,19 @@ class SelectionSection(PluginSection, frozen=True):
     """Parent and survivor selection (thesis section 5.3).
 
     Attributes:
-        population: number of individuals; with ``culling``, number of founders.
+        population: number of individuals; with ``culling``, or survivors whose number
+            varies, number of founders.
         children: births per generation.
         window: births in flight at once; ``children`` if not given.
-        parents: selection of parents: ``tournament``, ``random``, ``none``, which makes
-            each child a random robot, or ``module:attribute``.
-        parents_parameters: parameters of an own selection of parents.
+        parents: selection of parents: ``tournament`` of fitness, ``random``, ``none``,
+            which makes each child a random robot; tournaments of ``curiosity``,
+            ``novelty``, ``nsga2`` or ``age-layered``; or ``module:attribute``.
+        parents_parameters: parameters of the selection of parents.
         tournament_size: individuals per tournament.
-        survivors: the ``best`` or ``random`` ones survive, or ``module:attribute``.
-        survivors_parameters: parameters of an own selection of survivors.
+        survivors: the ``best`` or ``random`` ones survive, those that ``map-elites``,
+            ``dominated-novelty``, ``novelty``, ``nsga2`` or ``age-layered`` keep, or
+            ``module:attribute``.
+        survivors_parameters: parameters of the selection of survivors.
         keep_parents: parents compete with their children for survival.
         max_mating_attempts: attempts per birth before two new parents are chosen.
         culling: makes the population vary in size.
@@ -252,8 +257,9 @@ class SelectionSection(PluginSection, frozen=True):
     @property
     def parents_needed(self) -> int:
         """Least population to choose two parents from; 0 if none are chosen."""
-        needs = {"tournament": self.tournament_size + 1, "none": 0}
-        return needs.get(self.parents, 2)
+        if ":" in self.parents:
+            return 2
+        return {"random": 2, "none": 0}.get(self.parents, self.tournament_size + 1)
 
 
 class FounderGenome(Section, frozen=True):
@@ -279,8 +285,8 @@ class Founders(Section, frozen=True):
         run: folder of a run, relative to the document; not together with ``files``.
         island: of that run; all islands if not given. Numbers of births are those of
             island 0 then.
-        population: the fittest of the ``last`` population, or the ``best`` ever, both
-            up to ``selection.population``; or numbers of births.
+        population: the fittest of the ``last`` population, of its ``archive``, or the
+            ``best`` ever, up to ``selection.population``; or numbers of births.
         repeat: fill up by copies of these in order; otherwise by random robots.
         genomes: what these keys led to; ``revolve run`` sets it in their place.
     """

@@ -1,8 +1,4 @@
-"""The section ``[grid]``: cells over a few measures, in which robots differ.
-
-Rules of selection keep the fittest robot of each cell; coverage and archive maps count
-the same cells.
-"""
+"""The section ``[grid]``: cells over a few measures, for selection and figures."""
 
 from collections.abc import Iterator, Mapping
 from math import prod
@@ -16,7 +12,7 @@ from schema.experiment.section import AtLeastOne, Number, Section
 MOST_CELLS = 10_000
 """Most cells of a grid: a population may have an individual in each."""
 _EPSILON = 1e-6
-"""Added to each value in units of bins, as pyribs does: 0.3 / 0.1 is less than 3."""
+"""Added before the division, as pyribs does: 0.3 / 0.1 is less than 3."""
 
 Cell = tuple[int, ...]
 """Numbers of the bins of a cell, in the order of the grid's measures, from 0."""
@@ -39,11 +35,7 @@ class Grid(Section, frozen=True):
 
 
 def cell_of(grid: Grid, measures: Mapping[str, float]) -> Cell:
-    """Return the cell of an individual.
-
-    Args:
-        grid: the cells.
-        measures: of the individual by name, finite, at least those of the grid.
+    """Return the cell of an individual with these measures, which are finite.
 
     Source: ``GridArchive.index_of`` of pyribs 0.12, whose cells they are.
     """
@@ -63,21 +55,16 @@ def cell_name(cell: Cell) -> str:
 
 def grid_problems(grid: Grid, labels: tuple[str, ...]) -> Iterator[str]:
     """Yield what is wrong with a grid over measures that have these labels."""
-    names = grid.measures
+    names, bounds, bins = grid.measures, grid.bounds, grid.bins
     for name in names:
         if name not in labels:
-            rule = f"{shown(name)} is not in measures.names"
-            yield f"grid.measures: {rule}{nearest(name, labels)}"
-        if names.count(name) > 1:
-            yield f"grid.measures: must differ, got {shown(name)} twice"
-    for key in ("bounds", "bins"):
-        count = len(getattr(grid, key))
-        if count != len(names):
-            rule = f"must have {len(names)}, one of each measure"
-            yield f"grid.{key}: {rule}, got {count}"
-    for low, high in grid.bounds:
+            near = nearest(name, labels)
+            yield f"grid.measures: {shown(name)} is not in measures.names{near}"
+    if not len(set(names)) == len(names) == len(bounds) == len(bins):
+        rule = "must be as many as bounds and bins, and differ"
+        yield f"grid.measures: {rule}, got {shown(names)}, {len(bounds)}, {len(bins)}"
+    for low, high in bounds:
         if low >= high:
             yield f"grid.bounds: must be [least, greatest], got [{low:g}, {high:g}]"
-    if prod(grid.bins) > MOST_CELLS:
-        cells = f"must make <= {MOST_CELLS} cells"
-        yield f"grid.bins: {cells}, got {prod(grid.bins)}"
+    if prod(bins) > MOST_CELLS:
+        yield f"grid.bins: must make <= {MOST_CELLS} cells, got {prod(bins)}"

@@ -55,7 +55,8 @@ class Migration(PluginSection, frozen=True):
         handling: ``preserve`` copies the same migrants to each neighbour; ``evict``
             moves each migrant to one neighbour.
         replaced: individuals that make room for immigrants; ``none`` requires a
-            population of varying size.
+            population of varying size. With ``rule`` the island's selection of
+            survivors decides among natives and immigrants, off-line only.
         judge_anew: re-evaluate immigrants; always the case in an arena, and between
             islands that evaluate in different ways.
     """
@@ -70,7 +71,7 @@ class Migration(PluginSection, frozen=True):
     emigrants: str = "best"
     emigrants_parameters: Parameters = field(default_factory=dict)
     handling: Literal["preserve", "evict"] = "preserve"
-    replaced: Literal["worst", "random", "none"] = "worst"
+    replaced: Literal["worst", "random", "none", "rule"] = "worst"
     judge_anew: bool = False
 
 

@@ -18,7 +18,10 @@ RuleSection = SelectionSection | Migration
 METHODS = ("select", "update")
 """Methods of a rule that is a class."""
 _ARGUMENTS = {"parents": 3, "survivors": 4, "emigrants": 4}
-_NAMES = {"parents": PARENTS, "survivors": SURVIVORS, "emigrants": EMIGRANTS}
+NAMES = {"parents": PARENTS, "survivors": SURVIVORS, "emigrants": EMIGRANTS}
+"""Built-in rules of each kind."""
+_FUNCTIONS = {"tournament", "random", "none", "best"}
+"""Built-in rules without parameters."""
 
 
 def rule_key(name: str) -> str:
@@ -56,9 +59,16 @@ def own_rule(section: RuleSection, name: str) -> tuple[Callable[..., Any], Any] 
     return function, None
 
 
+def varies(selection: SelectionSection) -> bool:
+    """Return whether the survivors are as many as their rule likes."""
+    own = own_rule(selection, "survivors")
+    is_varying = own is not None and getattr(own[0], "varies", False) is True
+    return is_varying or selection.survivors == "map-elites"
+
+
 def rule_problems(section: RuleSection) -> Iterator[str]:
     """Yield what is wrong with the rules of a section."""
-    for name, built_in in _NAMES.items():
+    for name, built_in in NAMES.items():
         path = getattr(section, name, None)
         if path is None:
             continue
@@ -66,6 +76,6 @@ def rule_problems(section: RuleSection) -> Iterator[str]:
             own_rule(section, name)
         elif path not in built_in:
             yield str(unknown(path, rule_key(name), built_in))
-        elif table := getattr(section, f"{name}_parameters"):
+        elif path in _FUNCTIONS and (table := getattr(section, f"{name}_parameters")):
             why = f"{path!r} has no parameters, got {shown(table)}"
             yield f"{rule_key(name)}_parameters: {why}"

@@ -542,6 +542,10 @@ class StatefulSelection(Protocol):
     are shared by all islands and runs of a process. A run that is resumed makes a new
     object and calls both methods as before. The memory of an island stays there;
     migrants carry nothing of it.
+
+    ``varies = True`` in a class for survivors makes ``count`` the least number of
+    places, and `select` is called after each brood. A method ``archive(population)``
+    may return individuals by the entries, texts, that they hold; it changes nothing.
     """
 
     def select(

@@ -517,6 +517,19 @@ PATCHES = _table(
     _column("radius_m", _FLOAT, "radius of the place", unit="m"),
     _column("content", _FLOAT, "what it holds, such as energy", unit="1"),
 )
+ARCHIVE = _table(
+    "archive",
+    "a change of the archive that a rule of selection keeps on an island: who is in an "
+    "entry from now on; nobody if birth is null",
+    _ISLAND,
+    _BIRTHS,
+    _TIME.with_nullable(True),
+    _column("entry", pa.string(), "cell, such as 3/7, or island:birth"),
+    _BIRTH_ISLAND,
+    _BIRTH.with_nullable(True),
+    _OUTCOME[0],
+    _MEASURES,
+)
 MIGRATIONS = _table(
     "migrations",
     "a migrant sent",

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import (
     ArenaCommand,
@@ -46,6 +48,12 @@ Fit = Callable[[BirthId, int], float]
 def distinct_on_islands(birth: BirthId, island: int) -> float:
     """Return a fitness in (0, 1) that differs between births and between islands."""
     return (birth.number * 0.618034 + birth.island * 0.31 + island * 0.07 + 0.1) % 1.0
+
+
+def drawn_measures(birth: BirthId, count: int) -> tuple[float, ...]:
+    """Return measures in [0, 1) that differ between births."""
+    drawn = np.random.default_rng([birth.number, birth.island]).random(count)
+    return tuple(drawn.tolist())
 
 
 FEW = SelectionSection(population=5, tournament_size=2)
@@ -120,7 +128,10 @@ class ArchipelagoRun:
             case Vet():
                 self.tell(number, self.verdict(asked))
             case Evaluate():
-                found = Evaluation(self.fit(asked.birth, number), 0.1, 0.0, 12.0)
+                labels = self.experiment.measures.labels
+                measures = drawn_measures(asked.birth, len(labels))
+                fitness = self.fit(asked.birth, number)
+                found = Evaluation(fitness, 0.1, 0.0, 12.0, measures)
                 answer = Evaluated(
                     asked.birth, found, PROVENANCE, asked.trial, asked.requester
                 )

@@ -166,6 +166,50 @@ epoch = 15
 judge_anew = true
 """
 
+DIVERSE = """
+name = "diverse"
+births = 24
+[simulation]
+window_steps = 80
+[selection]
+population = 6
+children = 6
+tournament_size = 2
+[measures]
+names = ["body_size", "straight_velocity"]
+[grid]
+measures = ["body_size", "straight_velocity"]
+bounds = [[3, 31], [0, 0.5]]
+bins = [7, 5]
+[[islands]]
+[islands.selection]
+parents = "curiosity"
+survivors = "map-elites"
+[[islands]]
+[islands.selection]
+parents = "novelty"
+survivors = "novelty"
+survivors_parameters = {nearest = 3, threshold = 0.1, capacity = 9}
+[[islands]]
+[islands.selection]
+survivors = "dominated-novelty"
+[[islands]]
+[islands.selection]
+parents = "nsga2"
+parents_parameters.objectives = {fitness = "max", body_size = "min"}
+survivors = "nsga2"
+survivors_parameters.objectives = {fitness = "max", body_size = "min"}
+[[islands]]
+[islands.selection]
+parents = "age-layered"
+survivors = "age-layered"
+[migration]
+topology = "ring"
+epoch = 6
+replaced = "rule"
+"""
+"""An island of each rule of diversity; the rule of the receiver judges migrants."""
+
 ARENAS = f"""
 name = "arenas"
 births = 10

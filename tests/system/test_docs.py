@@ -12,6 +12,8 @@ from coordinator.storage.compare import compare
 from revolve.cli.commands import COMMANDS
 from schema.experiment.document import ArenaSection
 from schema.parts import ACTIVE_HINGE, PartType
+from schema.tables.archives import archive_at
+from schema.tables.files import read_table
 from tests.docs.page_runner import blocks_of
 from tests.documents import parse_experiment
 from tests.own_brains import write_module
@@ -64,8 +66,8 @@ def test_code_of_pages_about_tables_runs(
 def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
     """Two workers give the births of one process; the run needs its folder alone."""
     page = TOP / "docs" / "selection.md"
-    module, _ = blocks_of(page, "python")
-    document, _ = blocks_of(page, "toml")
+    module, *_ = blocks_of(page, "python")
+    document, *_ = blocks_of(page, "toml")
     folder = _write(workspace, {"crowding.py": module, "crowding.toml": document})
     block, _ = blocks_of(page, "sh")
     check, run = (line.split()[1:] for line in block.strip().splitlines())
@@ -86,6 +88,25 @@ def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
     (folder / "crowding.py").unlink()
     workspace.run("resume", "two", "--in-process", "--quiet")
     assert compare(folder / "calm", folder / "two") == []
+
+
+def test_archive_of_the_selection_page_is_read_and_begins_a_run(
+    workspace: Workspace,
+) -> None:
+    page = TOP / "docs" / "selection.md"
+    _write(workspace, {"kinds.toml": blocks_of(page, "toml")[2]})
+    words = ("--seed", "0", "--births", "45", "--quiet", "--workers", "2")
+    workspace.run("run", "kinds.toml", *words, "--out", "runs/kinds-seed0")
+    block = blocks_of(page, "python")[2].replace("at=60", "at=30")
+    told = workspace.python("-W", "error", "-c", block)
+    assert len(told.splitlines()) > 5
+    again = 'name = "again"\nbirths = 15\n[founders]\nrun = "runs/kinds-seed0"\n'
+    _write(workspace, {"again.toml": f'{again}population = "archive"\n'})
+    workspace.run("run", "again.toml", "--quiet", "--in-process", "--out", "again")
+    origins = read_table(workspace.folder / "again", "births")["origin_birth"]
+    held = archive_at(workspace.folder / "runs" / "kinds-seed0")
+    fittest = sorted(held, key=lambda row: -row["fitness"])[:15]
+    assert origins.to_pylist() == [row["birth"] for row in fittest]
 
 
 def test_rule_of_the_selection_page_remembers_per_island_and_run(
@@ -115,9 +136,10 @@ def test_rule_of_the_selection_page_remembers_per_island_and_run(
     killed.communicate()
     workspace.run("resume", "killed", "--workers", "1", "--quiet")
     assert compare(runs[0], folder / "killed") == []
+    assert read_table(runs[0], "archive").num_rows > 1
     shared = files["novelty.py"].replace("\n\nclass", "\nARCHIVE = []\n\n\nclass", 1)
-    text = "self.archive: list[rv.Selectable] = []"
-    _write(workspace, {"novelty.py": shared.replace(text, "self.archive = ARCHIVE")})
+    text = "self.known: list[rv.Selectable] = []"
+    _write(workspace, {"novelty.py": shared.replace(text, "self.known = ARCHIVE")})
     told = workspace.run(*run, "--in-process", "--out", "shared", code=2)
     assert told.endswith(f" {_quoted(page, 'selection.parents:')}\n")
     assert not (folder / "shared").exists()

@@ -15,6 +15,7 @@ from schema.tables.description import description_text, read_description
 from tests.system.documents import (
     ARENAS,
     BRIDGE,
+    DIVERSE,
     LEARNING,
     MIXED,
     OFF_LINE,
@@ -42,6 +43,7 @@ HOLDS = (
         pytest.param(BRIDGE, 15, 24, id="re-evaluations in a world that changes"),
         pytest.param(LEARNING, 6, 9, id="learning"),
         pytest.param(RING, 34, 64, id="a ring whose islands had closed"),
+        pytest.param(DIVERSE, 14, 24, id="islands of all rules of diversity"),
         pytest.param(SEASONS, 8, 12, id="an arena in a world that changes"),
         pytest.param(ARENAS, 6, 10, id="arenas with migration"),
         pytest.param(MIXED, 21, 26, id="an island and an arena"),

@@ -18,6 +18,7 @@ from tests.system.documents import (
     ARENAS,
     BRIDGE,
     CROWDED_ARENA,
+    DIVERSE,
     LEARNING,
     MIXED,
     OFF_LINE,
@@ -42,6 +43,7 @@ DOCUMENTS = {
     "learning": LEARNING,
     "crowd": CROWDED_ARENA,
     "ring": RING,
+    "diverse": DIVERSE,
     "arenas": ARENAS,
     "pond": POND,
     "ponds": PONDS,
@@ -92,7 +94,7 @@ def killed(folder: Path, mode: str, kills: tuple[int, int], seed: int) -> Any:  
 @pytest.mark.parametrize(
     ("mode", "kinds", "kills"),
     [
-        ("instants", ("bridge", "arena", "crowd"), (24, 0)),
+        ("instants", ("bridge", "arena", "crowd", "diverse"), (30, 0)),
         ("fleet", ("off", "bridge", "learning", "mixed"), (8, 24)),
     ],
 )

@@ -9,13 +9,23 @@ import pytest
 
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.members import Relatives
-from coordinator.evolution.rules import rule_of, select_parents, select_survivors
+from coordinator.evolution.rules import (
+    Rule,
+    rule_of,
+    select_parents,
+    select_survivors,
+)
 from coordinator.evolution.selection import (
     cull_population,
     fittest_first,
     select_culled,
 )
-from schema.experiment.document import ArenaSection, Culling, SelectionSection
+from schema.experiment.document import (
+    ArenaSection,
+    Culling,
+    Experiment,
+    SelectionSection,
+)
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -36,10 +46,14 @@ def numbers(chosen: Any) -> list[int]:  # noqa: ANN401 - any individuals
     return [one.birth.number for one in chosen]
 
 
+def rule(selection: SelectionSection, name: str) -> Rule:
+    return rule_of(Experiment("test", selection=selection), name, RELATIVES)
+
+
 def couples(population: list[Individual], **settings: Any) -> list[list[int]]:  # noqa: ANN401 - any setting
     selection = SelectionSection(**settings)
-    rng, rule = np.random.default_rng(2), rule_of(selection, "parents", RELATIVES)
-    return [numbers(select_parents(population, rng, rule)) for _ in range(N)]
+    rng, tournament = np.random.default_rng(2), rule(selection, "parents")
+    return [numbers(select_parents(population, rng, tournament)) for _ in range(N)]
 
 
 def test_of_equals_the_elder_comes_first() -> None:
@@ -82,8 +96,10 @@ def survivors(
     **settings: Any,  # noqa: ANN401 - any setting
 ) -> list[int]:
     rng, selection = np.random.default_rng(seed), SelectionSection(**settings)
-    rule = rule_of(selection, "survivors", RELATIVES)
-    return numbers(select_survivors(parents, children, rng, selection, rule))
+    chosen = select_survivors(
+        parents, children, rng, selection, rule(selection, "survivors")
+    )
+    return numbers(chosen)
 
 
 OLD = individuals(0.5, 0.1, 0.3)

@@ -19,7 +19,14 @@ from coordinator.evolution.check_rule import check_rule as check_rule_of
 from coordinator.evolution.members import Relatives
 from coordinator.evolution.rules import Rule, select_parents, select_survivors
 from schema.errors import ExperimentError, UnknownPlugin
-from schema.experiment.document import PARENTS, SURVIVORS, Experiment, SelectionSection
+from schema.experiment.document import (
+    PARENTS,
+    SURVIVORS,
+    Experiment,
+    Measures,
+    SelectionSection,
+)
+from schema.experiment.grid import Grid
 from schema.experiment.migration import Migration
 from schema.experiment.selection_rules import RuleSection
 from schema.robot.genome import Node
@@ -99,8 +106,19 @@ def chain(genome: int) -> Robot:
     return Robot((Part("Core", -1, -1, -1, 0, ()), *bricks))
 
 
+GRID = Grid(measures=("limbs", "size"), bounds=((0, 3), (0, 5)), bins=(4, 4))
+
+
+def with_rules(section: RuleSection) -> Experiment:
+    measures = Measures(names=GRID.measures)
+    document = Experiment("test", measures=measures, grid=GRID)
+    if isinstance(section, Migration):
+        return structs.replace(document, migration=section)
+    return structs.replace(document, selection=section)
+
+
 def rule_of(section: RuleSection, name: str) -> Rule:
-    return island_rules.rule_of(section, name, Relatives(chain))
+    return island_rules.rule_of(with_rules(section), name, Relatives(chain))
 
 
 def check_rule(rule: Rule) -> str:
@@ -114,8 +132,15 @@ def check_rule(rule: Rule) -> str:
 def test_built_in_rules_keep_their_contract(name: str, rule: str) -> None:
     # A tournament of one draws from any population.
     section = structs.replace(SelectionSection(tournament_size=1), **{name: rule})
-    built_in = rule_of(section, name)
-    check_rule(replace(built_in, relatives=Relatives(chain)))
+    if rule == "nsga2":
+        objectives = {"objectives": {"fitness": "max", "size": "min"}}
+        section = structs.replace(section, **{f"{name}_parameters": objectives})
+
+    def make(relatives: Relatives) -> Rule:
+        built_in = island_rules.rule_of(with_rules(section), name, relatives)
+        return replace(built_in, relatives=relatives)
+
+    check_rule_of(make, Experiment("test"))
 
 
 def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
@@ -303,8 +328,36 @@ def novel(population, count, rng, parameters, seen=[]):
 
 
 def check_new(section: RuleSection, name: str) -> str:
-    make = partial(island_rules.rule_of, section, name)
+    make = partial(island_rules.rule_of, with_rules(section), name)
     return check_rule_of(make, Experiment("test"))
+
+
+@pytest.mark.parametrize(
+    ("archive", "expected"),
+    [
+        ("return {one.birth.name: one for one in population}", ""),
+        (
+            "return {0: population[0].birth}",
+            "archive: must return individuals by entry",
+        ),
+        ("return 3", "raised TypeError"),
+        ("self.first = population[0]; return {}", "must not write in select"),
+    ],
+)
+def test_archive_of_an_own_rule_is_checked(
+    lab: Callable[[str], str], archive: str, expected: str
+) -> None:
+    methods = (
+        "\n    def __init__(self, parameters):\n        pass\n"
+        f"\n    def archive(self, population):\n        {archive}\n"
+    )
+    path = f"{lab(LAB + methods)}:Mindful"
+    section = SelectionSection(survivors=path)
+    if not expected:
+        assert not check_new(section, "survivors")
+        return
+    with pytest.raises(ExperimentError, match=expected):
+        check_new(section, "survivors")
 
 
 KEEPS = "self.archive += [one.fitness for one in brood]"

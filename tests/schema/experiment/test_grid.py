@@ -50,7 +50,10 @@ _KEYS = "[measures]\nnames = ['size', 'joints']\n[grid]\n"
         ("bounds = [[0, 1]]\nbins = [2]", "grid: must have a key 'measures'"),
         ("measures = ['sise']\nbounds = [[0, 1]]\nbins = [2]", "mean 'size'"),
         ("measures = ['size']\nbounds = [[1, 1]]\nbins = [2]", r"got \[1, 1\]"),
-        ("measures = ['size']\nbounds = [[0, 1]]\nbins = [2, 3]", "have 1, .*got 2"),
+        (
+            "measures = ['size']\nbounds = [[0, 1]]\nbins = [2, 3]",
+            "got .*, 1, 2",
+        ),
         (
             "measures = ['size']\nbounds = [[0, 1]]\nbins = [12_000]",
             "<= 10000 cells, got 12000",

@@ -98,6 +98,12 @@ def test_births_of_a_flag_replace_those_of_each_island(tmp_path: Path) -> None:
         ("migrants = 2", "migrants = 0.03", "rounds to 0"),
         ("migrants = 2", "migrants = 16", "<= 15"),
         ("migrants = 2", 'replaced = "none"', r"varies.*island 0"),
+        ("migrants = 2", 'replaced = "rule"', r'"rule" is for.*off-line.*island 4'),
+        (
+            "count = 4",
+            'count = 4\nselection.survivors = "map-elites"',
+            'must be "rule"',
+        ),
         ("epoch = 30", 'topology = "star"', "the same on all islands"),
         ("epoch = 30", "epok = 30", r"islands\[0\]\.migration\.epok.*'epoch'"),
         ("population = 20", "population = 3", r"islands\[1\]: selection"),

@@ -53,7 +53,7 @@ SELECTION = [
     ("[selection]\npopulation = 1\nparents = 'random'", "must be >= 2, .*nts, got 1"),
     ("[selection]\nchildren = 9\nkeep_parents = false", "children: must be >= .* = 15"),
     ("[selection]\nwindow = 16", "children: must be >= .*window = 16, got 15"),
-    ("[selection]\nparents = 'rank'", "parents: must be one of .* none .* got 'rank'"),
+    ("[selection]\nparents = 'rank'", "parents: must be one of .* none, .* got 'rank'"),
     ("[[islands]]\nselection = {survivors = 'bets'}", r"islands.0.: .*mean 'best'"),
     ("[selection.culling]\npopulation_floor = 4", "population_floor: must be >= 5"),
     ("[selection.culling]\npopulation_limit = 14", "population_limit: .* 15, .* 14"),

@@ -1,0 +1,1 @@
+"""Rules of selection that keep a population diverse; each ranks or fills cells."""
