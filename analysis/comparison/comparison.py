@@ -29,13 +29,19 @@ from analysis.comparison.statistics import (
 from analysis.measures.outputs import OUTCOME, OWN, schema
 from analysis.measures.population_table import Numbers
 from analysis.measures.study import MeasuredRun, reach
+from schema.experiment.grid import Grid
 
 Row = dict[str, Any]
 
 OF_FITNESS = frozenset({
     "fitness", "fitness_best", "late_gain", "late_rise", "variability", "gain",
+    "qd_score", "hypervolume",
 })  # fmt: skip
 """Measures whose values depend on the scale of the fitness function."""
+OF_GRID = frozenset({
+    "coverage", "qd_score", "archive_entropy", "hypervolume", "cell_entropy", "novelty",
+})  # fmt: skip
+"""Measures whose values depend on the grid."""
 
 
 class RunOutcomes(NamedTuple):
@@ -46,12 +52,14 @@ class RunOutcomes(NamedTuple):
         fitness: fitness function as ``fitness_text``.
         births: numbers of births at which it has outcomes.
         at: returns the outcomes at one of these, by measure.
+        grid: cells over measures.
     """
 
     folder: str
     fitness: str
     births: Collection[int]
     at: Callable[[int], Mapping[str, float]]
+    grid: Grid | None = None
 
 
 class Outcomes:
@@ -99,6 +107,10 @@ class Outcomes:
         runs = (run for name in experiments for run in self.runs[name])
         return list(dict.fromkeys(run.fitness for run in runs))
 
+    def have_one_grid(self, *experiments: str) -> bool:
+        """Return whether the runs of experiments have the same cells, or none."""
+        return len({run.grid for name in experiments for run in self.runs[name]}) == 1
+
     def table(self) -> pa.Table:
         """Return the outcomes of all finished runs, at births that all reach."""
         rows: list[Row] = []
@@ -118,7 +130,10 @@ def outcomes_of(measured: Sequence[MeasuredRun]) -> Outcomes:
     for one in measured:
         if one.run.is_finished and (end := reach(one)):
             at = partial(outcome, one.tables, settings=one.run.islands)
-            made = RunOutcomes(str(one.run.folder), one.run.fitness, range(end + 1), at)
+            grid = one.run.settings.grid
+            made = RunOutcomes(
+                str(one.run.folder), one.run.fitness, range(end + 1), at, grid
+            )
             runs.setdefault(one.run.experiment, []).append(made)
     return Outcomes(runs)
 
@@ -126,7 +141,8 @@ def outcomes_of(measured: Sequence[MeasuredRun]) -> Outcomes:
 def comparison(outcomes: Outcomes) -> pa.Table:
     """Return the comparison of every pair of experiments by every measure.
 
-    Pairs with different fitness functions have no rows of the measures ``OF_FITNESS``.
+    Pairs with different fitness functions have no rows of the measures ``OF_FITNESS``,
+    those with different grids none of ``OF_GRID``.
     A measure that is equal in all runs of both is no test: it has no p, and does not
     count for the correction of the others.
     """
@@ -134,8 +150,10 @@ def comparison(outcomes: Outcomes) -> pa.Table:
     for a, b in combinations(outcomes.experiments, 2):
         births = outcomes.births(a, b)
         is_alike = len(outcomes.fitness_functions(a, b)) == 1
+        unlike = frozenset() if is_alike else OF_FITNESS
+        unlike |= frozenset() if outcomes.have_one_grid(a, b) else OF_GRID
         for measure in (*OUTCOME, *outcomes.own_measures(births, a, b)):
-            if measure in OF_FITNESS and not is_alike:
+            if measure in unlike:
                 continue
             samples = [outcomes.values(name, measure, births) for name in (a, b)]
             if measure != "births" and all(map(len, samples)):

@@ -83,6 +83,24 @@ def unique_ancestors(table: PopulationTable, lines: list[int]) -> Integers:
     return np.array([union.bit_count() for union in unions], np.int64)
 
 
+def phylogenetic_diversity(table: PopulationTable, parents: list[list[int]]) -> Numbers:
+    """Return the branches of the tree of each population, (G,), of length 1 each.
+
+    The tree has all living robots, their first parents, those of these, and so on up to
+    the founders. A child begins as a copy of its first parent.
+
+    Source: Faith 1992, "Conservation evaluation and phylogenetic diversity".
+    """
+    firsts = [each[:1] for each in parents]
+    lines = ancestors(firsts)
+    founders = sum(1 << row for row, above in enumerate(firsts) if not above)
+    unions = [0] * len(table)
+    pairs = zip(table.group_of.tolist(), table.members.tolist(), strict=True)
+    for group, member in pairs:
+        unions[group] |= lines[member] | 1 << member
+    return np.array([(union & ~founders).bit_count() for union in unions], np.float64)
+
+
 def foreign_share(
     table: PopulationTable, births: pa.Table, parents: list[list[int]]
 ) -> Numbers:

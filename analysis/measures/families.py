@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from analysis.measures.ancestry import parents_of
-from analysis.measures.diversity import distances_of
+from analysis.measures.diversity.distances import distances_of
 from analysis.measures.outputs import run_schema
 from analysis.measures.run_tables import RunTables
 from schema.robot.trees import Integers, Trees

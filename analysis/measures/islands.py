@@ -3,7 +3,7 @@
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.diversity import distances_of, diversity
+from analysis.measures.diversity.distances import distances_of, diversity
 from analysis.measures.outputs import run_schema
 from analysis.measures.population_table import individual_ids, is_last_of_each, rows_of
 from analysis.measures.run_tables import RunTables

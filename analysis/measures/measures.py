@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 
 from analysis.measures.arenas import interactions, last_samples, variability
 from analysis.measures.bodies import extremity_bins
+from analysis.measures.diversity.grids import cells
 from analysis.measures.ecosystems import (
     birth_places,
     couples,
@@ -214,6 +215,11 @@ _OTHERS = {
         named_measures,
         _OF_ROBOTS,
         lambda islands: any(island.measures.names for island in islands),
+    ),
+    "cells": _Measure(
+        cells,
+        "births evaluations fitness",
+        lambda islands: any(island.grid for island in islands),
     ),
     "changes": _Measure(
         season_changes,

@@ -50,6 +50,17 @@ POPULATION = {
     "ancestors_per_robot": "ancestors divided by judged",
     "diversity": "mean tree edit distance of pairs of living robots",
     "retention": "share of living robots that are still alive 120 births later",
+    "phylogenetic_diversity": "branches of the tree of living robots and their first "
+    "parents up to the founders, each of length 1",
+    "coverage": "share of the grid's cells that the births so far have reached",
+    "qd_score": "sum over these cells of the greatest fitness so far minus grid.offset",
+    "archive_entropy": "entropy of the births so far over the grid's cells [nats]",
+    "hypervolume": "volume that the births so far dominate: fitness above grid.offset "
+    "and the grid's measures as shares of their ranges, all maximised; null for more "
+    "than two measures",
+    "cell_entropy": "entropy of living robots over the grid's cells [nats]",
+    "novelty": "mean distance of living robots to the 5 nearest, in measures of the "
+    "grid as shares of their ranges",
     "foreign": "share of living robots that, or whose ancestors, were born elsewhere",
     **{name: f"mean of judged robots: {what}" for name, what in BODY.items()},
     **{name: f"mean of judged robots: {what}" for name, what in PER_PART.items()},
@@ -227,6 +238,15 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "living": "descendants in that island's last population, itself included",
         "reached": "islands whose last population contains it or a descendant",
     },
+    "cells": {
+        **_RUN,
+        "island": _ISLAND["island"],
+        "cell": "bins of the grid's measures, from 0, such as 3/7",
+        **_ROBOT,
+        "fitness": "greatest fitness that a robot of the cell had",
+        "births": "births on the island when it was reached",
+        "robots": "evaluations in the cell; on-line samples of fitness",
+    },
     "named_measures": {
         **_ISLAND,
         "measure": "name in measures.names",
@@ -379,7 +399,7 @@ _INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "pla
              "trial", "born", "children", "patch"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measure",
           "a", "b", "figure", "claim", "expected", "verdict", "why", "what", "topic",
-          "setting", "value", "differs", "function", "fitness_function",
+          "setting", "value", "cell", "differs", "function", "fitness_function",
           "plugins", "about", "reason"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 

@@ -7,8 +7,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.ancestry import foreign_share, unique_ancestors
-from analysis.measures.diversity import diversity
+from analysis.measures.ancestry import (
+    foreign_share,
+    phylogenetic_diversity,
+    unique_ancestors,
+)
+from analysis.measures.diversity.distances import diversity
+from analysis.measures.diversity.grids import grid_measures
 from analysis.measures.outputs import POPULATION
 from analysis.measures.population_table import Numbers, PopulationTable, ratio
 from analysis.measures.run_tables import Problems, RunTables
@@ -87,6 +92,12 @@ _POPULATION: dict[str, Callable[[RunTables], Columns]] = {
     "fitness": _fitness,
     "ancestors": _ancestors,
     "diversity": lambda run: {"diversity": diversity(run.population_table, run.trees)},
+    "phylogeny": lambda run: {
+        "phylogenetic_diversity": phylogenetic_diversity(
+            run.population_table, run.parents
+        )
+    },
+    "grid": grid_measures,
     "retention": lambda run: {"retention": retention(run.population_table)},
     "foreign": lambda run: {
         "foreign": foreign_share(run.population_table, run.births, run.parents)

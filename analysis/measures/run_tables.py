@@ -8,12 +8,14 @@ import pyarrow as pa
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import SlotRule, body_sizes, encode
 from analysis.measures.brains.measures import brain_measures
+from analysis.measures.diversity.samples import Samples, samples
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
     population_table,
 )
 from schema.experiment.document import Experiment
+from schema.experiment.grid import Grid
 from schema.robot.trees import Trees
 
 Problems = dict[str, str]
@@ -50,6 +52,19 @@ class RunTables:
     def population_table(self) -> PopulationTable:
         """Recorded populations."""
         return population_table(self.tables["population"], self.births)
+
+    @property
+    def grid(self) -> Grid | None:
+        """Cells over measures, of all islands."""
+        return self.islands[0].grid if self.islands else None
+
+    @cached_property
+    def samples(self) -> Samples | None:
+        """Fitness and measures of the grid of all robots; None without a grid."""
+        if self.grid is None:
+            return None
+        evaluations, fitness = (self.tables[n] for n in ("evaluations", "fitness"))
+        return samples(evaluations, fitness, self.births, self.grid.measures)
 
     @cached_property
     def trees(self) -> Trees:

@@ -27,11 +27,13 @@ class Grid(Section, frozen=True):
         measures: names of measures, of ``measures.names``.
         bounds: least and greatest value of each [unit of the measure].
         bins: number of equal intervals of each.
+        offset: least possible fitness: QD score and hypervolume count what is above it.
     """
 
     measures: Annotated[tuple[str, ...], Meta(min_length=1, max_length=4)]
     bounds: tuple[tuple[Number, Number], ...]
     bins: tuple[AtLeastOne, ...]
+    offset: Number = 0.0
 
 
 def cell_of(grid: Grid, measures: Mapping[str, float]) -> Cell:

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from analysis.measures.brains.controllers import Controller, Name, controllers
-from analysis.measures.diversity import distances_of
+from analysis.measures.diversity.distances import distances_of
 from analysis.measures.population_table import Numbers
 from schema.robot.brain import NEURON_TYPES
 from schema.robot.cpg import BUILT_IN_KINDS

@@ -11,7 +11,7 @@ from analysis.comparison.progression import progression
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.arenas import interactions, variability
 from analysis.measures.bodies import body_sizes, encode, extremity_bins
-from analysis.measures.diversity import diversity
+from analysis.measures.diversity.distances import diversity
 from analysis.measures.islands import mean_distances, migrants
 from analysis.measures.measures import births_so_far, measure, robots
 from analysis.measures.outputs import schema

@@ -1,0 +1,1 @@
+"""Diversity: distances of bodies, cells of a grid, fronts of several objectives."""
