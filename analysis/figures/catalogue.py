@@ -1,7 +1,7 @@
 """Catalogue of the figures: number, title, caption and drawing function."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -130,6 +130,13 @@ def _course(
         partial(over_births, measure=measure, text=text),
         section,
     )
+
+
+def _of_cells(number: str, title: str, measure: str, text: str) -> Figure:
+    """Return a figure of a measure that needs cells over measures."""
+    figure = _course("diversity", number, title, measure, text)
+    source = ("cells", *figure.source)
+    return replace(figure, source=source, nothing="no experiment has a [grid]")
 
 
 def _with_note(tables: Tables, text: str) -> str:
@@ -271,5 +278,10 @@ FIGURES: tuple[Figure, ...] = (
            "rules of their own are shown.",
            ("birth_places", "couples", "patch_means"), ground_map, "islands",
            nothing=_NO_RULES),
+    _of_cells("Q", "Coverage over births", "coverage",
+              "share of cells reached so far"),
+    _of_cells("R", "QD score over births", "qd_score", "QD score"),
+    _of_cells("T", "Novelty over births", "novelty",
+              "mean distance to 5 nearest robots"),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

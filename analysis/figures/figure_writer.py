@@ -1,7 +1,7 @@
 """Draws all figures that the data allows; records why the others are left out."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from glob import escape
 from itertools import chain, count
@@ -10,6 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 from rich.progress import Progress
 
+from analysis.figures.archive_maps import ArchiveMap, archive_maps, map_figures
 from analysis.figures.catalogue import FIGURES, DrawnFigure, Figure
 from analysis.figures.family_tree import LINEAGE, Best
 from analysis.figures.forms import NothingToDraw, Tables, fitness_units
@@ -45,6 +46,7 @@ class Drawings:
     films: list[Film]
     no_films: dict[str, str]
     left_out: list[LeftOut]
+    maps: list[ArchiveMap] = field(default_factory=list)
 
 
 class FigureWriter:
@@ -59,7 +61,7 @@ class FigureWriter:
         """Remove files of earlier analyses whose names the experiments determine."""
         self._folder = folder
         self._taken: set[str] = set()
-        for pattern in ("G-*.p??", "S-*.p??", f"{_FILM}*.gif"):
+        for pattern in ("G-*.p??", "P-*.p??", "S-*.p??", f"{_FILM}*.gif"):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
@@ -153,9 +155,12 @@ def draw_figures(
     lineages = [LINEAGE.empty_table(), *lines.values()]
     given = {**tables, "lineage": pa.concat_tables(lineages)}
     units = fitness_units(tables)
+    reached = tables.get("cells")
+    maps, no_maps = archive_maps(reached, runs) if reached else ([], {})
     every = [
         *FIGURES,
         *_sweeps(tables),
+        *map_figures(maps, no_maps, units),
         *gait_figures([*pictures.values()], problems, units),
         *tree_figures(pictures, problems, lines, tables["robots"], units),
     ]
@@ -163,7 +168,7 @@ def draw_figures(
         writer.add(figure, given)
     films = [writer.add_film(one) for one in pictures.values()]
     figures = sorted(writer.drawn, key=_place)
-    return Drawings(figures, films, problems, writer.left_out)
+    return Drawings(figures, films, problems, writer.left_out, maps)
 
 
 def _sweeps(tables: Tables) -> Iterator[Figure]:

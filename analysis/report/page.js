@@ -10,6 +10,11 @@
     const mark = event.target.closest("[data-tip]");
     if (!mark) { hide(); return; }
     tip.textContent = mark.dataset.tip;
+    if (mark.matches(".robot")) {
+      const large = mark.cloneNode(true);
+      for (const name of ["x", "y", "width", "height"]) large.removeAttribute(name);
+      tip.append(large);
+    }
     tip.hidden = false;
     const { width, height } = tip.getBoundingClientRect();
     const right = document.documentElement.clientWidth - width - 8;

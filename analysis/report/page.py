@@ -10,6 +10,7 @@ from importlib.resources import files
 import pyarrow.compute as pc
 from PIL import Image
 
+from analysis.figures.archive_maps import MAP, ArchiveMap, map_caption
 from analysis.figures.catalogue import DrawnFigure, Section
 from analysis.figures.figure_writer import Drawings, Film
 from analysis.figures.forms import Tables
@@ -17,6 +18,7 @@ from analysis.figures.robot_figures import GAITS, PART_COLOURS
 from analysis.figures.style import in_order, label
 from analysis.measures.fitness_functions import axis_text
 from analysis.measures.outputs import OUTPUTS
+from analysis.report.archive_map import interactive_map
 from analysis.report.differences import all_differences, differences
 from analysis.report.fitness import (
     fitness_over_births,
@@ -112,7 +114,8 @@ def _sections(
     over_births = (*_COURSES[:2], _COURSES[2] + _COURSES_OF_ARENAS * has_arena)
     courses = _of_functions(tables, fitness_over_births, over_births, by_number)
     last = _of_functions(tables, last_populations, _LAST, by_number)
-    plots = {"6.3": courses, "6.2": last}
+    maps = {f"{MAP}-{one.experiment}": _map(one, by_number) for one in drawings.maps}
+    plots = {"6.3": courses, "6.2": last, **maps}
     installed = [[cell(name), cell(text)] for name, text in versions.items()]
     software = table(("software", "version"), installed)
 
@@ -131,7 +134,10 @@ def _sections(
         "fitness": ("Fitness", last + shown("fitness")),
         "comparison": ("Comparison", all_differences(tables)),
         "bodies": ("Bodies", shown("bodies")),
-        "diversity": ("Diversity and ancestry", shown("diversity")),
+        "diversity": (
+            "Diversity and ancestry",
+            "".join(maps.values()) + shown("diversity"),
+        ),
         "islands": ("Islands and arenas", shown("islands")),
         "measures": ("Measures of the experiments", shown("measures") + _own(tables)),
         "learning": ("Lifetime learning", shown("learning")),
@@ -190,6 +196,17 @@ def _of_functions(
             f'<figure id="{anchor}">{plot}<figcaption>{caption}</figcaption></figure>'
         )
     return "".join(figures)
+
+
+def _map(one: ArchiveMap, drawn: Mapping[str, DrawnFigure]) -> str:
+    number = f"{MAP}-{one.experiment}"
+    name = escape(f"Archive map of {label(one.experiment)}.")
+    files_of = f" {_file_of(drawn[number])}" if number in drawn else ""
+    return (
+        f'<figure id="figure-{escape(number)}" class="wide">{interactive_map(one)}'
+        f"<figcaption><b>{name}</b> {escape(map_caption(one))} A pointer on a cell "
+        f"shows its robot.{files_of}</figcaption></figure>"
+    )
 
 
 def _films(tables: Tables, drawings: Drawings) -> str:

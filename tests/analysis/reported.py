@@ -9,11 +9,14 @@ import pyarrow as pa
 from PIL import Image
 
 from analysis.comparison.progression import progression
+from analysis.figures.archive_maps import ArchiveMap, MapCell
 from analysis.figures.catalogue import DrawnFigure, Figure
 from analysis.figures.family_tree import Best
 from analysis.figures.figure_writer import Drawings, Film, film
 from analysis.measures.outputs import schema
+from analysis.render.plan import CORE, Outline
 from analysis.report.page import report
+from schema.experiment.grid import Grid
 
 NOTHING = Drawings([], [], {}, [])
 RUNS: list[dict[str, Any]] = [
@@ -90,7 +93,14 @@ def drawings(folder: Path) -> Drawings:
         for number, source in (("6.9", "outcomes"), ("A", "<a> file"))
     ]
     films = [Film(Best("soft", Path("soft-1"), 0, 0, 2, 0.3), folder / "one.gif")]
-    return Drawings(figures, films, {"hard & <b>": "no driver <x>"}, [])
+    corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5)])
+    cells = [
+        MapCell(at, at % 2, float(at), f"0:{at}", [Outline(corners, CORE)], "#9ecae1")
+        for at in range(3)
+    ]
+    grid = Grid(("size <b>", "energy"), bounds=((0, 30), (0, 1)), bins=(3, 2))
+    maps = [ArchiveMap("soft", Path("soft-1"), grid, cells, 3)]
+    return Drawings(figures, films, {"hard & <b>": "no driver <x>"}, [], maps)
 
 
 def page(given: dict[str, pa.Table], drawn: Drawings) -> str:
