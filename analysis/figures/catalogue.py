@@ -23,6 +23,7 @@ from analysis.figures.forms import (
     over_runs,
     spread_caption,
 )
+from analysis.figures.fronts import fronts
 from analysis.figures.islands import between, fitness_by_island, migration_graph
 from analysis.figures.learning import bodies_saved, learning_curves, learning_gain
 from analysis.figures.robots import extremities_and_fitness, lineages, variability
@@ -283,5 +284,10 @@ FIGURES: tuple[Figure, ...] = (
     _of_cells("R", "QD score over births", "qd_score", "QD score"),
     _of_cells("T", "Novelty over births", "novelty",
               "mean distance to 5 nearest robots"),
+    Figure("U", "Pareto fronts",
+           "All births in the first two objectives, pale, and those that no birth of "
+           "their island dominates in all objectives, joined by a line for each run "
+           "and island.",
+           ("fronts",), fronts, "diversity", nothing="no experiment has objectives"),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

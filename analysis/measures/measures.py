@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 from analysis.measures.arenas import interactions, last_samples, variability
 from analysis.measures.bodies import extremity_bins
 from analysis.measures.diversity.grids import cells
+from analysis.measures.diversity.objectives import fronts, objectives_of
 from analysis.measures.ecosystems import (
     birth_places,
     couples,
@@ -220,6 +221,11 @@ _OTHERS = {
         cells,
         "births evaluations fitness",
         lambda islands: any(island.grid for island in islands),
+    ),
+    "fronts": _Measure(
+        fronts,
+        "births evaluations",
+        lambda islands: any(map(objectives_of, islands)),
     ),
     "changes": _Measure(
         season_changes,

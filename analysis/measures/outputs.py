@@ -13,6 +13,7 @@ _KINDS = {
     "birth_island": pa.int32(),
     "is_last": pa.bool_(),
     "is_failed": pa.bool_(),
+    "is_front": pa.bool_(),
     "near_automatic": pa.bool_(),
     "kept": pa.bool_(),
     "saved": pa.bool_(),
@@ -56,8 +57,8 @@ POPULATION = {
     "qd_score": "sum over these cells of the greatest fitness so far minus grid.offset",
     "archive_entropy": "entropy of the births so far over the grid's cells [nats]",
     "hypervolume": "volume that the births so far dominate: fitness above grid.offset "
-    "and the grid's measures as shares of their ranges, all maximised; null for more "
-    "than two measures",
+    "and the grid's measures as shares of their ranges, those of grid.minimised from "
+    "the other end; null for more than two measures",
     "cell_entropy": "entropy of living robots over the grid's cells [nats]",
     "novelty": "mean distance of living robots to the 5 nearest, in measures of the "
     "grid as shares of their ranges",
@@ -247,6 +248,16 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "births": "births on the island when it was reached",
         "robots": "evaluations in the cell; on-line samples of fitness",
     },
+    "fronts": {
+        **_RUN,
+        "island": _ISLAND["island"],
+        **_ROBOT,
+        "x_objective": "first objective of nsga2, and whether its max or min is sought",
+        "y_objective": "second objective",
+        "x": "value of the first objective",
+        "y": "value of the second one",
+        "is_front": "whether no birth of the island dominates it in all objectives",
+    },
     "named_measures": {
         **_ISLAND,
         "measure": "name in measures.names",
@@ -399,8 +410,9 @@ _INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "pla
              "trial", "born", "children", "patch"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measure",
           "a", "b", "figure", "claim", "expected", "verdict", "why", "what", "topic",
-          "setting", "value", "cell", "differs", "function", "fitness_function",
-          "plugins", "about", "reason"}  # fmt: skip
+          "setting", "value", "differs", "function", "fitness_function",
+          "plugins", "about", "reason", "cell", "x_objective",
+          "y_objective"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

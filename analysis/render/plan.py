@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from schema.parts import BodySpace, PartType
 from schema.robot.frames import place_parts, shapes_of
@@ -68,5 +67,25 @@ def _defaults(kind: PartType) -> tuple[float, ...]:
 
 
 def _hull(points: Floats) -> Floats:
-    corners: Floats = points[ConvexHull(points, qhull_options="QJ").vertices]
-    return corners
+    """Return the corners of the convex hull of points, (N, 2), anticlockwise.
+
+    Source: Andrew 1979, the monotone chain.
+    """
+    ordered = sorted(map(tuple, points.tolist()))
+    corners: list[tuple[float, float]] = []
+    for some in (ordered, ordered[::-1]):
+        chain: list[tuple[float, float]] = []
+        for point in some:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        corners += chain[:-1]
+    return np.array(corners)
+
+
+def _turn(
+    first: tuple[float, float], second: tuple[float, float], third: tuple[float, float]
+) -> float:
+    """Return a number that is positive if a path turns left."""
+    (x, y), (x_2, y_2), (x_3, y_3) = first, second, third
+    return (x_2 - x) * (y_3 - y) - (y_2 - y) * (x_3 - x)

@@ -27,12 +27,14 @@ class Grid(Section, frozen=True):
         measures: names of measures, of ``measures.names``.
         bounds: least and greatest value of each [unit of the measure].
         bins: number of equal intervals of each.
+        minimised: those of which less is better, in the hypervolume.
         offset: least possible fitness: QD score and hypervolume count what is above it.
     """
 
     measures: Annotated[tuple[str, ...], Meta(min_length=1, max_length=4)]
     bounds: tuple[tuple[Number, Number], ...]
     bins: tuple[AtLeastOne, ...]
+    minimised: tuple[str, ...] = ()
     offset: Number = 0.0
 
 
@@ -65,6 +67,9 @@ def grid_problems(grid: Grid, labels: tuple[str, ...]) -> Iterator[str]:
     if not len(set(names)) == len(names) == len(bounds) == len(bins):
         rule = "must be as many as bounds and bins, and differ"
         yield f"grid.measures: {rule}, got {shown(names)}, {len(bounds)}, {len(bins)}"
+    for name in set(grid.minimised).difference(names):
+        near = nearest(name, names)
+        yield f"grid.minimised: {shown(name)} is not in grid.measures{near}"
     for low, high in bounds:
         if low >= high:
             yield f"grid.bounds: must be [least, greatest], got [{low:g}, {high:g}]"

@@ -12,9 +12,12 @@ def front(points: Numbers) -> Numbers:
     greater in one. Of equal points there is one.
     """
     different = np.unique(points, axis=0)
-    is_below = (different[:, np.newaxis] <= different).all(axis=2)
-    # Each point is below itself.
-    kept: Numbers = different[is_below.sum(axis=1) == 1]
+    is_kept = np.zeros(len(different), np.bool_)
+    # A point comes after all points that it may dominate.
+    for at in range(len(different) - 1, -1, -1):
+        rivals = different[at + 1 :][is_kept[at + 1 :]]
+        is_kept[at] = not (rivals >= different[at]).all(axis=1).any()
+    kept: Numbers = different[is_kept]
     return kept
 
 

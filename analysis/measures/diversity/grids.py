@@ -41,6 +41,7 @@ class Archive:
         self.qd_score = 0.0
         self._fitness: dict[Cell, float] = {}
         self._front: Numbers = np.empty((0, 1 + len(grid.measures)))
+        self._is_minimised = np.isin(grid.measures, grid.minimised)
         self._logs = self._volume = 0.0
 
     def add(self, index: int, fitness: float, values: Numbers) -> None:
@@ -54,8 +55,10 @@ class Archive:
         if last is None or fitness > last:
             self.qd_score += fitness - (grid.offset if last is None else last)
             self._fitness[cell], self.elites[cell] = fitness, index
+        within = shares(grid, values)
         if 1 + len(values) <= _MOST_OBJECTIVES and fitness > grid.offset:
-            point = np.append(shares(grid, values), fitness - grid.offset)
+            worth = np.where(self._is_minimised, 1.0 - within, within)
+            point = np.append(worth, fitness - grid.offset)
             if added := added_volume(self._front, point):
                 self._volume += added
                 self._front = front(np.vstack([self._front, point]))

@@ -10,9 +10,15 @@ import pytest
 
 from analysis.measures.diversity.fronts import added_volume, front, hypervolume
 from analysis.measures.diversity.grids import Archive, cells, grid_measures, novelty
+from analysis.measures.diversity.objectives import fronts
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import RunTables
-from schema.experiment.document import ArenaSection, Experiment, Measures
+from schema.experiment.document import (
+    ArenaSection,
+    Experiment,
+    Measures,
+    SelectionSection,
+)
 from schema.experiment.grid import Grid, cell_name
 from tests.analysis.tables import births, population, run, table
 
@@ -134,6 +140,11 @@ def test_hypervolume_is_that_of_the_boxes(objectives: int) -> None:
     points = rng.integers(0, 6, (8, objectives)).astype(float)
     assert hypervolume(points) == pytest.approx(union(points))
     kept = front(points)
+    assert not any(
+        (other >= point).all() and (other > point).any()
+        for point in kept
+        for other in points
+    )
     assert union(kept) == pytest.approx(union(points))
     for point in points:
         alone = [other for other in kept if (other >= point).all()]
@@ -141,6 +152,39 @@ def test_hypervolume_is_that_of_the_boxes(objectives: int) -> None:
     new = np.full(objectives, 4.0)
     more = union(np.vstack([points, new])) - union(points)
     assert added_volume(kept, new) == pytest.approx(more)
+
+
+def test_less_of_a_minimised_measure_dominates_more() -> None:
+    archive = Archive(Grid(("x",), bounds=((0, 10),), bins=(2,), minimised=("x",)))
+    for index, value in enumerate((4.0, 9.0)):
+        archive.add(index, 1.0 + index, np.array([value]))
+    # Boxes 0.6 x 1 and 0.1 x 2.
+    assert archive.scores[-1] == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("key", ["parents", "survivors"])
+def test_fronts_are_those_of_the_objectives(key: str) -> None:
+    """B has less of x than A and is fitter; C is on the front; D failed."""
+    objectives = {"objectives": {"x": "min", "fitness": "max"}}
+    section: dict[str, Any] = {key: "nsga2", f"{key}_parameters": objectives}
+    selection = SelectionSection(**section)
+    found = RunTables(
+        run(
+            births=births((A, []), (B, []), (C, []), (D, [])),
+            evaluations=table("evaluations", [
+                evaluation(A, 1.0, 0.5), evaluation(B, 2.0, 0.4),
+                evaluation(C, 3.0, 0.6), evaluation(D, None),
+            ]),
+        ),
+        islands=[Experiment(name="e", selection=selection)],
+    )  # fmt: skip
+    rows = fronts(found).drop_columns(["island", "birth_island"]).to_pylist()
+    assert [tuple(row.values()) for row in rows] == [
+        (birth, "x (min)", "fitness (max)", x, fitness, is_front)
+        for birth, x, fitness, is_front in (
+            (0, 0.5, 1.0, False), (1, 0.4, 2.0, True), (2, 0.6, 3.0, True),
+        )
+    ]  # fmt: skip
 
 
 @pytest.mark.long

@@ -55,6 +55,10 @@ _KEYS = "[measures]\nnames = ['size', 'joints']\n[grid]\n"
             "got .*, 1, 2",
         ),
         (
+            "measures = ['size']\nbounds = [[0, 1]]\nbins = [2]\nminimised = ['sise']",
+            "'sise' is not in grid.measures; did you mean 'size'",
+        ),
+        (
             "measures = ['size']\nbounds = [[0, 1]]\nbins = [12_000]",
             "<= 10000 cells, got 12000",
         ),
