@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
-from analysis.viewer.entities import island_path, motion_path, robot_path
+from analysis.viewer.entities import archive_path, island_path, motion_path, robot_path
 from analysis.viewer.motion import LANES
 from analysis.viewer.recording import BIRTHS, SIMULATED
 from analysis.viewer.scene import Scene
@@ -29,13 +29,14 @@ def layout(
     panels = rrb.Vertical(
         _curves("Fitness", islands, "fitness"),
         _curves("Population", islands, "size"),
+        *_archives(scene),
         rrb.Tabs(
             rrb.TextLogView(name="Births, deaths, migrations", origin="/log"),
             rrb.GraphView(name="Ancestry", origin="/ancestry"),
             rrb.TextDocumentView(name="Workers", origin="/workers"),
             active_tab=1,
         ),
-        row_shares=[3, 2, 4],
+        row_shares=[3, 2, 3, 4] if scene.grid else [3, 2, 4],
     )
     root = rrb.Horizontal(rrb.Grid(*views), panels, column_shares=[5, 3])
     # Off-line populations have no simulated time.
@@ -63,6 +64,21 @@ def _curves(name: str, islands: Sequence[int], what: str) -> rrb.TimeSeriesView:
         contents=[f"/{island_path(each)}/{what}" for each in islands],
         axis_x=rrb.TimeAxis(view_range=all_of_it),
     )
+
+
+def _archives(scene: Scene) -> list[rrb.Tabs]:
+    """Return the archive maps, if the experiment has a grid; y is upwards."""
+    if scene.grid is None:
+        return []
+    over = " by ".join(scene.grid.measures[1::-1])
+    own = "" if len(scene.islands) == 1 else " of island {}"
+    views = [
+        rrb.Spatial2DView(
+            origin=f"/{archive_path(each)}", name=f"Archive{own.format(each)}: {over}"
+        )
+        for each in scene.islands
+    ]
+    return [rrb.Tabs(*views)]
 
 
 def _island_view(

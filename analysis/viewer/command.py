@@ -75,7 +75,7 @@ def _replay(
     name = recording_name(news.experiment, folder.resolve().name)
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         recording.add_scene(scene)
-        show = Show(recording, scene.space)
+        show = Show(recording, scene.space, scene.grid)
         span = None
         if scene.arenas:
             span = span_of(options, LAST_S, ViewerError)

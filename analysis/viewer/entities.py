@@ -38,6 +38,11 @@ def robot_path(island: int, birth: BirthId) -> str:
     return f"islands/{island}/robots/{birth.island}-{birth.number}"
 
 
+def archive_path(island: int) -> str:
+    """Return the entity of the archive map of an island."""
+    return f"islands/{island}/archive"
+
+
 def motion_path(birth: BirthId) -> str:
     """Return the entity of a re-simulated robot."""
     return f"motion/{birth.island}-{birth.number}"

@@ -1,13 +1,19 @@
-"""Off-line populations on a grid, and the ancestry graph of the newest births."""
+"""Off-line populations side by side, archive maps, and the ancestry graph."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
-from itertools import count
+from collections.abc import Callable, Iterable, Mapping
+from itertools import count, groupby
+from operator import attrgetter
+
+import numpy as np
+import numpy.typing as npt
 
 from analysis.viewer.body import BoxModel, neutral_pose
 from analysis.viewer.entities import AncestryNode, TimePoint, robot_path
 from analysis.viewer.recording import Recording
+from schema.experiment.grid import Grid
 from schema.robot.ids import BirthId
+from schema.wire.elites import Elite
 from schema.wire.updates import Birth, Death, Level
 
 SPACING_M = 0.6
@@ -15,6 +21,8 @@ COLUMNS = 5
 """Spots in a row; the first row is nearest to the camera."""
 
 
+_PALE, _DARK = np.array([222.0, 235.0, 247.0]), np.array([8.0, 69.0, 148.0])
+"""Colours of the least and the most fit cells."""
 BoxModels = Mapping[BirthId, Callable[[], BoxModel]]
 """Functions that return the box models of the known robots."""
 _MOST = 150
@@ -53,6 +61,45 @@ def spot_place(spot: int) -> tuple[float, float]:
     """Return the place of a spot of the grid [m]; the middle column is at x = 0."""
     row, column = divmod(spot, COLUMNS)
     return SPACING_M * (column - COLUMNS // 2), SPACING_M * (row - 1)
+
+
+class ArchiveMaps:
+    """Maps of the fitness of cells, over the first two measures of a grid.
+
+    Of further measures each cell shows the fittest. Pale cells are the least fit, dark
+    ones the fittest so far; white ones have not been reached.
+    """
+
+    def __init__(self, recording: Recording, grid: Grid) -> None:
+        self._recording = recording
+        across, along = (*grid.bins, 1)[:2]
+        self._size = (along, across)
+        self._fitness: dict[int, npt.NDArray[np.float64]] = {}
+
+    def add(
+        self, elites: Iterable[Elite], when: Callable[[int, int], TimePoint]
+    ) -> None:
+        """Add elites; log the map of each island and number of births that has some.
+
+        ``when`` returns the time of an island and its number of births.
+        """
+        key = attrgetter("island", "births")
+        for (island, births), group in groupby(sorted(elites, key=key), key):
+            fitness = self._fitness.setdefault(island, np.full(self._size, np.nan))
+            for one in group:
+                x, y = (*one.cell, 0, 0)[:2]
+                if y < self._size[0] and x < self._size[1]:
+                    fitness[y, x] = np.fmax(fitness[y, x], one.fitness)
+            self._recording.archive(island, _pixels(fitness), when(island, births))
+
+
+def _pixels(fitness: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
+    """Return cells as an image, (H, W, 3), the first row at the bottom."""
+    low, high = np.nanmin(fitness), np.nanmax(fitness)
+    share = (fitness - low) / (high - low) if high > low else fitness - low
+    colours = _PALE + share[..., np.newaxis] * (_DARK - _PALE)
+    shown = np.where(np.isnan(colours), 255.0, colours)
+    return np.round(shown[::-1]).astype(np.uint8)
 
 
 class Lineage:

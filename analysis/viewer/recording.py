@@ -17,7 +17,12 @@ import rerun as rr
 
 from analysis.render.overlay import Colour, Rod
 from analysis.viewer.body import BoxModel, Float32s
-from analysis.viewer.entities import AncestryNode, TimePoint, island_path
+from analysis.viewer.entities import (
+    AncestryNode,
+    TimePoint,
+    archive_path,
+    island_path,
+)
 from analysis.viewer.ground import Relief, Surface
 from analysis.viewer.scene import Scene
 from schema.errors import RevolveError
@@ -197,6 +202,13 @@ class Recording(AbstractContextManager["Recording"]):
         self._stream.log(f"{path}/size", rr.Scalars(float(size)))
         if fitness:
             self._stream.log(f"{path}/fitness", rr.Scalars(list(fitness)))
+
+    def archive(
+        self, island: int, pixels: npt.NDArray[np.uint8], when: TimePoint
+    ) -> None:
+        """Log the archive map of an island, (H, W, 3)."""
+        self._at(when)
+        self._stream.log(archive_path(island), rr.Image(pixels))
 
     def upright(self, path: str) -> None:
         """Log that z is up for an entity."""

@@ -13,6 +13,7 @@ from schema.errors import RevolveError, RunFolderError
 from schema.robot.ids import BirthId
 from schema.robot.trace import Floats
 from schema.tables.files import read_table
+from schema.wire.elites import EliteReader
 from schema.wire.updates import (
     SAMPLED,
     Update,
@@ -46,6 +47,7 @@ def read_news(run: LoadedRun) -> Update:
     if not births:
         raise RunFolderError(f"{folder}: no robot has been born yet")
     population = read_table(folder, "population").to_pylist()
+    elites = EliteReader(run.document)
     return Update(
         run=str(folder),
         epoch=0,
@@ -64,6 +66,12 @@ def read_news(run: LoadedRun) -> Update:
             )
         ),
         document=run.document,
+        elites=tuple(
+            elite
+            for name in (("evaluations", "fitness") if elites.grid else ())
+            for row in read_table(folder, name).to_pylist()
+            if (elite := elites.read(name, row))
+        ),
     )
 
 

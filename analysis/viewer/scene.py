@@ -12,6 +12,7 @@ from schema.experiment.document import (
     island_experiments,
     light_of,
 )
+from schema.experiment.grid import Grid
 from schema.mjcf.model import ring_wall
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
@@ -33,6 +34,7 @@ class Scene:
         walls: walls of each island, (W, 10): centre [m], attitude w, x, y, z, and
             half sizes [m].
         surfaces: surfaces above the plane of each island.
+        grid: cells over measures, which have a map of their own.
     """
 
     islands: tuple[int, ...]
@@ -41,6 +43,7 @@ class Scene:
     space: BodySpace
     walls: tuple[Floats, ...]
     surfaces: tuple[tuple[Surface, ...], ...]
+    grid: Grid | None = None
 
     def below(self, births: Sequence[BirthId]) -> tuple[Surface, ...]:
         """Return the ground below robots, if they are shown at their recorded places.
@@ -100,4 +103,5 @@ def scene_of(experiment: Experiment) -> Scene:
             )
             for island in settings
         ),
+        experiment.grid,
     )

@@ -19,9 +19,10 @@ import pyarrow as pa
 from analysis.render.overlay import Overlay
 from analysis.viewer.body import BoxModel, Float32s, box_model, place_rows
 from analysis.viewer.entities import TimePoint, robot_path
-from analysis.viewer.populations import Gallery, Lineage
+from analysis.viewer.populations import ArchiveMaps, Gallery, Lineage
 from analysis.viewer.recording import Recording
 from analysis.viewer.replay import frames_of, rows_by_robot
+from schema.experiment.grid import Grid
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -50,10 +51,13 @@ class _ShownRobot:
 class Show:
     """One run in one recording."""
 
-    def __init__(self, recording: Recording, space: BodySpace) -> None:
+    def __init__(
+        self, recording: Recording, space: BodySpace, grid: Grid | None = None
+    ) -> None:
         self._recording = recording
         self._lineage = Lineage(recording)
         self._gallery = Gallery(recording)
+        self._archives = ArchiveMaps(recording, grid) if grid else None
         self._space = space
         # Each model is made at the first call.
         self._models: dict[BirthId, Callable[[], BoxModel]] = {}
@@ -79,6 +83,8 @@ class Show:
             self._departed(gone)
         for migrant in news.migrants:
             self._migrated(migrant)
+        if self._archives is not None:
+            self._archives.add(news.elites, self._birth_time)
         for sample in news.samples:
             self._overlays[sample.island].samples.append(sample)
         self._lineage.draw()
@@ -202,16 +208,18 @@ class Show:
         if (level.island, level.births) in self._levels:
             return
         self._levels.add((level.island, level.births))
-        clock = self._clocks[level.island]
-        # The last birth is that of the level, unless it is off-line.
-        births, born_s = clock[bisect_right(clock, (level.births, inf)) - 1]
-        is_known = births == level.births
-        when = TimePoint(born_s if is_known else None, level.births)
+        when = self._birth_time(level.island, level.births)
         fitness = (level.mean, level.best) if level.judged else ()
         self._recording.level(level.island, when, level.size, fitness)
         if when.sim_time_s is None and level.members:
             self._lineage.keep(level)
             self._gallery.show(level, self._models)
+
+    def _birth_time(self, island: int, births: int) -> TimePoint:
+        """Return the time of a number of births: in an arena that of the last one."""
+        clock = self._clocks[island]
+        known, born_s = clock[bisect_right(clock, (births, inf)) - 1]
+        return TimePoint(born_s if known == births else None, births)
 
     def _migrated(self, migrant: Migrant) -> None:
         key = (migrant.birth, migrant.to, migrant.epoch)

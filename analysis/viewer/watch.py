@@ -51,7 +51,7 @@ def watch(
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         window = Window(output)
         recording.add_scene(scene)
-        view = LiveView(Show(recording, scene.space), news.run, scene)
+        view = LiveView(Show(recording, scene.space, scene.grid), news.run, scene)
         view.tell(messages)
         with ProgressLine() as progress:
             while not (stop.is_set() or view.has_ended or window.was_closed):

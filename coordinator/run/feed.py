@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from coordinator.islands.events import Record
 from schema.robot.ids import BirthId
 from schema.tables.description import RunDetails
+from schema.wire.elites import EliteReader
 from schema.wire.updates import (
     SAMPLED,
     Birth,
@@ -56,6 +57,7 @@ class Feed:
         self._arenas = set[int]()
         self._newest: dict[int, Level] = {}
         self._migrants: list[Migrant] = []
+        self._elites = EliteReader(details.document)
         # By table: births, deaths, migrants, and rows of populations.
         self._new: defaultdict[str, list[Any]] = defaultdict(list)
 
@@ -63,6 +65,8 @@ class Feed:
         """Note the rows that are unread."""
         for record in self.unread:
             row, new = record.row, self._new[record.table]
+            if elite := self._elites.read(record.table, row):
+                self._new["elites"].append(elite)
             match record.table:
                 case "births":
                     self._born[row["island"]] += 1
@@ -97,6 +101,7 @@ class Feed:
             levels=tuple(read_levels(new["population"], self._arenas)),
             migrants=tuple(new["migrations"]),
             samples=tuple(read_samples(new["samples"])),
+            elites=tuple(new["elites"]),
         )
         self._remember(update)
         return update
@@ -113,6 +118,7 @@ class Feed:
             "births": births,
             "deaths": list(map(Raw, self._deaths)),
             "levels": [*map(Raw, self._levels), *self._newest.values()],
+            "elites": list(self._elites.best.values()),
         }
         return replace(self._past, migrants=tuple(self._migrants), **rows)
 

@@ -19,6 +19,7 @@ from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.results import failed_fitness
 from schema.robot.robot import Part
 from schema.wire.codec import Message, decode, encode
+from schema.wire.elites import Elite
 
 
 class Birth(Message, frozen=True):
@@ -148,6 +149,7 @@ class Update(Message, frozen=True):
         workers: all that are connected now.
         document: JSON of the experiment, if is_whole.
         samples: of arenas with own rules; a whole of a live run has none.
+        elites: new ones of cells; those of a whole are the fittest of each.
     """
 
     run: str
@@ -162,6 +164,7 @@ class Update(Message, frozen=True):
     workers: tuple[WorkerInfo, ...] = ()
     document: str = ""
     samples: tuple[ArenaSample, ...] = ()
+    elites: tuple[Elite, ...] = ()
 
 
 class Page(Message, frozen=True):

@@ -29,13 +29,16 @@ from analysis.viewer.show import Show
 from schema.errors import RunFolderError
 from schema.experiment.document import ArenaSection, Experiment
 from schema.experiment.file import read_experiment
+from schema.experiment.grid import Grid
 from schema.mjcf.model import add_walls, ring_wall
 from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
+from schema.wire.elites import Elite
 from schema.wire.updates import ArenaSample, Birth, Death, Level, Update
 from tests.coordinator.arena_world import poses
+from tests.documents import parse_experiment
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 WHOLE = Update("run", 1, 4, is_whole=True, experiment="e")
@@ -114,6 +117,37 @@ def test_a_death_has_as_many_births_as_the_last_pose() -> None:
     assert births.tolist() == [1, 2]
     (gone,) = [call[2] for call in recorded.calls if call[0] == "remove"]
     assert gone == TimePoint(10.0, 2)
+
+
+def test_archive_maps_show_the_fittest_of_each_cell() -> None:
+    """3 by 2 cells over two of three measures, the first row at the bottom."""
+    recorded: Any = Recorded()
+    grid = Grid(("a", "b", "c"), bounds=((0, 1),) * 3, bins=(3, 2, 5))
+    show = Show(recorded, BUILT_IN, grid)
+    elites = [
+        Elite(0, births, cell, BirthId(0, births - 1), fitness)
+        for births, cell, fitness in (
+            (1, (0, 0, 0), 1.0), (2, (2, 1, 0), 3.0), (2, (2, 1, 4), 2.0),
+            (2, (9, 0, 0), 9.0),
+        )
+    ]  # fmt: skip
+    show.tell(replace(WHOLE, elites=tuple(elites)))
+    calls = [call[1:] for call in recorded.calls if call[0] == "archive"]
+    assert [when for _, _, when in calls] == [TimePoint(None, n) for n in (1, 2)]
+    island, pixels, _ = calls[-1]
+    assert (island, pixels.shape) == (0, (2, 3, 3))
+    dark, pale, white = pixels[0, 2], pixels[1, 0], pixels[0, 0]
+    assert dark.tolist() < pale.tolist() < white.tolist() == [255, 255, 255]
+    assert (pixels == 255).all(axis=2).sum() == 4
+
+
+def test_the_layout_has_a_map_of_a_grid() -> None:
+    text = 'name = "e"\n[measures]\nnames = ["height"]\n[grid]\n'
+    text += 'measures = ["height"]\nbounds = [[0, 1]]\nbins = [2]\n'
+    blueprint: Any = layout(scene_of(parse_experiment(text, "e.toml")))
+    _, panels = blueprint.root_container.contents
+    (view,) = panels.contents[2].contents
+    assert view.name == "Archive: height"
 
 
 def test_views_of_a_mixed_archipelago_name_arenas_and_populations() -> None:

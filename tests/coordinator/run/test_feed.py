@@ -78,6 +78,24 @@ def test_updates_are_numbered_and_hold_each_row_once() -> None:
     assert feed.update(()) is None
 
 
+def test_elites_are_sent_once_and_the_whole_has_the_fittest() -> None:
+    document = (
+        '{"name": "e", "grid": {"measures": ["x"], "bounds": [[0, 1]], "bins": [2]}}'
+    )
+    feed = Feed("run", 1, RunDetails("experiment", 0, 1, document))
+    sent = []
+    for number, fitness in enumerate((1.0, 3.0, 2.0)):
+        row = {"island": 0, "birth": number, "fitness": fitness,
+               "measures": [("x", 0.2)]}  # fmt: skip
+        feed.unread.append(Record("evaluations", row))
+        sent.append(feed.update(()))
+    first, second, third = sent
+    assert third is None
+    elites = [_sent(update).elites[0] for update in (first, second)]
+    assert [(one.births, one.fitness) for one in elites] == [(1, 1.0), (2, 3.0)]
+    assert whole(feed).elites == (elites[1],)
+
+
 def test_changed_workers_make_an_update() -> None:
     feed = _feed()
     assert _sent(feed.update(WORKERS)).workers == WORKERS
