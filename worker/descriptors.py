@@ -6,7 +6,6 @@ the values are theirs.
 """
 
 import math
-from collections import Counter
 
 import numpy as np
 
@@ -17,8 +16,6 @@ PART_M = 0.041
 """Side of a brick: length that a part counts as [m]."""
 STILL = 0.001
 """Root mean square of joint positions below which a robot does not move [rad or m]."""
-_CROSSING = 4
-"""Neighbours of a part that is attached on all its sides."""
 
 
 def body_size(trace: Trace) -> float:
@@ -38,34 +35,9 @@ def body_limbs(trace: Trace) -> float:
 
     Source: Miras et al. 2018, "limbs".
     """
-    parts = len(trace.robot.parts)
-    leaves = sum(count == 0 for count in _children(trace)[1:])
-    return leaves / max(1, parts - 1 - max(0, (parts - 3) // 3))
-
-
-def body_limb_length(trace: Trace) -> float:
-    """Return the parts with one child, without the core, over the most, P - 2 [1].
-
-    It is 1 for a chain that begins at the core. 0 for bodies of two parts or one.
-
-    Source: Miras et al. 2018, "length of limbs".
-    """
-    chained = sum(count == 1 for count in _children(trace)[1:])
-    return chained / max(1, len(trace.robot.parts) - 2)
-
-
-def body_branching(trace: Trace) -> float:
-    """Return the parts with four neighbours or more, over the most, (P - 2) // 3 [1].
-
-    0 for bodies of less than five parts.
-
-    Source: Miras et al. 2018, "branching".
-    """
-    children = _children(trace)
-    crossings = sum(
-        count + (place > 0) >= _CROSSING for place, count in enumerate(children)
-    )
-    return crossings / max(1, (len(children) - 2) // 3)
+    parts = trace.robot.parts
+    leaves = len({*range(1, len(parts))} - {part.parent for part in parts})
+    return leaves / max(1, len(parts) - 1 - max(0, (len(parts) - 3) // 3))
 
 
 def body_joints(trace: Trace) -> float:
@@ -150,13 +122,6 @@ def _correlation(first: Floats, second: Floats) -> float:
     """Return the cosine of the angle between two arrays; 0 if one of them is 0."""
     size = math.sqrt(float((first * first).sum()) * float((second * second).sum()))
     return min(1.0, float((first * second).sum()) / size) if size else 0.0
-
-
-def _children(trace: Trace) -> list[int]:
-    """Return the number of children of each part."""
-    parts = trace.robot.parts
-    count = Counter(part.parent for part in parts)
-    return [count[place] for place in range(len(parts))]
 
 
 def _box(trace: Trace) -> list[float]:

@@ -152,8 +152,6 @@ BUILT_IN: dict[str, MeasureFunction] = {
         descriptors.body_size,
         descriptors.body_proportion,
         descriptors.body_limbs,
-        descriptors.body_limb_length,
-        descriptors.body_branching,
         descriptors.body_coverage,
         descriptors.body_joints,
         descriptors.duty_factor,

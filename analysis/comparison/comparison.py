@@ -39,7 +39,7 @@ OF_FITNESS = frozenset({
 })  # fmt: skip
 """Measures whose values depend on the scale of the fitness function."""
 OF_GRID = frozenset({
-    "coverage", "qd_score", "archive_entropy", "hypervolume", "cell_entropy", "novelty",
+    "coverage", "qd_score", "archive_entropy", "hypervolume", "novelty",
 })  # fmt: skip
 """Measures whose values depend on the grid."""
 

@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from matplotlib import colormaps
 from matplotlib import figure as drawing
 from matplotlib.axes import Axes
@@ -43,26 +44,19 @@ _MOST_IN = 8.0
 """Greatest height of the cells together [inches]."""
 _LEFT_IN, _RIGHT_IN, _BELOW_IN = 0.65, 0.85, 0.5
 """Space for the texts of axes [inches]."""
+_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+_Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class MapCell:
-    """A cell of a map, and its fittest robot.
-
-    Attributes:
-        x, y: number of the bin.
-        fitness: of the robot.
-        robot: its island of birth and number of birth, such as 0:12.
-        outlines: of the robot.
-        colour: of its fitness.
-    """
+    """A cell: numbers of its bins, fitness, name and outlines of its fittest robot."""
 
     x: int
     y: int
     fitness: float
     robot: str
     outlines: Sequence[Outline]
-    colour: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +66,7 @@ class ArchiveMap:
     Attributes:
         experiment, folder: of the run.
         grid: cells of the experiment.
-        cells: those that were reached, by bins.
+        cells: those that were reached.
         reached: number of cells that were reached, over all measures.
     """
 
@@ -89,10 +83,14 @@ class ArchiveMap:
         return across, along
 
     @property
-    def fitness_range(self) -> tuple[float, float]:
-        """Least and greatest fitness of the cells."""
+    def scale(self) -> Normalize:
+        """Fitness as a share of the range of the cells' fitness."""
         fitness = [cell.fitness for cell in self.cells]
-        return min(fitness), max(fitness)
+        return Normalize(min(fitness), max(fitness))
+
+    def colour(self, cell: MapCell) -> str:
+        """Return the colour of a cell."""
+        return str(to_hex(_PALE(self.scale(cell.fitness))))
 
 
 def archive_maps(
@@ -106,69 +104,50 @@ def archive_maps(
         cells: as ``outputs``.
         runs: by folder.
     """
+    of_runs: dict[str, list[_Row]] = {}
+    for row in cells.to_pylist():
+        of_runs.setdefault(row["folder"], []).append(row)
     maps, problems = [], {}
     for name in in_order(cells["experiment"].to_pylist()):
-        mine = cells.filter(pc.field("experiment") == name)
-        folder = _fullest(mine)
-        of_run = mine.filter(pc.field("folder") == folder)
+        mine = [rows for rows in of_runs.values() if rows[0]["experiment"] == name]
         try:
-            maps.append(_map(of_run, runs[Path(folder)]))
+            maps.append(_map(max(mine, key=_fullness), runs))
         except RevolveError as error:
             problems[name] = str(error)
     return maps, problems
 
 
-def _fullest(cells: pa.Table) -> str:
-    best = cells.group_by(["folder", "cell"]).aggregate([("fitness", "max")])
-    runs = best.group_by("folder").aggregate(
-        [("cell", "count"), ("fitness_max", "sum")]
-    )
-    keys = [("cell_count", "descending"), ("fitness_max_sum", "descending"),
-            ("folder", "ascending")]  # fmt: skip
-    return str(runs.sort_by(keys)["folder"][0].as_py())
+def _fullness(rows: Sequence[_Row]) -> tuple[int, float]:
+    return len({row["cell"] for row in rows}), sum(row["fitness"] for row in rows)
 
 
-def _map(cells: pa.Table, run: LoadedRun) -> ArchiveMap:
+def _map(rows: Sequence[_Row], runs: Mapping[Path, LoadedRun]) -> ArchiveMap:
+    run, best = runs[Path(rows[0]["folder"])], dict[tuple[int, int], _Row]()
     grid = run.settings.grid
     assert grid is not None
-    best: dict[tuple[int, int], dict[str, object]] = {}
-    ordered = cells.sort_by([("fitness", "descending"), ("birth", "ascending")])
-    for row in ordered.to_pylist():
+    for row in sorted(rows, key=lambda row: (-row["fitness"], row["birth"])):
         x, y, *_ = (*map(int, row["cell"].split("/")), 0)
         best.setdefault((x, y), row)
-    spots = sorted(best)
-    chosen = pa.Table.from_pylist([best[spot] for spot in spots], cells.schema)
-    outlines = _outlines(run, chosen)
-    fitness = chosen["fitness"].to_pylist()
-    shade = Normalize(min(fitness), max(fitness))
-    names = [
-        f"{island}:{birth}"
-        for island, birth in zip(
-            *(chosen[key].to_pylist() for key in ("birth_island", "birth")), strict=True
-        )
-    ]
     made = [
-        MapCell(x, y, value, name, drawn, to_hex(_PALE(shade(value))))
-        for (x, y), value, name, drawn in zip(
-            spots, fitness, names, outlines, strict=True
+        MapCell(*at, row["fitness"], f"{row['birth_island']}:{row['birth']}", outlines)
+        for (at, row), outlines in zip(
+            best.items(), _outlines(run, [*best.values()]), strict=True
         )
     ]
-    reached = len(set(cells["cell"].to_pylist()))
-    return ArchiveMap(run.experiment, run.folder, grid, made, reached)
+    return ArchiveMap(run.experiment, run.folder, grid, made, _fullness(rows)[0])
 
 
-def _outlines(run: LoadedRun, robots: pa.Table) -> list[list[Outline]]:
+def _outlines(run: LoadedRun, robots: list[_Row]) -> list[list[Outline]]:
     document = shown_document(run.document)
     if modules_named(document.encode()):
         allow_plugins_of(run.folder)
     experiment = experiment_from_text(document, is_own=True)
     space = body_space(experiment.space)
     births = read_table(run.folder, "births", ["island", "birth", "genome", "robot"])
-    rows = births.take(pa.array(rows_of(individual_ids(robots), births)))
-    pairs = zip(rows["genome"].to_pylist(), rows["robot"].to_pylist(), strict=True)
+    places = rows_of(individual_ids(pa.Table.from_pylist(robots)), births)
     return [
-        plan(robot_of_birth(genome, stored, experiment), space)
-        for genome, stored in pairs
+        plan(robot_of_birth(row["genome"], row["robot"], experiment), space)
+        for row in births.take(pa.array(places)).to_pylist()
     ]
 
 
@@ -179,92 +158,77 @@ def map_figures(
     for name, why in problems.items():
         yield missing(f"{MAP}-{name}", why)
     for one in maps:
-        unit = units.get(one.experiment, "")
         yield Figure(
             f"{MAP}-{one.experiment}",
             f"Archive map of {label(one.experiment)}",
             map_caption(one),
             ("cells", BIRTHS),
-            partial(_drawn, one=one, unit=unit),
+            partial(draw_map, one=one, unit=units.get(one.experiment, "")),
             "diversity",
             f"archive-map-of-{one.experiment}",
         )
 
 
-def _drawn(_: Tables, one: ArchiveMap, unit: str) -> drawing.Figure:
-    return draw_map(one, unit)
-
-
 def map_caption(one: ArchiveMap) -> str:
     """Return what a map shows."""
-    others = one.grid.measures[2:]
-    over = f" Each is the fittest over all bins of {' and '.join(others)}." if others \
-        else ""  # fmt: skip
-    total = int(np.prod(one.grid.bins))
-    least, most = one.fitness_range
+    scale, others = one.scale, " and ".join(one.grid.measures[2:])
+    over = f" Each is the fittest over all bins of {others}." * bool(others)
     return (
         f"The fittest robot of each cell that births of {one.folder.name} reached, "
-        f"{one.reached} of {total} cells, seen from above: black its core, red parts "
-        "with a motor, yellow other joints, grey all else. Robots are not to one "
-        f"scale. The darker a cell, the greater the fitness, {least:.3g} to {most:.3g}."
-        f"{over}"
+        f"{one.reached} of {prod(one.grid.bins)} cells, seen from above: black its "
+        "core, red parts with a motor, yellow other joints, grey all else. Robots are "
+        "not to one scale. The darker a cell, the greater the fitness, "
+        f"{scale.vmin:.3g} to {scale.vmax:.3g}.{over}"
     )
 
 
-def draw_map(one: ArchiveMap, unit: str) -> drawing.Figure:
+def draw_map(_: Tables, one: ArchiveMap, unit: str) -> drawing.Figure:
     """Return the picture of a map; ``unit`` is that of fitness."""
     across, along = one.bins
     side = min((WIDTH_IN - _LEFT_IN - _RIGHT_IN) / across, _MOST_IN / along)
     wide, tall = _LEFT_IN + side * across + _RIGHT_IN, _BELOW_IN + side * along + 0.1
     figure = drawing.Figure(figsize=(wide, tall))
-    edges = (_LEFT_IN / wide, _BELOW_IN / tall)
-    size = (side * across / wide, side * along / tall)
-    axes = figure.add_axes((*edges, *size))
-    _add_cells(axes, one)
-    axes.set(xlim=(0, across), ylim=(0, along), aspect="equal")
-    axes.set_axisbelow(True)
+    left, below = _LEFT_IN / wide, _BELOW_IN / tall
+    width, height = side * across / wide, side * along / tall
+    axes = figure.add_axes((left, below, width, height))
+    squares = [_SQUARE + np.array([cell.x, cell.y]) for cell in one.cells]
+    shades = [one.colour(cell) for cell in one.cells]
+    axes.add_collection(PolyCollection(squares, facecolors=shades, edgecolors="white"))
+    pairs = [(cell, outline) for cell in one.cells for outline in cell.outlines]
+    shapes = [
+        _SHARE * outline.corners + np.array([cell.x + 0.5, cell.y + 0.5])
+        for cell, outline in pairs
+    ]
+    # A thin edge closes the gaps between boxes of a part.
+    paint = [outline.colour for _, outline in pairs]
+    axes.add_collection(
+        PolyCollection(shapes, facecolors=paint, edgecolors=paint, linewidths=0.2)
+    )
+    _label_axes(axes, one)
+    beside = (left + width + 0.1 / wide, below, 0.13 / wide, height)
+    shades_of = ScalarMappable(one.scale, _PALE)
+    bar = figure.colorbar(shades_of, cax=figure.add_axes(beside))
+    bar.set_label(f"fitness [{unit}]" if unit else "fitness", color=INK)
+    bar.outline.set_visible(False)
+    return figure
+
+
+def _label_axes(axes: Axes, one: ArchiveMap) -> None:
+    axes.set(xlim=(0, one.bins[0]), ylim=(0, one.bins[1]))
+    axes.yaxis.set_visible(len(one.grid.measures) > 1)
     for axis, name, (low, high), bins in zip(
         (axes.xaxis, axes.yaxis), one.grid.measures, one.grid.bounds, one.bins,
         strict=False,
     ):  # fmt: skip
-        values = MaxNLocator(min(bins, 6), steps=[1, 2, 5, 10]).tick_values(low, high)
+        values = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high)
         shown = [value for value in values if low <= value <= high]
         places = [(value - low) / (high - low) * bins for value in shown]
         axis.set_ticks(places, [f"{value:g}" for value in shown])
         axis.set_label_text(axis_label(name))
-    if len(one.grid.measures) == 1:
-        axes.yaxis.set_visible(False)
     axes.tick_params(colors=INK, length=2)
-    for line in axes.spines.values():
-        line.set(color="#999999", linewidth=0.6)
-    beside = (edges[0] + size[0] + 0.1 / wide, edges[1], 0.13 / wide, size[1])
-    shades = ScalarMappable(Normalize(*one.fitness_range), _PALE)
-    bar = figure.colorbar(shades, cax=figure.add_axes(beside))
-    bar.set_label(f"fitness [{unit}]" if unit else "fitness", color=INK)
-    bar.outline.set_visible(False)
-    return figure
 
 
 def axis_label(measure: str) -> str:
     """Return the name of a measure with its unit, if it has one."""
     unit = UNITS.get(measure)
     return f"{measure} [{unit}]" if unit else measure
-
-
-def _add_cells(axes: Axes, one: ArchiveMap) -> None:
-    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
-    cells = [square + np.array([cell.x, cell.y]) for cell in one.cells]
-    shades = [cell.colour for cell in one.cells]
-    axes.add_collection(
-        PolyCollection(cells, facecolors=shades, edgecolors="#FFFFFF", linewidths=0.6)
-    )
-    pairs = [(cell, outline) for cell in one.cells for outline in cell.outlines]
-    shapes = [
-        _SHARE * outline.corners + np.array([cell.x + 0.5, cell.y + 0.5])
-        for cell, outline in pairs
-    ]
-    paint = [outline.colour for _, outline in pairs]
-    # A thin edge closes the gaps between boxes of a part.
-    axes.add_collection(
-        PolyCollection(shapes, facecolors=paint, edgecolors=paint, linewidths=0.2)
-    )

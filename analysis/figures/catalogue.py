@@ -283,7 +283,7 @@ FIGURES: tuple[Figure, ...] = (
               "share of cells reached so far"),
     _of_cells("R", "QD score over births", "qd_score", "QD score"),
     _of_cells("T", "Novelty over births", "novelty",
-              "mean distance to 5 nearest robots"),
+              "distance to the 5 nearest earlier births"),
     Figure("U", "Pareto fronts",
            "All births in the first two objectives, pale, and those that no birth of "
            "their island dominates in all objectives, joined by a line for each run "

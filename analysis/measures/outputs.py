@@ -59,9 +59,8 @@ POPULATION = {
     "hypervolume": "volume that the births so far dominate: fitness above grid.offset "
     "and the grid's measures as shares of their ranges, those of grid.minimised from "
     "the other end; null for more than two measures",
-    "cell_entropy": "entropy of living robots over the grid's cells [nats]",
-    "novelty": "mean distance of living robots to the 5 nearest, in measures of the "
-    "grid as shares of their ranges",
+    "novelty": "mean over the births since the population before of the distance to "
+    "the 5 nearest earlier births, in measures of the grid as shares of their ranges",
     "foreign": "share of living robots that, or whose ancestors, were born elsewhere",
     **{name: f"mean of judged robots: {what}" for name, what in BODY.items()},
     **{name: f"mean of judged robots: {what}" for name, what in PER_PART.items()},

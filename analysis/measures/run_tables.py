@@ -8,7 +8,7 @@ import pyarrow as pa
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import SlotRule, body_sizes, encode
 from analysis.measures.brains.measures import brain_measures
-from analysis.measures.diversity.samples import Samples, samples
+from analysis.measures.diversity.samples import samples
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
@@ -59,12 +59,11 @@ class RunTables:
         return self.islands[0].grid if self.islands else None
 
     @cached_property
-    def samples(self) -> Samples | None:
-        """Fitness and measures of the grid of all robots; None without a grid."""
-        if self.grid is None:
-            return None
+    def samples(self) -> pa.Table:
+        """Fitness and, with a grid, its measures, of robots by island and births."""
         evaluations, fitness = (self.tables[n] for n in ("evaluations", "fitness"))
-        return samples(evaluations, fitness, self.births, self.grid.measures)
+        names = self.grid.measures if self.grid else ()
+        return samples(evaluations, fitness, self.births, names)
 
     @cached_property
     def trees(self) -> Trees:

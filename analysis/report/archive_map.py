@@ -70,7 +70,7 @@ def _cell(one: ArchiveMap, cell: MapCell, side: float) -> str:
     return (
         f'<svg class="robot" x="{x:.1f}" y="{y:.1f}" width="{side:.1f}" '
         f'height="{side:.1f}" viewBox="{box}"><title>{title}</title>'
-        f'<rect {edge} fill="{cell.colour}"/>{paths}</svg>'
+        f'<rect {edge} fill="{one.colour(cell)}"/>{paths}</svg>'
     )
 
 

@@ -95,7 +95,7 @@ def drawings(folder: Path) -> Drawings:
     films = [Film(Best("soft", Path("soft-1"), 0, 0, 2, 0.3), folder / "one.gif")]
     corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5)])
     cells = [
-        MapCell(at, at % 2, float(at), f"0:{at}", [Outline(corners, CORE)], "#9ecae1")
+        MapCell(at, at % 2, float(at), f"0:{at}", [Outline(corners, CORE)])
         for at in range(3)
     ]
     grid = Grid(("size <b>", "energy"), bounds=((0, 30), (0, 1)), bins=(3, 2))

@@ -1,25 +1,23 @@
-"""Cells of a grid that births have reached: archives, their scores, and entropies."""
+"""Cells of a grid that births have reached: archives, scores, novelty."""
 
 import math
-from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections import Counter
 
 import numpy as np
 import pyarrow as pa
 
 from analysis.measures.diversity.fronts import added_volume, front
-from analysis.measures.diversity.samples import Samples
+from analysis.measures.diversity.samples import numbers
 from analysis.measures.outputs import run_schema
-from analysis.measures.population_table import Numbers, PopulationTable
+from analysis.measures.population_table import Numbers
 from analysis.measures.run_tables import RunTables
 from schema.experiment.grid import Cell, Grid, cell_name, cell_of
-from schema.robot.trees import Integers
 
 NEAREST = 5
-"""Neighbours whose mean distance is a robot's novelty."""
+"""Earlier births whose mean distance is the novelty of a birth."""
 _MOST_OBJECTIVES = 3
 """Objectives up to which a hypervolume is computed: it takes long with more."""
-_COURSES = ("coverage", "qd_score", "archive_entropy", "hypervolume")
+_SCORES = ("coverage", "qd_score", "archive_entropy", "hypervolume")
 
 
 class Archive:
@@ -29,35 +27,32 @@ class Archive:
     archive of pyribs, without a learning rate.
 
     Attributes:
-        elites: index of the fittest robot of each cell, in the order of adding.
+        elites: index and fitness of the fittest robot of each cell.
         counts: number of robots of each cell.
-        qd_score: sum over cells of the fitness above the grid's offset.
     """
 
     def __init__(self, grid: Grid) -> None:
-        self.grid = grid
-        self.elites: dict[Cell, int] = {}
-        self.counts: Counter[Cell] = Counter()
-        self.qd_score = 0.0
-        self._fitness: dict[Cell, float] = {}
-        self._front: Numbers = np.empty((0, 1 + len(grid.measures)))
+        self._grid = grid
         self._is_minimised = np.isin(grid.measures, grid.minimised)
-        self._logs = self._volume = 0.0
+        self.elites: dict[Cell, tuple[int, float]] = {}
+        self.counts: Counter[Cell] = Counter()
+        self._front: Numbers = np.empty((0, 1 + len(grid.measures)))
+        self._qd_score = self._logs = self._volume = 0.0
 
     def add(self, index: int, fitness: float, values: Numbers) -> None:
         """Add a robot with its measures, (M,)."""
-        grid = self.grid
+        grid = self._grid
         cell = cell_of(grid, dict(zip(grid.measures, values.tolist(), strict=True)))
+        self.counts[cell] += 1
         count = self.counts[cell]
-        self._logs += _n_log_n(count + 1) - _n_log_n(count)
-        self.counts[cell] = count + 1
-        last = self._fitness.get(cell)
-        if last is None or fitness > last:
-            self.qd_score += fitness - (grid.offset if last is None else last)
-            self._fitness[cell], self.elites[cell] = fitness, index
-        within = shares(grid, values)
-        if 1 + len(values) <= _MOST_OBJECTIVES and fitness > grid.offset:
-            worth = np.where(self._is_minimised, 1.0 - within, within)
+        self._logs += count * math.log(count) - (count - 1) * math.log(count - 1 or 1)
+        _, before = self.elites.get(cell, (0, grid.offset))
+        if cell not in self.elites or fitness > before:
+            self._qd_score += fitness - before
+            self.elites[cell] = index, fitness
+        if self._front.shape[1] <= _MOST_OBJECTIVES and fitness > grid.offset:
+            share = shares(grid, values)
+            worth = np.where(self._is_minimised, 1.0 - share, share)
             point = np.append(worth, fitness - grid.offset)
             if added := added_volume(self._front, point):
                 self._volume += added
@@ -69,8 +64,8 @@ class Archive:
         total = self.counts.total()
         entropy = math.log(total) - self._logs / total if total else 0.0
         volume = self._volume if self._front.shape[1] <= _MOST_OBJECTIVES else math.nan
-        share = len(self.elites) / math.prod(self.grid.bins)
-        return share, self.qd_score, max(0.0, entropy), volume
+        share = len(self.elites) / math.prod(self._grid.bins)
+        return share, self._qd_score, max(0.0, entropy), volume
 
 
 def shares(grid: Grid, values: Numbers) -> Numbers:
@@ -80,99 +75,64 @@ def shares(grid: Grid, values: Numbers) -> Numbers:
     return within
 
 
-def _n_log_n(count: int) -> float:
-    return count * math.log(count) if count else 0.0
-
-
 def grid_measures(run: RunTables) -> dict[str, Numbers]:
     """Return the measures of populations that need a grid, (G,) each.
 
     They are empty without a grid, and without a robot that has its measures.
     """
     grid, born = run.grid, run.samples
-    if grid is None or born is None or not len(born):
+    if grid is None or not born.num_rows:
         return {}
     table = run.population_table
-    columns = {name: np.full(len(table), np.nan) for name in _COURSES}
+    columns = {name: np.full(len(table), np.nan) for name in (*_SCORES, "novelty")}
     for island in np.unique(table.islands).tolist():
-        mine = born.born_on(island)
+        mine = born.filter(pa.compute.field("island") == island)
         groups = np.flatnonzero(table.islands == island)
-        at = np.searchsorted(mine.births, table.births[groups], side="right")
-        courses = np.array(list(_scores(grid, mine)))
-        for name, course in zip(_COURSES, courses.T, strict=True):
-            columns[name][groups] = course[at]
-    return columns | _of_living(grid, born, table)
+        ends = np.searchsorted(mine["births"], table.births[groups], side="right")
+        values = numbers(mine, grid.measures)
+        archive = Archive(grid)
+        scores = [archive.scores]
+        for index, fitness in enumerate(mine["fitness"].to_pylist()):
+            archive.add(index, fitness, values[index])
+            scores.append(archive.scores)
+        for name, course in zip(_SCORES, np.array(scores).T, strict=True):
+            columns[name][groups] = course[ends]
+        novelties = novelty(shares(grid, values))
+        for group, start, end in zip(groups, [0, *ends[:-1]], ends, strict=True):
+            if end > max(start, 1):
+                columns["novelty"][group] = np.nanmean(novelties[start:end])
+    return columns
 
 
-def _scores(grid: Grid, born: Samples) -> Iterator[tuple[float, ...]]:
-    """Yield the scores of the empty archive, then those after each sample."""
-    archive = Archive(grid)
-    yield archive.scores
-    for index, (fitness, values) in enumerate(
-        zip(born.fitness.tolist(), born.values, strict=True)
-    ):
-        archive.add(index, fitness, values)
-        yield archive.scores
+def novelty(places: Numbers) -> Numbers:
+    """Return the mean distance of places, (N, M), to the nearest earlier ones, (N,).
 
+    NaN of the first.
 
-def _of_living(grid: Grid, born: Samples, table: PopulationTable) -> dict[str, Numbers]:
-    """Return entropy over cells, and novelty, of the members with measures."""
-    last = born.of_members(table)
-    places = shares(grid, born.values)
-    entropy, novelties = (np.full(len(table), np.nan) for _ in range(2))
-    cells = _cells(grid, born)
-    for group, members in enumerate(table.living):
-        rows = last[members]
-        rows = rows[rows >= 0]
-        if not len(rows):
-            continue
-        counts = np.unique(cells[rows], return_counts=True)[1] / len(rows)
-        entropy[group] = abs(float((counts * np.log(counts)).sum()))
-        if len(rows) > 1:
-            novelties[group] = novelty(places[rows])
-    return {"cell_entropy": entropy, "novelty": novelties}
-
-
-def _cells(grid: Grid, born: Samples) -> Integers:
-    """Return the number of each sample's cell, (S,)."""
-    named = (dict(zip(grid.measures, row, strict=True)) for row in born.values.tolist())
-    cells = np.array([cell_of(grid, measures) for measures in named], np.int64)
-    numbers: Integers = np.ravel_multi_index(tuple(cells.T), grid.bins)
-    return numbers
-
-
-def novelty(places: Numbers) -> float:
-    """Return the mean distance of N > 1 places, (N, M), to their nearest neighbours.
-
-    Source: Lehman and Stanley 2011, "Abandoning objectives", of a population alone.
+    Source: Lehman and Stanley 2011, "Abandoning objectives", with an archive of all.
     """
-    apart = places[:, np.newaxis] - places
-    distances = np.sqrt((apart * apart).sum(axis=2))
-    nearest = min(NEAREST, len(places) - 1)
-    # The first of each row is the distance to itself.
-    return float(np.sort(distances, axis=1)[:, 1 : 1 + nearest].mean())
+    found = np.full(len(places), np.nan)
+    for at in range(1, len(places)):
+        distances = np.sqrt(((places[:at] - places[at]) ** 2).sum(axis=1))
+        found[at] = np.sort(distances)[:NEAREST].mean()
+    return found
 
 
 def cells(run: RunTables) -> pa.Table:
     """Return the fittest robot of each cell that the births of an island reached."""
-    grid, born = run.grid, run.samples
+    grid, born, rows = run.grid, run.samples, []
     assert grid is not None
-    assert born is not None
-    columns: dict[str, list[object]] = defaultdict(list)
-    for island in np.unique(born.islands).tolist():
-        mine, archive = born.born_on(island), Archive(grid)
-        pairs = zip(mine.fitness.tolist(), mine.values, strict=True)
-        for index, (fitness, values) in enumerate(pairs):
-            archive.add(index, fitness, values)
-        for cell, index in sorted(archive.elites.items()):
-            columns["island"].append(island)
-            columns["cell"].append(cell_name(cell))
-            columns["robot"].append(int(mine.robots[index]))
-            columns["fitness"].append(float(mine.fitness[index]))
-            columns["births"].append(int(mine.births[index]))
-            columns["robots"].append(archive.counts[cell])
-    if not columns:
-        return run_schema("cells").empty_table()
-    rows = run.births.take(pa.array(columns.pop("robot"), pa.int64()))
-    names = {"birth_island": rows["island"], "birth": rows["birth"]}
-    return pa.table({**columns, **names})
+    for island in pa.compute.unique(born["island"]).to_pylist():
+        mine, archive = born.filter(pa.compute.field("island") == island), Archive(grid)
+        values = numbers(mine, grid.measures)
+        for index, fitness in enumerate(mine["fitness"].to_pylist()):
+            archive.add(index, fitness, values[index])
+        for cell, (index, fitness) in sorted(archive.elites.items()):
+            birth = run.births["birth"][mine["robot"][index].as_py()].as_py()
+            so_far, robots = mine["births"][index].as_py(), archive.counts[cell]
+            rows.append(
+                (island, cell_name(cell), island, birth, fitness, so_far, robots)
+            )
+    schema = run_schema("cells")
+    named = [dict(zip(schema.names, row, strict=True)) for row in rows]
+    return pa.Table.from_pylist(named, schema)

@@ -1,29 +1,25 @@
 """Births of experiments with several objectives, and their Pareto fronts."""
 
 from collections.abc import Mapping
-from typing import Any
 
-import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from analysis.measures.diversity.fronts import front
-from analysis.measures.diversity.samples import samples
-from analysis.measures.load import island_settings
+from analysis.measures.diversity.samples import numbers, samples
 from analysis.measures.outputs import run_schema
 from analysis.measures.run_tables import RunTables
 from schema.experiment.document import Experiment
-
-_FITNESS = "fitness"
 
 
 def objectives_of(island: Experiment) -> Mapping[str, str]:
     """Return the objectives of ``nsga2``, "max" or "min" by name; empty without it."""
     own = island.selection
-    objectives: Mapping[str, str] = {}
-    if own.survivors == "nsga2":
-        objectives = own.survivors_parameters["objectives"]
-    elif own.parents == "nsga2":
-        objectives = own.parents_parameters["objectives"]
+    rules = {
+        own.parents: own.parents_parameters,
+        own.survivors: own.survivors_parameters,
+    }
+    objectives: Mapping[str, str] = rules.get("nsga2", {}).get("objectives", {})
     return objectives
 
 
@@ -32,34 +28,22 @@ def fronts(run: RunTables) -> pa.Table:
 
     The front is that of all births of an island in all of its objectives.
     """
-    tables = [run_schema("fronts").empty_table()]
-    homes = np.asarray(run.tables["evaluations"]["island"], np.int64)
-    for island in np.unique(homes).tolist():
-        objectives = objectives_of(island_settings(island, run.islands))
-        if objectives:
-            tables.append(_of_island(run, island, objectives))
-    return pa.concat_tables(tables)
-
-
-def _of_island(run: RunTables, island: int, objectives: Mapping[str, str]) -> pa.Table:
-    names = [name for name in objectives if name != _FITNESS]
+    schema, rows = run_schema("fronts"), []
     evaluations, fitness = (run.tables[name] for name in ("evaluations", "fitness"))
-    born = samples(evaluations, fitness, run.births, names).born_on(island)
-    known = dict(zip(names, born.values.T, strict=True)) | {_FITNESS: born.fitness}
-    signs = [1.0 if sense == "max" else -1.0 for sense in objectives.values()]
-    points = np.stack([known[name] for name in objectives], axis=1) * signs
-    best = {tuple(point) for point in front(points).tolist()}
-    rows = run.births.take(pa.array(born.robots))
-    (x_name, x_sense), (y_name, y_sense), *_ = objectives.items()
-    columns: dict[str, Any] = {
-        "island": pa.array([island] * len(born), pa.int32()),
-        "birth_island": rows["island"],
-        "birth": rows["birth"],
-        "x_objective": [f"{x_name} ({x_sense})"] * len(born),
-        "y_objective": [f"{y_name} ({y_sense})"] * len(born),
-        "x": known[x_name],
-        "y": known[y_name],
-        "is_front": [tuple(point) in best for point in points.tolist()],
-    }
-    made = pa.table(columns)
-    return made.select(run_schema("fronts").names).cast(run_schema("fronts"))
+    for island, settings in enumerate(run.islands):
+        objectives = objectives_of(settings)
+        names = [name for name in objectives if name != "fitness"]
+        born = samples(evaluations, fitness, run.births, names)
+        mine = born.filter(pc.field("island") == island)
+        if not objectives or not mine.num_rows:
+            continue
+        values = numbers(mine, [*objectives])
+        signs = [1.0 if sense == "max" else -1.0 for sense in objectives.values()]
+        best = {tuple(point) for point in front(values * signs).tolist()}
+        x_text, y_text, *_ = (f"{name} ({sense})" for name, sense in objectives.items())
+        births = run.births.take(mine["robot"])["birth"].to_pylist()
+        for birth, own in zip(births, values, strict=True):
+            is_best = tuple((own * signs).tolist()) in best
+            row = (island, island, birth, x_text, y_text, own[0], own[1], is_best)
+            rows.append(dict(zip(schema.names, row, strict=True)))
+    return pa.Table.from_pylist(rows, schema)

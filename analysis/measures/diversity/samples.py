@@ -1,109 +1,54 @@
-"""Fitness and measures of robots, in the order of births on their islands."""
+"""Fitness and measures of the robots of a run, in the order of births."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.population_table import (
-    Booleans,
-    Numbers,
-    PopulationTable,
-    individual_ids,
-    rows_of,
-)
-from schema.robot.trees import Integers
-
-
-@dataclass(frozen=True, slots=True)
-class Samples:
-    """Fitness and M measures of robots, by island and births; S samples.
-
-    Off-line there is one of each robot, its evaluation at birth, on-line one of each
-    sample of a mature robot. Failed evaluations are none.
-
-    Attributes:
-        islands: (S,) island.
-        births: (S,) births on the island so far; 0 of immigrants off-line.
-        robots: (S,) births row of the robot.
-        fitness: (S,).
-        values: (S, M) measures.
-    """
-
-    islands: Integers
-    births: Integers
-    robots: Integers
-    fitness: Numbers
-    values: Numbers
-
-    def __len__(self) -> int:
-        return len(self.births)
-
-    def __getitem__(self, rows: Booleans | Integers) -> "Samples":
-        """Return some of the samples."""
-        return Samples(
-            self.islands[rows],
-            self.births[rows],
-            self.robots[rows],
-            self.fitness[rows],
-            self.values[rows],
-        )
-
-    def born_on(self, island: int) -> "Samples":
-        """Return those of an island, without immigrants off-line."""
-        return self[(self.islands == island) & (self.births > 0)]
-
-    def of_members(self, table: PopulationTable) -> Integers:
-        """Return the last sample of each member by then, (N,); -1 if there is none."""
-        if not len(self):
-            return np.full(len(table.members), -1, np.int64)
-        robots = 1 + max(self.robots.max(), table.members.max(initial=0))
-        births = 1 + max(self.births.max(), table.births.max(initial=0))
-        known = (self.islands * robots + self.robots) * births + self.births
-        groups = table.group_of
-        lived = table.islands[groups] * robots + table.members
-        order = np.argsort(known, kind="stable")
-        wanted = lived * births + table.births[groups]
-        place = np.searchsorted(known[order], wanted, side="right") - 1
-        last = order[np.maximum(place, 0)]
-        is_own = (place >= 0) & (known[last] // births == lived)
-        found: Integers = np.where(is_own, last, -1)
-        return found
+from analysis.measures.population_table import Numbers, individual_ids, rows_of
 
 
 def samples(
     evaluations: pa.Table, fitness: pa.Table, births: pa.Table, names: Sequence[str]
-) -> Samples:
-    """Return the samples of a run, given three of its tables, with named measures."""
+) -> pa.Table:
+    """Return fitness and named measures of robots on their islands of birth.
+
+    Off-line they are those of the evaluation at birth, in arenas those of the first
+    sample of the mature robot. Failed evaluations are left out.
+
+    Returns:
+        ``island``, ``births`` on it so far, ``robot`` (row of births), ``fitness`` and
+        a column per measure, by island and births.
+    """
     first = evaluations.filter(pc.field("trial") == 0)
-    is_native = np.equal(first["island"], first["birth_island"])
-    born = np.where(is_native, np.asarray(first["birth"], np.int64) + 1, 0)
+    born = pc.add(first["birth"].cast(pa.int64()), 1)
     mature = fitness.filter(pc.field("is_mature"))
-    parts = [(first, born), (mature, np.asarray(mature["births"], np.int64))]
-    columns: list[tuple[Any, ...]] = [
-        (
-            np.asarray(table["island"], np.int64),
-            so_far,
-            rows_of(individual_ids(table), births),
-            np.asarray(table["fitness"].to_numpy(), np.float64),
-            _measures(table, names),
+    rows = pa.concat_tables(
+        pa.table(
+            {
+                "island": table["island"].cast(pa.int64()),
+                "births": so_far.cast(pa.int64()),
+                "robot": pa.array(rows_of(individual_ids(table), births)),
+                "home": table["birth_island"].cast(pa.int64()),
+                "fitness": table["fitness"],
+                **{
+                    name: pc.map_lookup(table["measures"], pa.scalar(name), "first")
+                    for name in names
+                },
+            }
         )
-        for table, so_far in parts
-    ]
-    every = Samples(*(np.concatenate(pair) for pair in zip(*columns, strict=True)))
-    is_known = ~np.isnan(every.values).any(axis=1) & ~np.isnan(every.fitness)
-    known = every[is_known & (every.robots >= 0)]
-    return known[np.lexsort((known.births, known.islands))]
+        for table, so_far in ((first, born), (mature, mature["births"]))
+    ).drop_null()
+    is_native = (pc.field("island") == pc.field("home")) & (pc.field("robot") >= 0)
+    native = rows.filter(is_native).sort_by(
+        [(key, "ascending") for key in ("island", "births")]
+    )
+    _, earliest = np.unique(native["robot"].to_numpy(), return_index=True)
+    return native.take(np.sort(earliest)).drop_columns("home")
 
 
-def _measures(table: pa.Table, names: Sequence[str]) -> Numbers:
-    """Return named measures of rows, (N, M); NaN where one is not known."""
-    lists = table["measures"].combine_chunks()
-    columns = [
-        pc.map_lookup(lists, pa.scalar(name), "first").to_numpy(zero_copy_only=False)
-        for name in names
-    ]
-    return np.stack([np.asarray(each, np.float64) for each in columns], axis=1)
+def numbers(rows: pa.Table, names: Sequence[str]) -> Numbers:
+    """Return columns of a table, (N, M)."""
+    columns = [np.asarray(rows[name].to_numpy(), np.float64) for name in names]
+    return np.stack(columns, axis=1)

@@ -64,21 +64,18 @@ def test_scores_of_populations_by_hand() -> None:
     assert columns["qd_score"] == pytest.approx([6, 7, 10])
     two_to_one = math.log(3) - 2 / 3 * math.log(2)
     assert columns["archive_entropy"] == pytest.approx([math.log(2), two_to_one, 0])
-    assert columns["cell_entropy"] == pytest.approx([math.log(2), math.log(3), 0])
     # Boxes 0.1 x 0.1 x 2 and 0.9 x 0.9 x 4; C has nothing of y.
     assert columns["hypervolume"] == pytest.approx([3.24, 3.24, 0])
-    assert columns["novelty"][0] == pytest.approx(math.hypot(0.8, 0.8))
-    # B, C and F at (.9, .9), (.2, 0), (.9, .5).
-    apart = [math.hypot(0.7, 0.9), 0.4, math.hypot(0.7, 0.5)]
-    assert columns["novelty"][1] == pytest.approx(sum(apart) / 3)
-    assert math.isnan(columns["novelty"][2])
+    # B from A; C, at (.2, 0), from both.
+    apart = [math.hypot(0.8, 0.8), (math.hypot(0.1, 0.1) + math.hypot(0.7, 0.9)) / 2]
+    assert columns["novelty"] == pytest.approx([*apart, np.nan], nan_ok=True)
     rows = cells(found).select(["island", "cell", "birth", "fitness", "robots"])
     assert [tuple(row.values()) for row in rows.to_pylist()] == [
         (0, "0/0", 2, 2.0, 2), (0, "1/4", 1, 3.0, 1), (1, "1/0", 0, 9.0, 1),
     ]  # fmt: skip
 
 
-def test_arenas_count_the_samples_of_mature_robots() -> None:
+def test_arenas_count_the_first_sample_of_a_mature_robot() -> None:
     samples = [
         evaluation(A, 1.0, 0.1, 1.0, births=1, is_mature=False),
         evaluation(A, 2.0, 0.1, 1.0, births=2, is_mature=True),
@@ -92,8 +89,8 @@ def test_arenas_count_the_samples_of_mature_robots() -> None:
         ),
     )
     columns = grid_measures(found)
-    assert columns["coverage"] == pytest.approx([0, 0.1, 0.2])
-    assert columns["cell_entropy"] == pytest.approx([np.nan, 0, 0], nan_ok=True)
+    assert columns["coverage"] == pytest.approx([0, 0.1, 0.1])
+    assert columns["qd_score"] == pytest.approx([0, 3, 3])
 
 
 @pytest.mark.parametrize("islands", [[], [Experiment(name="e", arena=ArenaSection())]])
@@ -115,12 +112,11 @@ def test_branches_of_first_parents() -> None:
     assert columns["phylogenetic_diversity"].to_pylist() == [1, 3, 0]
 
 
-def test_novelty_is_the_mean_distance_to_five_neighbours() -> None:
-    """Seven places 1 apart: the outermost have neighbours 1 to 5 away, and so on."""
+def test_novelty_is_the_mean_distance_to_the_five_nearest_earlier_births() -> None:
+    """The seventh of a row of places 1 apart is 1 to 5 from five, and 6 from one."""
     places = np.arange(7.0)[:, np.newaxis]
-    sums = [15, 1 + 1 + 2 + 3 + 4, 1 + 1 + 2 + 2 + 3, 1 + 1 + 2 + 2 + 3]
-    mean = (2 * sum(sums[:3]) + sums[3]) / 35
-    assert novelty(places) == pytest.approx(mean)
+    wanted = [np.nan, 1, 1.5, 2, 2.5, 3, 3]
+    assert novelty(places) == pytest.approx(np.array(wanted), nan_ok=True)
 
 
 def union(boxes: Any) -> float:  # noqa: ANN401
@@ -219,4 +215,6 @@ def test_archives_are_those_of_pyribs(measures: int) -> None:
             strict=True,
         )
     }
-    assert {cell_name(cell): index for cell, index in own.elites.items()} == place_of
+    assert {
+        cell_name(cell): index for cell, (index, _) in own.elites.items()
+    } == place_of
