@@ -48,8 +48,8 @@ from schema.experiment.file import read_draft, shipped_experiments
 from tests.analysis.drawn import table
 from tests.docs.page_runner import blocks_of
 
-STUDIES = ("ablation", "arena_settings", "ecosystem.results", "equal_evaluations",
-           "learners", "tasks", "thesis.results")  # fmt: skip
+STUDIES = ("ablation", "arena_settings", "diversity.results", "ecosystem.results",
+           "equal_evaluations", "learners", "tasks", "thesis.results")  # fmt: skip
 BIRTHS, MARK, COMMIT = 30, 15, "0123abc"
 OFF_LINE = """
 name = "{name}"
