@@ -62,7 +62,14 @@ def test_tutorial_runs(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "page", ["gallery/README.md", "growing.md", "founders.md", "simulation.md"]
+    "page",
+    [
+        "gallery/README.md",
+        "growing.md",
+        "founders.md",
+        "simulation.md",
+        "diversity.md",
+    ],
 )
 def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
     (tmp_path / "docs").symlink_to(DOCS)
