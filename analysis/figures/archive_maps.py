@@ -216,19 +216,20 @@ def draw_map(_: Tables, one: ArchiveMap, unit: str) -> drawing.Figure:
 def _label_axes(axes: Axes, one: ArchiveMap) -> None:
     axes.set(xlim=(0, one.bins[0]), ylim=(0, one.bins[1]))
     axes.yaxis.set_visible(len(one.grid.measures) > 1)
-    for axis, name, (low, high), bins in zip(
-        (axes.xaxis, axes.yaxis), one.grid.measures, one.grid.bounds, one.bins,
-        strict=False,
-    ):  # fmt: skip
-        values = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high)
-        shown = [value for value in values if low <= value <= high]
-        places = [(value - low) / (high - low) * bins for value in shown]
-        axis.set_ticks(places, [f"{value:g}" for value in shown])
-        axis.set_label_text(axis_label(name))
+    for axis, (name, ticks) in zip(
+        (axes.xaxis, axes.yaxis), map_axes(one), strict=False
+    ):
+        axis.set_ticks(*zip(*ticks, strict=True))
+        axis.set_label_text(name)
     axes.tick_params(colors=INK, length=2)
 
 
-def axis_label(measure: str) -> str:
-    """Return the name of a measure with its unit, if it has one."""
-    unit = UNITS.get(measure)
-    return f"{measure} [{unit}]" if unit else measure
+def map_axes(one: ArchiveMap) -> Iterator[tuple[str, list[tuple[float, str]]]]:
+    """Yield name, and places in cells and texts of marks, of the axes of a map."""
+    for name, (low, high), bins in zip(
+        one.grid.measures, one.grid.bounds, one.bins, strict=False
+    ):
+        values = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high)
+        shown = [value for value in map(float, values) if low <= value <= high]
+        marks = [((value - low) / (high - low) * bins, f"{value:g}") for value in shown]
+        yield (f"{name} [{UNITS[name]}]" if name in UNITS else name), marks

@@ -7,9 +7,8 @@ films of 400 robots would make a page of 100 MB.
 from html import escape
 from itertools import groupby
 
-from analysis.figures.archive_maps import ArchiveMap, MapCell, axis_label
+from analysis.figures.archive_maps import ArchiveMap, MapCell, map_axes
 from analysis.render.plan import Outline
-from analysis.report.plots import breaks
 
 _WIDTH, _LEFT, _RIGHT, _ABOVE, _BELOW = 1000.0, 100.0, 30.0, 16.0, 72.0
 _HALF = 100
@@ -34,21 +33,16 @@ def interactive_map(one: ArchiveMap) -> str:
 
 def _axes(one: ArchiveMap, side: float) -> str:
     high = side * one.bins[1]
-    texts = []
-    for is_x, (low, upper), bins in zip(
-        (True, False), one.grid.bounds, one.bins, strict=False
-    ):
-        for value in breaks(low, upper):
-            at = (value - low) / (upper - low) * bins * side
-            place = f'class="y" x="{_LEFT - 8}" y="{high - at + 6:.1f}"'
-            if is_x:
-                place = f'class="x" x="{_LEFT + at:.1f}" y="{high + 28:.1f}"'
-            texts.append(f"<text {place}>{value:g}</text>")
-    middle = (_LEFT + _WIDTH - _RIGHT) / 2
     turned = f'transform="translate(24 {high / 2:.1f}) rotate(-90)"'
-    places = (f'x="{middle}" y="{high + 62:.1f}"', turned)
-    for place, name in zip(places, one.grid.measures, strict=False):
-        texts.append(f'<text class="x" {place}>{escape(axis_label(name))}</text>')
+    middle = f'x="{(_LEFT + _WIDTH - _RIGHT) / 2}" y="{high + 62:.1f}"'
+    texts = []
+    for place, (name, ticks) in zip((middle, turned), map_axes(one), strict=False):
+        texts.append(f'<text class="x" {place}>{escape(name)}</text>')
+        for at, text in ticks:
+            spot = f'class="y" x="{_LEFT - 8}" y="{high - at * side + 6:.1f}"'
+            if place == middle:
+                spot = f'class="x" x="{_LEFT + at * side:.1f}" y="{high + 28:.1f}"'
+            texts.append(f"<text {spot}>{text}</text>")
     return "".join(texts)
 
 

@@ -48,8 +48,7 @@ def with_margin(values: Iterable[float]) -> tuple[float, float]:
     return low - margin * (low < 0), high + margin
 
 
-def breaks(low: float, high: float) -> list[float]:
-    """Return some round values within a range."""
+def _breaks(low: float, high: float) -> list[float]:
     numbers = MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high)
     slack = 1e-9 * (high - low)
     return [round(n, 12) for n in numbers if low - slack <= n <= high + slack]
@@ -99,11 +98,11 @@ def plot(
     The description is for screen readers.
     """
     right, bottom = WIDTH - _RIGHT, HEIGHT - _BOTTOM
-    numbered = [(value, f"{value:g}") for value in breaks(*axes.x_range)]
+    numbered = [(value, f"{value:g}") for value in _breaks(*axes.x_range)]
     frame = [
         f'<path class="grid" d="M{_LEFT} {axes.y(value):.1f}H{right}"/>'
         f'<text class="y" x="{_LEFT - 6}" y="{axes.y(value) + 4:.1f}">{value:g}</text>'
-        for value in breaks(*axes.y_range)
+        for value in _breaks(*axes.y_range)
     ] + [
         f'<text class="x" x="{axes.x(value):.1f}" y="{bottom + 18}">'
         f"{escape(name)}</text>"

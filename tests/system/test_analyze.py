@@ -62,7 +62,7 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
     assert set(measures) == set(OUTPUTS) - {
         "between", "migrants", "named_measures", "sweeps", "learning",
         "learning_curves", "life_courses", "lifespans", "birth_places", "couples",
-        "patch_means", "changes",
+        "patch_means", "changes", "cells", "fronts",
     }  # fmt: skip
     for name, table in measures.items():
         assert table.schema.equals(schema(name), check_metadata=True)

@@ -114,7 +114,8 @@ def novelty(places: Numbers) -> Numbers:
     found = np.full(len(places), np.nan)
     for at in range(1, len(places)):
         distances = np.sqrt(((places[:at] - places[at]) ** 2).sum(axis=1))
-        found[at] = np.sort(distances)[:NEAREST].mean()
+        nearest = min(NEAREST, at)
+        found[at] = np.partition(distances, nearest - 1)[:nearest].mean()
     return found
 
 
