@@ -28,6 +28,7 @@ from schema.experiment.document import (
     Reevaluation,
     SelectionSection,
 )
+from schema.experiment.grid import Grid
 from tests.analysis.drawn import table
 
 Level = Mapping[str, float | None]
@@ -302,6 +303,20 @@ def test_fitness_is_compared_only_with_the_same_function() -> None:
         "different fitness functions: f, g",
     )
     assert (fitter["p"], larger["p"]) == (None, 1.0)
+
+
+def test_cells_are_compared_only_with_the_same_grid() -> None:
+    levels = [{"births": 15, "coverage": 0.1, "parts": 1.0}]
+    made = []
+    for name, bins in (("a", 2), ("b", 2), ("c", 3)):
+        grid = Grid(("x",), bounds=((0, 1),), bins=(bins,))
+        one = measured(name, 0, tables(levels))
+        settings = Experiment("e", births=100, grid=grid)
+        made.append(replace(one, run=replace(one.run, settings=settings)))
+    rows = comparison(outcomes_of(made)).to_pylist()
+    found = {(row["a"], row["b"]) for row in rows if row["measure"] == "coverage"}
+    assert found == {("a", "b")}
+    assert {("a", "c"), ("b", "c")} < {(row["a"], row["b"]) for row in rows}
 
 
 def test_experiments_are_compared_at_births_that_all_runs_reach() -> None:
