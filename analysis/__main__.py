@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.extras import extra
-from analysis.viewer.flags import FILM_ENDING
+from analysis.render.flags import FILM_ENDINGS
 from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.agent.supervisor import cores
 from schema.plugins.permission import allow
@@ -109,7 +109,7 @@ def _view(options: argparse.Namespace) -> int:
 
     A film of an arena needs no viewer.
     """
-    if options.save is not None and options.save.suffix.lower() == FILM_ENDING:
+    if options.save is not None and options.save.suffix.lower() in FILM_ENDINGS:
         with extra("pictures need", "pictures"):
             from analysis.render.stage import choose_engine
 

@@ -19,7 +19,8 @@ from analysis.figures.robot_pictures import RobotPicture
 from analysis.figures.style import PICTURE_ENDING, file_name, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, LoadedRun
-from analysis.render.picture import Simulate, gif
+from analysis.render.files import gif
+from analysis.render.picture import Simulate
 from analysis.render.stage import Picture
 
 _FILM = "best-robot-of-"

@@ -15,7 +15,13 @@ from analysis.figures.style import (
     theme_of_size,
     two_line_label,
 )
-from analysis.measures.fitness_functions import axis_text, fitness_unit, functions_of
+from analysis.measures.fitness_functions import (
+    LOCOMOTION,
+    WEIGHTED,
+    axis_text,
+    fitness_unit,
+    functions_of,
+)
 from schema.errors import RevolveError
 
 Tables = Mapping[str, pa.Table]
@@ -68,8 +74,15 @@ def fitness_text(tables: Tables, text: str) -> str:
 
 
 def fitness_units(tables: Tables) -> dict[str, str]:
-    """Return the unit of each experiment's fitness; empty where it is not known."""
-    return {name: fitness_unit(text) for name, text in _functions(tables).items()}
+    """Return the unit of each experiment's fitness; empty where it is not known.
+
+    That of locomotion is named: a sum of velocities is how fast no robot moves.
+    """
+    functions = _functions(tables).items()
+    return {
+        name: WEIGHTED if text == LOCOMOTION else fitness_unit(text)
+        for name, text in functions
+    }
 
 
 def fitness_note(tables: Tables) -> str:

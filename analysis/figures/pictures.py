@@ -59,7 +59,7 @@ def _heading(robot: RobotPicture, unit: str) -> str:
     way = f"moved {100 * robot.moved_m:.2g} cm in {robot.times_s[-1]:.1f} s"
     if robot.moved_m < _STILL_M:
         way = "stood still in these pictures"
-    fitness = f"{robot.best.fitness:.3g} {unit}".rstrip()
+    fitness = f"{robot.best.fitness:.3g}" + f" ({unit})" * bool(unit)
     return f"{label(robot.best.experiment)}, fitness {fitness}, {way}"
 
 

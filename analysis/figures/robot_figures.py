@@ -100,7 +100,7 @@ def gait_figures(
             "Gaits of the best robots",
             "The fittest robot of each experiment's last populations, simulated alone "
             "and shown from the middle of its evaluation on, by a camera that stands "
-            "still; a tile of the floor has 20 cm. Pictures of robots that move less "
+            "still; a tile of the floor has 10 cm. Pictures of robots that move less "
             "than 10 cm in that time are taken further apart, up to the end of the "
             f"evaluation. {PART_COLOURS}",
             _SOURCE,

@@ -1,7 +1,7 @@
 """Renders the best robots, their gaits and their families."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from analysis.figures.family_tree import Best
 from analysis.measures.families import Family
+from analysis.render.motion import recorded
 from analysis.render.picture import RobotRenderer, Simulate
 from analysis.render.stage import Picture
 from schema.experiment.document import Experiment, island_experiment
@@ -26,14 +27,11 @@ from schema.wire.born import birth_point, robot_of_birth
 FRAMES = 6
 EVERY_S = 0.5
 """Pictures of a gait, and the time between two of them [s]."""
-FILM_EVERY_S = 0.1
+FILM_EVERY_S = 0.05
 """Time between two pictures of a film [s]; it lasts as long as the gait."""
-_LARGE, _SMALL, _FILMED = (400, 300), (300, 225), (320, 240)
+_LARGE, _SMALL, _FILMED = (400, 210), (300, 168), (400, 240)
+"""Sizes of pictures of a gait, of families and of films [pixels]."""
 _JUDGING = frozenset({"fitness", "measures", "selection"})
-_WIDE, _CLOSE = (0.15, 0.15, 0.0), (0.26, 0.14, 0.1)
-_FILM = (0.12, 0.03, 0.0)
-"""Shares of a picture that are cut off: of the height above and below, of the width at
-each side. Robots are flat, and the near side is below the middle."""
 _SLOW_M = 0.1
 """Way during a gait below which its pictures are taken further apart [m]: a robot that
 moves less looks the same in all of them."""
@@ -120,7 +118,7 @@ def robot_picture(
     pictures, names = {}, {}
     for member in sorted(members) if has_family else ():
         with RobotRenderer(painted(member), settings, size=_SMALL) as renderer:
-            pictures[member] = _cut(renderer.picture(), _CLOSE)
+            pictures[member] = renderer.picture()
         columns = (births["island"], births["birth"])
         names[member] = BirthId(*(column[member].as_py() for column in columns))
     birth = BirthId(best.birth_island, best.birth)
@@ -150,13 +148,6 @@ def shown_document(document: str) -> str:
     return json.dumps(shown)
 
 
-def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
-    high, wide = picture.shape[:2]
-    top, below = round(share[0] * high), round(share[1] * high)
-    left = round(share[2] * wide)
-    return picture[top : high - below, left : wide - left]
-
-
 def _motion(
     robot: Robot, settings: EvaluationSettings, simulate: Simulate
 ) -> tuple[tuple[Picture, ...], tuple[float, ...], tuple[Picture, ...], float, float]:
@@ -166,39 +157,24 @@ def _motion(
         Pictures of the gait and their times [s]; pictures of the film and the time
         between two of them [s]; the robot's way during the gait [m].
     """
-    poses: list[Floats] = []
-    watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
-    simulate(robot, settings, watch=watch)
-    tick_s = settings.simulation.tick_s
-    step, film_step = (
-        max(1, round(every_s / tick_s)) for every_s in (EVERY_S, FILM_EVERY_S)
-    )
+    step = round(EVERY_S / FILM_EVERY_S)
+    poses = recorded(simulate, robot, settings, FILM_EVERY_S)
     first = len(poses) // 2
     chosen = range(first, len(poses), step)[:FRAMES]
-    filmed = range(first, min(len(poses), first + FRAMES * step), film_step)
+    filmed = poses[first : first + FRAMES * step]
     if _way_m(poses, chosen) < _SLOW_M:
         step = max(step, (len(poses) - 1 - first) // (FRAMES - 1))
         chosen = range(first, len(poses), step)[:FRAMES]
+    times_s = tuple((at - first) * FILM_EVERY_S for at in chosen)
 
-    times_s = tuple((at - first) * tick_s for at in chosen)
+    def pictures(shown: Sequence[Floats], size: tuple[int, int]) -> tuple[Picture, ...]:
+        with RobotRenderer(robot, settings, size=size, is_fine=size == _LARGE) as one:
+            frame = one.framing(shown)
+            return tuple(one.picture(pose, frame) for pose in shown)
 
-    def pictures(
-        ticks: Sequence[int], size: tuple[int, int], share: tuple[float, float, float]
-    ) -> tuple[Picture, ...]:
-        shown = [poses[at] for at in ticks]
-        with RobotRenderer(robot, settings, size=size) as renderer:
-            look_at, distance_m = renderer.framing(shown, share[:2])
-            return tuple(
-                _cut(
-                    renderer.picture(pose, look_at=look_at, distance_m=distance_m),
-                    share,
-                )
-                for pose in shown
-            )
-
-    film = pictures(filmed, _FILMED, _FILM)
-    gait = pictures(chosen, _LARGE, _WIDE)
-    return gait, times_s, film, film_step * tick_s, _way_m(poses, chosen)
+    film = pictures(filmed, _FILMED)
+    gait = pictures([poses[at] for at in chosen], _LARGE)
+    return gait, times_s, film, FILM_EVERY_S, _way_m(poses, chosen)
 
 
 def _way_m(poses: Sequence[Floats], ticks: Sequence[int]) -> float:

@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 
 import pyarrow as pa
 
+LOCOMOTION, WEIGHTED = "locomotion", "weighted velocity"
+"""Fitness function of the thesis, and what its value is: path velocity and five times
+straight velocity."""
 UNITS = {
-    "locomotion": "m/s",
+    LOCOMOTION: "m/s",
     "directed-locomotion": "m/s",
     "target": "m/s",
     "light": "brightness",

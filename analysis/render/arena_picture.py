@@ -9,6 +9,7 @@ import numpy as np
 from analysis.render.overlay import Overlay
 from analysis.render.stage import (
     AZIMUTH,
+    HIDDEN_M,
     HIGH,
     Picture,
     Stage,
@@ -25,11 +26,7 @@ from schema.robot.trace import Floats
 Poses = Mapping[BirthId, Floats]
 """Pose of each living robot, (7 + joints,): place of the core x, y, z [m], attitude w,
 x, y, z, and the angle of every joint by ascending part [rad; m of a slider]."""
-_HIDDEN_M = -100.0
-"""Height of the robots that do not live at the time of a picture [m]."""
 _LEAST_REACH_M = 0.5
-_WHOLE = (0.0, 0.0)
-"""Shares of a picture that are cut off."""
 _RIM_M = 0.005
 """Half height of walls between the camera and the robots [m]."""
 _HEIGHTS = (2, 9)
@@ -70,7 +67,7 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
 
         def furnish_arena(spec: Any) -> None:  # noqa: ANN401 - imported late
             mjcf.add_walls(spec, walls)
-            furnish(size, settings.light, reach_m, spec)
+            furnish(None, settings.light, reach_m, spec)
             add_rods(overlay.most_rods, reach_m, spec)
 
         specs = [
@@ -80,13 +77,12 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
         model = mjcf.shared_model(
             specs, world, settings.environment, furnish=furnish_arena
         )
-        self._stage = Stage(model, size, HIGH)
+        self._stage = Stage(model, size, (AZIMUTH, HIGH), is_fine=False)
         self._starts = {
             birth: int(model.joint(f"{prefix}free").qposadr[0])
             for birth, (prefix, _) in zip(robots, specs, strict=True)
         }
         self.overlay = overlay
-        self._rods = [model.geom(f"rod{n}").id for n in range(overlay.most_rods)]
         self._paint = model.geom_rgba.copy()
         self._camera = self._framing(frames)
 
@@ -105,13 +101,8 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
             root = model.body(f"{birth.name}/root").id
             own = model.body_rootid[model.geom_bodyid] == root
             model.geom_rgba[own, :3] = np.divide(overlay.colours[birth], 255.0)
-        model.geom_pos[self._rods, 2] = _HIDDEN_M
-        shown = zip(self._rods, overlay.rods(time_s, poses), strict=False)
-        for geom, (centre, half_m, turn, radius_m, colour) in shown:
-            model.geom_pos[geom], model.geom_quat[geom] = centre, turn
-            model.geom_size[geom, :2] = radius_m, half_m
-            model.geom_rgba[geom, :3] = np.divide(colour, 255.0)
         self._pose(poses)
+        self._stage.show_rods(overlay.rods(time_s, poses))
         return self._stage.picture(*self._camera)
 
     def _pose(self, poses: Poses) -> None:
@@ -120,7 +111,7 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
             if birth in poses:
                 qpos[start : start + len(poses[birth])] = poses[birth]
             else:
-                qpos[start + 2] = _HIDDEN_M
+                qpos[start + 2] = HIDDEN_M
         self._stage.pose(qpos)
 
     def _framing(self, frames: Sequence[Poses]) -> tuple[Floats, float]:
@@ -128,15 +119,13 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
         model, data = self._stage.model, self._stage.data
         # Geoms of the world have no moving root.
         is_own = model.body_dofnum[model.body_rootid[model.geom_bodyid]] > 0
-        centres, radii = [], []
+        seen = []
         for poses in frames:
             self._pose(poses)
-            is_shown = is_own & (data.geom_xpos[:, 2] > 0.5 * _HIDDEN_M)
-            centres.append(data.geom_xpos[is_shown])
-            radii.append(model.geom_rbound[is_shown])
-        return self._stage.framing(
-            np.concatenate(centres), np.concatenate(radii), _WHOLE
-        )
+            is_shown = is_own & (data.geom_xpos[:, 2] > 0.5 * HIDDEN_M)
+            places, radii = data.geom_xpos[is_shown], model.geom_rbound[is_shown, None]
+            seen += [places + radii * axis for axis in (*np.eye(3), *-np.eye(3))]
+        return self._stage.framing(np.concatenate(seen))
 
 
 def _lowered(walls: Floats) -> Floats:

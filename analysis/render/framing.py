@@ -6,6 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 Numbers = npt.NDArray[np.float64]
+_FILLED = 0.88
+"""Share of a picture's width or height that is filled."""
+_ROUNDS = 5
+"""Near points are further from the middle than far ones: it is found step by step."""
 
 
 def view_axes(azimuth: float, elevation: float) -> Numbers:
@@ -19,30 +23,26 @@ def view_axes(azimuth: float, elevation: float) -> Numbers:
 
 
 def framed(
-    centres: Numbers,
-    radii: Numbers,
-    azimuth: float,
-    elevation: float,
-    tangents: tuple[float, float, float],
+    points: Numbers, azimuth: float, elevation: float, tangents: tuple[float, float]
 ) -> tuple[Numbers, float]:
-    """Return the point that a camera looks at, and its distance [m], to see spheres.
+    """Return the point that a camera looks at, and its distance [m], to see points.
+
+    The points are in the middle of the picture and fill it but for a rim.
 
     Args:
-        centres: (N, 3) centres of the spheres, world frame [m].
-        radii: (N,) their radii [m].
+        points: (N, 3), world frame [m].
         azimuth: direction of the camera's view, as MuJoCo's [rad].
         elevation: the same.
-        tangents: of the angles between the view and the edges of the picture: above,
-            below, and at each side.
+        tangents: of the angles between the view and the edges of the picture: above
+            and below, and at each side.
     """
     axes = view_axes(azimuth, elevation)
-    places = centres @ axes.T
+    places = points @ axes.T
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
-    across, up, towards = (places - middle).T
-    angles = np.arctan(tangents)
-    sides = zip((up, -up, np.abs(across)), angles, strict=True)
-    distances = [
-        towards + (beyond * np.cos(angle) + radii) / np.sin(angle)
-        for beyond, angle in sides
-    ]
-    return middle @ axes, float(np.max(distances))
+    edges = _FILLED * np.array([tangents[1], tangents[0]])
+    for _ in range(_ROUNDS):
+        offsets, towards = (places - middle)[:, :2], (places - middle)[:, 2:]
+        distance = float((towards + np.abs(offsets) / edges).max())
+        seen = offsets / (distance - towards)
+        middle[:2] += 0.5 * distance * (seen.min(axis=0) + seen.max(axis=0))
+    return middle @ axes, distance

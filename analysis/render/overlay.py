@@ -69,16 +69,17 @@ class Overlay:
             colour = _mixed(_MEADOW, content / self._fullest)
             # Discs may overlap.
             axis = (number + 1) * _THICK
-            rods.append(_rod(np.array([x, y, 0.0]), axis, radius_m, colour))
+            rods.append(rod(np.array([x, y, 0.0]), axis, radius_m, colour))
         is_over = time_s >= self._met.sim_time_s + self._met.over_s
         for first, second, are_parents in () if is_over else self._met.pairs:
             if first in poses and second in poses:
                 start, end = poses[first][:3] + _ABOVE, poses[second][:3] + _ABOVE
-                rods.append(_rod(start, end - start, *_LINES[are_parents]))
+                rods.append(rod(start, end - start, *_LINES[are_parents]))
         return rods
 
 
-def _rod(start: Floats, axis: Floats, radius_m: float, colour: Colour) -> Rod:
+def rod(start: Floats, axis: Floats, radius_m: float, colour: Colour) -> Rod:
+    """Return a cylinder from a point along an axis, (3,) [m]."""
     length_m = max(float(np.linalg.norm(axis)), 1e-9)
     x, y, z = axis / length_m
     turn = np.array([1.0 + z, -y, x, 1e-9])

@@ -1,18 +1,17 @@
-"""Pictures of one robot, and their files."""
+"""Pictures of one robot, or of several side by side."""
 
-import io
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
-from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
 
-from analysis.render.stage import FIELD_OF_VIEW, Picture, Stage, choose_engine, furnish
-from schema.errors import RevolveError
+from analysis.render.overlay import Rod
+from analysis.render.stage import Picture, Stage, add_rods, choose_engine, furnish
 from schema.experiment.document import body_space
+from schema.experiment.environment import Environment
 from schema.experiment.settings import EvaluationSettings
+from schema.parts import Vector
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats, Trace
 
@@ -21,193 +20,129 @@ Simulate = Callable[..., Trace]
 
 Each tick calls ``watch`` with ``MjData``.
 """
-_COLOURS = 256
-_SAMPLES = 6
-"""Pictures from which the colours of a film are chosen."""
+Frame = tuple[Floats, float]
+"""Point that a camera looks at, (3,) [m], and its distance from there [m]."""
 _REACH_M = 0.5
-"""Half width of what a picture of a robot shows, for light and clipping [m]."""
-
-
-class NoPictures(RevolveError):  # noqa: N818 - names what is missing
-    """A picture cannot be rendered or written."""
+"""Scale of the scene, for clipping [m]."""
+_CORNERS = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+_MOST_FRAMED = 100
+"""Poses that decide about the place of a camera, at most."""
 
 
 class RobotRenderer(AbstractContextManager["RobotRenderer"]):
-    """Renders one robot on a tiled floor; a context manager.
+    """Renders robots on a floor; a context manager.
 
     Attributes:
-        model: MuJoCo model of the robot; poses are its ``qpos``.
+        model: MuJoCo model of the robots; poses are its ``qpos``: of one robot with the
+            movable objects of its scenery, of several one after the other.
+        stage: camera and light.
     """
 
     def __init__(
         self,
-        robot: Robot,
+        robots: Robot | Sequence[Robot],
         settings: EvaluationSettings,
         *,
         size: tuple[int, int] = (640, 480),
+        background: Vector | None = None,
+        rods: int = 0,
+        is_fine: bool = True,
     ) -> None:
-        """Build the model, with the robot in neutral pose.
+        """Build the model, with one robot in neutral pose.
+
+        Several robots are on a plane. ``background`` is that of ``furnish``, ``rods``
+        the greatest number of rods that a picture shows.
 
         Raises:
             ExperimentError: invalid scenery.
         """
         choose_engine()
-        from schema.mjcf.model import solo_spec  # noqa: PLC0415 - imports MuJoCo
+        from schema.mjcf import model as mjcf  # noqa: PLC0415 - imports MuJoCo
 
-        self.model = solo_spec(
-            robot,
-            body_space(settings.space),
-            settings.simulation,
-            settings.environment,
-            furnish=partial(furnish, size, settings.environment.light, _REACH_M),
-        ).compile()
-        self._stage = Stage(self.model, size)
-        data = self._stage.data
-        self._stage.pose(data.qpos)
-        own = self.model.body("root").id
-        self._geoms = self.model.body_rootid[self.model.geom_bodyid] == own
-        centres = data.geom_xpos[self._geoms]
-        reaches = self.model.geom_rbound[self._geoms, np.newaxis]
-        low, high = (centres - reaches).min(axis=0), (centres + reaches).max(axis=0)
-        # Centre and radius of a sphere around the robot in neutral pose, in the frame
-        # of the core.
-        self._middle = 0.5 * (low + high) - data.qpos[:3]
-        away = np.linalg.norm(centres - 0.5 * (low + high), axis=1)
-        self._radius = float((away + reaches[:, 0]).max())
+        space, world = body_space(settings.space), settings.simulation
+        light = settings.environment.light
+
+        def furnished(spec: object, light: Vector | None = None) -> None:
+            furnish(background, light, _REACH_M, spec)
+            add_rods(rods, _REACH_M, spec)
+
+        if isinstance(robots, Robot):
+            spec = mjcf.solo_spec(
+                robots, space, world, settings.environment,
+                furnish=partial(furnished, light=light),
+            )  # fmt: skip
+            self.model, names = spec.compile(), [""]
+        else:
+            names = [f"{number}/" for number in range(len(robots))]
+            specs = [mjcf.robot_spec(one, space, world).spec for one in robots]
+            self.model = mjcf.shared_model(
+                list(zip(names, specs, strict=True)), world, Environment(),
+                furnish=furnished,
+            )  # fmt: skip
+        self.stage = Stage(self.model, size, is_fine=is_fine)
+        self.stage.pose(self.stage.data.qpos)
+        roots = [self.model.body(f"{name}root").id for name in names]
+        self._geoms = np.isin(self.model.body_rootid[self.model.geom_bodyid], roots)
+        self.starts = [int(self.model.joint(f"{n}free").qposadr[0]) for n in names]
 
     def __exit__(self, *_: object) -> None:
-        self._stage.close()
+        self.stage.close()
 
     def picture(
         self,
         pose: Floats | None = None,
-        *,
-        look_at: Floats | None = None,
-        distance_m: float | None = None,
+        frame: Frame | None = None,
+        rods: Sequence[Rod] = (),
     ) -> Picture:
-        """Return a picture of the robot in a pose.
+        """Return a picture of the robots in a pose.
 
         Args:
             pose: (nq,) ``qpos`` of the model; the previous pose if None.
-            look_at: (3,) point that the camera looks at [m]; the robot if None.
-            distance_m: of the camera from there [m]; None: just enough for the robot
-                in neutral pose.
+            frame: place of the camera; None: to see the robots in this pose.
+            rods: what else is shown.
         """
-        stage = self._stage
+        stage = self.stage
         if pose is not None:
             stage.pose(pose)
-        middle = stage.data.qpos[:3] + self._middle
-        near_m = 1.05 * self._radius / np.sin(np.radians(FIELD_OF_VIEW / 2))
-        return stage.picture(
-            middle if look_at is None else look_at,
-            near_m if distance_m is None else distance_m,
-        )
+        frame = frame or self.framing([stage.data.qpos.copy()])
+        stage.show_rods(rods)
+        return stage.picture(*frame, self.middle(stage.data.qpos))
 
-    def framing(
-        self, poses: Sequence[Floats], cut: tuple[float, float]
-    ) -> tuple[Floats, float]:
-        """Return ``look_at`` and ``distance_m`` to see a robot and its shadow in poses.
+    def cores(self, pose: Floats) -> Floats:
+        """Return the positions of the robots' cores in a pose, (N, 3) [m]."""
+        return np.stack([pose[start : start + 3] for start in self.starts])
 
-        Shares of the picture's height may be cut off above and below.
+    def middle(self, pose: Floats) -> Floats:
+        """Return the mean of the positions of the robots' cores in a pose, (3,) [m]."""
+        return np.asarray(self.cores(pose).mean(axis=0))
+
+    def framing(self, poses: Sequence[Floats], shifts: Floats | None = None) -> Frame:
+        """Return the place of a camera that sees robots and their shadows in poses.
+
+        ``shifts``, (T, 3) [m], are subtracted from the places of each pose.
         """
-        centres: list[Floats] = []
-        lamp = self._stage.data.light_xpos[0]
-        for pose in poses:
-            self._stage.pose(pose)
-            places = self._stage.data.geom_xpos[self._geoms]
-            height = np.clip(places[:, 2:], 0.0, 0.5 * lamp[2])
-            away = (places - lamp) * height / (lamp[2] - height)
-            centres += [places, places + away]
-        radii = np.tile(self.model.geom_rbound[self._geoms], len(centres))
-        return self._stage.framing(np.concatenate(centres), radii, cut)
+        step = -(-len(poses) // _MOST_FRAMED)
+        seen, reaches_m = [], []
+        for number in range(0, len(poses), step):
+            points = self._corners(poses[number])
+            away = points - self.middle(poses[number])
+            reaches_m.append(np.linalg.norm(away, axis=1).max())
+            seen.append(points if shifts is None else points - shifts[number])
+        self.stage.shadow_m = 1.05 * float(max(reaches_m))
+        return self.stage.framing(np.concatenate(seen))
 
+    def lowest_m(self, pose: Floats) -> float:
+        """Return the height of the robots' lowest point in a pose [m]."""
+        return float(self._corners(pose)[:, 2].min())
 
-def gait_strip(
-    pictures: Sequence[Picture], texts: Sequence[str] = (), *, columns: int = 5
-) -> Picture:
-    """Return pictures of one size in rows; the rest of the last row is white.
-
-    The text of each, such as its simulated time, is written below it, if given.
-    """
-    if texts:
-        marked = zip(pictures, texts, strict=True)
-        pictures = [_with_text(picture, text) for picture, text in marked]
-    height, width, _ = pictures[0].shape
-    columns = min(columns, len(pictures))
-    rows = -(-len(pictures) // columns)
-    cells = np.full((rows * columns, height, width, 3), 255, np.uint8)
-    cells[: len(pictures)] = pictures
-    strip = cells.reshape(rows, columns, height, width, 3).swapaxes(1, 2)
-    return strip.reshape(rows * height, columns * width, 3)
-
-
-def _with_text(picture: Picture, text: str) -> Picture:
-    height, width, _ = picture.shape
-    size = max(10, width // 16)
-    image = Image.new("RGB", (width, height + 3 * size // 2), "white")
-    image.paste(Image.fromarray(picture))
-    font = ImageFont.load_default(min(size, 5 * width // (3 * len(text))))
-    middle = (width / 2, height + 3 * size / 4)
-    ImageDraw.Draw(image).text(middle, text, "black", font, anchor="mm")
-    return np.asarray(image)
-
-
-def save_picture(picture: Picture, path: Path) -> None:
-    """Write a picture in the format of the file's ending.
-
-    Raises:
-        NoPictures: the ending is unknown, or the file cannot be written.
-    """
-    with _writing(path):
-        Image.fromarray(picture).save(path)
-
-
-def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
-    """Write pictures as a ``gif``.
-
-    Raises:
-        NoPictures: the file cannot be written.
-    """
-    with _writing(path):
-        path.write_bytes(gif(pictures, interval_s, _COLOURS))
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        why = f"cannot be written: {error.strerror or error}"
-        raise NoPictures(f"{path}: {why}") from None
-    except ValueError as error:
-        raise NoPictures(f"{path}: {error}") from None
-
-
-def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:
-    """Return pictures as a GIF that repeats.
-
-    All pictures share one palette without dithering, so that what does not move is
-    stored once.
-
-    Args:
-        pictures: pictures of one size; at least one.
-        interval_s: time between two pictures [s]; a GIF stores hundredths.
-        colours: size of the palette, at most 256.
-    """
-    every = -(-len(pictures) // _SAMPLES)
-    samples = Image.fromarray(np.concatenate(pictures[::every]))
-    palette = samples.quantize(colours, Image.Quantize.MEDIANCUT)
-    first, *others = (
-        Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE)
-        for one in pictures
-    )
-    file = io.BytesIO()
-    first.save(
-        file,
-        "GIF",
-        save_all=True,
-        append_images=others,
-        duration=round(1000 * interval_s),
-        loop=0,
-    )
-    return file.getvalue()
+    def _corners(self, pose: Floats) -> Floats:
+        """Return the corners of boxes around all geoms and their shadows, (N, 3)."""
+        self.stage.pose(pose)
+        data, fall = self.stage.data, self.stage.fall()
+        middles, halves = np.split(self.model.geom_aabb[self._geoms, None], 2, 2)
+        corners = (middles + halves * _CORNERS).reshape(-1, 8, 3)
+        turns = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
+        places = corners @ turns.swapaxes(1, 2) + data.geom_xpos[self._geoms, None]
+        points = places.reshape(-1, 3)
+        shadows = points - fall * np.maximum(points[:, 2:], 0.0) / fall[2]
+        return np.concatenate([points, shadows])

@@ -22,13 +22,14 @@ _VISIBLE = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 _DEFAULT_COLOUR = 0.5
 """Colour of geoms without one of their own; that of their material replaces it."""
 _FAR_M = 1000.0
-_ONTO = 1e-4
-"""Greatest relative distance from a lit point at which a ray of the light ends."""
+_LAMP_M = 100.0
+"""Distance of the lamp, whose light is parallel in truth [m]."""
+_ONTO_M = 1e-4
+"""Greatest distance from a lit point at which a ray of the light ends [m]."""
 _EDGE = 0.99
 """Cosine of the angle between two surfaces below which there is an edge."""
 _SUBPIXELS = ((-0.125, -0.375), (0.375, -0.125), (-0.375, 0.125), (0.125, 0.375))
 """Offsets of the rays that smooth edges, in pixels: a rotated grid."""
-_SKY = 1.0
 _HAZE = 0.3
 """Cosine of the angle of incidence below which the floor fades into the sky."""
 
@@ -55,16 +56,20 @@ class RayCaster:
         height: int,
         width: int,
         *,
-        floor: tuple[str, Shades, float],
+        floor: tuple[str, str, float],
     ) -> None:
-        """Prepare the rays to a model with one white spot light.
+        """Prepare the rays to a model with one white lamp.
 
-        ``floor`` is the name of the material that has a checker, its two colours,
-        (2, 3) from 0 to 1, and the side of its tiles [m].
+        ``floor`` is the name of the material that has a checker, that of its texture,
+        and the side of its tiles [m]. The sky has the colour of the first tile.
         """
         self._model = model
         self._size = height, width
-        name, self._tiles, self._tile_m = floor
+        name, texture, self._tile_m = floor
+        corner = int(model.tex_adr[model.texture(texture).id])
+        side = 3 * int(model.tex_width[model.texture(texture).id])
+        colours = model.tex_data[corner : corner + side].reshape(-1, 3)[[0, -1]]
+        self._tiles: Shades = colours.astype(np.float32) / np.float32(255.0)
         self._is_floor = model.geom_matid == model.material(name).id
         self._rows, self._columns = np.indices(self._size).reshape(2, -1)
         # Half of the picture's height at distance 1, divided by half of its pixels.
@@ -126,7 +131,7 @@ class RayCaster:
         places = eye + distances[:, None] * rays
         head = self._model.vis.headlight
         light, is_lit = self._light(data, places, normals)
-        light += head.ambient[0] + head.diffuse[0] * facing
+        light += head.ambient[0]
         paint = self._colours[geoms]
         floor = np.flatnonzero(self._is_floor[geoms] & ~is_sky)
         slant = facing[floor]
@@ -137,26 +142,24 @@ class RayCaster:
         )
         paint *= np.minimum(light, 1.0)[:, None]
         haze = np.maximum(1.0 - slant / _HAZE, 0.0)[:, None]
-        paint[floor] += haze * (_SKY - paint[floor])
-        paint[is_sky] = _SKY
+        paint[floor] += haze * (self._tiles[0] - paint[floor])
+        paint[is_sky] = self._tiles[0]
         is_lit[is_sky] = False
         return _Hits(geoms, normals, is_lit, paint)
 
     def _light(
         self, data: mujoco.MjData, places: Floats, normals: Floats
     ) -> tuple[Shades, npt.NDArray[np.bool_]]:
-        """Return the diffuse light of the spot at places, and where it gets to."""
-        spot = self._model.light(0)
-        lamp = data.light_xpos[0]
+        """Return the diffuse light of the lamp at places, and where it gets to."""
+        fall = data.light_xdir[0]
+        lamp = data.light_xpos[0] - _LAMP_M * fall
         rays = places - lamp
         lengths = np.sqrt(_products(rays, rays))
         rays /= lengths[:, None]
         _, distances, _ = self._cast(data, lamp, rays)
-        slant = np.maximum(-_products(rays, normals), 0.0)
-        along = rays @ data.light_xdir[0]
-        is_lit = distances > lengths * (1.0 - _ONTO)
-        is_lit &= (slant > 0.0) & (along > np.cos(np.radians(spot.cutoff[0])))
-        strength = spot.diffuse[0] * slant * along ** spot.exponent[0] * is_lit
+        slant = np.maximum(-(normals @ fall), 0.0)
+        is_lit = (distances > lengths - _ONTO_M) & (slant > 0.0)
+        strength = self._model.light(0).diffuse[0] * slant * is_lit
         return strength.astype(np.float32), is_lit
 
     def _cast(

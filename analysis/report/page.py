@@ -224,8 +224,7 @@ def _films(tables: Tables, drawings: Drawings) -> str:
     )
     text = (
         "Each is the best robot of an experiment's last populations. "
-        f"{PART_COLOURS} The dark shapes on the floor are shadows; their edges are "
-        "coarse because they are drawn with few pixels."
+        f"{PART_COLOURS} A tile of the floor has 10 cm."
     )
     note = f'<p class="note">{text}</p>'
     return (f'<div class="films">{shown}</div>{note}' if shown else "") + reasons

@@ -8,8 +8,8 @@ from pathlib import Path
 from analysis.measures.load import read_run
 from analysis.progress import bars
 from analysis.render.arena_picture import ArenaRenderer, Poses
+from analysis.render.files import NoPictures, gait_strip, save_film
 from analysis.render.overlay import Overlay
-from analysis.render.picture import NoPictures, gait_strip, save_animation
 from analysis.render.stage import Picture
 from analysis.viewer.flags import FILM_S
 from analysis.viewer.replay import (
@@ -66,7 +66,7 @@ def film(options: argparse.Namespace) -> int:
     span = span_of(options, FILM_S, NoPictures)
     pictures, times_s = draw_film(options.run, span, _SIZE)
     interval_s = (times_s[-1] - times_s[0]) / max(1, len(times_s) - 1)
-    save_animation(pictures, out, interval_s / SPEED)
+    save_film(pictures, out, interval_s / SPEED)
     tell_user(
         f"saved {out}: {times_s[0]:g} to {times_s[-1]:g} s at {SPEED:g} times real "
         "time; --from and --until choose others"

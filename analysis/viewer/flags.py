@@ -10,7 +10,6 @@ HOST, PORT = "127.0.0.1", 9876
 """Address of the server for viewers."""
 LAST_S, FILM_S = 600.0, 20.0
 """Simulated time at the end of a run that is replayed and filmed by default [s]."""
-FILM_ENDING = ".gif"
 BEST, BEST_EVER = "best", "best-ever"
 """Robots with a name: the fittest of the last population, and of all evaluated."""
 
@@ -37,8 +36,8 @@ def parser(_command: str = "view") -> Flags:
     add_shared(flags, "--connect")
     flags.add_argument(
         "--save", type=Path, metavar="FILE",
-        help="write a recording (.rrd), or a film of an arena (.gif, without a "
-        "viewer), instead of opening a window",
+        help="write a recording (.rrd), or a film of an arena (.gif, .mp4, .webm, "
+        "without a viewer), instead of opening a window",
     )  # fmt: skip
     flags.add_argument(
         "--serve", nargs="?", const=f"{HOST}:{PORT}", metavar="HOST:PORT",

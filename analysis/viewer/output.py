@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from analysis.viewer.flags import FILM_ENDING, HOST
+from analysis.render.flags import FILM_ENDINGS
+from analysis.viewer.flags import HOST
 from analysis.viewer.recording import Recording, ViewerError
 from schema.agent.import_path import python_command
 from schema.agent.log import tell_user
@@ -52,8 +53,8 @@ class Output:
         """
         if save is not None and save.suffix != _ENDING:
             raise ViewerError(
-                f"--save {save}: must end in {_ENDING}, or {FILM_ENDING} for "
-                "a film of an arena"
+                f"--save {save}: must end in {_ENDING}, or {', '.join(FILM_ENDINGS)} "
+                "for a film of an arena"
             )
         if save is not None and not save.absolute().parent.is_dir():
             raise ViewerError(f"--save {save}: no such folder: {save.parent}")

@@ -85,15 +85,16 @@ def save_film(pictures: list[Picture], path: Path, interval_s: float) -> None:
 
 def film_robot(robot: Robot, experiment: Experiment, path: Path) -> None:
     """Write a film of an evaluation, with a camera that follows the robot."""
-    from docs.studies.tasks_pictures import motion  # noqa: PLC0415 - after the engine is chosen
+    from analysis.render.motion import frames, recorded  # noqa: PLC0415 - after the engine
     from worker.robot.evaluation import simulate  # noqa: PLC0415 - the same
 
     settings = evaluation_settings_of(experiment)
-    poses = motion(simulate, robot, settings)[:FRAMES]
+    tick_s = settings.simulation.tick_s
+    poses = recorded(simulate, robot, settings, tick_s)[:FRAMES]
     with RobotRenderer(robot, settings, size=SIZE) as renderer:
-        pictures = [renderer.picture(pose) for pose in poses]
-    world = settings.simulation
-    save_film(pictures, path, world.tick_s)
+        views = frames(renderer, poses, "follow", tick_s)
+        pictures = list(map(renderer.picture, poses, views))
+    save_film(pictures, path, tick_s)
 
 
 def record_robot(name: str, robot: Robot, experiment: Experiment, path: Path) -> None:

@@ -8,9 +8,8 @@ Each picture shows three moments of an evaluation from a fixed camera.
 import sys
 from pathlib import Path
 
-import numpy as np
-
-from analysis.render.picture import RobotRenderer, Simulate, gait_strip, save_picture
+from analysis.render.files import gait_strip, save_picture
+from analysis.render.picture import RobotRenderer, Simulate
 from analysis.render.stage import choose_engine
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
@@ -44,9 +43,9 @@ def main() -> int:
         robot = read_robot(file, body_space(experiment.space))
         poses = motion(simulate, robot, settings)
         shown = [poses[int(share * len(poses))] for share in SHARES]
-        middle = np.mean([pose[:3] for pose in shown], axis=0)
         with RobotRenderer(robot, settings, size=SIZE) as renderer:
-            strip = [renderer.picture(pose, look_at=middle) for pose in shown]
+            frame = renderer.framing(shown)
+            strip = [renderer.picture(pose, frame) for pose in shown]
         out = PICTURES / f"{task}.png"
         save_picture(gait_strip(strip), out)
         print(f"{out}: {out.stat().st_size / 1000:.0f} kB")

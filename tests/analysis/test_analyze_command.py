@@ -14,7 +14,7 @@ from rich.console import Console
 from analysis.analyze_command import analyze
 from analysis.measures.outputs import schema
 from analysis.progress import bars
-from analysis.render.picture import NoPictures
+from analysis.render.files import NoPictures
 from analysis.summary import show
 from schema.tables.columns import TABLES
 from schema.tables.files import parquet_path

@@ -208,11 +208,11 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
 def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None:
     other = Best("mine", Path("f"), 0, 0, 5, 0.25)
     still = replace(robot_picture, best=other, moved_m=0.0)
-    figure = gaits([robot_picture, still], {"scenario1": "m/s"})
+    figure = gaits([robot_picture, still], {"scenario1": "weighted velocity"})
     assert len(figure.axes) == 4
     headings = [text.get_text() for axes in figure.axes for text in axes.texts]
     assert headings == [
-        "scenario 1, fitness 0.25 m/s, moved 3.1 cm in 0.5 s",
+        "scenario 1, fitness 0.25 (weighted velocity), moved 3.1 cm in 0.5 s",
         "mine, fitness 0.25, stood still in these pictures",
     ]
     assert [axes.get_title() for axes in figure.axes] == ["0.0 s", "0.5 s"] * 2

@@ -4,7 +4,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import NoReturn
 
 import numpy as np
@@ -12,22 +11,19 @@ import pytest
 from msgspec.structs import replace
 from PIL import Image
 
-from analysis.render.command import _draw_motion, render
+from analysis.render.command import render
+from analysis.render.files import NoPictures, gait_strip, save_film, save_picture
+from analysis.render.film import Film, Look
 from analysis.render.flags import parser
 from analysis.render.framing import framed
-from analysis.render.picture import (
-    NoPictures,
-    RobotRenderer,
-    gait_strip,
-    save_animation,
-    save_picture,
-)
+from analysis.render.picture import RobotRenderer
 from analysis.render.ray_caster import RayCaster
 from schema.experiment.environment import Environment
 from schema.formats.files import settings_of, write_robot
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
 
+SIZE = (160, 120)
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 ROBOT = Robot(
     (
@@ -47,7 +43,7 @@ def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
         monkeypatch.setenv("MUJOCO_GL", "disable")
         return name
     with RobotRenderer(ROBOT, settings_of(None), size=(16, 16)) as made:
-        if isinstance(made._stage._renderer, RayCaster):
+        if isinstance(made.stage._renderer, RayCaster):
             pytest.skip("no EGL or OSMesa that works")
     return name
 
@@ -55,7 +51,7 @@ def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
 @pytest.fixture
 def renderer(engine: str) -> Iterator[RobotRenderer]:
     with RobotRenderer(ROBOT, settings_of(None), size=(160, 120)) as made:
-        assert isinstance(made._stage._renderer, RayCaster) == (engine == "rays")
+        assert isinstance(made.stage._renderer, RayCaster) == (engine == "rays")
         yield made
 
 
@@ -117,9 +113,9 @@ def test_a_pose_moves_the_robot_before_a_fixed_camera(renderer: RobotRenderer) -
     pose = np.array([0.0, 0.0, 0.0225, 1.0, 0.0, 0.0, 0.0])
     there = pose.copy()
     there[0] += 0.05
-    middle = np.array([0.05, 0.0, 0.02])
-    one = mostly(renderer.picture(pose, look_at=middle), 0).mean(axis=0)
-    other = mostly(renderer.picture(there, look_at=middle), 0).mean(axis=0)
+    frame = np.array([0.05, 0.0, 0.02]), 1.0
+    one = mostly(renderer.picture(pose, frame), 0).mean(axis=0)
+    other = mostly(renderer.picture(there, frame), 0).mean(axis=0)
     assert other[1] > one[1] + 5
     follows = [mostly(renderer.picture(at), 0).mean(axis=0) for at in (pose, there)]
     assert follows[0] == pytest.approx(follows[1], abs=1.5)
@@ -141,12 +137,30 @@ def test_files_open_again(tmp_path: Path) -> None:
     pictures = [np.full((4, 6, 3), 120 * number, np.uint8) for number in range(3)]
     save_picture(pictures[1], tmp_path / "one.png")
     assert np.array_equal(np.array(Image.open(tmp_path / "one.png")), pictures[1])
-    save_animation(pictures, tmp_path / "film.gif", 0.12)
+    save_film(pictures, tmp_path / "film.gif", 0.12)
     with Image.open(tmp_path / "film.gif") as film:
         assert getattr(film, "n_frames", 0) == 3
         assert film.info["duration"] == 120
     with pytest.raises(NoPictures, match="cannot be written"):
         save_picture(pictures[0], tmp_path / "no" / "one.png")
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".webm"])
+def test_a_video_has_all_pictures_at_their_rate(tmp_path: Path, ending: str) -> None:
+    av = pytest.importorskip("av")
+    pictures = [np.full((33, 48, 3), 10 * number, np.uint8) for number in range(20)]
+    path = tmp_path / f"film{ending}"
+    save_film(pictures, path, 0.04)
+    with av.open(str(path)) as film:
+        (stream,) = film.streams
+        frames = [one.to_ndarray(format="rgb24") for one in film.decode(video=0)]
+        assert stream.average_rate == 25
+    assert len(frames) == 20
+    # Their colours are stored for squares of four pixels.
+    assert frames[0].shape == (32, 48, 3)
+    assert [one.mean() for one in frames] == pytest.approx(
+        [10 * number for number in range(20)], abs=4
+    )
 
 
 def simulate(*_: object, **__: object) -> NoReturn:
@@ -171,8 +185,6 @@ def test_a_strip_is_a_picture_and_not_longer_than_the_evaluation(
 ) -> None:
     out = robot_file.with_suffix(".png")
     words = ["robot render", str(robot_file), str(out)]
-    with pytest.raises(NoPictures, match=r"--gait needs a \.png"):
-        main(["robot render", "a.yaml", "a.gif", "--gait", "5"])
     message = r"--gait 49: must be <= 48, the number of ticks in the second half"
     with pytest.raises(NoPictures, match=message):
         main([*words, "--gait", "49"])
@@ -182,19 +194,67 @@ def test_a_strip_is_a_picture_and_not_longer_than_the_evaluation(
     assert capsys.readouterr().err.endswith(f"\nsimulating and rendering {out}\n")
 
 
-def test_a_strip_shows_the_whole_of_a_long_robot(engine: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("a.yaml a.jpg", r"a.jpg: must end in one of .png, .gif, .mp4, .webm, got"),
+        ("a.yaml a.gif --gait 5", r"a.gif: --gait needs a \.png"),
+        ("a.yaml b.yaml a.png --gait 5", "--gait: shows one robot, got several"),
+        ("a.yaml a.mp4 --background transparent", "--background transparent needs a"),
+        ("a.yaml a.png --trail", "a.png: --trail needs a film: .gif, .mp4, .webm"),
+        ("a.yaml a.png --seconds 2", "a.png: --seconds needs a film"),
+    ],
+)
+def test_flags_without_a_meaning_are_refused(words: str, why: str) -> None:
+    with pytest.raises(NoPictures, match=why):
+        main(["robot render", *words.split()])
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("--size 8", "must be a whole number in 16..4096, got '8'"),
+        ("--size 200x", "must be a whole number in 16..4096, got ''"),
+        ("--background pink", "one of white, black, grey, #RRGGBB, transparent, got"),
+        ("--fps 51", "must be a whole number in 1..50, got '51'"),
+    ],
+)
+def test_values_of_flags_are_refused(
+    words: str, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        parser().parse_args(["a.yaml", "a.png", *words.split()])
+    assert why in capsys.readouterr().err
+
+
+def test_a_picture_shows_the_whole_of_a_long_robot(engine: str) -> None:
     assert engine
     bricks = [Part("FixedBrick", n, 1, 0, 0, BLUE) for n in range(1, 10)]
     parts = (*ROBOT.parts[:1], Part("FixedBrick", 0, 0, 0, 0, BLUE), *bricks)
-    robot = Robot(parts, ROBOT.brain)
-    start = SimpleNamespace(qpos=np.array([0, 0, 0.0225, 1, 0, 0, 0]), time=0.0)
-    out = tmp_path / "strip.png"
-    with RobotRenderer(robot, settings_of(None), size=(160, 120)) as made:
-        _draw_motion(made, lambda watch: watch(start), 1, out, 0.125)
-    found = mostly(np.asarray(Image.open(out))[:120], 2)
-    assert len(found) > 200
+    with RobotRenderer(Robot(parts, ROBOT.brain), settings_of(None), size=SIZE) as made:
+        found = mostly(made.picture(), 2)
     assert (found > 0).all()
     assert (found < (119, 159)).all()
+    # It fills the picture.
+    assert (np.ptp(found, axis=0) > np.array([120, 160]) * 0.7).any()
+
+
+def test_a_transparent_picture_looks_as_one_on_its_page(engine: str) -> None:
+    """Blue on grey as drawn there; shadows darken any page."""
+    assert engine
+    grey = (0.5, 0.5, 0.5)
+    looks = Look(SIZE, "fixed", is_clear=True), Look(SIZE, "fixed", background=grey)
+    settings = settings_of(None)
+    pictures = []
+    for look in looks:
+        with Film(ROBOT, settings, look, is_fine=True) as film:
+            pictures.append(film[0].astype(float))
+    clear, drawn = pictures
+    opaque = clear[..., 3:] / 255.0
+    assert opaque[0, 0, 0] == 0.0
+    assert opaque[60, 80, 0] == 1.0
+    put = clear[..., :3] * opaque + 127.5 * (1.0 - opaque)
+    assert np.abs(put - drawn).mean() < 1.5
 
 
 NO_LIBRARY = "import ctypes.util; ctypes.util.find_library = lambda name: None"
@@ -242,15 +302,16 @@ def test_both_engines_draw_the_same_robot(
 
 
 def test_a_shadow_falls_away_from_the_light(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The light at (-0.5, -0.8, 3) shines through (0, 0, 1) at (0.25, 0.4, 0)."""
+    """From 1 m it falls 0.5 m to the camera's right and 0.35 m ahead of it.
+
+    The camera looks along (cos 130, sin 130) degrees.
+    """
     monkeypatch.setenv("MUJOCO_GL", "disable")
     core = Robot(ROBOT.parts[:1], ROBOT.brain)
     low, high = (np.array([0, 0, z, 1, 0, 0, 0]) for z in (0.0225, 1.0))
-    with RobotRenderer(core, settings_of(None), size=(160, 120)) as made:
-        spot = np.array([0.25, 0.4, 0.0])
-        bright, dark = (
-            made.picture(pose, look_at=spot)[60, 80] for pose in (low, high)
-        )
+    with RobotRenderer(core, settings_of(None), size=SIZE) as made:
+        spot = 0.5 * np.array([0.766, 0.643, 0]) + 0.35 * np.array([-0.643, 0.766, 0])
+        bright, dark = (made.picture(pose, (spot, 1.0))[60, 80] for pose in (low, high))
     assert (dark < 0.8 * bright).all()
 
 
@@ -258,32 +319,25 @@ def test_framing_shows_the_whole_shadow_of_a_robot_in_the_air(
     renderer: RobotRenderer,
 ) -> None:
     pose = np.array([0.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0])
-    look_at, distance_m = renderer.framing([pose], (0.0, 0.0))
-    picture = renderer.picture(pose, look_at=look_at, distance_m=distance_m)
+    picture = renderer.picture(pose)
     is_grey = np.ptp(picture.astype(int), axis=2) < 30
-    dark = np.argwhere(is_grey & (picture.max(axis=2) < 140))
+    dark = np.argwhere(is_grey & (picture.max(axis=2) < 160))
     assert len(dark) > 50
     assert (dark > 0).all()
     assert (dark < (119, 159)).all()
 
 
-def test_a_sphere_touches_the_narrowest_edge() -> None:
-    """Seen along +x, at 45 degrees a sphere of radius 1 is sqrt(2) away."""
-    centre = np.array([[3.0, 4.0, 5.0]])
-    point, distance = framed(centre, np.ones(1), 0.0, 0.0, (1.0, 2.0, 3.0))
-    assert point == pytest.approx([3, 4, 5])
-    assert distance == pytest.approx(2**0.5)
+def test_the_nearest_points_touch_the_rim_at_both_sides() -> None:
+    """Seen along +x, at 45 degrees; the rim is 12 % of a picture's width.
 
-
-def test_points_at_the_left_end_and_nearer_to_the_camera_are_seen() -> None:
-    """Of points at y = -2 and 2, the camera is 2 / 0.5 from the nearer one.
-
-    They are 1 before and behind the middle of the view along +x.
+    Of points at y = -2 and 2, 1 before and behind the middle, the first is at
+    2 - s from the view, the other at 2 + s, so that both touch: (2 - s) / (d - 1) =
+    (2 + s) / (d + 1) = 0.88, so d = 2 / 0.88 and s = 0.88.
     """
     points = np.array([[9.0, -2.0, 0.0], [11.0, 2.0, 0.0]])
-    point, distance = framed(points, np.zeros(2), 0.0, 0.0, (1.0, 1.0, 0.5))
-    assert point == pytest.approx([10, 0, 0])
-    assert distance == pytest.approx(1 + 2 / 0.5)
+    point, distance = framed(points, 0.0, 0.0, (1.0, 1.0))
+    assert point == pytest.approx([10, -0.88, 0], abs=0.02)
+    assert distance == pytest.approx(2 / 0.88, abs=0.02)
 
 
 def test_texts_of_any_length_leave_room_for_themselves() -> None:
