@@ -28,6 +28,7 @@ PERMITTED = {
         "schema/formats/mjcf_export.py",
         "schema/formats/urdf.py",
         "worker/**/*.py",
+        "analysis/render/motion.py",
         "analysis/render/ray_caster.py",
         "analysis/render/stage.py",
     ),
