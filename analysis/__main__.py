@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.extras import extra
+from analysis.page.flags import PAGE_ENDING
 from analysis.render.flags import FILM_ENDINGS
 from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.agent.supervisor import cores
@@ -14,7 +15,7 @@ from schema.plugins.permission import allow
 
 
 def main(arguments: list[str]) -> int:
-    """Run ``analyze``, ``robot render`` or ``view``; return the exit code.
+    """Run one of the commands of ``parser``; return the exit code.
 
     Raises:
         RunFolderError: no run is found.
@@ -26,6 +27,13 @@ def main(arguments: list[str]) -> int:
         with extra("pictures need", "pictures"):
             from analysis.render.command import render
         return render(options, simulate)
+    if arguments[0] == "robot page":
+        simulate = _simulation()
+        with extra("pages need", "pictures"):
+            from analysis.page.robots import robot_page
+        from worker.robot.evaluation import evaluate
+
+        return robot_page(options, simulate, evaluate)
     if arguments[0] == "view":
         return _view(options)
     allow(options.plugins)
@@ -37,7 +45,7 @@ def main(arguments: list[str]) -> int:
 
 
 def parser(command: str) -> Flags:
-    """Return the parser of ``analyze``, ``robot render`` or ``view``.
+    """Return the parser of ``analyze``, ``view``, ``robot page`` or ``robot render``.
 
     It needs none of the libraries that the command itself needs.
     """
@@ -45,6 +53,10 @@ def parser(command: str) -> Flags:
         from analysis.viewer.flags import parser as view
 
         return view()
+    if command == "robot page":
+        from analysis.page.flags import parser as page
+
+        return page()
     if command == "robot render":
         from analysis.render.flags import parser as render
 
@@ -109,7 +121,12 @@ def _view(options: argparse.Namespace) -> int:
 
     A film of an arena needs no viewer.
     """
-    if options.save is not None and options.save.suffix.lower() in FILM_ENDINGS:
+    ending = options.save.suffix.lower() if options.save is not None else ""
+    if ending == PAGE_ENDING:
+        with extra("pages need", "pictures"):
+            from analysis.page.arena import arena_page
+        return arena_page(options)
+    if ending in FILM_ENDINGS:
         with extra("pictures need", "pictures"):
             from analysis.render.stage import choose_engine
 

@@ -37,7 +37,7 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
     """
     allow(options.plugins)
     _check(options)
-    shown = _read(options)
+    shown = read_shown(options)
     if options.out.suffix.lower() in FILM_ENDINGS:
         _draw_film(options, shown, simulate)
     elif options.gait:
@@ -67,7 +67,13 @@ def _check(options: argparse.Namespace) -> None:
         raise NoPictures(f"{out}: {flag} needs a film: {', '.join(FILM_ENDINGS)}")
 
 
-def _read(options: argparse.Namespace) -> Shown:
+def read_shown(options: argparse.Namespace) -> Shown:
+    """Return the robots of ``options.files``, files or run folders, by name.
+
+    Raises:
+        RevolveError: as of ``read_with_settings``.
+        NoPictures: a file is given twice.
+    """
     shown: Shown = {}
     for file in options.files:
         is_run = (file / BEST).is_file()
@@ -127,11 +133,7 @@ def _draw_film(options: argparse.Namespace, shown: Shown, simulate: Simulate) ->
     interval_s, motions = 1.0 / options.fps, []
     with bars(f"simulating and rendering {options.out}") as bar:
         for robot, settings in bar.track(shown.values(), description="simulating"):
-            clock = settings.simulation
-            if options.seconds:
-                steps = max(1, steps_of(options.seconds, clock))
-                clock = replace(clock, warmup_steps=0, window_steps=steps)
-            lasting = replace(settings, simulation=clock)
+            lasting = lasting_for(settings, options.seconds)
             motions.append(recorded(simulate, robot, lasting, interval_s))
         poses = motions[0]
         if len(shown) > 1:
@@ -141,6 +143,17 @@ def _draw_film(options: argparse.Namespace, shown: Shown, simulate: Simulate) ->
             options, shown, poses, interval_s, advance=lambda: bar.advance(task)
         ) as film:
             save_film(film, options.out, interval_s)
+
+
+def lasting_for(
+    settings: EvaluationSettings, seconds: float | None
+) -> EvaluationSettings:
+    """Return settings of the first seconds of an evaluation, or of all of it."""
+    clock = settings.simulation
+    if seconds is not None:
+        steps = max(1, steps_of(seconds, clock))
+        clock = replace(clock, warmup_steps=0, window_steps=steps)
+    return replace(settings, simulation=clock)
 
 
 def _draw_gait(options: argparse.Namespace, shown: Shown, simulate: Simulate) -> None:

@@ -57,22 +57,24 @@ def recorded(
     return poses
 
 
-def side_by_side(
+def lanes(
     motions: Sequence[Sequence[Floats]],
     shown: Sequence[tuple[Robot, EvaluationSettings]],
 ) -> list[Floats]:
-    """Return the motions of robots as one, from a start line on.
+    """Return the motions of robots, (T, 7 + J) each, from a start line on.
 
-    Each robot is turned so that it ends straight before its start; those whose motion
-    is shorter wait. Objects of scenery are left out.
+    Several are side by side, and each is turned so that it ends straight before its
+    start. Objects of scenery are left out.
     """
     right = np.array([sin(np.radians(AZIMUTH)), -cos(np.radians(AZIMUTH))])
     ahead = np.array([-right[1], right[0]])
-    lanes, end_m = [], 0.0
+    paths, end_m = [], 0.0
     for poses, (robot, own) in zip(motions, shown, strict=True):
         objects = object_count(own.environment, own.simulation)
         path = np.array(poses)
         path = path[:, : path.shape[1] - 7 * objects]
+        if len(motions) == 1:
+            return [path]
         way = path[-1, :2] - path[0, :2]
         turn = np.arctan2(right[1], right[0]) - np.arctan2(way[1], way[0])
         turned = _turned(path, turn if np.hypot(*way) > _STILL_M else 0.0)
@@ -82,11 +84,19 @@ def side_by_side(
         start_m = end_m + reach_m - across.min()
         turned[:, :2] += start_m * ahead
         end_m = start_m + across.max() + reach_m + _GAP_M
-        lanes.append(turned)
-    longest = max(map(len, lanes))
+        paths.append(turned)
+    return paths
+
+
+def side_by_side(
+    motions: Sequence[Sequence[Floats]],
+    shown: Sequence[tuple[Robot, EvaluationSettings]],
+) -> list[Floats]:
+    """Return ``lanes`` as one motion; robots whose motion is shorter wait."""
+    paths = lanes(motions, shown)
     return [
-        np.concatenate([lane[min(at, len(lane) - 1)] for lane in lanes])
-        for at in range(longest)
+        np.concatenate([path[min(at, len(path) - 1)] for path in paths])
+        for at in range(max(map(len, paths)))
     ]
 
 

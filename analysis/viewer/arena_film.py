@@ -48,21 +48,8 @@ def film(options: argparse.Namespace) -> int:
         NoPictures: the flags conflict, there are no poses, or the file cannot be
             written.
     """
+    check_film(options)
     out: Path = options.save
-    allow(options.plugins)
-    unfit = {
-        "--serve": options.serve,
-        "--follow": options.follow,
-        "--robot": options.robot,
-        "--connect": options.connect,
-    }
-    if given := [flag for flag, value in unfit.items() if value]:
-        hint = "; of one robot: revolve robot render" if options.robot else ""
-        raise NoPictures(f"--save {out}: a film takes no {', '.join(given)}{hint}")
-    if options.run is None:
-        raise NoPictures(f"--save {out}: a film needs a run folder")
-    if not out.absolute().parent.is_dir():
-        raise NoPictures(f"--save {out}: no such folder: {out.parent}")
     span = span_of(options, FILM_S, NoPictures)
     pictures, times_s = draw_film(options.run, span, _SIZE)
     interval_s = (times_s[-1] - times_s[0]) / max(1, len(times_s) - 1)
@@ -72,6 +59,29 @@ def film(options: argparse.Namespace) -> int:
         "time; --from and --until choose others"
     )
     return 0
+
+
+def check_film(options: argparse.Namespace) -> None:
+    """Refuse flags of ``revolve view`` that a film or page does not take.
+
+    Raises:
+        NoPictures: the flags conflict.
+    """
+    out: Path = options.save
+    allow(options.plugins)
+    unfit = {
+        "--serve": options.serve,
+        "--follow": options.follow,
+        "--robot": options.robot,
+        "--connect": options.connect,
+    }
+    if given := [flag for flag, value in unfit.items() if value]:
+        hint = "; of one robot: revolve robot render or page" if options.robot else ""
+        raise NoPictures(f"--save {out}: a film takes no {', '.join(given)}{hint}")
+    if options.run is None:
+        raise NoPictures(f"--save {out}: a film needs a run folder")
+    if not out.absolute().parent.is_dir():
+        raise NoPictures(f"--save {out}: no such folder: {out.parent}")
 
 
 def draw_film(

@@ -36,8 +36,8 @@ def parser(_command: str = "view") -> Flags:
     add_shared(flags, "--connect")
     flags.add_argument(
         "--save", type=Path, metavar="FILE",
-        help="write a recording (.rrd), or a film of an arena (.gif, .mp4, .webm, "
-        "without a viewer), instead of opening a window",
+        help="write a recording (.rrd), or, of an arena and without a viewer, a film "
+        "(.gif, .mp4, .webm) or web page (.html), instead of opening a window",
     )  # fmt: skip
     flags.add_argument(
         "--serve", nargs="?", const=f"{HOST}:{PORT}", metavar="HOST:PORT",

@@ -54,7 +54,7 @@ class Output:
         if save is not None and save.suffix != _ENDING:
             raise ViewerError(
                 f"--save {save}: must end in {_ENDING}, or {', '.join(FILM_ENDINGS)} "
-                "for a film of an arena"
+                "or .html for an arena"
             )
         if save is not None and not save.absolute().parent.is_dir():
             raise ViewerError(f"--save {save}: no such folder: {save.parent}")

@@ -22,6 +22,7 @@ COMMANDS = {
     "analyzer": ("analyzer.__main__", "vet robot bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
     "robot pack": ("revolve.cli.pack", "write a robot and its settings to one file"),
+    "robot page": ("analysis.__main__", "write robots to a page that plays them"),
     "robot random": ("revolve.cli.random_robots", "generate random robots"),
     "robot render": ("analysis.__main__", "render a robot as picture or film"),
     "robot simulate": ("worker.robot_command", "simulate a robot and show its fitness"),

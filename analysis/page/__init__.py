@@ -1,0 +1,1 @@
+"""Web pages that play recorded motion of robots, without network."""
