@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.extras import extra
-from analysis.page.flags import PAGE_ENDING
-from analysis.render.flags import FILM_ENDINGS
+from analysis.render.flags import FILM_ENDINGS, PAGE_ENDING
 from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.agent.supervisor import cores
 from schema.plugins.permission import allow
@@ -54,9 +53,9 @@ def parser(command: str) -> Flags:
 
         return view()
     if command == "robot page":
-        from analysis.page.flags import parser as page
+        from analysis.render.flags import page_parser
 
-        return page()
+        return page_parser()
     if command == "robot render":
         from analysis.render.flags import parser as render
 

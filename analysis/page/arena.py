@@ -11,21 +11,19 @@ import pyarrow.compute as pc
 
 from analysis.measures.load import read_run
 from analysis.page.content import grounds, moving, page
-from analysis.page.robots import save_page
-from analysis.render.files import NoPictures
+from analysis.render.files import NoPictures, writing
 from analysis.viewer.arena_film import check_film
+from analysis.viewer.body import numbers_of
 from analysis.viewer.flags import FILM_S
 from analysis.viewer.replay import read_news, read_poses, rows_by_robot, span_of
 from analysis.viewer.scene import scene_of
 from schema.agent.log import tell_user
 from schema.experiment.file import experiment_from_text
 from schema.robot.robot import Robot
-from schema.robot.trace import Floats
 from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 from schema.wire.updates import Update
 
-_COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _BETWEEN = 1.1
 """Distance of arenas side by side, by the width of one."""
 
@@ -66,7 +64,7 @@ def arena_page(options: argparse.Namespace) -> int:
             body = bodies[birth]
             assert body is not None
             times = rows["sim_time_s"].to_numpy()
-            path = _path(rows)
+            path = np.hstack(numbers_of(rows))
             path[:, 0] += shift[0]
             interval_s = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
             robots.append(
@@ -81,17 +79,10 @@ def arena_page(options: argparse.Namespace) -> int:
         "zoom; click the name of a robot to follow it."
     )
     title = f"{run.experiment}: {folder.resolve().name}"
-    save_page(options.save, page(title, lead, content))
+    with writing(options.save):
+        options.save.write_text(page(title, lead, content), "utf-8")
     tell_user(f"saved {options.save}; --from and --until choose another time")
     return 0
-
-
-def _path(rows: pa.Table) -> Floats:
-    """Return the poses of one robot, (T, 7 + J)."""
-    cores = np.stack([rows[name].to_numpy() for name in _COLUMNS], axis=1)
-    angles = rows["angles"].combine_chunks().flatten().to_numpy()
-    joined = np.hstack([cores, angles.reshape(len(cores), -1)])
-    return np.asarray(joined, np.float64)
 
 
 def _curves(folder: Path, news: Update) -> list[dict[str, Any]]:

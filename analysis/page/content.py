@@ -113,7 +113,7 @@ def page(title: str, lead: str, content: Mapping[str, Any]) -> str:
     }
     text = _file("page.html")
     for name, fill in fills.items():
-        text = text.replace(f"<!--{name}-->", fill, 1)
+        text = text.replace(f"<!--{name}-->", fill)
     return text
 
 

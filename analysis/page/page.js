@@ -64,6 +64,13 @@ class Robot {
     });
     this.mesh.instanceMatrix.needsUpdate = true;
   }
+
+  // Distance of the farthest box from the core, in the present pose [m].
+  reach() {
+    const away = this.boxes.map(({ centre, segment, size }) => 0.5 * size.length() +
+      spot.copy(centre).applyQuaternion(this.turns[segment]).add(this.places[segment]).distanceTo(this.places[0]));
+    return Math.max(...away);
+  }
 }
 const other = new T.Quaternion(), spot = new T.Vector3(), matrix = new T.Matrix4();
 const robots = data.robots.map((entry) => new Robot(entry));
@@ -146,8 +153,9 @@ data.grounds.forEach(solid);
 let chosen = robots.length === 1 ? robots[0] : null;
 
 function look() {
-  const reach = chosen ? 0.55 : 0.5 * Math.hypot(high.x - low.x, high.y - low.y) + 0.45;
-  const away = reach / Math.sin(Math.PI / 12) / Math.min(1, camera.aspect);
+  const way = 0.5 * Math.hypot(high.x - low.x, high.y - low.y);
+  const reach = chosen ? chosen.reach() : way + Math.max(...robots.map((r) => r.reach()));
+  const away = 0.85 * reach / Math.sin(Math.PI / 12) / Math.min(1, camera.aspect);
   const middle = chosen ? chosen.places[0].clone() : low.clone().add(high).multiplyScalar(0.5);
   controls.target.copy(middle);
   camera.position.copy(middle).add(spot.set(0.57, -0.68, 0.47).multiplyScalar(away));
@@ -290,7 +298,7 @@ data.curves.forEach(curve);
 // ---- time ----
 let now_s = begin_s, isPlaying = true, before = null;
 const seek = (time_s) => { now_s = Math.min(Math.max(time_s, begin_s), end_s); show(0); };
-$("play").addEventListener("click", () => { isPlaying = !isPlaying; $("play").textContent = isPlaying ? "❚❚" : "▶"; });
+$("play").addEventListener("click", () => { isPlaying = !isPlaying; $("play").textContent = isPlaying ? "Pause" : "Play"; });
 $("time").addEventListener("input", () => seek(begin_s + Number($("time").value) * (end_s - begin_s)));
 
 const target = new T.Vector3();

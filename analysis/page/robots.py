@@ -9,10 +9,10 @@ import numpy as np
 
 from analysis.measures.families import family
 from analysis.page.content import grounds, moving, packed, page
-from analysis.page.flags import PAGE_ENDING
 from analysis.progress import bars
 from analysis.render.command import lasting_for, read_shown
-from analysis.render.files import NoPictures
+from analysis.render.files import NoPictures, writing
+from analysis.render.flags import PAGE_ENDING
 from analysis.render.motion import lanes, recorded
 from analysis.render.picture import Simulate
 from analysis.viewer.ground import surfaces
@@ -50,25 +50,25 @@ def robot_page(
     if out.suffix.lower() != PAGE_ENDING:
         raise NoPictures(f"{out}: must end in {PAGE_ENDING}, got {out.suffix!r}")
     shown = read_shown(options)
+    motions: list[list[Floats]] = []
+    commands: list[list[Floats]] = [[] for _ in shown]
     with bars(f"simulating robots: {len(shown)}") as bar:
-        motions, commands = [], []
-        for robot, settings in bar.track(shown.values(), description="simulating"):
-            poses, ticks = _simulated(simulate, robot, settings, options.seconds)
-            motions.append(poses)
-            commands.append(ticks)
-        paths = lanes(motions, [*shown.values()])
+        tracked = bar.track(shown.values(), description="simulating")
+        for (robot, own), ticks in zip(tracked, commands, strict=True):
+            lasting = lasting_for(own, options.seconds)
+            motions.append(recorded(simulate, robot, lasting, INTERVAL_S, ticks))
         robots = []
-        for (name, (robot, settings)), path, ticks, file in zip(
-            shown.items(), paths, commands, options.files, strict=True
+        paths = lanes(motions, shown)
+        for file, name, path, ticks in zip(
+            options.files, shown, paths, commands, strict=True
         ):
-            facts = _facts_of_run(file) or {
-                "fitness": evaluate(robot, settings).fitness
-            }
+            robot, own = shown[name]
+            facts = _facts_of_run(file) or {"fitness": evaluate(robot, own).fitness}
             robots.append(
                 moving(
-                    name, robot, body_space(settings.space), path,
-                    interval_s=INTERVAL_S, commands=packed(ticks), motors=len(ticks[0]),
-                    commands_s=settings.simulation.tick_s, **facts,
+                    name, robot, body_space(own.space), path, interval_s=INTERVAL_S,
+                    commands=packed(ticks), commands_s=own.simulation.tick_s,
+                    motors=len(ticks[0]), **facts,
                 )
             )  # fmt: skip
     around: list[dict[str, Any]] = []
@@ -79,42 +79,10 @@ def robot_page(
         around = grounds(below, np.zeros((0, 10)))
     content = {"robots": robots, "grounds": around, "curves": []}
     lead = "Drag to turn, scroll to zoom; click the name of a robot to follow it."
-    save_page(out, page(", ".join(shown), lead, content))
+    with writing(out):
+        out.write_text(page(", ".join(shown), lead, content), "utf-8")
     tell_user(f"saved {out}, {out.stat().st_size / 1e6:.1f} MB; a browser shows it")
     return 0
-
-
-def save_page(path: Path, text: str) -> None:
-    """Write a page.
-
-    Raises:
-        NoPictures: the file cannot be written.
-    """
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        why = f"cannot be written: {error.strerror or error}"
-        raise NoPictures(f"{path}: {why}") from None
-
-
-def _simulated(
-    simulate: Simulate,
-    robot: Robot,
-    settings: EvaluationSettings,
-    seconds: float | None,
-) -> tuple[list[Floats], list[Floats]]:
-    """Return the states of a robot, and the commands of its motors at each tick."""
-    commands: list[Floats] = []
-
-    def watched(*given: Any, watch: Callable[[Any], None]) -> Any:  # noqa: ANN401
-        def both(data: Any) -> None:  # noqa: ANN401 - of a library imported later
-            commands.append(data.ctrl.copy())
-            watch(data)
-
-        return simulate(*given, watch=both)
-
-    lasting = lasting_for(settings, seconds)
-    return recorded(watched, robot, lasting, INTERVAL_S), commands
 
 
 def _facts_of_run(folder: Path) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -21,6 +22,16 @@ _CODECS = {
 _COLOURS = 256
 _SAMPLES = 6
 """Pictures from which the colours of a film are chosen."""
+
+
+class Pictures(Protocol):
+    """Pictures of one size by number, such as a list; at least one."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int, /) -> Picture: ...
+
+    def __iter__(self) -> Iterator[Picture]: ...
 
 
 class NoPictures(RevolveError):  # noqa: N818 - names what is missing
@@ -63,11 +74,11 @@ def save_picture(picture: Picture, path: Path) -> None:
     Raises:
         NoPictures: the ending is unknown, or the file cannot be written.
     """
-    with _writing(path):
+    with writing(path):
         Image.fromarray(picture).save(path)
 
 
-def save_film(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
+def save_film(pictures: Pictures, path: Path, interval_s: float) -> None:
     """Write pictures of one size as a film, in the format of the file's ending.
 
     Raises:
@@ -75,16 +86,14 @@ def save_film(pictures: Sequence[Picture], path: Path, interval_s: float) -> Non
         MissingExtra: the encoder of MP4 and WebM is not installed.
     """
     ending = path.suffix.lower()
-    with _writing(path):
+    with writing(path):
         if ending in _CODECS:
             _encode(pictures, path, interval_s, ending)
         else:
             path.write_bytes(gif(pictures, interval_s, _COLOURS))
 
 
-def _encode(
-    pictures: Sequence[Picture], path: Path, interval_s: float, ending: str
-) -> None:
+def _encode(pictures: Pictures, path: Path, interval_s: float, ending: str) -> None:
     with extra("films in MP4 and WebM need", "films"):
         import av  # noqa: PLC0415 - large, and not for GIF
         from av.video.stream import VideoStream  # noqa: PLC0415 - the same
@@ -104,7 +113,12 @@ def _encode(
 
 
 @contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def writing(path: Path) -> Iterator[None]:
+    """Report a file that cannot be written.
+
+    Raises:
+        NoPictures: it cannot be written, or its format does not exist.
+    """
     try:
         yield
     except OSError as error:
@@ -114,7 +128,7 @@ def _writing(path: Path) -> Iterator[None]:
         raise NoPictures(f"{path}: {error}") from None
 
 
-def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:
+def gif(pictures: Pictures, interval_s: float, colours: int) -> bytes:
     """Return pictures as a GIF that repeats.
 
     All pictures share one palette without dithering, so that what does not move is
@@ -126,7 +140,8 @@ def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:
         colours: size of the palette, at most 256.
     """
     every = -(-len(pictures) // _SAMPLES)
-    samples = Image.fromarray(np.concatenate(pictures[::every]))
+    chosen = [pictures[at] for at in range(0, len(pictures), every)]
+    samples = Image.fromarray(np.concatenate(chosen))
     palette = samples.quantize(colours, Image.Quantize.MEDIANCUT)
     first, *others = (
         Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE)

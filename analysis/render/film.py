@@ -1,86 +1,60 @@
 """Pictures of robots in motion, drawn one by one."""
 
-from collections.abc import Callable, Sequence
+import argparse
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import overload
 
 import numpy as np
 
+from analysis.render.flags import TRANSPARENT
 from analysis.render.marks import rods_needed, way_marks, with_names, with_scale
-from analysis.render.motion import frames
+from analysis.render.motion import Shown, frames
 from analysis.render.picture import RobotRenderer
 from analysis.render.stage import Picture
-from schema.experiment.settings import EvaluationSettings
-from schema.parts import Vector
-from schema.robot.robot import Robot
 from schema.robot.trace import Floats
 
 _PAGES = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
 """Colours on which transparent pictures are drawn."""
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
-    """How robots are shown.
-
-    Attributes:
-        size: of a picture [pixels].
-        camera: one of ``CAMERAS``.
-        background: that of ``furnish``.
-        is_clear: whether the background is transparent.
-        has_trail: whether the way of each core is drawn.
-        has_start: whether each start is marked.
-        has_scale: whether there is a scale bar.
-    """
-
-    size: tuple[int, int]
-    camera: str
-    background: Vector | None = None
-    is_clear: bool = False
-    has_trail: bool = False
-    has_start: bool = False
-    has_scale: bool = False
-
-
-class Film(AbstractContextManager["Film"], Sequence[Picture]):
-    """Pictures of one robot, or of several by name, that are drawn when asked for."""
+class Film(AbstractContextManager["Film"]):
+    """Pictures of robots, drawn when asked for by number."""
 
     def __init__(
         self,
-        robots: Robot | dict[str, Robot],
-        settings: EvaluationSettings,
-        look: Look,
-        poses: Sequence[Floats] = (),
+        shown: Shown,
+        poses: Sequence[Floats],
+        options: argparse.Namespace,
         interval_s: float = 1.0,
         *,
-        is_fine: bool,
+        is_fine: bool = True,
         advance: Callable[[], object] = lambda: None,
     ) -> None:
-        """Place the camera; without poses, one robot is in neutral pose.
+        """Place the camera, with the flags of ``revolve robot render``.
 
         ``advance`` is called with each picture.
 
         Raises:
             ExperimentError: invalid scenery.
         """
-        self._names = list(robots) if isinstance(robots, dict) else []
-        shown = [*robots.values()] if isinstance(robots, dict) else robots
-        self._look, self._advance = look, advance
-        marks = {"has_trail": look.has_trail, "has_start": look.has_start}
-        rods = rods_needed(max(1, len(self._names)), **marks)
+        self._names, self._poses = list(shown) if len(shown) > 1 else [], poses
+        self._has_scale, self._advance = options.scale_bar, advance
+        (robot, settings), *others = shown.values()
+        robots = [robot, *(one for one, _ in others)] if others else robot
+        marks = {"has_trail": options.trail, "has_start": options.start_mark}
+        is_clear = options.background == TRANSPARENT
         self._renderers = [
             RobotRenderer(
-                shown, settings, size=look.size, background=page, rods=rods,
-                is_fine=is_fine,
+                robots, settings, size=options.size, background=page,
+                rods=rods_needed(len(shown), **marks), is_fine=is_fine,
             )
-            for page in (_PAGES if look.is_clear else (look.background,))
+            for page in (_PAGES if is_clear else (options.background,))
         ]  # fmt: skip
-        first = self._renderers[0]
-        self._poses = poses or [first.stage.data.qpos.copy()]
+        still = "fixed" if options.gait or others else "follow"
         for renderer in self._renderers:
-            self._frames = frames(renderer, self._poses, look.camera, interval_s)
-        self._rods = way_marks(first, self._poses, **marks)
+            camera = options.camera or still
+            self._frames = frames(renderer, poses, camera, interval_s)
+        self._rods = way_marks(self._renderers[0], poses, **marks)
 
     def __exit__(self, *_: object) -> None:
         for renderer in self._renderers:
@@ -89,27 +63,19 @@ class Film(AbstractContextManager["Film"], Sequence[Picture]):
     def __len__(self) -> int:
         return len(self._poses)
 
-    @overload
-    def __getitem__(self, index: int) -> Picture: ...
+    def __iter__(self) -> Iterator[Picture]:
+        return map(self.__getitem__, range(len(self)))
 
-    @overload
-    def __getitem__(self, index: slice) -> list[Picture]: ...
-
-    def __getitem__(self, index: int | slice) -> Picture | list[Picture]:
-        if isinstance(index, slice):
-            return [self[at] for at in range(len(self))[index]]
-        if not 0 <= index < len(self):
-            raise IndexError(index)
+    def __getitem__(self, index: int) -> Picture:
         self._advance()
         first, *others = [self._drawn(one, index) for one in self._renderers]
         return _see_through(first, others[0]) if others else first
 
     def _drawn(self, renderer: RobotRenderer, index: int) -> Picture:
-        look, frame = self._look, self._frames[index]
-        done = index / max(1, len(self) - 1)
-        shown = [one for when, one in self._rods if when <= done]
-        picture = renderer.picture(self._poses[index], frame, shown)
-        if look.has_scale:
+        frame, done = self._frames[index], index / max(1, len(self) - 1)
+        rods = [rod for when, rod in self._rods if when <= done]
+        picture = renderer.picture(self._poses[index], frame, rods)
+        if self._has_scale:
             picture = with_scale(picture, frame[1])
         if self._names:
             start = self._poses[0]

@@ -16,6 +16,7 @@ from schema.parts import Vector
 
 PICTURE_ENDING = ".png"
 FILM_ENDINGS = (".gif", ".mp4", ".webm")
+PAGE_ENDING = ".html"
 CAMERAS = ("follow", "fixed", "side", "top")
 TRANSPARENT = "transparent"
 MOST_FPS = 50
@@ -36,11 +37,7 @@ def parser(_command: str = "robot render") -> Flags:
             "revolve robot render runs/a runs/b race.webm --trail --start-mark",
         ),
     )
-    flags.add_argument(
-        "files", type=Path, nargs="+", metavar="FILE|RUN",
-        help="robot file, or run folder, of which the best robot is shown; several "
-        "robots move side by side from one start line",
-    )  # fmt: skip
+    _add_robots(flags)
     flags.add_argument(
         "out", type=Path, metavar="OUT", help="file to write: .png, .gif, .mp4, .webm"
     )
@@ -57,10 +54,6 @@ def parser(_command: str = "robot render") -> Flags:
     flags.add_argument(
         "--fps", type=whole_number(1, MOST_FPS), default=25, metavar="N",
         help="frames per second of a film (default: %(default)s)",
-    )  # fmt: skip
-    flags.add_argument(
-        "--seconds", type=positive_number, metavar="S",
-        help="length of a film, from the start on (default: the evaluation)",
     )  # fmt: skip
     flags.add_argument(
         "--camera", choices=CAMERAS,
@@ -82,9 +75,37 @@ def parser(_command: str = "robot render") -> Flags:
         "--scale-bar", action="store_true",
         help="draw a bar of a round length, at the distance of the robot",
     )  # fmt: skip
+    return flags
+
+
+def page_parser() -> Flags:
+    """Return the parser of ``revolve robot page``."""
+    flags = Flags(
+        prog="revolve robot page",
+        description="Write one HTML file in which robots move: it needs no network, "
+        "and turns with the mouse.",
+        examples=(
+            "revolve robot page best.yaml best.html --experiment scenario1",
+            "revolve robot page runs/a runs/b race.html --seconds 20",
+        ),
+    )
+    _add_robots(flags)
+    flags.add_argument("out", type=Path, metavar="OUT.html", help="page to write")
+    return flags
+
+
+def _add_robots(flags: Flags) -> None:
+    flags.add_argument(
+        "files", type=Path, nargs="+", metavar="FILE|RUN",
+        help="robot file, or run folder, of which the best robot is shown; several "
+        "robots move side by side from one start line",
+    )  # fmt: skip
+    flags.add_argument(
+        "--seconds", type=positive_number, metavar="S",
+        help="length of a film or page, from the start on (default: the evaluation)",
+    )  # fmt: skip
     add_settings(flags, "that of the run folder that holds the file, else scenario1")
     add_plugins(flags)
-    return flags
 
 
 def _size(text: str) -> tuple[int, int]:

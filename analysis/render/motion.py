@@ -17,6 +17,8 @@ from schema.robot.frames import place_parts, shapes_of
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
 
+Shown = dict[str, tuple[Robot, EvaluationSettings]]
+"""Robots and their settings by name."""
 _ELEVATIONS = dict(zip(CAMERAS, (LOW, LOW, -6.0, -90.0), strict=True))
 """Elevation of the view by the name of a camera [degrees]."""
 _CALM_S = 1.0
@@ -32,11 +34,12 @@ def recorded(
     robot: Robot,
     settings: EvaluationSettings,
     interval_s: float,
+    commands: list[Floats] | None = None,
 ) -> list[Floats]:
     """Return the states of an evaluation, (nq,) each, at equal intervals [s].
 
     The worker's simulation shows a state per tick of the brain; a copy of it is stepped
-    from there with the same commands.
+    from there with the same commands, (M,), which are appended to a list.
 
     Raises:
         SimulationDiverged: the physics diverged.
@@ -48,6 +51,8 @@ def recorded(
         from mujoco import mj_step  # noqa: PLC0415 - after its engine is chosen
 
         twin = copy(data)
+        if commands is not None:
+            commands.append(data.ctrl.copy())
         for _ in range(clock.brain_steps):
             if twin.time + 0.5 * clock.timestep_s >= len(poses) * interval_s:
                 poses.append(twin.qpos.copy())
@@ -57,10 +62,7 @@ def recorded(
     return poses
 
 
-def lanes(
-    motions: Sequence[Sequence[Floats]],
-    shown: Sequence[tuple[Robot, EvaluationSettings]],
-) -> list[Floats]:
+def lanes(motions: Sequence[Sequence[Floats]], shown: Shown) -> list[Floats]:
     """Return the motions of robots, (T, 7 + J) each, from a start line on.
 
     Several are side by side, and each is turned so that it ends straight before its
@@ -69,7 +71,7 @@ def lanes(
     right = np.array([sin(np.radians(AZIMUTH)), -cos(np.radians(AZIMUTH))])
     ahead = np.array([-right[1], right[0]])
     paths, end_m = [], 0.0
-    for poses, (robot, own) in zip(motions, shown, strict=True):
+    for poses, (robot, own) in zip(motions, shown.values(), strict=True):
         objects = object_count(own.environment, own.simulation)
         path = np.array(poses)
         path = path[:, : path.shape[1] - 7 * objects]
@@ -88,10 +90,7 @@ def lanes(
     return paths
 
 
-def side_by_side(
-    motions: Sequence[Sequence[Floats]],
-    shown: Sequence[tuple[Robot, EvaluationSettings]],
-) -> list[Floats]:
+def side_by_side(motions: Sequence[Sequence[Floats]], shown: Shown) -> list[Floats]:
     """Return ``lanes`` as one motion; robots whose motion is shorter wait."""
     paths = lanes(motions, shown)
     return [

@@ -114,14 +114,15 @@ def place_rows(model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
     counts = pyarrow.compute.list_value_length(rows["angles"]).to_numpy()
     if (counts != joints).any():
         raise MalformedMessage(f"poses: must have {joints} angles each", "impossible")
+    return place(model, *numbers_of(rows))
+
+
+def numbers_of(rows: pa.Table) -> tuple[Floats, Floats]:
+    """Return the cores, (T, 7), and angles, (T, J), of a robot's rows of poses."""
     axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
     roots = np.stack([rows[axis].to_numpy() for axis in axes], axis=1)
     angles = rows["angles"].combine_chunks().flatten().to_numpy()
-    return place(
-        model,
-        roots.astype(np.float64),
-        angles.astype(np.float64).reshape(len(roots), joints),
-    )
+    return roots.astype(np.float64), angles.astype(np.float64).reshape(len(roots), -1)
 
 
 def neutral_pose(

@@ -45,7 +45,9 @@ def walk(angle: float, length_m: float, count: int) -> list[Floats]:
 def test_robots_side_by_side_keep_their_speed_and_go_one_way() -> None:
     """Wherever they looked, all look and go to the right of the camera in the end."""
     motions = [walk(0.3, 1.0, 5), walk(2.5, 0.5, 3)]
-    joined = np.array(side_by_side(motions, [(SPIDER, SHORT)] * 2))
+    joined = np.array(
+        side_by_side(motions, {"a": (SPIDER, SHORT), "b": (SPIDER, SHORT)})
+    )
     assert joined.shape == (5, 14)
     right = np.array([np.sin(np.radians(130)), -np.cos(np.radians(130))])
     first, second = joined[:, :7], joined[:, 7:]

@@ -13,7 +13,7 @@ from PIL import Image
 
 from analysis.render.command import render
 from analysis.render.files import NoPictures, gait_strip, save_film, save_picture
-from analysis.render.film import Film, Look
+from analysis.render.film import Film
 from analysis.render.flags import parser
 from analysis.render.framing import framed
 from analysis.render.picture import RobotRenderer
@@ -191,7 +191,7 @@ def test_a_strip_is_a_picture_and_not_longer_than_the_evaluation(
     # One less is what there is, and goes on to the simulation.
     with pytest.raises(AssertionError, match="words come first"):
         main([*words, "--gait", "48"])
-    assert capsys.readouterr().err.endswith(f"\nsimulating and rendering {out}\n")
+    assert capsys.readouterr().err.endswith(f"\nrendering {out}\n")
 
 
 @pytest.mark.parametrize(
@@ -243,11 +243,13 @@ def test_a_transparent_picture_looks_as_one_on_its_page(engine: str) -> None:
     """Blue on grey as drawn there; shadows darken any page."""
     assert engine
     grey = (0.5, 0.5, 0.5)
-    looks = Look(SIZE, "fixed", is_clear=True), Look(SIZE, "fixed", background=grey)
-    settings = settings_of(None)
+    shown = {"one": (ROBOT, settings_of(None))}
+    start = np.array([0.0, 0.0, 0.0225, 1.0, 0.0, 0.0, 0.0])
     pictures = []
-    for look in looks:
-        with Film(ROBOT, settings, look, is_fine=True) as film:
+    for background in ("transparent", grey):
+        options = parser().parse_args(["a.yaml", "a.png"])
+        options.size, options.background = SIZE, background
+        with Film(shown, [start], options) as film:
             pictures.append(film[0].astype(float))
     clear, drawn = pictures
     opaque = clear[..., 3:] / 255.0
