@@ -85,7 +85,9 @@ def grounds(surfaces: Sequence[Surface], walls: Floats) -> list[dict[str, Any]]:
     shapes: list[dict[str, Any]] = []
     for one in surfaces:
         if isinstance(one, Relief):
-            shapes.append({"shape": "mesh", "corners": packed(one.corners)})
+            nodes = np.unique(one.corners.reshape(-1, 3), axis=0)  # by x, then y
+            extent_m, heights = float(nodes[-1, 0]), packed(nodes[:, 2])
+            shapes.append({"shape": "mesh", "extent": extent_m, "heights": heights})
             continue
         frame = np.eye(4)
         frame[:3, :3], frame[:3, 3] = one.rotation, one.centre

@@ -114,8 +114,10 @@ function solid(one) {
     color: new T.Color().setRGB(colour[0], colour[1], colour[2], T.SRGBColorSpace),
     transparent: colour[3] < 1, opacity: colour[3] });
   if (one.shape === "mesh") {
-    const geometry = new T.BufferGeometry();
-    geometry.setAttribute("position", new T.BufferAttribute(floats(one.corners), 3));
+    // Heights by x, then y; a plane's vertices are by falling y, then x.
+    const heights = floats(one.heights), n = Math.round(Math.sqrt(heights.length));
+    const geometry = new T.PlaneGeometry(2 * one.extent, 2 * one.extent, n - 1, n - 1);
+    heights.forEach((z, at) => geometry.attributes.position.setZ((n - 1 - at % n) * n + Math.floor(at / n), z));
     geometry.computeVertexNormals();
     mesh = new T.Mesh(geometry, paint([0.84, 0.86, 0.88, 1]));
   } else if (one.shape === "wall") {

@@ -1,34 +1,16 @@
 """Report in a real browser: no script error, no overlap, nothing too wide."""
 
-import json
-import re
-import shutil
-import subprocess
-from html import unescape
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.analysis.browser import looked_at
 from tests.analysis.reported import drawings, page, tables
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(180)]
 
 WIDE, SCREEN = 1000, 720
 """Width from which on, and height at which the difference must be seen [pixels]."""
-_FRAME = """<!DOCTYPE html><pre id="found"></pre><script>
-window.addEventListener("message", (event) => {
-  document.getElementById("found").textContent = event.data;
-});
-</script><iframe src="page.html" width="WIDTH" height="800" style="border: 0"></iframe>
-"""
-"""Page with the report in a frame: windows of Chromium are at least 500 pixels wide."""
-_PROBE = """
-<script>
-const errors = [];
-window.addEventListener("error", (event) => errors.push(event.message));
-</script>
-"""
 _LOOK = """
 <script>
 window.addEventListener("load", () => {
@@ -79,37 +61,12 @@ window.addEventListener("load", () => {
 """
 
 
-@pytest.fixture(scope="module")
-def chromium() -> str:
-    for name in ("chromium", "chromium-browser", "google-chrome"):
-        if path := shutil.which(name):
-            return path
-    pytest.skip("no Chromium is installed")
-
-
-def looked_at(chromium: str, shown: str, folder: Path, width: int) -> dict[str, Any]:
-    """Return what a script finds in a page that a browser shows from a file."""
-    probed = shown.replace("<body>", f"<body>{_PROBE}")
-    probed = probed.replace("</body>", f"{_LOOK}</body>")
-    (folder / "page.html").write_text(probed, encoding="utf-8")
-    frame = folder / "frame.html"
-    frame.write_text(_FRAME.replace("WIDTH", str(width)), encoding="utf-8")
-    command = [chromium, "--headless=new", "--no-sandbox", "--disable-gpu",
-               f"--user-data-dir={folder / 'profile'}", "--window-size=1400,900",
-               "--hide-scrollbars", "--virtual-time-budget=5000", "--dump-dom",
-               frame.as_uri()]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    (found,) = re.findall(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)
-    answer: dict[str, Any] = json.loads(unescape(found))
-    return answer
-
-
 @pytest.mark.parametrize("width", [1280, 400])
 def test_a_browser_shows_the_report_without_errors_or_overlaps(
-    chromium: str, tmp_path: Path, width: int
+    tmp_path: Path, width: int
 ) -> None:
     shown = page(tables(), drawings(tmp_path))
-    found = looked_at(chromium, shown, tmp_path, width)
+    found = looked_at(shown, _LOOK, tmp_path, width)
     assert found["errors"] == []
     assert found["overlapping"] == []
     assert found["outside"] == []
