@@ -20,6 +20,7 @@ from analysis.figures.style import PICTURE_ENDING, file_name, in_order, label, s
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, LoadedRun
 from analysis.render.files import gif
+from analysis.render.flags import PAGE_ENDING
 from analysis.render.picture import Simulate
 from analysis.render.stage import Picture
 
@@ -62,7 +63,13 @@ class FigureWriter:
         """Remove files of earlier analyses whose names the experiments determine."""
         self._folder = folder
         self._taken: set[str] = set()
-        for pattern in ("G-*.p??", "P-*.p??", "S-*.p??", f"{_FILM}*.gif"):
+        for pattern in (
+            "G-*.p??",
+            "P-*.p??",
+            "S-*.p??",
+            f"{_FILM}*.gif",
+            f"{_FILM}*{PAGE_ENDING}",
+        ):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
@@ -89,10 +96,11 @@ class FigureWriter:
         self.drawn.append(DrawnFigure(figure, text, picture))
 
     def add_film(self, robot: RobotPicture) -> Film:
-        """Write the moving picture of a robot."""
+        """Write the moving picture of a robot, and beside it its page."""
         stem = self._stem(f"{_FILM}{robot.best.experiment}")
         path = stem.with_name(f"{stem.name}.gif")
         path.write_bytes(film(robot.film, robot.film_interval_s))
+        path.with_suffix(PAGE_ENDING).write_text(robot.page, "utf-8")
         return Film(robot.best, path)
 
     def _stem(self, text: str) -> Path:

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from analysis.figures.family_tree import Best
 from analysis.measures.families import Family
+from analysis.page.robots import page_of
 from analysis.render.motion import recorded
 from analysis.render.picture import RobotRenderer, Simulate
 from analysis.render.stage import Picture
@@ -65,6 +66,7 @@ class RobotPicture:
         family: its nearest ancestors; None if they are not shown.
         pictures: pictures of the family, by births row.
         births: birth ids of the family, by births row.
+        page: web page that plays its whole motion.
     """
 
     best: Best
@@ -76,6 +78,7 @@ class RobotPicture:
     family: Family | None
     pictures: Mapping[int, Picture]
     births: Mapping[int, BirthId]
+    page: str
 
 
 def robot_picture(
@@ -123,12 +126,19 @@ def robot_picture(
         names[member] = BirthId(*(column[member].as_py() for column in columns))
     birth = BirthId(best.birth_island, best.birth)
     own = Identity(replace(origin, island=best.island), birth, 0)
+    robot, commands = painted(row), list[Floats]()
+    alone = partial(simulate, identity=own)
+    poses = recorded(alone, robot, settings, FILM_EVERY_S, commands)
+    name = f"Robot {birth.name} of {best.folder.name}"
+    facts = [{"fitness": best.fitness}]
+    page = page_of({name: (robot, settings)}, [poses], [commands], facts, FILM_EVERY_S)
     return RobotPicture(
         best,
-        *_motion(painted(row), settings, partial(simulate, identity=own)),
+        *_motion(robot, settings, poses),
         relatives if has_family else None,
         pictures,
         names,
+        page,
     )
 
 
@@ -149,7 +159,7 @@ def shown_document(document: str) -> str:
 
 
 def _motion(
-    robot: Robot, settings: EvaluationSettings, simulate: Simulate
+    robot: Robot, settings: EvaluationSettings, poses: Sequence[Floats]
 ) -> tuple[tuple[Picture, ...], tuple[float, ...], tuple[Picture, ...], float, float]:
     """Return pictures from the middle of a robot's life on, by a fixed camera.
 
@@ -158,7 +168,6 @@ def _motion(
         between two of them [s]; the robot's way during the gait [m].
     """
     step = round(EVERY_S / FILM_EVERY_S)
-    poses = recorded(simulate, robot, settings, FILM_EVERY_S)
     first = len(poses) // 2
     chosen = range(first, len(poses), step)[:FRAMES]
     filmed = poses[first : first + FRAMES * step]

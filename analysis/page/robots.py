@@ -1,7 +1,7 @@
 """``revolve robot page``: robots that move in a browser."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from analysis.progress import bars
 from analysis.render.command import lasting_for, read_shown
 from analysis.render.files import NoPictures, writing
 from analysis.render.flags import PAGE_ENDING
-from analysis.render.motion import lanes, recorded
+from analysis.render.motion import Shown, lanes, recorded
 from analysis.render.picture import Simulate
 from analysis.viewer.ground import surfaces
 from schema.agent.log import tell_user
@@ -57,32 +57,45 @@ def robot_page(
         for (robot, own), ticks in zip(tracked, commands, strict=True):
             lasting = lasting_for(own, options.seconds)
             motions.append(recorded(simulate, robot, lasting, INTERVAL_S, ticks))
-        robots = []
-        paths = lanes(motions, shown)
-        for file, name, path, ticks in zip(
-            options.files, shown, paths, commands, strict=True
-        ):
-            robot, own = shown[name]
-            facts = _facts_of_run(file) or {"fitness": evaluate(robot, own).fitness}
-            robots.append(
-                moving(
-                    name, robot, body_space(own.space), path, interval_s=INTERVAL_S,
-                    commands=packed(ticks), commands_s=own.simulation.tick_s,
-                    motors=len(ticks[0]), **facts,
-                )
-            )  # fmt: skip
-    around: list[dict[str, Any]] = []
-    if len(shown) == 1:
-        ((_, own),) = shown.values()
-        world = own.environment
-        below = surfaces(world, own.simulation, world.light)
-        around = grounds(below, np.zeros((0, 10)))
-    content = {"robots": robots, "grounds": around, "curves": []}
-    lead = "Drag to turn, scroll to zoom; click the name of a robot to follow it."
+        facts = [
+            _facts_of_run(file) or {"fitness": evaluate(*one).fitness}
+            for file, one in zip(options.files, shown.values(), strict=True)
+        ]
+    text = page_of(shown, motions, commands, facts, INTERVAL_S)
     with writing(out):
-        out.write_text(page(", ".join(shown), lead, content), "utf-8")
+        out.write_text(text, "utf-8")
     tell_user(f"saved {out}, {out.stat().st_size / 1e6:.1f} MB; a browser shows it")
     return 0
+
+
+def page_of(
+    shown: Shown,
+    motions: Sequence[Sequence[Floats]],
+    commands: Sequence[Sequence[Floats]],
+    facts: Sequence[Mapping[str, Any]],
+    interval_s: float,
+) -> str:
+    """Return the page of robots, with the states and commands of ``recorded``.
+
+    ``facts`` are those of ``moving``.
+    """
+    robots = [
+        moving(
+            name, robot, body_space(own.space), path, interval_s=interval_s,
+            commands=packed(ticks), commands_s=own.simulation.tick_s,
+            motors=len(ticks[0]), **fact,
+        )
+        for (name, (robot, own)), path, ticks, fact in zip(
+            shown.items(), lanes(motions, shown), commands, facts, strict=True
+        )
+    ]  # fmt: skip
+    (_, own), *others = shown.values()
+    world = own.environment
+    around = () if others else surfaces(world, own.simulation, world.light)
+    below = grounds(around, np.zeros((0, 10)))
+    content = {"robots": robots, "grounds": below, "curves": []}
+    lead = "Drag to turn, scroll to zoom; click the name of a robot to follow it."
+    return page(", ".join(shown), lead, content)
 
 
 def _facts_of_run(folder: Path) -> dict[str, Any]:

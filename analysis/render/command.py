@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from analysis.progress import bars
 from analysis.render.files import NoPictures, gait_strip, save_film, save_picture
-from analysis.render.film import Film
+from analysis.render.film import RobotFilm
 from analysis.render.flags import FILM_ENDINGS, PICTURE_ENDING, TRANSPARENT
 from analysis.render.motion import Shown, recorded, side_by_side
 from analysis.render.picture import RobotRenderer, Simulate
@@ -50,7 +50,7 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
                     motions.append([renderer.stage.data.qpos.copy()])
         poses = side_by_side(motions, shown) if others else motions[0][first:last]
         task = bar.add_task("rendering", total=len(poses))
-        with Film(
+        with RobotFilm(
             shown, poses, options, interval_s, is_fine=not is_film,
             advance=lambda: bar.advance(task),
         ) as film:  # fmt: skip

@@ -17,7 +17,7 @@ _PAGES = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
 """Colours on which transparent pictures are drawn."""
 
 
-class Film(AbstractContextManager["Film"]):
+class RobotFilm(AbstractContextManager["RobotFilm"]):
     """Pictures of robots, drawn when asked for by number."""
 
     def __init__(

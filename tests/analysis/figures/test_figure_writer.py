@@ -31,7 +31,7 @@ def tree_of(experiment: str) -> Figure:
 def robot_of(experiment: str, shade: int) -> RobotPicture:
     pictures = tuple(np.full((8, 8, 3), shade, np.uint8) for _ in range(2))
     best = Best(experiment, Path("f"), 0, 0, 1, 0.1)
-    return RobotPicture(best, (), (), pictures, 0.1, 0.0, None, {}, {})
+    return RobotPicture(best, (), (), pictures, 0.1, 0.0, None, {}, {}, "page")
 
 
 def test_each_experiment_has_files_of_its_own(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from PIL import Image
 
 from analysis.render.command import render
 from analysis.render.files import NoPictures, gait_strip, save_film, save_picture
-from analysis.render.film import Film
+from analysis.render.film import RobotFilm
 from analysis.render.flags import parser
 from analysis.render.framing import framed
 from analysis.render.picture import RobotRenderer
@@ -249,7 +249,7 @@ def test_a_transparent_picture_looks_as_one_on_its_page(engine: str) -> None:
     for background in ("transparent", grey):
         options = parser().parse_args(["a.yaml", "a.png"])
         options.size, options.background = SIZE, background
-        with Film(shown, [start], options) as film:
+        with RobotFilm(shown, [start], options) as film:
             pictures.append(film[0].astype(float))
     clear, drawn = pictures
     opaque = clear[..., 3:] / 255.0
