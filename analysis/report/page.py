@@ -243,7 +243,7 @@ def _film(one: Film, run: str, *, has_arena: bool) -> str:
         f"{number(best.fitness)}.</b> {escape(name)}, simulated alone, from the "
         f"middle of its evaluation on.{others} "
         f"File: <code>figures/{escape(one.path.name)}</code>; "
-        f'<a href="figures/{escape(one.path.stem)}.html">turn it in three dimensions</a>.'
+        f'<a href="figures/{escape(one.path.stem)}.html">look from all sides</a>.'
         "</figcaption></figure>"
     )
 

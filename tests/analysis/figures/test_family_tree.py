@@ -164,6 +164,7 @@ def robot_picture(members: pa.Table) -> RobotPicture:
         relatives,
         pictures,
         {row: BirthId(0 if row else 1, row) for row in pictures},
+        "page",
     )
 
 

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from analysis.page.content import grounds, moving, packed, page
 from analysis.page.robots import robot_page
-from analysis.render.command import NoPictures
+from analysis.render.files import NoPictures
 from analysis.render.flags import page_parser
 from analysis.render.motion import recorded
 from analysis.viewer.body import box_model, place
@@ -116,4 +116,4 @@ def test_pages_are_small_and_name_no_address(
 def test_a_page_has_its_ending(tmp_path: Path) -> None:
     options = page_parser().parse_args(["a.yaml", str(tmp_path / "a.htm")])
     with pytest.raises(NoPictures, match=r"must end in \.html, got '\.htm'"):
-        robot_page(options, simulate, lambda *_: None)  # type: ignore[arg-type,return-value]
+        robot_page(options, simulate, lambda *_: None)  # type: ignore[arg-type]
