@@ -63,13 +63,7 @@ class FigureWriter:
         """Remove files of earlier analyses whose names the experiments determine."""
         self._folder = folder
         self._taken: set[str] = set()
-        for pattern in (
-            "G-*.p??",
-            "P-*.p??",
-            "S-*.p??",
-            f"{_FILM}*.gif",
-            f"{_FILM}*{PAGE_ENDING}",
-        ):
+        for pattern in ("G-*.p??", "P-*.p??", "S-*.p??", f"{_FILM}*.*"):
             self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
