@@ -97,15 +97,23 @@ for (const one of robots) scene.add(one.mesh);
 
 function grid(low, high) {
   // Tiles of 10 cm; of large grounds 1 m.
-  const wide = Math.max(high.x - low.x, high.y - low.y) + 6, step = wide > 14 ? 1 : 0.1;
-  const half = step * Math.ceil(wide / step / 2);
-  const floor = new T.Mesh(new T.PlaneGeometry(8 * half, 8 * half), new T.MeshLambertMaterial({ color: 0xdfe4ea }));
+  const wide = Math.max(high.x - low.x, high.y - low.y), step = wide > 8 ? 1 : 0.1;
+  const tiles = document.createElement("canvas"), paint = tiles.getContext("2d");
+  tiles.width = tiles.height = 128;
+  ["#eff1f4", "#e0e4ea"].forEach((colour, n) => [0, 64].forEach((x) => {
+    paint.fillStyle = colour;
+    paint.fillRect(x, n ? 64 - x : x, 64, 64);
+  }));
+  const texture = new T.CanvasTexture(tiles), side = 40 * step * Math.ceil((wide + 2) / step / 4);
+  texture.wrapS = texture.wrapT = T.RepeatWrapping;
+  texture.colorSpace = T.SRGBColorSpace;
+  texture.anisotropy = renderer.capabilities.getMaxAnisotropy();
+  texture.repeat.set(side / step / 2, side / step / 2);
+  const floor = new T.Mesh(new T.PlaneGeometry(side, side), new T.MeshLambertMaterial({ map: texture }));
   floor.receiveShadow = true;
-  const lines = new T.GridHelper(2 * half, Math.round(2 * half / step), 0xc3cbd4, 0xcdd4dc);
-  lines.rotation.x = 0.5 * Math.PI;
-  lines.position.set(step * Math.round((low.x + high.x) / 2 / step), step * Math.round((low.y + high.y) / 2 / step), 0.0006);
-  floor.position.set(lines.position.x, lines.position.y, 0);
-  scene.add(floor, lines);
+  const middle = (a, b) => step * Math.round((a + b) / 2 / step);
+  floor.position.set(middle(low.x, high.x), middle(low.y, high.y), 0);
+  scene.add(floor);
 }
 
 function solid(one) {
@@ -157,7 +165,7 @@ let chosen = robots.length === 1 ? robots[0] : null;
 function look() {
   const way = 0.5 * Math.hypot(high.x - low.x, high.y - low.y);
   const reach = chosen ? chosen.reach() : way + Math.max(...robots.map((r) => r.reach()));
-  const away = 0.85 * reach / Math.sin(Math.PI / 12) / Math.min(1, camera.aspect);
+  const away = 0.65 * reach / Math.sin(Math.PI / 12) / Math.min(1, camera.aspect);
   const middle = chosen ? chosen.places[0].clone() : low.clone().add(high).multiplyScalar(0.5);
   controls.target.copy(middle);
   camera.position.copy(middle).add(spot.set(0.57, -0.68, 0.47).multiplyScalar(away));

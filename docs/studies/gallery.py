@@ -4,7 +4,8 @@
 
 The robots of the tasks are those that docs/studies/tasks.py kept. The arena is a run
 of scenario 3, which is made in FOLDER if it is not there yet (several minutes). Each
-film is a GIF of the first seconds; each recording (.rrd) opens in Rerun's viewer.
+film is a GIF of the first seconds; pages (.html) open in a browser, and recordings
+(.rrd) in Rerun's viewer.
 """
 
 import shutil
@@ -14,6 +15,7 @@ from pathlib import Path
 
 from PIL import Image
 
+from analysis.render.motion import Shown
 from analysis.render.picture import RobotRenderer
 from analysis.render.stage import Picture, choose_engine
 from schema.experiment.document import Experiment, body_space
@@ -21,6 +23,7 @@ from schema.experiment.file import read_experiment
 from schema.experiment.settings import evaluation_settings_of
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
+from schema.robot.trace import Floats
 
 ROOT = Path(__file__).resolve().parents[2]
 GALLERY = ROOT / "docs" / "gallery"
@@ -30,6 +33,8 @@ ARENA_SIZE = (300, 225)
 COLOURS = 28
 MOST_BYTES = 300_000
 """Greatest size of a film; frames at its end are left out."""
+PAGE_S = 20.0
+"""Motion that the page of all robots plays [s]."""
 FRAMES = 60
 """Frames of a robot's film, one per tick of its brain: 7.5 s."""
 ARENA = ("scenario3", "--seed", "7", "--births", "90")
@@ -45,11 +50,14 @@ def main(folder: Path) -> int:
     from docs.studies.tasks import ROBOTS, TASKS  # noqa: PLC0415
     from schema.formats.files import read_robot  # noqa: PLC0415
 
+    shown: Shown = {}
     for task, (shipped, _) in TASKS.items():
         experiment = read_experiment(shipped)
         robot = read_robot(ROBOTS / f"{task}.yaml", body_space(experiment.space))
+        shown[task] = robot, evaluation_settings_of(experiment)
         film_robot(robot, experiment, GALLERY / f"{task}.gif")
         record_robot(task, robot, experiment, GALLERY / f"{task}.rrd")
+    write_page(shown, GALLERY / "robots.html")
     run = folder / "arena"
     if not run.exists():
         words = ("-m", "revolve", "run", *ARENA, "--out", str(run))
@@ -58,8 +66,8 @@ def main(folder: Path) -> int:
     save_film(pictures, GALLERY / "arena.gif", (times_s[1] - times_s[0]) / SPEED)
     span = ("--from", str(SHOWN[0]), "--until", str(SHOWN[1]))
     viewed = ("-m", "revolve", "view", str(run), *span, "--save")
-    out = str(GALLERY / "arena.rrd")
-    subprocess.run([sys.executable, *viewed, out], cwd=ROOT, check=True)
+    for out in (str(GALLERY / "arena.rrd"), str(GALLERY / "arena.html")):
+        subprocess.run([sys.executable, *viewed, out], cwd=ROOT, check=True)
     shutil.copy(run / "best.yaml", GALLERY / "arena.yaml")
     for path in sorted(GALLERY.iterdir()):
         print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
@@ -95,6 +103,22 @@ def film_robot(robot: Robot, experiment: Experiment, path: Path) -> None:
         views = frames(renderer, poses, "follow", tick_s)
         pictures = list(map(renderer.picture, poses, views))
     save_film(pictures, path, tick_s)
+
+
+def write_page(shown: Shown, path: Path) -> None:
+    """Write a page of the first seconds of all robots, side by side."""
+    from analysis.page.robots import INTERVAL_S, page_of  # noqa: PLC0415 - after the engine
+    from analysis.render.command import lasting_for  # noqa: PLC0415 - the same
+    from analysis.render.motion import recorded  # noqa: PLC0415 - the same
+    from worker.robot.evaluation import evaluate, simulate  # noqa: PLC0415 - the same
+
+    commands: list[list[Floats]] = [[] for _ in shown]
+    motions = [
+        recorded(simulate, robot, lasting_for(own, PAGE_S), INTERVAL_S, ticks)
+        for (robot, own), ticks in zip(shown.values(), commands, strict=True)
+    ]
+    facts = [{"fitness": evaluate(*one).fitness} for one in shown.values()]
+    path.write_text(page_of(shown, motions, commands, facts, INTERVAL_S), "utf-8")
 
 
 def record_robot(name: str, robot: Robot, experiment: Experiment, path: Path) -> None:
