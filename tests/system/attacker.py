@@ -19,7 +19,7 @@ from schema.limits import ADVANCE_REQUEST_BYTES
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode, fingerprint
 from schema.wire.messages import Answer, Call, Crash, Evaluate, Request, RunningJob
-from tests.system.silent_agents import alive, introduce
+from tests.system.introductions import alive, introduce
 from tests.system.workspace import address_of
 
 _NOW = zenoh.ConsolidationMode.NONE
@@ -30,11 +30,6 @@ def run_name(folder: Path) -> str:
     """Return the unique name of a run, as its jobs carry it."""
     nonce = json.loads((folder / "run.json").read_text())["nonce"]
     return f"{socket.gethostname()}:{nonce}:{folder.resolve()}"
-
-
-def claim_of(run: str, epoch: int) -> bytes:
-    """Return a request that no agent can do, of a coordinator that claims an epoch."""
-    return encode(Request(run, epoch, 1, Call(b"\xc0"), b""))
 
 
 class Attacker:
@@ -54,7 +49,8 @@ class Attacker:
 
     def claim(self, epoch: int) -> None:
         """Claim to each agent to be the run's coordinator of an epoch."""
-        data = claim_of(self.run, epoch)
+        # A request that no agent can do.
+        data = encode(Request(self.run, epoch, 1, Call(b"\xc0"), b""))
         for role in ("worker", "analyzer"):
             for member in self.agents(role):
                 self.session.get(member.jobs, payload=data, consolidation=_NOW)
@@ -74,16 +70,6 @@ class Attacker:
 
         def act(key: str, data: bytes) -> None:
             self.session.put(key.replace("/jobs", "/cancelled"), fingerprint(data))
-
-        self.overhear(act)
-
-    def claim_as(self, epoch: int) -> None:
-        """Claim to be the run's coordinator of an epoch whenever a job is sent."""
-        data = claim_of(self.run, epoch)
-
-        def act(key: str, seen: bytes) -> None:
-            if seen != data:
-                self.session.get(key, payload=data, consolidation=_NOW)
 
         self.overhear(act)
 

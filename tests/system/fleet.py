@@ -15,7 +15,7 @@ from coordinator.cluster.kit import ClusterKit, Kit, MemberRole, utc_now
 from coordinator.islands.events import Advanced
 from coordinator.storage.journal import NAME, Journal
 from schema.agent.network import Tls, client_config
-from tests.system.silent_agents import alive
+from tests.system.introductions import alive
 from tests.system.workspace import Process, Workspace, wait_until
 
 

@@ -1,5 +1,6 @@
 """Roles of certificates at a real hub, and processes of one user without flags."""
 
+import json
 from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -12,7 +13,7 @@ from coordinator.storage.compare import compare
 from schema.agent.network import Tls, client_config
 from tests.system.documents import SCENARIO1
 from tests.system.fleet import kit_files, make_kit, tls_flags
-from tests.system.silent_agents import alive
+from tests.system.introductions import alive
 from tests.system.workspace import (
     Process,
     Workspace,
@@ -129,6 +130,11 @@ def test_strangers_do_not_connect(lab: Lab) -> None:
     ours = kit_files(lab.kit.folder, "good").ca
     with pytest.raises(zenoh.ZError):
         lab.session_of(Tls(ours, stranger.certificate, stranger.key))
+    config = json.loads(client_config(lab.address, Tls(ours, "", "")))
+    shown = {"root_ca_certificate": ours, "enable_mtls": False}
+    config["transport"]["link"]["tls"] = shown
+    with pytest.raises(zenoh.ZError):
+        zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
     # The hub has read the list without it.
     lab.kit.add("unlisted", "worker")
     with lab.session("unlisted") as nobody, lab.session("chief") as head:

@@ -73,21 +73,18 @@ def test_killed_process_is_replaced_under_another_name(workspace: Workspace) -> 
         assert name[:6] == gone.agent[:6]
 
 
-def test_agents_end_when_their_standard_input_closes(workspace: Workspace) -> None:
+@pytest.mark.parametrize("flags", [("--until-closed",), ()])
+def test_agents_end_with_their_standard_input_or_command(
+    workspace: Workspace, flags: tuple[str, ...]
+) -> None:
     with Network(name="c") as network:
-        flags = ("--connect", network.address, "--processes", "2", "--until-closed")
-        process = workspace.start("worker", *flags)
+        words = ("worker", "--connect", network.address, "--processes", "2")
+        process = workspace.start(*words, *flags)
         until(network, 2)
-        # It closes the standard input first.
-        process.communicate(timeout=PATIENCE_S)
-        assert process.returncode == 0
-        assert all(isinstance(event, Left) for event in until(network, 2))
-
-
-def test_agents_do_not_outlive_their_command(workspace: Workspace) -> None:
-    with Network(name="c") as network:
-        flags = ("--connect", network.address, "--processes", "2")
-        process = workspace.start("worker", *flags)
-        until(network, 2)
-        process.kill()
+        if flags:
+            # It closes the standard input first.
+            process.communicate(timeout=PATIENCE_S)
+            assert process.returncode == 0
+        else:
+            process.kill()
         assert all(isinstance(event, Left) for event in until(network, 2))

@@ -5,8 +5,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import duckdb
-import polars as pl
 import pyarrow.parquet as pq
 import pytest
 from msgspec.structs import replace
@@ -127,28 +125,3 @@ def test_fonts_are_embedded_in_pdfs(report_and_output: tuple[Path, str]) -> None
     pdfs = [path.read_bytes() for path in (report / "figures").glob("6.*.pdf")]
     # Type 42 is TrueType: its outlines are in FontFile2, and text stays text.
     assert {b"/FontFile2" in pdf and b"/Type3" not in pdf for pdf in pdfs} == {True}
-
-
-def test_three_libraries_read_the_same_tables(
-    report_and_output: tuple[Path, str],
-) -> None:
-    report, _ = report_and_output
-    for path in sorted(report.glob("measures/*.parquet")):
-        arrow = pq.read_table(path)
-        assert pl.read_parquet(path).rows() == [
-            tuple(row.values()) for row in arrow.to_pylist()
-        ]
-        rows = duckdb.read_parquet(str(path)).fetchall()
-        assert rows == [tuple(row.values()) for row in arrow.to_pylist()]
-
-
-def test_a_damaged_run_is_measured_in_part(
-    workspace: Workspace, undisturbed: Path
-) -> None:
-    shutil.copytree(undisturbed, workspace.folder / "run")
-    (evaluations,) = (workspace.folder / "run").glob("tables/*/*/evaluations.parquet")
-    evaluations.write_bytes(b"")
-    output = workspace.run("analyze", "run", "--out", "report")
-    assert "left out: run: table evaluations: " in output
-    robots = pq.read_table(workspace.folder / "report" / "measures" / "robots.parquet")
-    assert robots.num_rows == 0

@@ -14,12 +14,6 @@ from tests.system.workspace import Workspace
 pytestmark = pytest.mark.system
 
 
-def _refused(workspace: Workspace, *words: str) -> str:
-    output: str = workspace.run(*words, code=2)
-    assert len(output.strip().splitlines()) == 1, output
-    return output
-
-
 def test_certificates_of_the_environment_are_not_those_of_a_run_in_one_process(
     workspace: Workspace,
 ) -> None:

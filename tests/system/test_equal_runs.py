@@ -4,7 +4,6 @@ test_many_kills.py kills more of them; these are processes as a user starts them
 """
 
 import shutil
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from coordinator.storage.compare import compare
 from schema.tables.files import read_table
 from tests.system.documents import SCENARIO1
 from tests.system.fleet import Fleet, kill_beyond, size
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -34,13 +33,6 @@ def drive(trace):
     changes = np.abs(np.diff(trace.outputs, axis=0)).sum()
     return float(height + changes + np.abs(trace.commands).sum())
 """
-
-
-def test_one_worker_gives_the_same_births_as_a_single_process(
-    workspace: Workspace, undisturbed: Path
-) -> None:
-    workspace.run("run", *SCENARIO1, "--out", "one", "--workers", "1")
-    assert compare(undisturbed, workspace.folder / "one") == []
 
 
 def test_killing_one_of_three_workers_gives_the_same_births(
@@ -113,18 +105,3 @@ def test_noise_is_the_same_in_every_process(workspace: Workspace) -> None:
     out = workspace.run("view", "one", *robots, "--save", "a.rrd")
     assert out.count("moves as recorded, equal to the last bit") == 2
     assert "DIFFERS" not in out
-
-
-def test_ctrl_c_stops_cleanly_and_shows_how_to_resume(
-    workspace: Workspace, undisturbed: Path
-) -> None:
-    folder = workspace.folder / "stopped"
-    first = workspace.start("run", *SCENARIO1, "--out", "stopped", "--workers", "2")
-    wait_until(lambda: size(folder) > size(undisturbed) // 3, "the run is on its way")
-    first.send_signal(signal.SIGINT)
-    out, err = first.communicate(timeout=60)
-    assert first.returncode == 130, out + err
-    assert "revolve resume stopped" in out + err
-    assert "Traceback" not in err
-    workspace.run("resume", "stopped", "--workers", "1", "--quiet")
-    assert compare(undisturbed, folder) == []

@@ -69,6 +69,8 @@ def wait_for_line(process: Any, text: str) -> None:  # noqa: ANN401 - a process 
 def test_disconnecting_a_worker_gives_an_equal_run(
     network: Network, undisturbed: Path
 ) -> None:
+    """Also by a cable that loses packets before and after."""
+    network.slow_down("far", delay_s=0.05, loss=0.03)
     fleet, _ = remote_fleet(network, *SCENARIO1)
     fleet.wait_for(np.random.default_rng(31).uniform(0.1, 0.7) * size(undisturbed))
     network["far"].cut()

@@ -11,7 +11,7 @@ import pytest
 from coordinator.storage.compare import compare
 from schema.limits import MOST_EPOCH
 from tests.system.attacker import FALSE_REPLIES, Attacker, attacker_at
-from tests.system.documents import HAMLET, SCENARIO1
+from tests.system.documents import SCENARIO1
 from tests.system.workspace import PATIENCE_S, Workspace, wait_until
 
 pytestmark = [
@@ -83,22 +83,3 @@ def test_a_run_beside_a_forger_equals_an_undisturbed_one(
     assert "\x1b" not in out + err
     if kind:
         assert f" {kind}: " in err.partition("not used: ")[2], err
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["cancelled", "fenced"])
-def test_an_arena_beside_a_forger_equals_an_undisturbed_one(
-    small_arena_workspace: Workspace, small_arena_run: Path, name: str
-) -> None:
-    folder = small_arena_workspace.folder / "run"
-    words = (*HAMLET, "--workers", "2", "--out", "run")
-    process = small_arena_workspace.start("run", *words)
-    with attacker_at(folder) as attacker:
-        if name == "cancelled":
-            attacker.cancel()
-        else:
-            attacker.claim_as(MOST_EPOCH)
-        _, err = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0, err
-    assert compare(small_arena_run, folder) == []
-    assert f" {name}: " in err.partition("not used: ")[2], err

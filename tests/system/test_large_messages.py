@@ -16,7 +16,6 @@ from schema.agent.network import client_config
 from schema.agent.topics import Member
 from schema.limits import MIB, PAGE_BYTES
 from tests.system.fleet import kit_files, make_kit
-from tests.system.test_hub import Site
 from tests.system.workspace import (
     Workspace,
     free_address,
@@ -34,20 +33,6 @@ MOST_QUERIES_PER_S = 10.0
 MOST_QUERY_BYTES = 64
 PROMPT_S = 4.0
 """Less than the engine waits for a process that does not read [s]."""
-CROWD = """
-name = "crowd"
-births = 10
-[selection]
-population = 8
-[simulation]
-pose_steps = 5
-[arena]
-population_limit = 12
-founder_interval_s = 0.25
-birth_interval_s = 5.0
-snapshot_interval_s = 2.5
-"""
-"""Few robots whose poses between two births take more than 64 kB."""
 FROZEN_VIEWER = """
 import os, signal, sys, time, zenoh
 config, key, count, interval = sys.argv[1:]
@@ -139,16 +124,6 @@ def test_threads_that_the_user_sets_have_no_effect(
     told, listening = (workspace.folder / "hub.log").read_text().splitlines()
     assert told == f"ZENOH_RUNTIME: has no effect here, got {threads!r}"
     assert "listening on" in listening
-
-
-def test_an_arena_runs_with_a_separate_hub(workspace: Workspace) -> None:
-    site = Site(workspace)
-    (site.folder / "crowd.toml").write_text(CROWD)
-    site.start("analyzer")
-    worker = site.start("worker", "--processes", "1")
-    words = ("coordinator", "crowd.toml", "--seed", "1", "--quiet", "--out", "run")
-    site.start(*words, "--connect", "hub").end()
-    assert "retrying" not in worker.text
 
 
 def test_a_hub_drops_long_and_frequent_requests_of_viewers(

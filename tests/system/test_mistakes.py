@@ -3,7 +3,6 @@
 All in this process; tests/system/test_bad_input.py has what needs another one.
 """
 
-import os
 import shutil
 import socket
 from pathlib import Path
@@ -238,16 +237,6 @@ def test_restriction_that_no_robot_satisfies_ends_the_run_with_the_reason(
     assert main([*words, "--out", "x"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "space" in line
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    tmp_path.chmod(0o500)
-    assert main(["run", "scenario1", "--out", "x"]) == 2
-    assert "x: cannot be written: Permission denied" in capfd.readouterr().err
 
 
 def test_a_port_in_use(

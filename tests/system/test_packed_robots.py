@@ -1,14 +1,24 @@
 """A packed robot with a part of a user's file, on a machine that has only that file."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 
-from tests.system.test_own_parts import prepared
 from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
+CRAWLERS = Path(__file__).parents[1] / "plugins" / "crawlers.py"
+SPACE = """
+[space]
+part_types = [
+    "schema.parts:CORE", "schema.parts:FIXED_BRICK", "crawlers:PISTON",
+    "schema.robogen_parts:ACTIVE_WHEEL", "schema.robogen_parts:WHEEL",
+    "schema.robogen_parts:IR_SENSOR",
+]
+max_inputs = 16
+"""
 EVALUATE = """
 import revolve as rv
 try:
@@ -29,6 +39,13 @@ REFUSED = (
 )
 
 
+def prepared(workspace: Workspace) -> None:
+    """Write the user's file and an experiment with one of its part types."""
+    shutil.copy(CRAWLERS, workspace.folder)
+    text = f'name = "crawlers"\n{SPACE}'
+    (workspace.folder / "mine.toml").write_text(text)
+
+
 def moved(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     """Return an empty folder, on a machine where no run was, with the packed robot."""
     away = Workspace(workspace.folder / "away")
@@ -43,7 +60,7 @@ def moved(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
 def test_a_packed_robot_needs_no_run(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    prepared(workspace, "PISTON")
+    prepared(workspace)
     words = ("mine.toml", "--births", "30", "--seed", "3", "--quiet", "--in-process")
     workspace.run("run", *words, "--out", "run")
     beside = workspace.run("robot", "simulate", "run/best.yaml")
