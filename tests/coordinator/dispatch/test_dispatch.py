@@ -907,13 +907,3 @@ def test_each_job_is_delivered_once_for_any_events(
             continue
         assert bool(delivered.reason) == failed
         assert delivered.answer == (b"" if failed else b"a%d" % number)
-
-
-def test_same_events_give_the_same_commands() -> None:
-    stories = []
-    for _ in range(2):
-        world = World(7)
-        for _ in range(300):
-            getattr(world, world.random.choice(ACTIONS))()
-        stories.append((world.past, world.held, list(world.delivered)))
-    assert stories[0] == stories[1]

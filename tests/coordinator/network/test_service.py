@@ -3,7 +3,6 @@
 import ctypes
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -142,14 +141,6 @@ def listen(fleet: JobRouter, is_enough: Callable[[], bool]) -> dict[int, str]:
             assert end.answer.number == end.job.number
             agents[end.job.number] = end.agent
     return agents
-
-
-def test_agent_joins_with_its_properties_and_leaves(network: Network) -> None:
-    with agent(network, "an", role="analyzer") as process:
-        assert until(network, has(1)) == [Joined("an", "analyzer", 1, "p")]
-        process.terminate()
-        assert until(network, has(1)) == [Left("an")]
-        assert process.wait(PATIENCE_S) == 0
 
 
 def test_each_job_is_delivered_once_by_two_workers(
@@ -338,22 +329,6 @@ def test_bad_requests_are_refused_and_the_next_one_served(network: Network) -> N
     assert read_answer(answer.answer).number == 9
 
 
-def test_an_older_coordinator_is_told_once_that_it_is_fenced(network: Network) -> None:
-    with agent(network, "w"):
-        until(network, has(1))
-        network.send(0, "w", request(0, epoch=2), WAIT_S)
-        until(network, has(1))
-        network.send(1, "w", request(1, epoch=1), WAIT_S)
-        (told,) = until(network, has(1))
-        network.send(2, "w", request(2, epoch=1), WAIT_S)
-        (answer,) = until(network, has(1))
-    assert isinstance(told, Returned)
-    assert told.outcome == "fenced"
-    assert "epoch 1 of run r is over: epoch 2" in told.reason
-    assert isinstance(answer, Returned)
-    assert answer.outcome == "ok"
-
-
 @pytest.mark.parametrize("others", range(8))
 def test_no_message_is_dropped_behind_many_without_an_event(
     network: Network, monkeypatch: pytest.MonkeyPatch, others: int
@@ -407,16 +382,6 @@ def test_port_in_use_is_reported_in_one_line(network: Network) -> None:
     with (
         pytest.raises(NetworkError, match=r"^cannot listen on .*: it is in use; "),
         Network(name="d", listen=(network.address,)),
-    ):
-        pass
-
-
-def test_missing_hub_is_reported_in_one_line() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-    with (
-        pytest.raises(NetworkError, match=rf"^no hub at tcp/127.0.0.1:{port}$"),
-        Network(name="c", connect=f"tcp/127.0.0.1:{port}"),
     ):
         pass
 

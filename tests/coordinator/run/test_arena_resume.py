@@ -247,11 +247,14 @@ class Mortal(LocalAgents):
         return news
 
 
-def test_worker_that_loses_its_state_repeatedly_changes_nothing(
-    tmp_path: Path, calm: Path
+@pytest.mark.parametrize(
+    "other", [{"agents": Mortal}, {"throttle": RealTimeThrottle(2.0)}]
+)
+def test_lost_states_and_a_throttle_change_nothing(
+    tmp_path: Path, calm: Path, other: dict[str, Any]
 ) -> None:
     path = tmp_path / "run"
-    assert run(path, agents=Mortal)
+    assert run(path, **other)
     assert compare(calm, path) == []
 
 
@@ -272,12 +275,6 @@ def test_run_resumes_without_lost_snapshots(tmp_path: Path, calm: Path) -> None:
     for file in (path / "snapshots").iterdir():
         file.unlink()
     assert run(path)
-    assert compare(calm, path) == []
-
-
-def test_throttle_changes_no_result(tmp_path: Path, calm: Path) -> None:
-    path = tmp_path / "run"
-    assert run(path, throttle=RealTimeThrottle(2.0))
     assert compare(calm, path) == []
 
 

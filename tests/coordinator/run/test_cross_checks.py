@@ -1,7 +1,5 @@
 """Audits: which evaluations are done twice, and what happens to the pair."""
 
-from pathlib import Path
-
 import pytest
 from msgspec.structs import replace
 
@@ -13,7 +11,6 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.run.cross_checks import CrossChecks, audit_records, describe
-from coordinator.storage.journal import decode_record, encode_event
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from schema.robot.robot import Part, Robot
@@ -98,11 +95,6 @@ def test_outcome_of_a_single_job_passes_unchanged() -> None:
     vetted = VettingFailed(BIRTH, 0, "why")
     assert audits.settle(1, ONE) == [ONE]
     assert audits.settle(2, vetted) == [vetted]
-
-
-@pytest.mark.parametrize("event", [Audited(ONE, OTHER), Audited(FAILED, DIFFERENT)])
-def test_journal_keeps_both_outcomes(event: Audited) -> None:
-    assert decode_record(Path("journal"), encode_event(event)) == event
 
 
 def test_rows_have_the_columns_of_their_table() -> None:

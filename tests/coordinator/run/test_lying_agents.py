@@ -43,10 +43,6 @@ def judging(
     return lie
 
 
-def with_a_stranger(judged: tuple[Judgement, ...]) -> tuple[Judgement, ...]:
-    return (*judged, replace(judged[0], birth=BirthId(0, 10_000)))
-
-
 def saying(result: Result) -> Lie:
     """Return a change of the whole result."""
     return lambda answer: replace(answer, result=result)
@@ -98,7 +94,6 @@ def journalled(path: Path) -> list[JournalledEvent]:
 LIES: dict[str, tuple[AgentKind, Lie]] = {
     # A journal with such an advance could not be resumed.
     "robot left out": ("worker", judging(lambda judged: judged[1:])),
-    "unknown robot": ("worker", judging(with_a_stranger)),
     "other job": ("worker", lambda answer: replace(answer, number=answer.number + 1)),
     "too many deaths": ("worker", saying(ENDLESS)),
     "30 MB of text": ("worker", saying(CallValue(b"x" * 30_000_000))),

@@ -274,13 +274,6 @@ def test_an_epoch_that_the_journal_cannot_number_is_damaged(tmp_path: Path) -> N
     assert (tmp_path / "run" / "epoch").read_text() == "1000"
 
 
-def test_a_folder_without_a_run_is_refused_and_nothing_is_made(tmp_path: Path) -> None:
-    for path, why in ((tmp_path / "none", "no such f"), (tmp_path, "no run is there")):
-        with pytest.raises(RunFolderError, match=why):
-            RunFolder(path)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     "content",
     [b"many", b"", b"-3", b"\xff\x00", b"1" * 5000, b"99999999", b"%d" % (2**64 - 1)],

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, get_args
 
@@ -106,16 +106,6 @@ def written(folder: Path) -> list[int]:
             journal.append([event])
             sizes.append((folder / NAME).stat().st_size)
     return sizes
-
-
-def test_a_batch_has_the_same_bytes_as_single_events(tmp_path: Path) -> None:
-    (tmp_path / "one").mkdir()
-    (tmp_path / "all").mkdir()
-    written(tmp_path / "one")
-    with Journal.open(tmp_path / "all") as journal:
-        journal.append(EVENTS)
-    one, all_ = (tmp_path / name / NAME for name in ("one", "all"))
-    assert one.read_bytes() == all_.read_bytes()
 
 
 def test_a_journal_cut_anywhere_keeps_exactly_its_whole_records(tmp_path: Path) -> None:
@@ -284,10 +274,3 @@ def test_an_event_is_read_as_it_was_written(kind: Any, data: st.DataObject) -> N
     else:
         written = encode_event(event)
     assert decode_record(Path("journal"), written) == event
-
-
-@given(st.binary(max_size=80))
-def test_any_bytes_are_an_event_or_of_another_version(data: bytes) -> None:
-    with suppress(RunFolderError):
-        event = decode_record(Path("journal"), data)
-        assert decode_record(Path("journal"), encode_event(event)) == event
