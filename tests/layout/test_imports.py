@@ -1,12 +1,11 @@
 """Checks of the permitted imports of each file.
 
 import-linter follows import chains between the project's modules (contracts in
-pyproject.toml). In addition, these tests parse the syntax trees, which covers
+pyproject.toml). Other tests parse the syntax trees, which covers the libraries of
 revolve/ and reports file and library directly.
 """
 
 import ast
-import importlib
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -71,11 +70,6 @@ def imported(path: Path) -> Iterator[str]:
             yield (name or "").partition(".")[0]
 
 
-def is_composition_root(path: Path) -> bool:
-    """Return whether a file may import several rooms."""
-    return ROOT / "revolve" in path.parents or path.name == "__main__.py"
-
-
 def relative(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
@@ -110,25 +104,6 @@ def test_no_room_imports_test_only_libraries() -> None:
     assert {path: names for path, names in violations.items() if names} == {}
 
 
-def test_rooms_import_only_schema_and_themselves() -> None:
-    violations = {
-        relative(path): (set(ROOMS) & set(imported(path)))
-        - {"schema", path.relative_to(ROOT).parts[0]}
-        for path in sources()
-        if not is_composition_root(path)
-    }
-    assert {path: names for path, names in violations.items() if names} == {}
-
-
-def test_no_room_imports_the_command() -> None:
-    importers = [
-        relative(path)
-        for path in sources()
-        if "revolve" in imported(path) and ROOT / "revolve" not in path.parents
-    ]
-    assert importers == []
-
-
 def test_no_file_uses_type_checking_imports() -> None:
     found = [
         relative(path)
@@ -151,13 +126,6 @@ def test_a_run_starts_without_libraries_that_it_does_not_use() -> None:
     )
     unused = {"cryptography", "matplotlib", "networkx", "numba", "pandas", "PIL"}
     assert unused & {*done.stdout.split()} == set()
-
-
-@pytest.mark.parametrize("room", ROOMS)
-def test_room_is_imported_from_this_tree(room: str) -> None:
-    module = importlib.import_module(room)
-    assert module.__file__ is not None
-    assert Path(module.__file__).resolve() == (ROOT / room / "__init__.py").resolve()
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -14,4 +14,3 @@ def _shape(_values: tuple[float, ...]) -> Shape:
 
 FLIPPER = PartType("Flipper", 1, _shape, sensors=(Sensor("touch", "paddle"),))
 SECOND_FLIPPER = PartType("Flipper", 1, _shape)
-NOT_A_PART = 3.0

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import LONG_S, Compute, Reply, Server
@@ -217,13 +215,6 @@ def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None
     reason = server(raising(quoted)).reply(request()).reason
     assert len(reason) == LONGEST_REASON
     assert reason.isprintable()
-
-
-@settings(derandomize=True, deadline=None)
-@given(st.binary(max_size=64))
-def test_any_bytes_get_a_reply(data: bytes) -> None:
-    reply = server().reply(data)
-    assert bool(reply.answer) != bool(reply.reason)
 
 
 def test_agent_info_holds_the_deaths() -> None:

@@ -290,14 +290,6 @@ def test_damaged_protobuf_is_refused(tmp_path: Path) -> None:
             read_robot(path)
 
 
-def test_robot_of_another_body_space_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "robot.pb"
-    path.write_bytes(encode_robot(read(TEXT)))
-    space = {name: kind for name, kind in BUILT_IN.items() if name != "TouchSensor"}
-    with pytest.raises(InvalidRobot, match=r"robot\.pb: body\.parts\[1\]\.kind: must"):
-        read_robot(path, space)
-
-
 def test_malformed_robot_is_not_written(tmp_path: Path) -> None:
     robot = develop(node("Core"), BUILT_IN)
     broken = replace(robot, brain=replace(robot.brain, neurons=()))

@@ -7,8 +7,9 @@ from msgspec.structs import replace
 from schema.parts import BUILT_IN
 from schema.robot.brain import Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, develop, walk
-from schema.robot.robot import check_robot
-from tests.schema.robots import node, random_genomes
+from schema.robot.inverse_development import genome_of
+from schema.robot.robot import Robot, check_robot
+from tests.schema.robots import node, random_genomes, random_robots
 
 End = tuple[Layer, int]
 Edge = tuple[End, tuple[int, ...], End, float]
@@ -165,3 +166,17 @@ def test_what_develops_is_well_formed(genome: Genome) -> None:
 def test_bodies_do_not_depend_on_brains(genome: Genome) -> None:
     bare = replace(genome, hidden=(), connections=())
     assert develop(bare, BUILT_IN).parts == develop(genome, BUILT_IN).parts
+
+
+def unordered(robot: Robot) -> Robot:
+    """Return a robot with sorted connections."""
+    edges = sorted(robot.brain.connections, key=lambda edge: (edge.source, edge.target))
+    return replace(robot, brain=replace(robot.brain, connections=tuple(edges)))
+
+
+@given(robot=random_robots())
+def test_development_inverts_genome_of(robot: Robot) -> None:
+    again = develop(genome_of(robot), BUILT_IN)
+    assert unordered(again) == unordered(robot)
+    # From there on nothing changes any more, the order included.
+    assert develop(genome_of(again), BUILT_IN) == again

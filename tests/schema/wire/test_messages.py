@@ -118,13 +118,6 @@ def test_damaged_bytes_decode_or_are_malformed(name: str, data: DataObject) -> N
         assert repr(decode(KINDS[name], encode(decoded), MOST)) == repr(decoded)
 
 
-@given(data=st.binary(max_size=64))
-def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
-    for kind in KINDS.values():
-        with suppress(MalformedMessage):
-            decode(kind, data, MOST)
-
-
 def changed(message: object, path: str, value: object) -> bytes:
     """Return the bytes of a message with another value at a path of names."""
     tree = msgpack.decode(encode(message))

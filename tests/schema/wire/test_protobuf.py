@@ -71,13 +71,6 @@ def test_bytes_are_those_of_earlier_versions() -> None:
     assert decode_robot(ROBOT_OF_0_1 + b"\x98\x06\x01") == ROBOT
 
 
-@given(data=st.binary(max_size=64))
-def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
-    for decode in (decode_robot, decode_genome):
-        with suppress(MalformedMessage):
-            decode(data)
-
-
 @given(data=st.data())
 def test_damaged_bytes_decode_or_are_malformed(
     genomes: SearchStrategy[Genome], data: DataObject

@@ -14,11 +14,10 @@ from schema.experiment.environment import Environment
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.wire.arena import Changes, Insertion
+from schema.wire.arena import Insertion
 from tests.schema import robots
 from tests.worker.arena_cases import (
     SECOND,
-    crowd,
     placed,
     populated,
     seconds,
@@ -137,29 +136,6 @@ def test_robot_alone_in_an_arena_has_the_off_line_track(robot_of: Robots) -> Non
     own = np.array(world.population.find(A).window.positions)
     positions = own[-len(track.core_position) :]
     assert positions.tobytes() == track.core_position.tobytes()
-
-
-@pytest.mark.slow
-def test_rough_arena_is_repeatable_with_threads_and_after_a_restore(
-    robot_of: Robots,
-) -> None:
-    """The run has births on obstacles, merges on rough ground, and deaths."""
-    settings, found = arena(WILD), []
-    for threads in (1, 2, 4):
-        world = populated(settings, crowd(robot_of, 10, 0.5), threads)
-        seconds(world, 1.5)
-        middle = world.snapshot()
-        newborns = crowd(robot_of, 3, 0.3, seed=2, first=20)
-        changes = Changes(removals=world.births[:2], insertions=newborns)
-        world.apply(changes)
-        found.append((middle, seconds(world, 1.5)))
-        assert world.population.merges > 0
-        world.close()
-    assert found[0] == found[1] == found[2]
-    middle, advance = found[0]
-    restored = World.restore(settings, middle)
-    restored.apply(changes)
-    assert seconds(restored, 1.5) == advance
 
 
 def test_robots_on_one_obstacle_are_not_in_contact() -> None:

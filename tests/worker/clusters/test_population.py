@@ -43,15 +43,6 @@ def live(
     return world, oracle
 
 
-@pytest.mark.parametrize(("radius_m", "drop_m"), [(0.9, 0.25), (0.35, 0.6)])
-def test_no_contact_is_missed(robot_of: Robots, radius_m: float, drop_m: float) -> None:
-    """Compared with one model of all robots, at every physics step."""
-    world, oracle = live(robot_of, radius_m=radius_m, drop_m=drop_m, lives=6, seed=1)
-    assert oracle.missed == []
-    assert oracle.pair_steps > 200
-    assert world.population.merges > 10
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_no_contact_is_missed_in_long_runs(robot_of: Robots) -> None:
