@@ -4,15 +4,13 @@ import signal
 from pathlib import Path
 
 import pytest
-import zenoh
 
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunFolder
-from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.description import RunDetails, read_state
 from tests.system.conftest import Once
-from tests.system.workspace import Workspace, address_of, free_address, wait_until
+from tests.system.workspace import Workspace, address_of, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -105,28 +103,6 @@ def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
     assert again.count("revolve resume campaign") == 1
     lab.run("resume", "campaign", "--in-process", "--quiet")
     assert compare(whole, campaign) == []
-
-
-def test_two_coordinators_share_the_workers_of_a_hub(
-    lab: Workspace, whole: Path
-) -> None:
-    address = free_address()
-    flags = ("--seed", "7", "--repeats", "2", "--connect", address)
-    with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
-        commands = [
-            lab.start("run", f"{name}.toml", *flags, "--out", name)
-            for name in EXPERIMENTS
-        ]
-        lab.start("analyzer", "--connect", address)
-        lab.start("worker", "--connect", address, "--processes", "2")
-        for command in commands:
-            out, err = command.communicate(timeout=200)
-            assert command.returncode == 0, out + err
-    runs = [path.parent for path in whole.glob("*/run.json")]
-    assert len(runs) == RUNS
-    for run in runs:
-        name = run.name.partition("-")[0]
-        assert compare(run, lab.folder / name / run.name) == []
 
 
 def test_status_of_all_coordinators_of_a_hub(lab: Workspace) -> None:

@@ -52,17 +52,6 @@ def test_a_hub_that_never_answers_costs_a_few_seconds(workspace: Workspace) -> N
     assert lines["hub"].startswith("fail")
 
 
-def test_the_hub_of_a_run(workspace: Workspace) -> None:
-    words = ("--listen", "tcp/127.0.0.1:0", "--quiet", "--out", "run")
-    workspace.start("coordinator", "scenario1", *words)
-    address_of(workspace.folder / "run")
-    code, lines = lines_of(workspace, "--connect", "run")
-    assert code == 0, lines
-    assert "round trip" in lines["hub"]
-    assert "coordinator" in lines["coordinators"].split()[2]
-    assert lines["its clock"].startswith("ok")
-
-
 def test_rights_of_certificates(workspace: Workspace) -> None:
     kit = make_kit(
         workspace.folder / "lab",
@@ -94,6 +83,8 @@ def test_rights_of_certificates(workspace: Workspace) -> None:
     assert code == 0, lines
     assert lines["rights"].endswith("those of operator")
     assert lines["coordinators"].split()[2].startswith("chief.")
+    assert "round trip" in lines["hub"]
+    assert lines["its clock"].startswith("ok")
     run.kill()
     (kit.folder / "members" / "a" / "key.pem").chmod(0o644)
     code, lines = seen("a")

@@ -26,35 +26,18 @@ pytestmark = [
 PATIENCE_S = 120
 
 
-def stopped_coordinator(workspace: Workspace, undisturbed: Path) -> Fleet:
-    """Return a fleet whose coordinator is stopped by SIGSTOP during its run."""
+@pytest.mark.parametrize("when", ["meanwhile", "afterwards"])
+def test_continued_coordinator_exits_and_writes_nothing_after_a_takeover(
+    workspace: Workspace, undisturbed: Path, when: str
+) -> None:
+    """The epoch detects a takeover on file systems without locks."""
     fleet = Fleet(workspace, *SCENARIO1)
     fleet.join("judge", "analyzer")
     fleet.join("one")
     share = np.random.default_rng(43).uniform(0.2, 0.5)
     fleet.wait_for(share * size(undisturbed))
     fleet.coordinator.send_signal(signal.SIGSTOP)
-    return fleet
-
-
-def test_stopped_coordinator_keeps_the_lock_of_its_run(
-    workspace: Workspace, undisturbed: Path
-) -> None:
-    fleet = stopped_coordinator(workspace, undisturbed)
-    output = workspace.run("resume", "run", "--quiet", code=2)
-    assert f"in use by process {fleet.coordinator.pid} on " in output
-    assert len(output.strip().splitlines()) == 1
-    fleet.coordinator.send_signal(signal.SIGCONT)
-    fleet.finish()
-    assert compare(undisturbed, fleet.folder) == []
-
-
-@pytest.mark.parametrize("when", ["meanwhile", "afterwards"])
-def test_continued_coordinator_exits_and_writes_nothing_after_a_takeover(
-    workspace: Workspace, undisturbed: Path, when: str
-) -> None:
-    """The epoch detects a takeover on file systems without locks."""
-    fleet = stopped_coordinator(workspace, undisturbed)
+    assert "in use by process" in workspace.run("resume", "run", "--quiet", code=2)
     (fleet.folder / LOCK).unlink()
     second = workspace.start("resume", "run", "--workers", "1", "--quiet")
     whole = size(undisturbed)

@@ -12,7 +12,6 @@ import pytest
 
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
-from tests.system.documents import SCENARIO1
 from tests.system.fleet import Fleet
 from tests.system.workspace import Workspace, wait_until
 
@@ -177,24 +176,6 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
     fleet.join("good", "worker", *allows)
     fleet.finish()
     assert compare(workspace.folder / "calm", fleet.folder) == []
-
-
-def test_audit_of_agreeing_workers_does_not_change_the_run(
-    workspace: Workspace, undisturbed: Path
-) -> None:
-    fleet = Fleet(workspace, *SCENARIO1, "--audit", "0.2")
-    fleet.join("one")
-    fleet.join("other")
-    fleet.begin(workers=2)
-    fleet.finish()
-    assert compare(undisturbed, fleet.folder) == []
-    rows = read_table(fleet.folder, "audits").to_pylist()
-    assert len(rows) >= 2 * 0.1 * 60
-    assert all(row["agrees"] for row in rows)
-    for first, second in zip(rows[::2], rows[1::2], strict=True):
-        assert first["birth"] == second["birth"]
-        assert first["worker"] != second["worker"]
-        assert first["fitness"] == second["fitness"]
 
 
 def test_disagreeing_workers_are_reported_and_stop_the_run(

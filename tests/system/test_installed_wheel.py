@@ -19,8 +19,6 @@ from hatchling.builders.wheel import WheelBuilder
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
-from tests.system.documents import OFF_LINE, SMALL_ARENA
-from tests.system.test_strangers import PACKAGE, TOGETHER, document
 from tests.system.workspace import wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.long, pytest.mark.timeout(3600)]
@@ -217,22 +215,3 @@ def _follow_advice(
     assert Path(python).is_relative_to(its.folder.parent)
     its.run("python", *install, "-q", *limits)
     its.run("revolve", *command)
-
-
-def test_a_strangers_package_evolves_from_its_own_environment(
-    made: Callable[[str], Environment], wheel: Path
-) -> None:
-    its = made("{}.{}".format(*sys.version_info[:2]))
-    its.install(str(wheel))
-    its.install(str(PACKAGE))
-    for name, added in TOGETHER.items():
-        is_arena = name == "brain"
-        text = document(SMALL_ARENA if is_arena else OFF_LINE, added, 20)
-        (its.folder / f"{name}.toml").write_text(text)
-        words = (f"{name}.toml", "--seed", "5", "--quiet", "--out")
-        its.run("revolve", "run", *words, name, "--workers", "2")
-        its.run("revolve", "run", *words, f"{name}-2", "--in-process")
-        assert "equal" in its.run("revolve", "compare", name, f"{name}-2")
-    checked = its.run("python", "-c", "import revolve as rv; print("
-                      "rv.read('bodies').births.num_rows)")  # fmt: skip
-    assert checked.split() == ["20"]
