@@ -1,6 +1,5 @@
 """Tests of failure reports in the summary, in status and before a resume."""
 
-import json
 import re
 import shutil
 from collections.abc import Callable
@@ -21,7 +20,7 @@ from schema.tables.description import RunDetails, read_state
 from schema.tables.last_populations import last_populations
 from tests.system.conftest import Once
 from tests.system.flipping import flip
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace
 
 pytestmark = pytest.mark.system
 
@@ -317,19 +316,3 @@ def test_wrong_address_leaves_the_folder_usable(
     output = told(*words, "--connect", "tcp/127.0.0.1:1", code=2)
     assert "no hub at tcp/127.0.0.1:1" in output
     told(*words, "--in-process")
-
-
-def test_moved_folder_is_reported(workspace: Workspace) -> None:
-    words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
-    process = workspace.start("run", *words, "--quiet")
-    journal = workspace.folder / "gone" / "journal.bin"
-    wait_until(
-        lambda: journal.exists() and journal.stat().st_size > 2000,
-        "the run is on its way",
-    )
-    (workspace.folder / "gone").rename(workspace.folder / "elsewhere")
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == 2
-    assert "was moved or removed" in err
-    details = json.loads((workspace.folder / "elsewhere" / "run.json").read_text())
-    assert details["name"] == "scenario1"

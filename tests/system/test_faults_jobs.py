@@ -3,8 +3,6 @@
 A plug-in causes the crashes, which depend only on the robot.
 """
 
-import os
-import signal
 import sys
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import pytest
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
 from tests.system.fleet import Fleet
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace
 
 pytestmark = [
     pytest.mark.system,
@@ -98,30 +96,6 @@ def test_robot_that_crashes_three_processes_is_quarantined(
     if kind == "wait":
         workspace.run("run", *words, "--workers", "1", "--out", "one")
         assert compare(folder, workspace.folder / "one") == []
-
-
-def test_external_kills_do_not_lead_to_quarantine(workspace: Workspace) -> None:
-    """Kill the worker of the same robot repeatedly from outside."""
-    write_plug_in(
-        workspace, "open('here', 'w').write(str(os.getpid())); signal.pause()"
-    )
-    pid_file = workspace.folder / "here"
-    run = workspace.start("run", *WORDS, "--workers", "1", "--out", "run")
-    for _ in range(4):
-        wait_until(
-            lambda: pid_file.exists() and pid_file.read_text() != "",
-            "a worker is at it",
-        )
-        victim = int(pid_file.read_text())
-        pid_file.unlink()
-        os.kill(victim, signal.SIGKILL)
-    wait_until(
-        lambda: pid_file.exists() and pid_file.read_text() != "", "a worker is at it"
-    )
-    assert run.poll() is None
-    assert reasons(workspace.folder / "run") == {}
-    run.kill()
-    os.kill(int(pid_file.read_text()), signal.SIGKILL)
 
 
 @pytest.mark.long

@@ -121,29 +121,6 @@ def test_replay_contains_each_pose_of_each_robot(
         assert min(time for time, _, _ in sizes) == times[0]
 
 
-def test_dead_robots_are_cleared_at_their_death(
-    replayed: Path, small_arena_run: Path
-) -> None:
-    deaths = {
-        row["birth"]: round(row["sim_time_s"] * 1e9)
-        for row in read_table(small_arena_run, "deaths").to_pylist()
-    }
-    assert deaths
-    robots = [path for path in paths(replayed) if "/robots/" in path]
-    assert len(robots) == read_table(small_arena_run, "births").num_rows
-    for path in robots:
-        assert not any(chunk.is_static for chunk in chunks(replayed, path))
-        number = int(path.rpartition("-")[2])
-        if number in deaths:
-            cleared = {
-                time: births
-                for time, births, _ in rows(replayed, path, "Clear:is_recursive")
-            }
-            # On the timeline of births, too, no pose follows the removal.
-            last = max(births for _, births, _ in rows(replayed, path, CENTRES))
-            assert cleared[deaths[number]] >= last
-
-
 def test_curves_of_a_replay_equal_the_tables(
     replayed: Path, small_arena_run: Path
 ) -> None:

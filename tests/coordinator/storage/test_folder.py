@@ -257,6 +257,13 @@ def test_a_replaced_coordinator_notices_it(tmp_path: Path) -> None:
                 old.confirm()
 
 
+def test_a_moved_folder_is_noticed(tmp_path: Path) -> None:
+    with RunFolder(tmp_path / "run", DETAILS) as folder:
+        folder.path.rename(tmp_path / "elsewhere")
+        with pytest.raises(RunFolderError, match="was moved or removed"):
+            folder.confirm()
+
+
 def test_a_lower_epoch_in_the_folder_is_no_takeover(tmp_path: Path) -> None:
     RunFolder(tmp_path / "run", DETAILS).close()
     RunFolder(tmp_path / "run").close()
