@@ -1,4 +1,4 @@
-"""Numbers in messages and tables for people."""
+"""Texts of errors and of other processes, as users see them."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from schema.errors import (
     rounded,
     shown,
 )
-from schema.limits import LONGEST_REASON
+from schema.limits import LONGEST_REASON, printable
 
 
 @pytest.mark.parametrize(
@@ -79,3 +79,20 @@ def test_the_text_of_a_foreign_error_is_cut() -> None:
 def test_a_value_that_cannot_be_shown_is_named_by_its_type() -> None:
     assert shown(Mute()) == "a Mute that cannot be shown"
     assert shown(10**5000) == "a int that cannot be shown"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("", ""),
+        ("plain", "plain"),
+        (" two\r\n lines\t", "two lines"),
+        ("\x1b[31mred\x1b[0m", "?[31mred?[0m"),
+        ("left\u202eright\0", "left?right?"),
+        ("Grüße 机器人", "Grüße 机器人"),
+        ("x" * 11, "xxxxxxx..."),
+        (" " * 1000 + "x", "..."),
+    ],
+)
+def test_texts_become_short_printable_lines(text: str, line: str) -> None:
+    assert printable(text, 10 if len(text) > 10 and "x" in text else 40) == line

@@ -14,7 +14,7 @@ import pytest
 
 from coordinator.storage.compare import compare
 from tests.system.documents import HAMLET, SCENARIO1
-from tests.system.fleet import Fleet, agent_processes, holders, size
+from tests.system.fleet import Fleet, advances, agent_processes, holders, size
 from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [
@@ -103,3 +103,23 @@ def test_duplicate_and_late_answers_give_an_equal_run(
         fleet.finish()
     assert int(report[0]) > 0
     assert compare(undisturbed, fleet.folder) == []
+
+
+def test_arena_of_a_silent_worker_continues_on_an_idle_one(
+    small_arena_workspace: Workspace, small_arena_run: Path
+) -> None:
+    fleet = Fleet(small_arena_workspace, *HAMLET)
+    with fleet.misbehaving("silent") as report:
+        fleet.join("one")
+        fleet.begin(workers=2)
+        fleet.finish()
+    # It sent its late answer when the job was cancelled.
+    assert report == ["1"]
+    assert compare(small_arena_run, fleet.folder) == []
+    agents = [each.provenance.agent[:3] for each in advances(fleet.folder)]
+    first = agents.index("one")
+    assert first >= 3
+    assert agents == ["odd"] * first + ["one"] * (len(agents) - first)
+    said = fleet.coordinator.stderr.read()
+    assert said.count("has not answered for") == 1
+    assert "takes its job" in said

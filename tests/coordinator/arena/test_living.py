@@ -1,13 +1,20 @@
-"""Living robots of an arena: places of insertion."""
+"""Places of births, and sizes of populations in any world."""
 
+import random
 from math import atan2, dist, hypot
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from coordinator.arena.arena import Arena
 from coordinator.arena.living import draw_place
 from coordinator.evolution.random_streams import BufferedRng
+from coordinator.islands.events import Record, Started
 from schema.experiment.document import ArenaSection
+from schema.robot.ids import BirthId
+from tests.coordinator.arena_world import DT, ArenaRun, World, experiment, reject_some
 
 
 def draws(seed: int) -> BufferedRng:
@@ -47,3 +54,51 @@ def test_the_first_free_place_is_taken() -> None:
     source, reference = draws(4), draws(4)
     first, second = (draw_place(reference, (), ArenaSection()) for _ in range(2))
     assert draw_place(source, [first], ArenaSection()) == second
+
+
+fixed = settings(max_examples=12, derandomize=True, database=None, deadline=None)
+
+
+@given(
+    luck=st.integers(0, 2**32),
+    limit=st.integers(15, 30),
+    floor=st.integers(5, 15),
+    share=st.floats(0.0, 1.5),
+)
+@fixed
+def test_floor_and_limit_hold_in_every_world(
+    luck: int, limit: int, floor: int, share: float
+) -> None:
+    def fit(birth: BirthId, step: int) -> float:
+        return random.Random(f"{luck} {birth} {step}").random()  # noqa: S311
+
+    def diverges(birth: BirthId, step: int) -> bool:
+        return random.Random(f"{birth} {step} {luck}").random() < 0.002  # noqa: S311
+
+    rules = {
+        "population_limit": limit,
+        "population_floor": floor,
+        "survive_share_of_mean": share,
+    }
+    lived = ArenaRun(
+        Arena(experiment(45, **rules), 3, 0), World(fit, diverges), reject_some
+    )
+    while not lived.commands or lived.waiting:
+        before = lived.arena.step
+        found = lived.turn() if lived.commands else lived.tell(Started())
+        assert len(lived.arena.population) <= limit
+        culled = [
+            one
+            for one in found
+            if isinstance(one, Record)
+            and one.table == "deaths"
+            and one.row["reason"] in ("selection", "cull")
+        ]
+        if culled:
+            assert lived.arena.step > before
+            since = {
+                one: lived.world.step - then for one, then in lived.world.born.items()
+            }
+            mature = [one for one, age in since.items() if age * DT >= 15.0]
+            assert len(mature) - len(culled) >= floor
+    assert lived.arena.births <= 45

@@ -1,4 +1,4 @@
-"""Campaigns: their description, their folder, and which existing runs they adopt."""
+"""Campaigns, and the commands that resume runs."""
 
 import shlex
 from dataclasses import replace as changed
@@ -23,7 +23,13 @@ from coordinator.storage.campaign import (
     write_campaign,
 )
 from coordinator.storage.folder import RunFolder
-from coordinator.storage.hints import command
+from coordinator.storage.hints import (
+    FLAGS,
+    command,
+    keep_flags,
+    resume_command,
+    stopped,
+)
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.sweep import Sweep
@@ -190,3 +196,23 @@ def test_the_best_fitness_of_few_islands_is_shown_per_island() -> None:
     arena = IslandStatus(1, 9, 0.5, 4, simulated_s=20.0, is_paused=True)
     both = replace(run, islands=(*islands, arena))
     assert about_arenas(both) == ", 20 s simulated, 4 alive, paused"
+
+
+def test_the_kept_flags_give_the_same_command_as_the_message(tmp_path: Path) -> None:
+    flags = ["--workers", "0", "--listen", "hub", "--tls-ca", "my files/ca.pem"]
+    keep_flags(tmp_path, flags)
+    assert stopped(tmp_path, flags) == f"stopped; to resume: {resume_command(tmp_path)}"
+    assert resume_command(tmp_path).endswith("--listen hub --tls-ca 'my files/ca.pem'")
+    keep_flags(tmp_path, [])
+    assert resume_command(tmp_path) == f"revolve resume {tmp_path}"
+
+
+def test_a_missing_or_damaged_file_gives_no_flags(tmp_path: Path) -> None:
+    alone = f"revolve resume {tmp_path}"
+    assert resume_command(tmp_path) == alone
+    (tmp_path / FLAGS).write_bytes(b"\xff")
+    assert resume_command(tmp_path) == alone
+    (tmp_path / FLAGS).write_bytes(b"x" * 5000)
+    assert resume_command(tmp_path) == alone
+    (tmp_path / FLAGS).write_text("a\x1b[2J\n")
+    assert resume_command(tmp_path) == f"{alone} 'a [2J'"

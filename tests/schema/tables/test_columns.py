@@ -1,6 +1,8 @@
-"""Columns of the tables of a run."""
+"""Columns of tables, and Arrow without pandas."""
 
 import io
+import subprocess
+import sys
 from collections.abc import Callable
 
 import pyarrow as pa
@@ -124,3 +126,20 @@ def test_births_round_trip_through_stream_and_parquet(
     assert [row["gene"] for row in first["body"]] == [part.gene for part in parts]
     assert [row["idx"] for row in second["body"]] == list(range(len(parts)))
     assert [row["birth"] for row in first["parents"]] == [1, 0]
+
+
+PROGRAM = """
+import sys
+from schema.tables.arrow import skip_pandas
+skip_pandas()
+import pyarrow as pa
+numbers = pa.array([1, 2])
+assert "pandas" not in sys.modules
+assert numbers.to_pandas().sum() == 3
+assert "pandas" in sys.modules
+"""
+
+
+def test_arrays_are_made_without_pandas_and_still_convert_to_it() -> None:
+    pytest.importorskip("pandas")
+    subprocess.run([sys.executable, "-c", PROGRAM], check=True)
