@@ -1,9 +1,12 @@
-"""Checks that the files of a release agree with pyproject.toml."""
+"""Files of a release, and code that is generated."""
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 
 from schema.agent.version import VERSION
@@ -70,3 +73,23 @@ def test_images_have_plain_bases_that_the_project_supports() -> None:
     assert set(bases) == {"python:3.13-slim"}
     assert "Programming Language :: Python :: 3.13" in PROJECT["classifiers"]
     assert docker.rindex("\nUSER revolve\n") < docker.index('ENTRYPOINT ["revolve"]')
+
+
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the current output of `make proto`."""
+    folder = tmp_path_factory.mktemp("proto")
+    command = [sys.executable, "-m", "grpc_tools.protoc", f"-I{ROOT}"]
+    outputs = [
+        f"--python_out={folder}",
+        f"--pyi_out={folder}",
+        "schema/wire/revolve.proto",
+    ]
+    subprocess.run([*command, *outputs], cwd=ROOT, check=True, capture_output=True)
+    return folder / "schema" / "wire"
+
+
+@pytest.mark.parametrize("name", ["revolve_pb2.py", "revolve_pb2.pyi"])
+def test_generated_code_is_up_to_date(name: str, fresh: Path) -> None:
+    committed = (ROOT / "schema" / "wire" / name).read_bytes()
+    assert (fresh / name).read_bytes() == committed, "run make proto"

@@ -1,4 +1,4 @@
-"""Tests of interrupts, closed pipes and full devices."""
+"""Interrupts, closed pipes, full devices and completion at a terminal."""
 
 import os
 import signal
@@ -12,6 +12,8 @@ import pytest
 
 from revolve import command as revolve
 from revolve.cli.commands import COMMANDS
+from revolve.cli.completion import main
+from schema.experiment.file import shipped_experiments
 from tests.system.workspace import Workspace, wait_until
 
 pytestmark = pytest.mark.system
@@ -121,3 +123,57 @@ def _terminal_output(*words: str) -> str:
 
 def test_benchmarks_show_progress() -> None:
     assert "100%" in _terminal_output("bench", "evaluate", "--robots", "1")
+
+
+_COMPLETE = """
+source ./script
+COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1))
+_shtab_revolve revolve "${!#}" ""
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+def script(shell: str, capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(["completion", shell]) == 0
+    return capsys.readouterr().out
+
+
+def test_bash_completes_commands_flags_experiments_and_folders(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "script").write_text(script("bash", capsys))
+    (tmp_path / "runs" / "a").mkdir(parents=True)
+    (tmp_path / "mine.toml").touch()
+    (tmp_path / "mine.yaml").touch()
+    for line, expected in (
+        ("resu", {"resume"}),
+        ("robot s", {"show", "simulate"}),
+        ("robot render x --wi", {"--width"}),
+        ("run sce", {"scenario1", "scenario2", "scenario3"}),
+        ("run mi", {"mine.toml"}),
+        ("robot check a.yaml --experiment mi", {"mine.toml"}),
+        ("resume r", {"runs"}),
+        ("run scenario1 --connect r", {"runs"}),
+        ("completion ", {"bash", "zsh", "fish"}),
+        ("help st", {"status"}),
+    ):
+        words = ["revolve", *line.split(" ")]
+        done = subprocess.run(
+            ["bash", "-c", _COMPLETE, "bash", *words],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert set(done.stdout.split()) == expected, line
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_other_shells_get_all_commands_and_experiments(
+    shell: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both scripts were tried by hand; neither shell is needed for the tests."""
+    text = script(shell, capsys)
+    for name in (*COMMANDS, *shipped_experiments()):
+        assert name.split()[-1] in text
+    assert "_revolve_experiments" in text

@@ -1,11 +1,14 @@
-"""Log lines: plain for a person at a terminal, else with time and level, or JSON."""
+"""Lines of a log, and the progress of one task."""
 
+import io
 import json
 import os
 import re
+import time
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from rich.console import Console
 
 from schema.agent.log import (
     LOG_VARIABLE,
@@ -15,6 +18,7 @@ from schema.agent.log import (
     tell_user,
     warn_user,
 )
+from schema.agent.terminal.progress_line import SPAN_S, ProgressLine, progress_if_long
 from schema.errors import RevolveError
 
 
@@ -93,3 +97,43 @@ def test_an_unknown_form_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(LOG_VARIABLE, "xml")
     with pytest.raises(RevolveError, match=r"\$REVOLVE_LOG: must be plain, time, json"):
         start_log("worker")
+
+
+def test_a_log_of_one_line_repeats_it_only_if_it_has_changed() -> None:
+    log = io.StringIO()
+    with ProgressLine(Console(file=log)) as line:
+        for text, now_s in (("a", 0.0), ("a", SPAN_S), ("b", SPAN_S + 1.0)):
+            line.update(text, now_s)
+    assert log.getvalue() == "a\nb\n"
+
+
+def test_a_log_shows_progress_at_intervals() -> None:
+    log = io.StringIO()
+    with ProgressLine(Console(file=log)) as line:
+        for number, now_s in enumerate((5.0, 5.2, 4.9 + SPAN_S, 5.0 + SPAN_S)):
+            line.update(f"[{number}] so far", now_s)
+    assert log.getvalue() == "[0] so far\n[3] so far\n"
+
+
+def test_a_terminal_shows_the_newest_progress() -> None:
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=60)
+    with ProgressLine(console) as line:
+        line.update("[1] so far", 0.0)
+        line.update("[2] so far", 0.1)
+        line.update("[3] so far", 0.2)
+    assert "[3] so far" in screen.getvalue()
+
+
+def test_only_a_long_task_shows_its_newest_progress(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with progress_if_long("0 of 9") as tell:
+        tell("1 of 9")
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr("schema.agent.terminal.progress_line.SOON_S", 0.05)
+    with progress_if_long("0 of 9") as tell:
+        tell("1 of 9")
+        time.sleep(0.5)
+        tell("2 of 9")
+    assert capsys.readouterr() == ("", "1 of 9\n")

@@ -1,4 +1,4 @@
-"""Brain types and neuron types of an experiment, by name."""
+"""Own neurons, brains and sensors in experiments."""
 
 from pathlib import Path
 
@@ -9,9 +9,11 @@ from schema.errors import ExperimentError, RevolveError
 from schema.experiment.brains import neuron_kinds, neuron_types
 from schema.experiment.document import NETWORK, BrainSection, Space, references
 from schema.experiment.file import experiment_from_text, experiment_text
+from schema.experiment.kinds import KINDS, SENSOR, Use, kind_of
 from schema.experiment.settings import evaluation_settings, evaluation_settings_of
 from schema.formats.files import read_robot, write_robot
 from schema.plugins import permission
+from schema.plugins.permission import allow
 from schema.robot.brain import NEURON_TYPES, Brain, Neuron
 from schema.robot.robot import Part
 from tests.documents import parse_experiment
@@ -98,3 +100,44 @@ def test_a_module_that_is_not_allowed_is_not_imported(
         neuron_kinds(BrainSection(type="intruder:Brain"), Space())
     with pytest.raises(ExperimentError, match="module 'intruder' is not allowed"):
         neuron_types(("intruder:Neuron",))
+
+
+MODULE = '''"""Two sensors."""
+
+
+class Nose:
+    """Sensor of one input."""
+
+    inputs = 1
+
+    def read(self, view):
+        """Return how near the ground is."""
+        return (1.0 - view.distance("tip", (0.0, 0.0, -1.0), 0.5) / 0.5,)
+
+
+class Drip(Nose):
+    """Sensor of a value too many."""
+
+    def read(self, view):
+        """Return two values."""
+        return (*super().read(view), 0.0)
+
+
+NOSE, DRIP = Nose(), Drip()
+'''
+
+
+def test_a_sensor_is_recognised_and_checked(tmp_path: Path) -> None:
+    file = tmp_path / "noses_of_a_user.py"
+    file.write_text(MODULE)
+    allow([str(file)])
+    use = Use(SENSOR, "noses_of_a_user:NOSE")
+    plugin = SENSOR.load(use.path)
+    assert kind_of(plugin, KINDS) is SENSOR
+    assert kind_of(type(plugin), KINDS) is None
+    assert use.check() == ("noses_of_a_user.py:22", "")
+    message = r"sensor: noses_of_a_user.py.*must return 1 values, its inputs, got 2"
+    with pytest.raises(ExperimentError, match=message):
+        Use(SENSOR, "noses_of_a_user:DRIP").check()
+    with pytest.raises(ExperimentError, match="has no 'inputs'"):
+        SENSOR.load("schema.parts:SERVO")
