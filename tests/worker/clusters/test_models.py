@@ -1,4 +1,4 @@
-"""Models of clusters: bounding spheres, and pairs that are near."""
+"""Models of robots in clusters: spheres, pairs that are near, tracks."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -6,6 +6,7 @@ from itertools import combinations
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT
@@ -13,13 +14,15 @@ from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
 from schema.robogen_parts import ACTIVE_WHEEL
 from schema.robot.robot import Part, Robot
-from schema.robot.trace import Floats
+from schema.robot.trace import Floats, Trace
 from tests.plugins.crawlers import PISTON
-from tests.worker.arena_cases import crowd, populated, seconds, settings_of
+from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of
 from worker.arena.world import World
 from worker.clusters.models import bounding_spheres
 from worker.clusters.proximity import FASTEST, Proximity, RobotBounds
+from worker.clusters.robot import FitnessWindow
 from worker.clusters.states import Pairs
+from worker.fitness import load_fitness, path_velocity, straight_velocity
 
 GREY = (0.5, 0.5, 0.5)
 ROBOT = Robot(
@@ -130,3 +133,60 @@ def test_pairs_to_merge_and_to_keep_equal_those_of_all_measurements(
         assert not pairs_apart or proximity.pairs_to_keep(bounds, pairs_apart) == found
         pairs += len(found)
     assert pairs > 0 or gap_m < 0.1
+
+
+CLOCK = Simulation(
+    timestep_s=0.01, pose_steps=10, brain_steps=10, window_steps=80, warmup_steps=20
+)
+"""Samples every 0.1 s, a window of 0.8 s, a warm-up of 0.2 s."""
+
+
+def track(window: FitnessWindow) -> Trace:
+    return Trace(0.1, np.array(window.positions))
+
+
+def test_window_excludes_fall_and_warm_up() -> None:
+    window = FitnessWindow(CLOCK, born=100)
+    window.add(110, (9.0, 9.0, 9.0))
+    assert not window.positions
+    window.add(120, (0.0, 0.0, 0.0))
+    window.add(130, (0.1, 0.0, 0.0))
+    has_fitness = [window.has_fitness]
+    window.add(140, (0.1, 0.1, 5.0))
+    has_fitness.append(window.has_fitness)
+    assert has_fitness == [False, True]
+    assert path_velocity(track(window)) == pytest.approx(1.0)
+    assert straight_velocity(track(window)) == pytest.approx(2**0.5 / 2)
+
+
+def test_window_is_mature_after_warm_up_and_window() -> None:
+    """200 + 800 ms: from the sample at age 1 s on."""
+    window = FitnessWindow(CLOCK, born=50)
+    mature = []
+    for step in range(50, 200, 10):
+        window.add(step, (0.0, 0.0, 0.0))
+        mature.append(window.is_mature)
+    assert mature.index(True) == (20 + 80) // 10
+
+
+def test_window_drops_old_samples() -> None:
+    """East at 1 m/s for 0.8 s, then back west: after 0.4 s of that s is 0."""
+    window = FitnessWindow(CLOCK, born=0)
+    places = [0.1 * min(n, 16 - n) for n in range(17)]
+    straight, path = [], []
+    for number, x in enumerate(places):
+        window.add(20 + 10 * number, (x, 0.0, 0.0))
+        if window.is_mature:
+            straight.append(straight_velocity(track(window)))
+            path.append(path_velocity(track(window)))
+    assert straight == pytest.approx([1.0, 0.75, 0.5, 0.25, 0.0, 0.25, 0.5, 0.75, 1.0])
+    assert path == pytest.approx([1.0] * 9)
+    assert len(window.positions) == 9
+
+
+def test_fitness_of_the_window_uses_the_experiment_s_weights() -> None:
+    window = FitnessWindow(CLOCK, born=0)
+    for number in range(9):
+        window.add(20 + 10 * number, (0.01 * number, 0.0, 0.0))
+    fitness = replace(SETTINGS.fitness, path_weight=1.0, straight_weight=5.0)
+    assert load_fitness(fitness).value(track(window)) == pytest.approx(0.6)
