@@ -29,9 +29,7 @@ from tests.coordinator.sent_requests import JUDGED
 Lie = Callable[[Answer], Answer | bytes]
 
 
-def judging(
-    change: Callable[[tuple[Judgement, ...]], tuple[Judgement, ...]],
-) -> Lie:
+def judging(change: Callable[[tuple[Judgement, ...]], tuple[Judgement, ...]]) -> Lie:
     """Return a change of the judgements of each advance."""
 
     def lie(answer: Answer) -> Answer:

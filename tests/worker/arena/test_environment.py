@@ -16,13 +16,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Insertion
 from tests.schema import robots
-from tests.worker.arena_cases import (
-    SECOND,
-    placed,
-    populated,
-    seconds,
-    settings_of,
-)
+from tests.worker.arena_cases import SECOND, placed, populated, seconds, settings_of
 from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
 from worker.robot.evaluation import simulate
