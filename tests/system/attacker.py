@@ -19,7 +19,7 @@ from schema.limits import ADVANCE_REQUEST_BYTES
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode, fingerprint
 from schema.wire.messages import Answer, Call, Crash, Evaluate, Request, RunningJob
-from tests.system.introductions import alive, introduce
+from tests.system.fleet import alive, introduce
 from tests.system.workspace import address_of
 
 _NOW = zenoh.ConsolidationMode.NONE

@@ -24,7 +24,7 @@ from schema.agent.topics import Member, unique_name
 from schema.limits import ADVANCE_REQUEST_BYTES
 from schema.wire.codec import decode
 from schema.wire.messages import Request
-from tests.system.introductions import introduce
+from tests.system.fleet import introduce
 
 GONE_S = 0.3
 GOOD_ANSWERS = 3

@@ -12,8 +12,7 @@ from coordinator.cluster.kit import ClusterKit, Kit, MemberRole
 from coordinator.storage.compare import compare
 from schema.agent.network import Tls, client_config
 from tests.system.documents import SCENARIO1
-from tests.system.fleet import kit_files, make_kit, tls_flags
-from tests.system.introductions import alive
+from tests.system.fleet import alive, kit_files, make_kit, tls_flags
 from tests.system.workspace import (
     Process,
     Workspace,

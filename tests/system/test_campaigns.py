@@ -10,7 +10,7 @@ from coordinator.storage.folder import RunFolder
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.description import RunDetails, read_state
 from tests.system.conftest import Once
-from tests.system.workspace import Workspace, address_of, wait_until
+from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -103,27 +103,3 @@ def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
     assert again.count("revolve resume campaign") == 1
     lab.run("resume", "campaign", "--in-process", "--quiet")
     assert compare(whole, campaign) == []
-
-
-def test_status_of_all_coordinators_of_a_hub(lab: Workspace) -> None:
-    words = ("coordinator", *WORDS[1:], "one", "--listen", "tcp/127.0.0.1:0")
-    first = lab.start(*words)
-    address = address_of(lab.folder / "one")
-    lab.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
-    address_of(lab.folder / "two")  # it is connected
-
-    def status() -> str:
-        return lab.run("status", "--connect", address)
-
-    wait_until(
-        lambda: "two" in status() and "steady-1" in status(), "both coordinators answer"
-    )
-    assert "0 workers" not in status()
-    assert f"0 of {RUNS} runs finished, 0 of {16 * RUNS} births" in status()
-    # The folder's own coordinator answers; a folder alone has no estimate of time left.
-    assert "left" not in lab.run("status", "one")
-    lab.start("worker", "--connect", address, "--processes", "1")
-    wait_until(
-        lambda: "1 worker, 0 analyzers" in lab.run("status", "one"), "it answers"
-    )
-    assert first.poll() is None

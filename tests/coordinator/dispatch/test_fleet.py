@@ -19,7 +19,7 @@ from coordinator.dispatch.pool import FIRST_S, LONGEST_WAIT_S, REPLY_S
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.codec import fingerprint
 from schema.wire.messages import Crash, RunningJob
-from tests.coordinator.sent_jobs import SentJobs
+from tests.coordinator.sent_requests import SentJobs
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
 

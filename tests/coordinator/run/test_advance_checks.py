@@ -41,8 +41,7 @@ from schema.wire.codec import decode, encode
 from schema.wire.messages import Answer, Request, StateMissing
 from schema.wire.poses import PoseArrays
 from tests.coordinator.arena_world import DT, experiment
-from tests.coordinator.sent_jobs import SentJobs
-from tests.coordinator.sent_requests import JUDGED, ROBOT
+from tests.coordinator.sent_requests import JUDGED, ROBOT, SentJobs
 from tests.worker.fake_world import FakeWorld
 from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards

@@ -25,8 +25,7 @@ from tests.coordinator.run.test_advance_checks import (
     Kept,
     NoDeaths,
 )
-from tests.coordinator.sent_jobs import SentJobs
-from tests.coordinator.sent_requests import ROBOT
+from tests.coordinator.sent_requests import ROBOT, SentJobs
 from worker.serve.jobs import Jobs
 from worker.serve.shards import Shards
 

@@ -24,7 +24,7 @@ from schema.errors import RevolveError, RunFolderError
 from schema.experiment.file import read_experiment
 from schema.tables.description import read_state
 from schema.wire.status import RunStatus
-from tests.coordinator.sent_jobs import SentJobs
+from tests.coordinator.sent_requests import SentJobs
 
 BIRTHS = 24
 EXPERIMENTS = tuple(
