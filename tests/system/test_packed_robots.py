@@ -42,13 +42,6 @@ REFUSED = (
 )
 
 
-def prepared(workspace: Workspace) -> None:
-    """Write the user's file and an experiment with one of its part types."""
-    shutil.copy(CRAWLERS, workspace.folder)
-    text = f'name = "crawlers"\n{SPACE}'
-    (workspace.folder / "mine.toml").write_text(text)
-
-
 def moved(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     """Return an empty folder, on a machine where no run was, with the packed robot."""
     away = Workspace(workspace.folder / "away")
@@ -63,7 +56,9 @@ def moved(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
 def test_a_packed_robot_needs_no_run(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    prepared(workspace)
+    shutil.copy(CRAWLERS, workspace.folder)
+    text = f'name = "crawlers"\n{SPACE}'
+    (workspace.folder / "mine.toml").write_text(text)
     words = ("mine.toml", "--births", "30", "--seed", "3", "--quiet", "--in-process")
     workspace.run("run", *words, "--out", "run")
     beside = workspace.run("robot", "simulate", "run/best.yaml")
