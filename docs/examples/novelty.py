@@ -1,7 +1,5 @@
 """Novelty search with an archive: individuals with new bodies mate and live on."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from msgspec import Struct
 
@@ -23,7 +21,7 @@ class Novelty:
 
     def select(
         self, population: list[rv.Selectable], count: int, rng: np.random.Generator
-    ) -> Sequence[int]:
+    ) -> list[int]:
         """Return places; the archive stays as it is."""
         chances = np.array(self.novelty(population)) + 1e-6
         return list(rng.choice(len(chances), count, False, chances / chances.sum()))

@@ -81,7 +81,7 @@ MISTAKES = [
     # Views
     ("view nowhere --save a.rrd", "nowhere: no such folder"),
     ("view run --robot 0:9999 --save a.rrd", "0:9999: no robot of that name was born"),
-    ("view run --save a.mp4", "--save a.mp4: must end in .rrd"),
+    ("view run --save a.avi", "--save a.avi: must end in .rrd"),
     ("view run --save nowhere/a.gif", "--save nowhere/a.gif: no such folder: nowhere"),
     ("view run --robot best --save a.gif", "--save a.gif: a film takes no --robot"),
     ("view run --save a.gif --from 1e5 --until 1.1e5", "no poses of an arena between"),

@@ -25,7 +25,8 @@ FILLED = {
     "off-line": {"births", "evaluations", "population", "runs"},
     "arena": {"births", "deaths", "fitness", "population", "poses", "runs", "touches"},
     "archipelago": {*TABLES}
-    - {"audits", "drifts", "learning", "touches", "meetings", "matings", "patches"},
+    - {"audits", "archive", "drifts", "learning", "touches"}
+    - {"meetings", "matings", "patches"},
 }
 """Tables that have rows in each run."""
 
