@@ -39,6 +39,10 @@ def main(arguments: list[str]) -> int:
     # Before matplotlib is imported: it refuses backends of other programs.
     os.environ["MPLBACKEND"] = "agg"
     with extra("analysis needs", "analysis"):
+        from analysis.render.stage import choose_engine
+
+        # Before MuJoCo is imported.
+        choose_engine()
         from analysis.analyze_command import analyze
     return analyze(options, arguments, _simulation)
 

@@ -58,3 +58,18 @@ def test_the_backend_of_a_notebook_does_not_stop_an_analysis(
         env={**os.environ, "MPLBACKEND": "module://matplotlib_inline.backend_inline"},
     )
     assert "RunFolderError: nowhere: no such folder" in done.stderr
+
+
+def test_the_renderer_of_an_analysis_is_chosen_before_mujoco_is_imported() -> None:
+    """Later choices have no effect, and robots would be drawn ray by ray."""
+    script = "import sys; from analysis.__main__ import main; import os\ntry:\n"
+    script += "    main(['analyze', 'nowhere'])\n"
+    script += "finally:\n    print('mujoco' in sys.modules, 'MUJOCO_GL' in os.environ)"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={name: os.environ[name] for name in os.environ if name != "MUJOCO_GL"},
+    )
+    assert done.stdout == "True True\n"
