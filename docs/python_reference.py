@@ -20,6 +20,36 @@ Written from the docstrings by `python -m docs.python_reference`. [Python](pytho
 is the introduction.
 
 """
+_GROUPS = {
+    "Runs and what they made": "run resume read Run Runs analyze Analysis",
+    "Robots": "Robot Part Brain Neuron Connection Widths RobotOrigin vet body_distance",
+    "Evaluation and simulation": (
+        "evaluate simulate Fleet Result Report Trace Simulation Simulations gym"
+    ),
+    "Experiments and permission": "Experiment allow needs",
+    "Genomes": "Genome NeuronGene ConnectionGene",
+    "Arenas that run": "Arena ArenaListing ListedRobot",
+    "Fitness, measures and selection of your own": (
+        "FitnessFunction MeasureFunction ParentSelection SurvivorSelection "
+        "StatefulSelection Selectable"
+    ),
+    "Parts and sensors of your own": (
+        "PartType Parameter Shape Box cylinder constant_shape Slot Joint Motor Sensor "
+        "SensorType SensorView"
+    ),
+    "Brains, encodings and learners of your own": (
+        "BrainType BrainGenes BrainRules BrainControl Bank NeuronType Tick Encoding "
+        "Draws Branch Learner"
+    ),
+    "Rules of arenas of your own": (
+        "ArenaRules ArenaView Resident Meeting Conception Death Patch Decisions"
+    ),
+    "Errors": (
+        "RevolveError ExperimentError UnknownPlugin InvalidRobot RunFolderError "
+        "NetworkError FitnessUndefined SensorFailed SimulationDiverged JobRefused"
+    ),
+}
+"""Public names by what one does with them."""
 _LISTS = ("Args", "Attributes", "Raises")
 _TEXTS = ("Returns", "Yields")
 """Parts of a docstring: lists of names with a text each, and mere texts."""
@@ -28,25 +58,34 @@ _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 
 def reference() -> str:
     """Return the page."""
-    names = sorted(dir(revolve), key=lambda name: (_order(name), name.lower()))
-    text = "\n".join(line for name in names for line in _entry(name, revolve))
-    return _HEAD + linked(text)
+    grouped = " ".join(_GROUPS.values()).split()
+    assert sorted(grouped) == dir(revolve), "each public name has one group"
+    contents = [
+        f"- [{title}](#{_anchor(title)}): {_links(names)}"
+        for title, names in _GROUPS.items()
+    ]
+    lines = [*contents, ""]
+    for title, names in _GROUPS.items():
+        lines += [f"## {title}", ""]
+        lines += (line for name in names.split() for line in _entry(name, revolve))
+    return _HEAD + linked("\n".join(lines))
 
 
-def _order(name: str) -> int:
-    """Return the place of a kind of name: functions, classes, errors, modules."""
-    found = getattr(revolve, name)
-    if inspect.ismodule(found):
-        return 3
-    if not inspect.isclass(found):
-        return 0
-    return 2 if issubclass(found, Exception) else 1
+def _links(names: str) -> str:
+    """Return names as links to their entries."""
+    return ", ".join(f"[`{name}`](#{_anchor(name)})" for name in names.split())
+
+
+def _anchor(title: str) -> str:
+    """Return the anchor of a heading; a class comes after the function of its name."""
+    anchor = title.lower().replace(",", "").replace(" ", "-")
+    return f"{anchor}-1" if title != anchor and anchor in dir(revolve) else anchor
 
 
 def _entry(name: str, module: ModuleType) -> Iterator[str]:
     """Yield the lines about a public name of a module."""
     found = getattr(module, name.rpartition(".")[2])
-    yield f"## `{name}`"
+    yield f"### `{name}`"
     if inspect.ismodule(found):
         yield from ("", inspect.getdoc(found) or "", "")
         for inner in found.__all__:
@@ -63,9 +102,9 @@ def _entry(name: str, module: ModuleType) -> Iterator[str]:
             continue
         own = getattr(found, key)
         if isinstance(member, property | cached_property):
-            yield from (f"### `{name}.{key}`", inspect.getdoc(member) or "", "")
+            yield from (f"#### `{name}.{key}`", inspect.getdoc(member) or "", "")
         elif isinstance(member, FunctionType | classmethod):
-            yield f"### `{name}.{key}`"
+            yield f"#### `{name}.{key}`"
             yield from _text(own, f"{name}.{key}{_signature(own)}")
 
 

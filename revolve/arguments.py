@@ -1,6 +1,7 @@
 """Checks of the arguments of the Python API."""
 
 import re
+import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from operator import index
@@ -34,6 +35,11 @@ def whole_number(
     raise RevolveError(
         f"{name}: must be a whole number from {least} to {most}, got {shown(value)}"
     )
+
+
+def is_silent(*, progress: bool | None) -> bool:
+    """Return whether to show no progress; None: show it in notebooks only."""
+    return not ("ipykernel" in sys.modules if progress is None else progress)
 
 
 def picture_size(width: int, height: int) -> tuple[int, int]:

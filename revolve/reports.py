@@ -5,6 +5,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet
 
+from revolve.arguments import is_silent
 from revolve.children import run_command
 from revolve.runs import Run, check_table
 from schema.errors import RunFolderError
@@ -46,19 +47,22 @@ class Analysis:
 
 
 def analyze(
-    *runs: Run | str | Path, out: str | Path = "report", progress: bool = False
+    *runs: Run | str | Path, out: str | Path = "report", progress: bool | None = None
 ) -> Analysis:
     """Measure runs, draw the figures and write a report, as ``revolve analyze`` does.
 
     Args:
         runs: runs, or folders that contain some.
         out: folder to write to.
-        progress: show progress on standard error, and the findings.
+        progress: show progress on standard error, and the findings; None: in
+            notebooks.
 
     Raises:
         RunFolderError: no run is found, or the folder cannot be written.
         RevolveError: a library is missing; the message says how to install it.
     """
     folders = [str(each.folder if isinstance(each, Run) else each) for each in runs]
-    run_command(["analyze", *folders, "--out", str(out)], is_quiet=not progress)
+    run_command(
+        ["analyze", *folders, "--out", str(out)], is_quiet=is_silent(progress=progress)
+    )
     return Analysis(out)

@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from revolve.arguments import in_order, whole_number
+from revolve.arguments import in_order, is_silent, whole_number
 from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, as_experiment, of_plain, plain
@@ -318,7 +318,7 @@ def run(
     workers: int | None = None,
     connect: str | None = None,
     plugins: Iterable[str] = (),
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Run:
     """Run an experiment to its end, as ``revolve run`` does, with the same births.
 
@@ -334,7 +334,8 @@ def run(
         connect: address of a hub whose workers do the work.
         plugins: modules or ``.py`` files that may be imported, beside those that the
             experiment names.
-        progress: show progress on standard error, and the summary.
+        progress: show progress on standard error, and the summary; None: in
+            notebooks only.
 
     Raises:
         ExperimentError: an invalid experiment.
@@ -385,7 +386,7 @@ def resume(
     births: int | None = None,
     workers: int | None = None,
     plugins: Iterable[str] = (),
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Run:
     """Continue a run to its end, as ``revolve resume`` does.
 
@@ -410,18 +411,18 @@ def resume(
 
 
 def _common(
-    workers: int | None, plugins: Iterable[str], *, progress: bool
+    workers: int | None, plugins: Iterable[str], *, progress: bool | None
 ) -> list[str]:
     words = [word for entry in dict.fromkeys(plugins) for word in ("--plugins", entry)]
     if workers is not None:
         most = most_processes()
         words += ["--workers", str(whole_number("workers", workers, 0, most))]
-    return words if progress else [*words, "--quiet"]
+    return [*words, "--quiet"] if is_silent(progress=progress) else words
 
 
-def _done(words: tuple[str, ...], folder: Path, *, progress: bool) -> Run:
+def _done(words: tuple[str, ...], folder: Path, *, progress: bool | None) -> Run:
     """Run a command; return the run that it has finished."""
-    run_command(words, is_quiet=not progress)
+    run_command(words, is_quiet=is_silent(progress=progress))
     finished = Run(folder)
     if finished.state != "finished":
         raise RevolveError(f"{folder}: not finished: revolve.resume continues it")

@@ -2,6 +2,7 @@
 
 import contextlib
 import getpass
+import os
 import shlex
 import socket
 import subprocess
@@ -89,9 +90,12 @@ class Window:
                     tell_user(line)
             return
         # The viewer's own server, which is not used, listens on this machine only.
-        command = [*python_command("rerun"), "--bind", HOST, "--connect"]
+        viewer = python_command("rerun")
+        _decline_statistics(viewer)
         self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
-            [*command, output.url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [*viewer, "--bind", HOST, "--connect", output.url],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_WINDOW_S)
@@ -108,6 +112,17 @@ class Window:
         if ended is not None and ended > 0:
             raise ViewerError(f"the viewer cannot open a window: {WITHOUT_SCREEN}")
         return ended is not None
+
+
+def _decline_statistics(viewer: list[str]) -> None:
+    """Turn Rerun's usage statistics off, unless the user has chosen."""
+    folder = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    if (Path(folder) / "rerun" / "analytics.json").exists():
+        return
+    command = [*viewer, "analytics", "disable"]
+    done = subprocess.run(command, capture_output=True, check=False)  # noqa: S603 - our own interpreter
+    if done.returncode == 0:
+        tell_user("Rerun sends no usage statistics; to send: rerun analytics enable")
 
 
 def ways_to_view(output: Output) -> list[str]:

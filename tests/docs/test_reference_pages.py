@@ -159,7 +159,7 @@ def test_a_field_without_a_description_is_an_error() -> None:
 
 def test_every_public_name_has_an_entry() -> None:
     lines = python_reference.reference().splitlines()
-    titles = [line for line in lines if line.startswith("## ")]
-    inner = [f"## `gym.{name}`" for name in ("RobotEnv", "make")]
-    names = [f"## `{name}`" for name in dir(revolve)]
+    titles = [line for line in lines if line.startswith("### ")]
+    inner = [f"### `gym.{name}`" for name in ("RobotEnv", "make")]
+    names = [f"### `{name}`" for name in dir(revolve)]
     assert sorted(titles) == sorted(names + inner)

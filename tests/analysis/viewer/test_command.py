@@ -1,5 +1,6 @@
 """Tests of the viewer without network and screen."""
 
+import json
 import os
 import re
 import socket
@@ -226,6 +227,32 @@ def test_invalid_files_and_addresses_are_refused(
         Output.of(tmp_path / file if file else None, address)
 
 
+def choose_statistics(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the user have chosen whether Rerun sends statistics."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(folder))
+    (folder / "rerun").mkdir()
+    (folder / "rerun" / "analytics.json").write_text('{"analytics_enabled": true}')
+
+
+@pytest.mark.parametrize("has_chosen", [False, True])
+def test_usage_statistics_are_off_unless_the_user_has_chosen(
+    has_chosen: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    if has_chosen:
+        choose_statistics(tmp_path, monkeypatch)
+    for screen in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(screen, raising=False)
+    with pytest.raises(ViewerError, match="cannot open a window"):
+        Window(Output(None, ("127.0.0.1", 1), has_window=True))
+    chosen = json.loads((tmp_path / "rerun" / "analytics.json").read_text())
+    assert chosen["analytics_enabled"] == has_chosen
+    assert ("no usage statistics" in capsys.readouterr().err) != has_chosen
+
+
 def test_a_window_that_fails_late_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -233,6 +260,7 @@ def test_a_window_that_fails_late_is_reported(
     program.write_text(f"#!/bin/sh\nread -r _ < {tmp_path}/go\nexit 1\n")
     program.chmod(0o755)
     os.mkfifo(tmp_path / "go")
+    choose_statistics(tmp_path, monkeypatch)
     monkeypatch.setattr("sys.executable", str(program))
     monkeypatch.setattr("analysis.viewer.output._WINDOW_S", 0.1)
     output = Output(None, ("127.0.0.1", 1), has_window=True)
