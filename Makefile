@@ -4,8 +4,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# The environment has what running, pictures and analysis need (NEEDED), or everything
-# (STAMP), which also serves `make demo`.
+# The environment has what running, pictures and analysis need (NEEDED), everything
+# (STAMP), which also serves `make demo`, or what the docs site needs (DOCS_STAMP).
 NEEDED := $(VENV)/.installed-needed
 STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.docs-installed
@@ -113,12 +113,6 @@ docs-serve: docs
 		|| { tail -n 1 $(VENV)/docs-serve.log >&2; \
 		echo 'To use another port: make DOCS_PORT=8001 docs-serve' >&2; exit 1; }
 
-$(DOCS_STAMP): $(STAMP)
-	@echo 'Adding the generator of the docs site to $(VENV): about 200 MB ...'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-		-c constraints.txt -e '.[docs]'
-	@touch $@
-
 clean:
 	rm -rf $(VENV) docs/_build dist .hypothesis .import_linter_cache .mypy_cache \
 		.pytest_cache .ruff_cache MUJOCO_LOG.TXT
@@ -128,9 +122,12 @@ $(NEEDED): EXTRAS := pictures,analysis
 $(NEEDED): SIZE := 1 GB
 $(STAMP): EXTRAS := all,dev
 $(STAMP): SIZE := 2 GB
+$(STAMP): ALSO := $(NEEDED)
+$(DOCS_STAMP): EXTRAS := docs
+$(DOCS_STAMP): SIZE := 600 MB
 # Dots are packages. Modules are compiled by all cores, which pip does not do; tests of
 # packages are not compiled.
-$(NEEDED) $(STAMP): pyproject.toml constraints.txt
+$(NEEDED) $(STAMP) $(DOCS_STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' \
 		|| { echo 'Python 3.11, 3.12, 3.13 or 3.14 is needed, and "$(PYTHON)" is' \
 		"$$($(PYTHON) --version 2>/dev/null || echo missing)." \
@@ -147,4 +144,4 @@ $(NEEDED) $(STAMP): pyproject.toml constraints.txt
 			END { if (!/^ended 0$$/) print ""; exit !/^ended 0$$/ }'
 	@$(BIN)/python -m compileall -q -j 0 -x '/tests?/' $(VENV)/lib || true
 	@echo '$(VENV) is ready.'
-	@touch $(NEEDED) $@
+	@touch $@ $(ALSO)

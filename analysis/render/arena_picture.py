@@ -125,7 +125,10 @@ class ArenaRenderer(AbstractContextManager["ArenaRenderer"]):
             is_shown = is_own & (data.geom_xpos[:, 2] > 0.5 * HIDDEN_M)
             places, radii = data.geom_xpos[is_shown], model.geom_rbound[is_shown, None]
             seen += [places + radii * axis for axis in (*np.eye(3), *-np.eye(3))]
-        return self._stage.framing(np.concatenate(seen))
+        points = np.concatenate(seen)
+        look_at, distance_m = self._stage.framing(points)
+        self._stage.shadow_m = float(np.linalg.norm(points - look_at, axis=1).max())
+        return look_at, distance_m
 
 
 def _lowered(walls: Floats) -> Floats:

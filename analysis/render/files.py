@@ -59,7 +59,7 @@ def gait_strip(
 
 def _with_text(picture: Picture, text: str) -> Picture:
     height, width, _ = picture.shape
-    size = max(10, width // 16)
+    size = min(max(10, width // 16), 24)
     image = Image.new("RGB", (width, height + 3 * size // 2), "white")
     image.paste(Image.fromarray(picture))
     font = ImageFont.load_default(min(size, 5 * width // (3 * len(text))))

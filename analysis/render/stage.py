@@ -51,6 +51,8 @@ HIDDEN_M = -100.0
 """Height of what pictures do not show [m]."""
 _MOST_FINE = 2048
 """Greatest width and height of pictures that are drawn twice as large [pixels]."""
+_SPARE_GEOMS = 1000
+"""Geoms of a picture that are in no model, such as the sky."""
 _SHRUNK, _SHRUNK_M, _LAYERS = 0.0015, 5e-5, 17
 """Boxes are drawn smaller by multiples of a share or length, whichever is less [m]:
 faces in one plane would flicker."""
@@ -201,7 +203,8 @@ def _renderer(
         high, wide = factor * height, factor * width
         model.vis.global_.offwidth, model.vis.global_.offheight = wide, high
         try:
-            return mujoco.Renderer(model, high, wide)
+            most_geoms = _SPARE_GEOMS + model.ngeom
+            return mujoco.Renderer(model, high, wide, max_geom=most_geoms)
         # The type of the exception depends on the backend.
         except Exception as error:  # noqa: BLE001
             why = f"{engine or 'its default backend'} does not work: {one_line(error)}"

@@ -2,10 +2,11 @@
 
     python -m docs.studies.gallery FOLDER
 
-The robots of the tasks are those that docs/studies/tasks.py kept. The arena is a run
-of scenario 3, which is made in FOLDER if it is not there yet (several minutes). Each
-film is a GIF of the first seconds; pages (.html) open in a browser, and recordings
-(.rrd) in Rerun's viewer.
+The robots of the tasks are those that docs/studies/tasks.py kept. The arenas are runs
+of scenario 3 and of docs/gallery/hundreds.toml, whose founders are those of
+runs/elites; runs are made if they are not there yet (a quarter of an hour). Each film
+is a GIF of the first seconds; pages (.html) open in a browser, and recordings (.rrd) in
+Rerun's viewer.
 """
 
 import shutil
@@ -15,6 +16,7 @@ from pathlib import Path
 
 from PIL import Image
 
+from analysis.render import files
 from analysis.render.motion import Shown
 from analysis.render.picture import RobotRenderer
 from analysis.render.stage import Picture, choose_engine
@@ -40,6 +42,20 @@ FRAMES = 60
 ARENA = ("scenario3", "--seed", "7", "--births", "90")
 SHOWN = (500.0, 520.0)
 """Simulated time of the arena that is shown [s]."""
+ELITES = ("map-elites", "--seed", "1", "--births", "1500", "--out", "runs/elites")
+HUNDREDS = (str(GALLERY / "hundreds.toml"), "--seed", "3")
+CROWDED, RECORDED = (385.0, 400.0), (398.0, 400.0)
+"""Simulated times of the arena of 400 robots of its film and recording [s]."""
+CROWDED_SIZE = (800, 450)
+WALK = (
+    "docs/tasks_data/locomotion.yaml",
+    "--size",
+    "360x270",
+    "--seconds",
+    "8",
+    "--fps",
+    "12",
+)
 
 
 def main(folder: Path) -> int:
@@ -58,20 +74,35 @@ def main(folder: Path) -> int:
         film_robot(robot, experiment, GALLERY / f"{task}.gif")
         record_robot(task, robot, experiment, GALLERY / f"{task}.rrd")
     write_page(shown, GALLERY / "robots.html")
-    run = folder / "arena"
-    if not run.exists():
-        words = ("-m", "revolve", "run", *ARENA, "--out", str(run))
-        subprocess.run([sys.executable, *words], cwd=ROOT, check=True)
-    pictures, times_s = draw_film(run, SHOWN, ARENA_SIZE)
+    revolve("robot", "render", *WALK, str(GALLERY / "walk.gif"))
+    if not (ROOT / "runs" / "elites").exists():
+        revolve("run", *ELITES)
+    runs = {"arena": ARENA, "hundreds": HUNDREDS}
+    for name, words in runs.items():
+        if not (folder / name).exists():
+            revolve("run", *words, "--out", str(folder / name))
+    pictures, times_s = draw_film(folder / "arena", SHOWN, ARENA_SIZE)
     save_film(pictures, GALLERY / "arena.gif", (times_s[1] - times_s[0]) / SPEED)
-    span = ("--from", str(SHOWN[0]), "--until", str(SHOWN[1]))
-    viewed = ("-m", "revolve", "view", str(run), *span, "--save")
-    for out in (str(GALLERY / "arena.rrd"), str(GALLERY / "arena.html")):
-        subprocess.run([sys.executable, *viewed, out], cwd=ROOT, check=True)
-    shutil.copy(run / "best.yaml", GALLERY / "arena.yaml")
+    pictures, times_s = draw_film(folder / "hundreds", CROWDED, CROWDED_SIZE)
+    interval_s = (times_s[1] - times_s[0]) / SPEED
+    files.save_film(pictures, GALLERY / "hundreds.gif", interval_s)
+    for name, ending, start_s, end_s in (
+        ("arena", "rrd", *SHOWN),
+        ("arena", "html", *SHOWN),
+        ("hundreds", "rrd", *RECORDED),
+    ):
+        span = ("--from", str(start_s), "--until", str(end_s))
+        out = GALLERY / f"{name}.{ending}"
+        revolve("view", str(folder / name), *span, "--save", str(out))
+    shutil.copy(folder / "arena" / "best.yaml", GALLERY / "arena.yaml")
     for path in sorted(GALLERY.iterdir()):
         print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
     return 0
+
+
+def revolve(*words: str) -> None:
+    """Run a command of ours."""
+    subprocess.run([sys.executable, "-m", "revolve", *words], cwd=ROOT, check=True)
 
 
 def save_film(pictures: list[Picture], path: Path, interval_s: float) -> None:

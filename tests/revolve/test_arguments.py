@@ -23,7 +23,7 @@ def test_anything_else_is_refused_with_the_range(value: object) -> None:
 
 @pytest.mark.parametrize("progress", [True, False])
 def test_progress_is_shown_in_notebooks_unless_told_otherwise(
-    progress: bool, monkeypatch: pytest.MonkeyPatch
+    *, progress: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delitem(sys.modules, "ipykernel", raising=False)
     assert is_silent(progress=None)

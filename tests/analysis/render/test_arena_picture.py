@@ -1,11 +1,13 @@
 """Tests of pictures of arenas."""
 
+import mujoco
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from analysis.render.arena_picture import ArenaRenderer, Poses
 from analysis.render.overlay import Overlay
+from analysis.render.stage import HIDDEN_M, Stage, furnish
 from schema.experiment.document import ArenaSection
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import arena_settings_of
@@ -36,6 +38,18 @@ def pose(x: float, y: float, angle: float = 0.0) -> np.ndarray:
 def _engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if request.param == "rays":
         monkeypatch.setenv("MUJOCO_GL", "disable")
+
+
+def test_no_geom_is_left_out_of_a_picture_of_many() -> None:
+    spec = mujoco.MjSpec()
+    for _ in range(10_000):
+        spec.worldbody.add_geom(size=[0.01] * 3, pos=[0.0, 0.0, HIDDEN_M])
+    spec.worldbody.add_geom(size=[0.3] * 3, rgba=[1.0, 0.0, 0.0, 1.0])
+    furnish(None, None, 1.0, spec)
+    stage = Stage(spec.compile(), SIZE, is_fine=False)
+    stage.pose(np.zeros(0))
+    assert len(mostly(stage.picture(np.zeros(3), 3.0), 0)) > 1000
+    stage.close()
 
 
 @pytest.mark.usefixtures("_engine")

@@ -236,6 +236,7 @@ def choose_statistics(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("has_chosen", [False, True])
 def test_usage_statistics_are_off_unless_the_user_has_chosen(
+    *,
     has_chosen: bool,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
