@@ -253,7 +253,9 @@ class Run:
         is_wanted = pc.field("birth").isin([row["birth"] for row in rows])
         table = read_table(self.folder, "births", where=is_wanted)
         places = {individual(row): at for at, row in enumerate(table.to_pylist())}
-        born = table.take([places[individual(row)] for row in rows])
+        born = table.take(
+            pa.array([places[individual(row)] for row in rows], pa.int64())
+        )
         robots = self._robots(born, [row["island"] for row in rows])
         return list(zip(rows, robots, strict=True))
 

@@ -39,7 +39,7 @@ _ASKED = {
     "selection.survivors": (_CHILDREN + 1, _CHILDREN),
     "migration.emigrants": (2, 1),
 }
-"""Least size of a population for a rule, and number of places."""
+"""Least size of a population for a rule, and number of places, if that is fixed."""
 
 
 def _examples(encoding: IslandEncoding, labels: Labels) -> list[Individual]:
@@ -85,15 +85,17 @@ def _populations(
 def _live(
     rules: Mapping[int, Rule],
     examples: Sequence[Individual],
+    asked: tuple[int, int],
     modules: Sequence[str],
     *,
     is_backward: bool = False,
 ) -> dict[int, dict[tuple[int, int], list[int]]]:
     """Return what rules of islands that take turns select, by brood and population.
 
-    Modules and, in ``select``, objects must not change.
+    ``asked``: least size of a population, and number of places. Modules and, in
+    ``select``, objects must not change.
     """
-    least, count = _ASKED[next(iter(rules.values())).key]
+    least, count = asked
     samples = {island: _populations(least, examples, island) for island in rules}
     answers: dict[int, dict[tuple[int, int], list[int]]] = {at: {} for at in rules}
     for brood in range(_BROODS):
@@ -140,18 +142,19 @@ def check_rule(
     examples = _examples(encoding, labels)
     new = partial(make, Relatives(encoding.develop))
     last = new()  # imports its module
-    modules = own_modules()
-    alone = {
-        **_live({0: new()}, examples, modules),
-        **_live({1: new()}, examples, modules),
-    }
-    if _live({0: new(), 1: new()}, examples, modules) != alone:
+    least, count = _ASKED[last.key]
+    if last.varies:
+        count = max(1, experiment.selection.parents_needed)
+    live = partial(
+        _live, examples=examples, asked=(least, count), modules=own_modules()
+    )
+    alone = {**live({0: new()}), **live({1: new()})}
+    if live({0: new(), 1: new()}) != alone:
         must = "select on an island as if there were no other"
         raise broken("", must, came="other places when two islands take turns")
-    if _live({0: new()}, examples, modules, is_backward=True)[0] != alone[0]:
+    if live({0: new()}, is_backward=True)[0] != alone[0]:
         must = "select the same whatever was selected before"
         raise broken("", must, came="other places in another order")
-    least, count = _ASKED[last.key]
     population = _populations(least, examples, 0)[-1]
     failed = failed_last(
         individual if number % _FAILED else individual.evaluated(None, ())

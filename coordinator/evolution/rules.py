@@ -115,9 +115,10 @@ class Rule:
             return None
         with naming_plugin(self.key, self.plugin):
             archive = dict(method(self.relatives.members(population)))
-            if not all(isinstance(one, Member) for one in archive.values()):
-                raise broken("archive", "return individuals by entry", archive)
-            return {str(entry): one for entry, one in archive.items()}
+            kinds = {(type(entry), type(one)) for entry, one in archive.items()}
+            if kinds - {(str, Member)}:
+                raise broken("archive", "return individuals by texts", archive)
+            return archive
 
     def update(self, brood: Sequence[S]) -> None:
         """Change the memory of the rule, if it has one.

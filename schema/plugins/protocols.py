@@ -443,6 +443,10 @@ class Selectable(Protocol):
         """
 
     @property
+    def has_failed(self) -> bool:
+        """Its evaluation failed."""
+
+    @property
     def size(self) -> int:
         """Number of parts of its body."""
 

@@ -337,9 +337,10 @@ def check_new(section: RuleSection, name: str) -> str:
     [
         ("return {one.birth.name: one for one in population}", ""),
         (
-            "return {0: population[0].birth}",
-            "archive: must return individuals by entry",
+            "return {'0': population[0].birth}",
+            "archive: must return individuals by texts",
         ),
+        ("return {0: population[0]}", "archive: must return individuals by texts"),
         ("return 3", "raised TypeError"),
         ("self.first = population[0]; return {}", "must not write in select"),
     ],
@@ -353,6 +354,25 @@ def test_archive_of_an_own_rule_is_checked(
     )
     path = f"{lab(LAB + methods)}:Mindful"
     section = SelectionSection(survivors=path)
+    if not expected:
+        assert not check_new(section, "survivors")
+        return
+    with pytest.raises(ExperimentError, match=expected):
+        check_new(section, "survivors")
+
+
+@pytest.mark.parametrize(
+    ("kept", "expected"), [(5, ""), (4, "must return at least 5 different")]
+)
+def test_a_rule_that_varies_keeps_as_many_as_it_likes(
+    lab: Callable[[str], str], kept: int, expected: str
+) -> None:
+    few = (
+        "\n    varies = True\n    def __init__(self, parameters):\n        pass\n"
+        "\n    def select(self, population, count, rng):\n"
+        f"        return range({kept})\n"
+    )
+    section = SelectionSection(survivors=f"{lab(LAB + few)}:Mindful")
     if not expected:
         assert not check_new(section, "survivors")
         return
