@@ -101,7 +101,7 @@ def test_archive_of_the_selection_page_is_read_and_begins_a_run(
     block = blocks_of(page, "python")[2].replace("at=60", "at=30")
     told = workspace.python("-W", "error", "-c", block)
     assert len(told.splitlines()) > 5
-    assert rv.read(workspace.folder / "runs" / "kinds-seed0").archive(at=0) == []
+    assert rv.Run(workspace.folder / "runs" / "kinds-seed0").archive(at=0) == []
     again = 'name = "again"\nbirths = 15\n[founders]\nrun = "runs/kinds-seed0"\n'
     _write(workspace, {"again.toml": f'{again}population = "archive"\n'})
     workspace.run("run", "again.toml", "--quiet", "--in-process", "--out", "again")
