@@ -164,6 +164,12 @@ def mean_difference(a: Numbers, b: Numbers | float) -> tuple[float, float, float
     return difference, difference - half, difference + half
 
 
+def median_interval(values: Numbers) -> tuple[float, float]:
+    """Return the exact 95 % interval of a median; NaN for fewer than six runs."""
+    exact = stats.quantile_test(values, p=0.5).confidence_interval(LEVEL)
+    return float(exact.low), float(exact.high)  # type: ignore[attr-defined]
+
+
 def half_interval(deviation: Numbers, runs: Integers) -> Numbers:
     """Return half the width of means' 95 % intervals, (G,); NaN for one run.
 

@@ -31,6 +31,7 @@ COMMANDS = {
     "export": ("revolve.cli.export", "write the tables of all runs to one file"),
     "robustness": ("revolve.cli.reevaluate", "re-evaluate a run under changes"),
     "ablate": ("revolve.cli.reevaluate", "re-evaluate a run without sensors or motors"),
+    "suite": ("revolve.suite.command", "score experiments by a frozen protocol"),
     "completion": ("revolve.cli.completion", "print a completion script for a shell"),
     "bench": ("worker.__main__", "benchmark this machine"),
 }

@@ -69,6 +69,7 @@ def test_tutorial_runs(name: str, tmp_path: Path) -> None:
         "founders.md",
         "simulation.md",
         "diversity.md",
+        "suite.md",
     ],
 )
 def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:

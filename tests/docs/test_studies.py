@@ -49,7 +49,8 @@ from tests.analysis.drawn import table
 from tests.docs.page_runner import blocks_of
 
 STUDIES = ("ablation", "arena_settings", "diversity.results", "ecosystem.results",
-           "equal_evaluations", "learners", "tasks", "thesis.results")  # fmt: skip
+           "equal_evaluations", "learners", "suite", "tasks",
+           "thesis.results")  # fmt: skip
 BIRTHS, MARK, COMMIT = 30, 15, "0123abc"
 OFF_LINE = """
 name = "{name}"

@@ -18,6 +18,7 @@ from analysis.comparison.statistics import (
     mean_alike_p,
     mean_alike_power,
     mean_difference,
+    median_interval,
     rank_sum_p,
     signed_rank,
     standard_error,
@@ -66,6 +67,19 @@ def test_difference_of_means_equals_scipy() -> None:
     alone = stats.ttest_1samp(a, 0.5).confidence_interval()
     _, low, high = mean_difference(a, 0.5)
     assert (low + 0.5, high + 0.5) == pytest.approx((alone.low, alone.high), rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [6, 7, 9, 10, 30])
+def test_median_interval_by_signs(count: int) -> None:
+    values = numbers(*np.random.default_rng(count).permutation(count) + 1)
+    low, high = median_interval(values)
+    # So many values, of as many coins, may lie beyond each end.
+    beyond = int(low) - 1
+    ways = [sum(math.comb(count, k) for k in range(most + 1)) / 2**count
+            for most in (beyond, beyond + 1)]  # fmt: skip
+    assert ways[0] <= 0.025 < ways[1]
+    assert high == count - beyond
+    assert np.isnan(median_interval(values[:5])).all()
 
 
 @pytest.mark.parametrize("turns", [1, -1])
