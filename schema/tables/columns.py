@@ -524,7 +524,7 @@ ARCHIVE = _table(
     _ISLAND,
     _BIRTHS,
     _TIME.with_nullable(True),
-    _column("entry", pa.string(), "cell, such as 3/7, island:birth, or a name of an own rule"),
+    _column("entry", pa.string(), "cell, such as 3/7, island:birth, or text of a rule"),
     _BIRTH_ISLAND,
     _BIRTH.with_nullable(True),
     _OUTCOME[0],
