@@ -9,7 +9,7 @@ from threading import Event, Thread
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn, Task
 
-from schema.agent.terminal.progress_line import SPAN_S, print_line
+from schema.agent.progress_line import SPAN_S, print_line
 
 
 def replaced(file: Path, what: str, others: str) -> Iterator[str]:

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from analysis.measures.fitness_functions import not_compared
 from analysis.measures.populations import last_rows
-from schema.agent.terminal.progress_line import print_line
+from schema.agent.progress_line import print_line
 from schema.errors import rounded
 
 _BORDERS, _BORDER = 3, 1

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 
 import schema.experiment.kinds
@@ -21,11 +22,16 @@ from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
 from coordinator.cli.founders import with_founders
 from coordinator.dispatch.events import AgentKind
-from coordinator.evolution.check_brain_genes import check_brain_genes
+from coordinator.evolution.check_encoding import check_brain_genes
 from coordinator.evolution.kinds import KINDS, brain_kind
 from coordinator.plugins.checks import check_built_in, refuse_faulty, refuse_faulty_of
-from coordinator.plugins.command import check, check_flags, list_flags, list_plugins
-from coordinator.plugins.cost import cost_line
+from coordinator.plugins.command import (
+    check,
+    check_flags,
+    cost_line,
+    list_flags,
+    list_plugins,
+)
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
@@ -51,12 +57,12 @@ from schema.agent.command import (
 )
 from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
+from schema.agent.import_path import missing_screen
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.request_handler import Compute
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
-from schema.agent.terminal.screen import missing_screen
 from schema.errors import ExperimentError, NetworkError
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.kinds import Kind
@@ -74,10 +80,7 @@ _OF_NETWORK = (
 
 
 def main(arguments: list[str]) -> int:
-    """Run one of the coordinator's commands and return its exit code.
-
-    Args:
-        arguments: the command's name first.
+    """Run one of the coordinator's commands, named first, and return its exit code.
 
     Returns:
         0 for success; 1 if ``compare`` found a difference, a plug-in is refused, a run
@@ -206,7 +209,10 @@ def _deployment(
     from worker.serve.jobs import Jobs
     from worker.serve.shards import Shards
 
-    _refuse_flags_of_arenas(options, experiments)
+    islands = chain(*map(island_experiments, experiments))
+    any_arena = any(own.arena is not None for own in islands)
+    if not any_arena:
+        _refuse_flags_of_arenas(options, experiments)
     if options.view:
         _check_window(folder)
     if options.connect and options.listen:
@@ -225,7 +231,8 @@ def _deployment(
     if workers is None:
         workers = 0 if options.connect else cores()
     # An arena that is small runs in one process; several arenas spread over them.
-    is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
+    is_alone = len(experiments) == 1 and island_count(experiments[0]) == 1
+    is_one_arena = is_alone and any_arena and not _is_repeated(options)
     threads = options.threads or (cores() if is_one_arena else 1)
     most_held = shards_that_fit(memory_bytes(), processes=1)
     shards = Shards(World, most_held=most_held, threads=threads)
@@ -260,13 +267,7 @@ def _deployment(
 def _refuse_flags_of_arenas(
     options: argparse.Namespace, experiments: tuple[Experiment, ...]
 ) -> None:
-    """Raise if a flag is for arenas, and there is none.
-
-    Raises:
-        ExperimentError: there is none.
-    """
-    if any(map(_has_arena, experiments)):
-        return
+    """Raise if a flag is for arenas, of which these experiments have none."""
     names = ", ".join(experiment.name for experiment in experiments)
     for flag in ("speed", "arena-workers"):
         if getattr(options, flag.replace("-", "_")) is not None:
@@ -276,11 +277,7 @@ def _refuse_flags_of_arenas(
 
 
 def _check_window(folder: Path) -> None:
-    """Raise unless ``--view`` can open a window.
-
-    Raises:
-        NetworkError: the viewer is not installed, or there is no screen.
-    """
+    """Raise unless ``--view`` can open a window."""
     if find_spec("rerun") is None:
         raise NetworkError(
             f"--view: the viewer is not installed: {install_advice('view')}"
@@ -288,15 +285,6 @@ def _check_window(folder: Path) -> None:
     if why := missing_screen():
         beside = command_line("view", "--connect", folder, "--serve")
         raise NetworkError(f"--view: {why}: run without it, and beside it: {beside}")
-
-
-def _has_arena(experiment: Experiment) -> bool:
-    return any(own.arena is not None for own in island_experiments(experiment))
-
-
-def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
-    is_alone = island_count(experiment) == 1 and not _is_repeated(options)
-    return is_alone and _has_arena(experiment)
 
 
 def _is_repeated(options: argparse.Namespace) -> bool:

@@ -47,7 +47,6 @@ from schema.plugins.arena_rules import Decisions as Decisions
 from schema.plugins.arena_rules import Meeting as Meeting
 from schema.plugins.arena_rules import Patch as Patch
 from schema.plugins.arena_rules import Resident as Resident
-from schema.plugins.needs import needs as needs
 from schema.plugins.permission import allow as allow
 from schema.plugins.protocols import Bank as Bank
 from schema.plugins.protocols import BrainControl as BrainControl
@@ -78,5 +77,6 @@ from schema.robot.neurons import Tick as Tick
 from schema.robot.results import Report as Report
 from schema.robot.robot import Part as Part
 from schema.robot.trace import Trace as Trace
+from schema.robot.trace import needs as needs
 from schema.wire.operator import ArenaListing as ArenaListing
 from schema.wire.operator import ListedRobot as ListedRobot

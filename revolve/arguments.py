@@ -21,11 +21,7 @@ _FLAG = re.compile(r"--(births|connect|experiment|fleet|out|plugins|seed|workers
 def whole_number(
     name: str, value: object, least: int = 0, most: int = MOST_NUMBER
 ) -> int:
-    """Return an argument that is a whole number.
-
-    Raises:
-        RevolveError: anything else.
-    """
+    """Return an argument that is a whole number; raise ``RevolveError`` for others."""
     try:
         number = index(value)  # type: ignore[arg-type]
     except TypeError:
@@ -51,11 +47,7 @@ def picture_size(width: int, height: int) -> tuple[int, int]:
 
 
 def finite_numbers(name: str, values: object, count: int, unit: str) -> Floats:
-    """Return an argument that is an array of numbers, (count,).
-
-    Raises:
-        RevolveError: anything else.
-    """
+    """Return an argument of (count,) finite numbers; ``RevolveError`` for others."""
     try:
         array = np.asarray(values)
     except ValueError:  # lists of different lengths
@@ -78,11 +70,7 @@ def naming_arguments() -> Iterator[None]:
 
 
 def in_order(name: str, values: Iterable[T]) -> Iterable[T]:
-    """Return an argument with values whose order is defined.
-
-    Raises:
-        RevolveError: a set, or nothing with values.
-    """
+    """Return an argument with values whose order is defined; else ``RevolveError``."""
     given: object = values
     if isinstance(given, Iterable) and not isinstance(given, set | frozenset):
         return values

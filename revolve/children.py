@@ -58,7 +58,6 @@ class Child:
     """Process that runs ``revolve.child``; ends with ``end``."""
 
     def __init__(self, words: Sequence[str], *, is_quiet: bool = False) -> None:
-        """Start it."""
         self.connection, theirs = Pipe()
         with theirs:
             file = theirs.fileno()
@@ -160,7 +159,9 @@ class Simulator:
         with self._lock:
             self._note_sources(task.settings)
             try:
-                child = self._running()
+                if self._child is None or self._owner != os.getpid():
+                    self._child, self._owner = Child(("simulate",)), os.getpid()
+                child = self._child
                 child.connection.send_bytes(msgspec.msgpack.encode(task))
                 outcome = _OUTCOMES.decode(child.connection.recv_bytes())
             except (EOFError, ConnectionError):
@@ -181,11 +182,6 @@ class Simulator:
             if self._sources.setdefault(name, digest) != digest:
                 self.end()
                 self._sources = {name: digest}
-
-    def _running(self) -> Child:
-        if self._child is None or self._owner != os.getpid():
-            self._child, self._owner = Child(("simulate",)), os.getpid()
-        return self._child
 
     def _death(self) -> str:
         """Return why the process has ended, and forget it."""

@@ -223,11 +223,7 @@ class _Output(io.FileIO):
 
 
 def _flush() -> None:
-    """Flush standard output.
-
-    Raises:
-        OSError: that fails, or an earlier write did: argparse ignores such errors.
-    """
+    """Flush standard output; raise earlier errors, which argparse ignores, too."""
     sys.stdout.flush()
     if (error := _first_write_error()) is not None:
         raise error

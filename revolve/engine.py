@@ -117,11 +117,7 @@ class Engine:
             self._fault = self._fault or _CLOSED
 
     def order(self, order: WantedJob) -> None:
-        """Order a job; its future gets the outcome.
-
-        Raises:
-            RevolveError: the fleet is closed, or cannot do jobs any more.
-        """
+        """Order a job; its future gets the outcome. Errors are those of ``check``."""
         with self._lock:
             self.check()
             self._orders.put(order)

@@ -16,10 +16,9 @@ from schema.experiment.document import island_experiment
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.limits import LONGEST_REASON, MOST_TRIAL, printable
-from schema.plugins.needs import check_channels
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
-from schema.robot.trace import Trace
+from schema.robot.trace import Trace, check_channels
 from schema.wire.messages import Failure, Traced
 from schema.wire.trace import unpack_trace
 
@@ -151,11 +150,7 @@ def settings_for(
 
 
 def outside_of_runs(trial: object) -> Identity:
-    """Return the identity of an evaluation of a robot that was born in no run.
-
-    Raises:
-        RevolveError: no whole number from 0 to ``MOST_TRIAL``.
-    """
+    """Return the identity of an evaluation of a robot that was born in no run."""
     number = whole_number("trial", trial, most=MOST_TRIAL)
     return dataclasses.replace(NO_IDENTITY, trial=number)
 

@@ -221,11 +221,7 @@ def plain(robot: object) -> PlainRobot:
 
 
 def _of_numpy(value: object) -> object:
-    """Return an array or a number of NumPy as lists and numbers.
-
-    Raises:
-        TypeError: the value is something else.
-    """
+    """Return an array or a number of NumPy as lists and numbers."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"must be numbers and texts, got {shown(value)}")
@@ -246,11 +242,7 @@ def of_plain(
 
 
 def as_experiment(experiment: Experiment | str | Path) -> Experiment:
-    """Return an experiment, read if it is given by name or path.
-
-    Raises:
-        ExperimentError: no such experiment or file, or an invalid document.
-    """
+    """Return an experiment, read if it is given by name or path."""
     if isinstance(experiment, Experiment):
         return experiment
     return Experiment.read(experiment)
@@ -259,11 +251,7 @@ def as_experiment(experiment: Experiment | str | Path) -> Experiment:
 def checked(
     robot: Robot | PlainRobot, types: tuple[BodySpace, NeuronKinds]
 ) -> PlainRobot:
-    """Return a robot as the rooms have it.
-
-    Raises:
-        InvalidRobot: it is not well formed with these types.
-    """
+    """Return a robot as the rooms have it; ``InvalidRobot`` if it fits no types."""
     plainly = plain(robot)
     check_number(plainly)
     check_robot(plainly, *types)

@@ -25,7 +25,6 @@ from schema.limits import MOST_SEED
 from schema.plugins.permission import allowed
 from schema.robot.archive import RobotOrigin
 from schema.robot.ids import BirthId
-from schema.tables.archives import archive_at
 from schema.tables.columns import TABLES
 from schema.tables.description import (
     allow_plugins_of,
@@ -36,6 +35,7 @@ from schema.tables.description import (
 from schema.tables.files import born_as, read_table
 from schema.tables.last_populations import (
     Row,
+    archive_at,
     best_ever,
     best_of,
     fittest,
@@ -52,9 +52,10 @@ _OF_ROBOTS = ("island", "birth", "genome", "robot")
 """Columns of births that robots are made from, of any run."""
 
 
-def _table(name: str, rows: str) -> property:
-    """Return the property of a run that reads a table; ``rows`` says what it has."""
-    return property(lambda run: run.table(name), doc=rows)
+def _table(name: str) -> property:
+    """Return the property of a run that reads a table."""
+    rows = TABLES[name].metadata[b"description"].decode()
+    return property(lambda run: run.table(name), doc=f"Each row is {rows}.")
 
 
 class Run:
@@ -93,27 +94,21 @@ class Run:
         """``finished``, ``stopped``, or ``running`` (also after a kill)."""
         return read_state(self.folder)
 
-    births = _table("births", "One row per individual born.")
-    evaluations = _table("evaluations", "One row per finished evaluation, off-line.")
-    learning = _table("learning", "One row per trial of a newborn that learns.")
-    population = _table("population", "Members of each recorded population.")
-    fitness = _table("fitness", "One row per living robot and sample, on-line.")
-    poses = _table("poses", "One row per living robot and pose, on-line.")
-    deaths = _table("deaths", "One row per individual gone, on-line.")
-    touches = _table(
-        "touches", "One row per pair of robots that touched, on-line, if recorded."
-    )
-    meetings = _table(
-        "meetings", "One row per pair of robots that met before a decision of rules."
-    )
-    matings = _table("matings", "One row per mating that rules decided on.")
-    patches = _table("patches", "One row per place of an arena's rules and sample.")
-    migrations = _table("migrations", "One row per migrant.")
-    audits = _table(
-        "audits", "One row per evaluation that was repeated on a second worker."
-    )
-    drifts = _table("drifts", "One row per move of an arena to another platform.")
-    runs = _table("runs", "One row about a finished run.")
+    births = _table("births")
+    evaluations = _table("evaluations")
+    learning = _table("learning")
+    population = _table("population")
+    fitness = _table("fitness")
+    poses = _table("poses")
+    deaths = _table("deaths")
+    touches = _table("touches")
+    meetings = _table("meetings")
+    matings = _table("matings")
+    patches = _table("patches")
+    migrations = _table("migrations")
+    audits = _table("audits")
+    drifts = _table("drifts")
+    runs = _table("runs")
 
     def table(self, name: str) -> pa.Table:
         """Return a table.

@@ -57,7 +57,7 @@ class Simulation(AbstractContextManager["Simulation"]):
         """Build the model and start."""
         choose_engine()
         from worker.filters.ablation import inputs_of, motors_of  # noqa: PLC0415
-        from worker.serve.checks import checked_evaluation  # noqa: PLC0415
+        from worker.kinds import checked_evaluation  # noqa: PLC0415
 
         settings = settings_for(robot, experiment, record)
         self._robot = checked(robot, types_of(settings))

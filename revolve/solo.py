@@ -31,8 +31,8 @@ def _done(task: Task) -> Outcome:
         from analysis.render.stage import choose_engine  # noqa: PLC0415
 
         choose_engine()
+    from worker.kinds import checked_evaluation  # noqa: PLC0415
     from worker.robot.evaluation import evaluate_traced  # noqa: PLC0415
-    from worker.serve.checks import checked_evaluation  # noqa: PLC0415
 
     # Before the robot, whose neurons may be those of a plug-in.
     settings = checked_evaluation(task.settings)

@@ -9,8 +9,7 @@ import math
 
 import numpy as np
 
-from schema.plugins.needs import needs
-from schema.robot.trace import Floats, Trace
+from schema.robot.trace import Floats, Trace, needs
 
 PART_M = 0.041
 """Side of a brick: length that a part counts as [m]."""

@@ -1,12 +1,20 @@
-"""Kinds of plug-ins that workers run: fitness functions and measures."""
+"""Kinds of plug-ins of the worker, and settings with checked plug-ins."""
 
 from collections.abc import Iterator
-from functools import partial
+from functools import lru_cache, partial
+from typing import TypeVar
 
 import worker.fitness
-from schema.experiment.document import Fitness, Measures
-from schema.experiment.kinds import Kind, sections_of, takes
-from schema.experiment.settings import FITNESS, fitness_function
+from schema.experiment.document import Fitness, Measures, body_space
+from schema.experiment.kinds import Kind, Use, sections_of, takes
+from schema.experiment.settings import (
+    FITNESS,
+    ArenaSettings,
+    EvaluationSettings,
+    fitness_function,
+    read_arena_settings,
+    read_evaluation_settings,
+)
 from schema.plugins.simple_traces import check_function
 from worker.fitness import load_fitness
 from worker.measures import BUILT_IN, measures_of
@@ -59,3 +67,31 @@ MEASURE_KIND = Kind(
     check=check_measures,
 )
 KINDS = (FITNESS_KIND, MEASURE_KIND)
+
+
+T = TypeVar("T", EvaluationSettings, ArenaSettings)
+
+
+@lru_cache(maxsize=64)
+def checked_evaluation(settings: bytes) -> EvaluationSettings:
+    """Return the settings of an evaluation request, with checked plug-ins.
+
+    Raises:
+        ExperimentError: the bytes are not such settings; a plug-in cannot be loaded or
+            breaks its contract.
+    """
+    return _checked(read_evaluation_settings(settings))
+
+
+@lru_cache(maxsize=64)
+def checked_arena(settings: bytes) -> ArenaSettings:
+    """Return the settings of a request about an arena, as ``checked_evaluation``."""
+    return _checked(read_arena_settings(settings))
+
+
+def _checked(settings: T) -> T:
+    body_space(settings.space)
+    Use(FITNESS_KIND, settings.fitness).check()
+    for measures in single_measures(settings.measures):
+        Use(MEASURE_KIND, measures).check()
+    return settings

@@ -14,10 +14,9 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Measures
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.plugins.load import load_function, load_object
-from schema.plugins.needs import channels_of, needs
 from schema.plugins.parameters import parameters_type, read_parameters
 from schema.plugins.protocols import MeasureFunction
-from schema.robot.trace import Trace
+from schema.robot.trace import Trace, channels_of, needs
 from worker import descriptors
 from worker.fitness import (
     Functions,

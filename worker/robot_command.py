@@ -7,7 +7,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from schema.agent.flags import Flags, add_count, add_plugins, add_settings
-from schema.agent.terminal.progress_line import progress_if_long
+from schema.agent.progress_line import progress_if_long
 from schema.errors import counted, rounded
 from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
@@ -21,18 +21,7 @@ from worker.robot.robustness import rejudge, small_changes, summary
 
 
 def main(arguments: list[str]) -> int:
-    """Simulate a robot, print its evaluation, and return the exit code.
-
-    Returns:
-        0 if it was evaluated.
-
-    Raises:
-        InvalidRobot: the file holds no valid robot.
-        SimulationDiverged: the physics diverged.
-        FitnessUndefined: the fitness function raised or gave no finite number.
-        ExperimentError: an invalid experiment, or a sensor that has no stimulus in
-            its environment.
-    """
+    """Simulate a robot, print its evaluation, and return the exit code, 0."""
     options = parser().parse_args(arguments[1:])
     allow(options.plugins)
     robot, settings = _read(options.file, options.experiment, options.island)

@@ -14,8 +14,7 @@ from msgspec import Meta, Struct
 
 from schema.errors import ExperimentError
 from schema.experiment.section import Angle, Coordinate, Extent, Limit, NotNegative
-from schema.plugins.needs import needs
-from schema.robot.trace import Floats, Trace, sum_in_order
+from schema.robot.trace import Floats, Trace, needs, sum_in_order
 
 _Place = tuple[Coordinate, Coordinate]
 

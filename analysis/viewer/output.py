@@ -14,9 +14,8 @@ from urllib.parse import quote
 from analysis.render.flags import FILM_ENDINGS
 from analysis.viewer.flags import HOST
 from analysis.viewer.recording import Recording, ViewerError
-from schema.agent.import_path import python_command
+from schema.agent.import_path import missing_screen, python_command
 from schema.agent.log import tell_user
-from schema.agent.terminal.screen import missing_screen
 
 WITHOUT_SCREEN = (
     "use --save FILE.rrd for a recording that 'rerun FILE.rrd' opens elsewhere, or "

@@ -15,7 +15,7 @@ from analysis.viewer.recording import Recording
 from analysis.viewer.scene import Scene, scene_of
 from analysis.viewer.show import Show
 from schema.agent.log import tell_user
-from schema.agent.terminal.progress_line import ProgressLine
+from schema.agent.progress_line import ProgressLine
 from schema.errors import MalformedMessage, NetworkError, RevolveError, counted
 from schema.experiment.file import experiment_from_text
 from schema.limits import printable

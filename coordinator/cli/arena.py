@@ -68,11 +68,7 @@ _EXAMPLES = {
 
 
 def main(arguments: list[str]) -> int:
-    """Send one request to a running coordinator and print its reply.
-
-    Returns:
-        0 if done, 1 if refused.
-    """
+    """Send one request to a running coordinator; print its reply; 1 if refused."""
     options = parser().parse_args(arguments[1:])
     action = _action(options)
     coordinator, where = coordinator_of(options)

@@ -31,11 +31,15 @@ from schema.plugins.source import digest_in_use, modules_named
 from schema.robot.ids import BirthId
 from schema.robot.results import Report
 from schema.robot.robot import Robot
-from schema.tables.archives import archive_at
 from schema.tables.columns import Row
 from schema.tables.description import KeptFounder, read_description, run_columns
 from schema.tables.files import read_table
-from schema.tables.last_populations import best_ever, fittest, last_populations
+from schema.tables.last_populations import (
+    archive_at,
+    best_ever,
+    fittest,
+    last_populations,
+)
 from schema.wire.protobuf import decode_robot
 from schema.wire.updates import individual
 

@@ -80,11 +80,7 @@ class MetricsServer(AbstractContextManager["MetricsServer"]):
     """
 
     def __init__(self, host: str, port: int) -> None:
-        """Listen.
-
-        Args:
-            host: name or IP address, IPv6 in brackets.
-            port: 0 lets the system choose.
+        """Listen at a host, IPv6 in brackets; port 0 lets the system choose.
 
         Raises:
             NetworkError: an address that cannot be listened on.

@@ -57,11 +57,7 @@ class Source(NamedTuple):
 
 
 def main(arguments: list[str]) -> int:
-    """Show the progress of runs.
-
-    Returns:
-        0 if done, 1 if a run is damaged or has failed.
-    """
+    """Show the progress of runs; return 1 if one is damaged or has failed, else 0."""
     flags = parser()
     options = flags.parse_args(arguments[1:])
     skip_pandas()
@@ -98,11 +94,7 @@ def _at_hub(options: argparse.Namespace) -> dict[str, Status]:
 
 
 def ask_status(options: argparse.Namespace) -> dict[str, Status]:
-    """Return the status of each coordinator at ``--connect``, by its name.
-
-    Raises:
-        NetworkError: no coordinator answers.
-    """
+    """Return the status of each coordinator at ``--connect``, by name, as ``ask``."""
     replies = ask(options, OperatorRequest(uuid4().hex, 0, GetStatus()))
     return {name: reply.status for name, reply in replies.items() if reply.status}
 

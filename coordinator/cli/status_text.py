@@ -177,10 +177,7 @@ def table_of(columns: dict[str, list[str]], **settings: str) -> Table:
 
 
 def show(*lines: str | Table) -> None:
-    """Print lines and tables on standard output.
-
-    A narrow terminal wraps them, but nothing is cut.
-    """
+    """Print lines and tables on standard output, wrapped where needed but never cut."""
     console = Console(width=_WIDEST, highlight=False, markup=False)
     for line in lines:
         console.print(line)

@@ -14,8 +14,8 @@ from coordinator.storage.disk import replace_text, storage_errors
 from coordinator.storage.folder import read_details
 from coordinator.storage.folder_status import births_of
 from coordinator.storage.hints import command
+from schema.agent.import_path import missing_screen
 from schema.agent.log import tell_user, warn_user
-from schema.agent.terminal.screen import missing_screen
 from schema.errors import ExperimentError, InvalidRobot, counted, rounded
 from schema.experiment.brains import types_of
 from schema.experiment.document import (
@@ -68,10 +68,8 @@ def conclude(folder: Path, experiment: Experiment) -> Conclusion:
 def restore_best(folder: Path) -> None:
     """Write the best robot of a last population to a file if the file is missing.
 
-    A process that ends after its run, but before the summary, leaves no file.
-
-    Raises:
-        RunFolderError: a table cannot be read, or the robot cannot be written.
+    A process that ends after its run, but before the summary, leaves no file. Errors
+    are those of ``conclude``.
     """
     best = None if (folder / BEST).exists() else best_of(last_populations(folder))
     if best is None:

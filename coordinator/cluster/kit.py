@@ -104,11 +104,7 @@ class Kit:
         return cls(folder, cluster, clock)
 
     def member(self, name: str) -> CertificateHolder:
-        """Return a member.
-
-        Raises:
-            RevolveError: there is none of this name.
-        """
+        """Return a member; raise ``RevolveError`` if there is none of this name."""
         for member in self.cluster.members:
             if member.name == name:
                 return member

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
-from coordinator.doctor.finding import Finding, Level
+from coordinator.doctor.machine import Finding, Level
 from schema.agent.access import Certificate
 from schema.agent.certificate import CertificateFacts
 

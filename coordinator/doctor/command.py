@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from coordinator.doctor import machine, system
-from coordinator.doctor.finding import Finding
+from coordinator.doctor.machine import Finding
 from schema.agent.address import CONNECT_VARIABLE, can_lock, runtime_directory
 from schema.agent.command import (
     NETWORK,
@@ -23,11 +23,11 @@ from schema.agent.command import (
     tls_of,
 )
 from schema.agent.flags import Flags
+from schema.agent.import_path import missing_screen
 from schema.agent.network import Tls
 from schema.agent.platform_tag import cpu_flags, platform_tag
 from schema.agent.service import why_no_hub
 from schema.agent.supervisor import cores
-from schema.agent.terminal.screen import missing_screen
 from schema.errors import NetworkError
 
 _REACH_S = 1.0
@@ -35,11 +35,7 @@ _RENDER_S = 4.5
 
 
 def main(arguments: list[str]) -> int:
-    """Print one line for each check, within about five seconds.
-
-    Returns:
-        0 if no check failed, else 1.
-    """
+    """Print a line for each check, within five seconds; return 1 if one failed."""
     options = parser().parse_args(arguments[1:])
     began_s = time.monotonic()
     rendering = system.start_rendering()
@@ -101,7 +97,7 @@ def _hub(
     connect: str, options: argparse.Namespace, tls: Tls | None, name: str
 ) -> Iterator[Finding]:
     from coordinator.doctor import hub
-    from coordinator.network.probe_service import probe, reach
+    from coordinator.network.client_service import probe, reach
 
     if why := reach(connect, _REACH_S):
         is_wanted = bool(options.connect or os.environ.get(CONNECT_VARIABLE))

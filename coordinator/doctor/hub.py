@@ -1,7 +1,7 @@
 """Checks of hub, rights and coordinators; each takes what was seen."""
 
-from coordinator.doctor.finding import Finding, judged
-from coordinator.network.probe_service import ROLES, HubProbe
+from coordinator.doctor.machine import Finding, judged
+from coordinator.network.client_service import ROLES, HubProbe
 from schema.limits import printable
 
 _SLOW_S = 0.2

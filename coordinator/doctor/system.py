@@ -82,11 +82,7 @@ def start_rendering() -> "subprocess.Popen[str]":
 def end_rendering(
     process: "subprocess.Popen[str]", timeout_s: float
 ) -> tuple[int | None, str]:
-    """Return exit code and last line of a rendering process.
-
-    Returns:
-        The code, None if it did not end in time; the line may be empty.
-    """
+    """Return exit code, None if there is none yet, and last line of a process."""
     try:
         output, _ = process.communicate(timeout=timeout_s)
     except subprocess.TimeoutExpired:

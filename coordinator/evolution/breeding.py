@@ -34,7 +34,6 @@ class Individual(Struct, frozen=True):
     """Member of a population.
 
     Attributes:
-        birth: its id.
         genome: what its children inherit, of the type that the encoding uses.
         fitness: always maximised; where its evaluation failed 0, or the least of its
             population below 0.
@@ -114,11 +113,8 @@ class Candidate(Struct, frozen=True):
     """Robot that may be born under a birth id.
 
     Attributes:
-        birth: the birth id.
         attempt: number of the attempt that gave this candidate, from 0.
         couple: its parents; None for a random robot.
-        genome: what it inherits.
-        robot: the robot that develops from the genome.
         learnt: as of ``Individual``.
         origin: the given founder that it is, if it is one.
     """
@@ -148,6 +144,8 @@ class Candidate(Struct, frozen=True):
 
 class Breeder:
     """Source of candidates and selector of survivors for one island and run.
+
+    What fails in a rule or an encoding is an ``ExperimentError`` that names the birth.
 
     Attributes:
         emigrants: own rule that selects them; None for a built-in one.
@@ -285,9 +283,6 @@ class Breeder:
         """Return the population after a brood, in birth order.
 
         The brood has at least one child, and is in birth order.
-
-        Raises:
-            ExperimentError: the selection of survivors fails.
         """
         selection = self._experiment.selection
         judged = failed_last([*parents, *children])
@@ -319,11 +314,7 @@ class Breeder:
     def update(
         self, population: Sequence[Individual], brood: Sequence[Individual]
     ) -> None:
-        """Let the rules of selection remember a brood of a population, in birth order.
-
-        Raises:
-            ExperimentError: a rule fails.
-        """
+        """Let the rules of selection remember a population's brood, in birth order."""
         if self._own:
             self._relatives.members([*population, *brood])  # later ancestors
         for rule in self._own:

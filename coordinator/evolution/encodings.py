@@ -66,7 +66,6 @@ class IslandEncoding:
 
     Attributes:
         name: of the experiment's key ``encoding.type``.
-        types: part types by name.
         no_child: reason of a failed attempt at which it gave no genome.
         stores_robots: births hold the robot, as its genome does not suffice.
         random: returns the genome of a random robot; ``ExperimentError`` if no robot
@@ -74,7 +73,6 @@ class IslandEncoding:
         mate: returns the genome of the child of two; None if the attempt fails.
         develop: returns the robot that a genome describes; ``InvalidRobot`` if it is
             not well formed or breaks a limit of ``[space]``, never of the thesis's.
-        to_bytes: returns a genome as bytes.
     """
 
     random: Callable[[np.random.Generator, BirthId], object]
@@ -101,19 +99,11 @@ class IslandEncoding:
         self.random, self.mate, self.to_bytes = code.random, code.mate, code.to_bytes
 
     def check(self, robot: Robot) -> None:
-        """Raise unless a robot has the part types and a brain of the experiment.
-
-        Raises:
-            InvalidRobot: it does not.
-        """
+        """Raise ``InvalidRobot`` unless types and brain are those of the experiment."""
         check_robot(robot, self.types, self._kinds)
 
     def from_bytes(self, data: bytes) -> object:
-        """Return the genome of some bytes.
-
-        Raises:
-            InvalidRobot: other bytes.
-        """
+        """Return the genome of some bytes; raise ``InvalidRobot`` for others."""
         try:
             return self._encoding.from_bytes(data)
         except Exception as error:

@@ -12,10 +12,10 @@ from coordinator.evolution.check_encoding import check_encoding
 from coordinator.evolution.check_rule import Labels, check_rule
 from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
 from coordinator.evolution.encodings import METHODS, WHERE
-from coordinator.evolution.learners.check_learner import check_learner
 from coordinator.evolution.learners.learner import BUILT_IN as LEARNERS
 from coordinator.evolution.learners.learner import METHODS as LEARNER_METHODS
 from coordinator.evolution.learners.learner import WHERE as LEARNER
+from coordinator.evolution.learners.learner import check_learner
 from coordinator.evolution.rules import RULE_CLASSES, rule_of
 from coordinator.evolution.selection import PARENT_RULES, SURVIVOR_RULES
 from schema.experiment.check import check_experiment

@@ -21,7 +21,6 @@ class Relatives:
     """What the individuals of an island know of each other.
 
     Attributes:
-        develop: returns the robot of a genome.
         parents: birth ids of the parents of each individual that lived on the island.
         distances: of bodies, by pairs of birth ids in order.
     """
@@ -49,17 +48,14 @@ class Member:
         self._robot: Robot | None = None
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute
-        """Return an attribute of the individual."""
         if name.startswith("_"):  # of a copy that is being made
             raise AttributeError(name)
         return getattr(self._individual, name)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another one is the same individual."""
         return isinstance(other, Member) and self.birth == other.birth
 
     def __hash__(self) -> int:
-        """Return the hash of the birth id."""
         return hash(self.birth)
 
     @property

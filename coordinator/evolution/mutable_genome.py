@@ -150,11 +150,7 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
 
 
 def _as_tuple(genes: tuple[Gene, ...]) -> tuple[Gene, ...]:
-    """Return genes as a tuple, as genomes share them; a brain type may return a list.
-
-    Raises:
-        TypeError: neither a tuple nor a list.
-    """
+    """Return genes as a tuple, as genomes share them; brain types may return a list."""
     if not isinstance(genes, tuple | list):
         raise TypeError(f"genes must be a tuple, got a {type(genes).__name__}")
     return tuple(genes)
@@ -279,11 +275,7 @@ def size_of(branches: Iterable[MutableGenome]) -> SizeCounts:
 
 
 def subtree_sizes(branches: Sequence[MutableGenome]) -> list[Counts]:
-    """Return the counts of every subtree, in the order of the branches.
-
-    Args:
-        branches: those of a whole tree, depth first.
-    """
+    """Return the counts of every subtree of a whole tree, given depth first."""
     sums: list[Counts] = []
     of_children: list[Counts] = []
     for branch in reversed(branches):
@@ -301,12 +293,7 @@ def subtree_sizes(branches: Sequence[MutableGenome]) -> list[Counts]:
 
 
 def fitting_subtrees(sizes: Sequence[Counts], room: SizeCounts) -> list[int]:
-    """Return the places of the subtrees that exceed no count of ``room``.
-
-    Args:
-        sizes: of all subtrees of a tree, which itself does not count.
-        room: greatest counts.
-    """
+    """Return the places of a tree's subtrees, but itself, that fit into ``room``."""
     parts, inputs, outputs, hidden = room
     return [
         place

@@ -8,7 +8,6 @@ connection.
 
 from collections.abc import Iterable, Sequence
 from decimal import Decimal
-from functools import lru_cache
 from typing import TypeVar
 
 from msgspec.structs import replace
@@ -240,15 +239,7 @@ def add_hidden_neurons(
     rules: BrainRules,
     kinds: NeuronKinds,
 ) -> None:
-    """Add as many hidden neurons as deletion removes on average.
-
-    Args:
-        draws: source of all choices.
-        branches: branches of the tree, depth first.
-        before: number of hidden neurons before deletion.
-        rules: probability of deletion, and limit.
-        kinds: neuron types.
-    """
+    """Add as many hidden neurons as deletion removes, on average, of those before."""
     wanted = draws.rounded(before * rules.p_delete_hidden_neuron)
     if not wanted:
         return
@@ -261,15 +252,13 @@ def add_hidden_neurons(
 def add_connections(
     draws: Draws, branches: Sequence[Branch], before: int, rules: BrainRules
 ) -> None:
-    """Add as many connections as deletion removes on average, rounded half up.
+    """Add as many connections as deletion removes, on average, of those before.
 
-    Args:
-        draws: source of all choices.
-        branches: branches of the tree, depth first.
-        before: number of connections before deletion.
-        rules: probability of deletion.
+    The number is rounded half up; the probability counts as the decimal number of the
+    document, so that halves are exact.
     """
-    count = _share(before, rules.p_remove_brain_connection)
+    probability = Decimal(repr(rules.p_remove_brain_connection))
+    count = int(before * probability + _HALF)
     if not count:
         return
     sources = endpoints(branches, "input", "output", "hidden")
@@ -279,16 +268,3 @@ def add_connections(
     for _ in range(count):
         source, target = draws.pick(sources), draws.pick(targets)
         source[0].connections += (connect(draws, source, target),)
-
-
-def _share(count: int, probability: float) -> int:
-    """Return a share of a count, rounded half up.
-
-    The probability counts as the decimal number of the document: halves are exact.
-    """
-    return int(count * _as_written(probability) + _HALF)
-
-
-@lru_cache(maxsize=64)
-def _as_written(number: float) -> Decimal:
-    return Decimal(repr(number))

@@ -52,14 +52,7 @@ def stream(
     """Return the stream of one purpose of one attempt at one birth.
 
     Its seed sequence is that of ``SeedSequence(seed, spawn_key=(run, island, birth,
-    attempt, purpose))``.
-
-    Args:
-        seed: seed of the run, < 2^64.
-        run: number of the repeat, from 0.
-        birth: island and birth number.
-        attempt: from 0.
-        purpose: what is drawn.
+    attempt, purpose))``; the seed of the run is < 2^64.
     """
     # NumPy makes these 32-bit words of a seed and a key, but slowly, number by number.
     key = (run, birth.island, birth.number, attempt, purpose)
@@ -107,12 +100,9 @@ class BufferedRng:
     def nearby(
         self, parameters: Sequence[Parameter], values: Sequence[float], epsilon: float
     ) -> tuple[float, ...]:
-        """Return values moved by a share of the way to random ones.
+        """Return values moved by the share ``epsilon`` of the way to random ones.
 
-        Args:
-            parameters: their ranges; immutable parameters keep their value.
-            values: one for each parameter.
-            epsilon: share; 0 keeps the values, 1 draws new ones.
+        Immutable parameters keep their value; so do all for 0, while 1 draws new ones.
         """
         moved: list[float] = []
         number, rest = self.number, 1.0 - epsilon

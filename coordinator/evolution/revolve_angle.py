@@ -57,7 +57,6 @@ class Donor(NamedTuple):
     Attributes:
         nodes: of its genome, depth first.
         sizes: of the subtree of each node.
-        types: part types.
     """
 
     nodes: Sequence[Node]
@@ -80,11 +79,7 @@ class RevolveAngle:
         self._donors: dict[int, Donor] = {}
 
     def random(self, rng: np.random.Generator, birth: BirthId) -> Genome:
-        """Return the genome of a random robot with at least one motor.
-
-        Raises:
-            ExperimentError: no random tree meets the restrictions.
-        """
+        """Return a random genome with at least one motor, as ``generate``."""
         return generate(rng, self._experiment, birth)
 
     def develop(self, genome: Genome) -> Robot:
@@ -96,11 +91,8 @@ class RevolveAngle:
     ) -> Genome | None:
         """Return the genome of a child: crossover and mutation of one mutable tree.
 
-        Args:
-            first: parent that gives the root.
-            second: parent that gives a subtree.
-            rng: the stream of this attempt.
-            birth: id of the child; the identities of its new parts derive from it.
+        The first parent gives the root, the second a subtree; the identities of new
+        parts derive from the child's birth id.
 
         Returns:
             A genome within all restrictions, planar where the experiment says so, with
@@ -167,12 +159,9 @@ class RevolveAngle:
     def _mutated(
         self, draws: BufferedRng, root: MutableGenome, birth: BirthId
     ) -> Genome | None:
-        """Mutate a tree, step by step in the order of the thesis.
+        """Mutate a tree in the order of the thesis; return its genome, if with a motor.
 
         The tree is of no use afterwards.
-
-        Returns:
-            The genome of the tree; None if no motor is left.
         """
         experiment = self._experiment
         delete_subtree(draws, root, experiment)
@@ -310,11 +299,7 @@ def add_parts(
     genes: Iterator[int],
     experiment: Experiment,
 ) -> list[MutableGenome]:
-    """Add random parts, `expected_parts` on average, with neurons and connections.
-
-    Returns:
-        The branches of the tree then, depth first.
-    """
+    """Return a tree with random parts added, `expected_parts` on average."""
     expected = expected_parts(branches, experiment)
     if expected > 0.0:
         trials = ceil(2.0 * expected)

@@ -52,7 +52,6 @@ class Rule:
     Attributes:
         key: of the experiment, for messages.
         plugin: function or class, for messages.
-        call: selects.
         relatives: of the island; None for a built-in rule, whose answers are not
             checked.
         memory: object of a rule that is a class.
@@ -121,11 +120,7 @@ class Rule:
             return archive
 
     def update(self, brood: Sequence[S]) -> None:
-        """Change the memory of the rule, if it has one.
-
-        Raises:
-            ExperimentError: it raises.
-        """
+        """Change the memory of the rule, if it has one."""
         if self.memory is not None and self.relatives is not None:
             with naming_plugin(self.key, self.plugin):
                 self.memory.update(self.relatives.members(brood))
@@ -204,9 +199,6 @@ def select_parents(
     """Return two different parents, the one that gives its root first.
 
     The population is in a reproducible order.
-
-    Raises:
-        ExperimentError: the rule raises, or returns no two places.
     """
     first, second = rule.places(2, population, rng)
     return population[first], population[second]
@@ -223,9 +215,6 @@ def select_survivors(
 
     Its size is constant, or as a rule that ``varies`` likes. A brood cut short by the
     end of the run always competes with its parents, or the population would shrink.
-
-    Raises:
-        ExperimentError: the rule raises, or returns other than that many places.
     """
     size = max(1, selection.parents_needed) if rule.varies else selection.population
     pool = list(children)

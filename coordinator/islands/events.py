@@ -66,8 +66,6 @@ class Evaluated(Message, frozen=True, tag=True):
     """A robot was evaluated.
 
     Attributes:
-        birth: id of the robot.
-        evaluation: the outcome.
         provenance: which worker did it.
         trial: number of the evaluation of this robot; 0 is the one at its birth.
         requester: island that requested it; None for the island of its birth.
@@ -88,8 +86,6 @@ class EvaluationFailed(Message, frozen=True, tag=True):
     """A robot's evaluation failed for a reason that lies in the robot.
 
     Attributes:
-        birth: id of the robot.
-        reason: the reason.
         provenance: which worker reported it.
         trial, requester, point: as in ``Evaluated``.
     """
@@ -116,7 +112,6 @@ class Asked(Message, frozen=True, tag=True):
     """A learner answered which parameters to try.
 
     Attributes:
-        birth: id of the newborn.
         number: number of the request, from 0.
         points: parameters of each trial, as shares of their ranges.
     """
@@ -130,7 +125,6 @@ class Advanced(Message, frozen=True, tag=True):
     """An arena shard reached the requested step.
 
     Attributes:
-        island: number of the arena.
         number: number of the requested advance.
         advance: its result; a journal returns it without poses, which are stored in
             their table before the journal has this event.
@@ -190,10 +184,8 @@ class Commanded(Message, frozen=True, tag=True):
     """An operator gave an order.
 
     Attributes:
-        island: number of the arena.
         command_id: unique id; a repeated order is carried out once.
         step: step at which it takes effect: the next decision (``Arena.next_step``).
-        order: the order.
     """
 
     island: int
@@ -219,12 +211,7 @@ class Immigrated(Message, frozen=True):
 
 
 class NeighbourClosed(Message, frozen=True):
-    """A neighbour has finished and sends no more migrants.
-
-    Attributes:
-        island: the receiving island.
-        neighbour: the island that has finished.
-    """
+    """A neighbour has finished and sends no more migrants."""
 
     island: int
     neighbour: int
@@ -276,7 +263,6 @@ class Ask(Message, frozen=True):
     """Ask the learner of a newborn which parameters to try.
 
     Attributes:
-        birth: id of the newborn.
         number: number of the request, from 0.
         start: parameters of the brain at birth, as shares of their ranges.
         most: greatest number of points, at least 1.

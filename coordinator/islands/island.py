@@ -73,7 +73,6 @@ class Island:
     """One population and its births.
 
     Attributes:
-        experiment: its settings.
         births: number of recorded births.
         population: living individuals, in birth order.
     """
@@ -88,15 +87,10 @@ class Island:
         epochs: MigrationEpochs | None = None,
         given: Sequence[Founder] = (),
     ) -> None:
-        """Initialise an island before its first event.
+        """Initialise an island, which has a number in its run, before its first event.
 
-        Args:
-            experiment: settings of this island.
-            seed: seed of the run.
-            run: number of the repeat, from 0.
-            number: number of this island.
-            epochs: its migration; None without neighbours.
-            given: founders of the first births; the others are random.
+        ``epochs`` are its migration, None without neighbours; ``given`` are founders of
+        the first births, of which the others are random.
         """
         selection = experiment.selection
         self.births = 0
@@ -221,11 +215,7 @@ class Island:
         return self._proceed()
 
     def _newborn(self, event: Answered) -> _Birth | None:
-        """Return the birth that an answer belongs to; None if it has its outcome.
-
-        Raises:
-            UnexpectedEvent: the birth has not begun, or was not vetted before.
-        """
+        """Return the birth that an answer belongs to; None if it has its outcome."""
         birth = event.birth
         if birth.island != self._number or not 0 <= birth.number < self._begun:
             raise self._unexpected(event, f"births 0..{self._begun - 1} have begun")

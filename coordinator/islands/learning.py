@@ -28,7 +28,6 @@ class IslandLearning:
     """What all newborns of an island that learns have in common.
 
     Attributes:
-        rules: the section ``learning``.
         parameters: what is learnt of a brain.
     """
 

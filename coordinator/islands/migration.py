@@ -51,8 +51,6 @@ class MigrationEpochs:
     """Epochs of one island: its emigrants, and immigrants that have arrived.
 
     Attributes:
-        island: number of the island.
-        links: its neighbours.
         epoch: number of the epoch, from 0.
         is_waiting: it has sent its migrants and awaits those of its neighbours.
         emigrants: own rule that selects them, which its island makes, if any.
@@ -105,9 +103,6 @@ class MigrationEpochs:
 
         The candidates are in a reproducible order; at most ``spare`` of them may be
         moved away.
-
-        Raises:
-            ExperimentError: an own rule that selects them fails.
         """
         self.is_waiting = True
         targets = [to for to in self.links.targets if to in self._active]
@@ -158,13 +153,8 @@ class MigrationEpochs:
     ) -> list[tuple[Individual, bool]]:
         """Begin the next epoch; return the immigrants of the last one, each once.
 
-        Args:
-            known: ids of individuals that are left out.
-            births: number of births on the island.
-            now_s: simulated time of an arena [s].
-
-        Returns:
-            The immigrants by their source, and whether each must be re-evaluated.
+        They are by source, and with each is whether it must be re-evaluated. Those that
+        are ``known`` are left out; arenas give their simulated time [s].
         """
         senders = [one for one in self._active if (one, self.epoch) in self._inbox]
         arrivals: dict[BirthId, tuple[Individual, bool]] = {}

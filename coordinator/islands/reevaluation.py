@@ -29,15 +29,13 @@ def with_durations(
     """Return commands with random durations of evaluation, uniform in their range."""
     assert simulation.evaluation_s is not None
     shortest, longest = (steps_of(end, simulation) for end in simulation.evaluation_s)
-    timed: list[IslandCommand] = []
-    for each in commands:
-        if isinstance(each, Evaluate):
-            rng = stream(seed, run, each.birth, each.trial, Purpose.DURATION)
-            steps = shortest + BufferedRng(rng).below(longest - shortest + 1)
-            timed.append(replace(each, steps=steps))
-        else:
-            timed.append(each)
-    return timed
+
+    def timed(each: Evaluate) -> Evaluate:
+        rng = stream(seed, run, each.birth, each.trial, Purpose.DURATION)
+        steps = shortest + BufferedRng(rng).below(longest - shortest + 1)
+        return replace(each, steps=steps)
+
+    return [timed(each) if isinstance(each, Evaluate) else each for each in commands]
 
 
 def with_points(
@@ -48,15 +46,12 @@ def with_points(
     That of a newborn is its number, also in the trials in which it learns; that of a
     re-evaluation are the births of the island so far.
     """
-    pointed: list[IslandCommand] = []
-    for each in commands:
-        if isinstance(each, Evaluate):
-            is_newborn = each.requester is None and (learns or not each.trial)
-            point = each.birth.number if is_newborn else births
-            pointed.append(replace(each, point=point))
-        else:
-            pointed.append(each)
-    return pointed
+
+    def pointed(each: Evaluate) -> Evaluate:
+        is_newborn = each.requester is None and (learns or not each.trial)
+        return replace(each, point=each.birth.number if is_newborn else births)
+
+    return [pointed(each) if isinstance(each, Evaluate) else each for each in commands]
 
 
 class Reevaluations:

@@ -34,10 +34,7 @@ class Membership:
     """
 
     def __init__(self, version: str, faults: PeerFaults | None = None) -> None:
-        """Initialise without agents.
-
-        ``faults``: counts what is dropped; None: counts of its own.
-        """
+        """Initialise without agents; ``faults`` counts what is dropped."""
         self.joined: dict[str, Member] = {}
         self.refused: dict[str, str] = {}
         self._faults = faults or PeerFaults()
@@ -50,11 +47,9 @@ class Membership:
         self._gone: dict[str, None] = {}
 
     def __len__(self) -> int:
-        """Return the number of agents whose token exists."""
         return len(self._alive)
 
     def __contains__(self, member: Member) -> bool:
-        """Return whether the token of an agent exists."""
         return member in self._alive
 
     def appear(self, key: str) -> Member | None:
@@ -81,11 +76,7 @@ class Membership:
         return member
 
     def vanish(self, key: str) -> Left | None:
-        """Note that a token is gone; return the event if the agent had joined.
-
-        Raises:
-            MalformedMessage: not the token of an agent.
-        """
+        """Note that a token is gone; return the event if the agent had joined."""
         member = member_of(key)
         self._forget(member)
         name = member.name
@@ -137,11 +128,7 @@ class Membership:
         return [*self._new_deaths(member, info), joined]
 
     def progress(self, member: Member, data: bytes) -> Progressed | None:
-        """Return the event if an agent that has joined reports progress.
-
-        Raises:
-            MalformedMessage: as for ``introduce``.
-        """
+        """Return the event if an agent that has joined reports progress."""
         if self.joined.get(member.name) != member:
             return None
         info = _parsed(member, data)
@@ -236,11 +223,7 @@ class InfoQueue:
 
 
 def _parsed(member: Member, data: bytes) -> AgentInfo:
-    """Return the message of an agent's own properties.
-
-    Raises:
-        MalformedMessage: see ``Membership.introduce``.
-    """
+    """Return the message of an agent's own properties; see ``introduce``."""
     role, agent = member.role, member.name
     try:
         info = decode(AgentInfo, data, INFO_BYTES)

@@ -11,8 +11,7 @@ from itertools import chain
 
 from msgspec import structs
 
-from coordinator.parts.exchange import Exchange, PartResult
-from coordinator.parts.joining import continued, joined
+from coordinator.parts.exchange import Exchange, PartResult, continued, joined
 from coordinator.parts.partition import GROWTH_M, divide, groups_of
 from schema.parts import Vector
 from schema.robot.ids import BirthId
@@ -95,10 +94,7 @@ class ArenaParts:
     def begin(
         self, requested: AdvanceShard, places: Mapping[BirthId, Vector], parts: int
     ) -> None:
-        """Begin an advance, and its first exchange.
-
-        ``places``: of the robots before it, without changes.
-        """
+        """Begin an advance and its first exchange; changes come after ``places``."""
         self._requested, self._changes = requested, requested.changes
         self._so_far, self._works = None, {}
         self._boxes = {

@@ -3,17 +3,22 @@
 Parts are advanced as if they were alone. If robots of two of them came within reach of
 each other, their results are wrong: their groups are advanced again, together, from
 their states before the exchange. What is left is equal to the advance of the whole
-arena, to the last bit.
+arena, to the last bit. The results of all parts are joined to those of one worker.
 """
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
+
+from msgspec import structs
 
 from coordinator.parts.partition import groups_of
 from schema.robot.groups import Group
 from schema.robot.ids import BirthId
-from schema.wire.arena import Advance, Box
-from schema.wire.arena_state import ArenaState
+from schema.wire.arena import Advance, Box, Casualty, Judgement, Touch
+from schema.wire.arena_state import ArenaState, joined_states, states_of
+from schema.wire.poses import PoseArrays
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +71,9 @@ class Exchange:
         return [part for part in self.parts if part not in self._results]
 
     def overlap(self) -> bool:
-        """Look for robots of different results in reach of each other.
+        """Return whether robots of different results are in reach of each other.
 
         They join ``repeated``, which is to be advanced again.
-
-        Returns:
-            Whether there are any.
         """
         boxes: dict[BirthId, Box] = {}
         source: dict[BirthId, int] = {}
@@ -98,3 +100,59 @@ class Exchange:
             for part, births in self.parts.items()
         ]
         return valid if self._again is None else [*valid, (self._again, self.repeated)]
+
+
+Chosen = Sequence[tuple[PartResult, Collection[BirthId]]]
+"""Results, each with the robots for which it is valid."""
+
+
+def joined(chosen: Chosen) -> PartResult:
+    """Return the result of all robots of an exchange."""
+    judgements: list[Judgement] = []
+    casualties: list[Casualty] = []
+    touches: list[Touch] = []
+    poses: list[PoseArrays] = []
+    boxes: dict[BirthId, Box] = {}
+    costs: dict[BirthId, float] = {}
+    works: dict[BirthId, float] = {}
+    for result, births in chosen:
+        advance = result.advance
+        judgements += [one for one in advance.judgements if one.birth in births]
+        casualties += [lost for lost in advance.casualties if lost.birth in births]
+        touches += [touch for touch in advance.touches if touch.first in births]
+        sampled = PoseArrays.received(advance.poses)
+        is_all = births == result.boxes.keys()
+        poses.append(sampled if is_all else sampled.of(births))
+        boxes |= {birth: result.boxes[birth] for birth in births}
+        costs |= {birth: result.costs[birth] for birth in births}
+        works |= {b: work_j for b, work_j in result.works.items() if b in births}
+    state = joined_states([states_of(each.state, births) for each, births in chosen])
+    advance = Advance(
+        step=state.step,
+        digest=state.digest,
+        judgements=tuple(sorted(judgements, key=lambda one: one.birth)),
+        casualties=tuple(sorted(casualties, key=lambda lost: (lost.step, lost.birth))),
+        touches=tuple(sorted(touches, key=lambda one: (one.first, one.second))),
+        poses=PoseArrays.joined(poses).message(),
+        work_j=tuple(works[birth] for birth in state.births) if works else (),
+    )
+    return PartResult(advance, state, boxes, costs, works)
+
+
+def continued(before: Advance, after: Advance, interval_s: float) -> Advance:
+    """Return an advance that two exchanges made, one after the other.
+
+    Durations of touches are multiples of an interval, and so are their sums [s].
+    """
+    counts = Counter[tuple[BirthId, BirthId]]()
+    for touch in chain(before.touches, after.touches):
+        counts[touch.first, touch.second] += round(touch.duration_s / interval_s)
+    poses = [PoseArrays.received(each.poses) for each in (before, after)]
+    return structs.replace(
+        after,
+        casualties=before.casualties + after.casualties,
+        touches=tuple(
+            Touch(*pair, count * interval_s) for pair, count in sorted(counts.items())
+        ),
+        poses=PoseArrays.joined(poses).message(),
+    )

@@ -21,7 +21,7 @@ from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.rewriting import rewriting
 from schema.agent.log import tell_user
-from schema.agent.terminal.progress_line import progress_if_long
+from schema.agent.progress_line import progress_if_long
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_from_text, experiment_text, with_births
 from schema.tables.description import RunDetails, read_description

@@ -94,10 +94,8 @@ def read_drafts(
 ) -> list[tuple[str, Draft]]:
     """Return names and documents; a campaign stands for its experiments.
 
-    Args:
-        sources: names of shipped experiments or campaigns, or paths to .toml files.
-        births: of ``--births``, in place of those of the documents.
-        run: of ``--from``, as of ``read_draft``.
+    Sources are names of shipped experiments or campaigns, or paths to .toml files;
+    births and run are those of ``--births`` and ``--from``, as of ``read_draft``.
 
     Raises:
         ExperimentError: there is no such experiment, or its document is invalid.
@@ -174,11 +172,9 @@ def _check_distinct(experiments: Sequence[Experiment]) -> None:
 
 
 def refuse_used(folder: Path, wanted: Campaign) -> None:
-    """Raise if a folder already holds a campaign or a single run.
+    """Raise ``RunFolderError`` if a folder already holds a campaign or a single run.
 
-    Raises:
-        RunFolderError: it holds one; the message says if only its number of births is
-            another than the wanted one.
+    The message says if only its number of births is another than the wanted one.
     """
     if is_campaign(folder):
         which, flags = _difference(folder, wanted)
@@ -205,11 +201,7 @@ def _difference(folder: Path, wanted: Campaign) -> tuple[str, tuple[str, ...]]:
 
 
 def write_campaign(folder: Path, campaign: Campaign) -> None:
-    """Write the description of a campaign to its folder.
-
-    Raises:
-        RunFolderError: the disk is full or failed.
-    """
+    """Write the description of a campaign to its folder."""
     # JSON with all defaults; without a single quote it cannot end the literal.
     documents = [
         experiment_text(experiment).replace("'", "\\u0027")
@@ -266,11 +258,7 @@ def read_campaign(folder: Path) -> Campaign:
 
 
 def campaign_plugins(folder: Path) -> dict[str, KeptPlugin]:
-    """Return the modules of the plug-ins of a folder's campaign, by name.
-
-    Raises:
-        RunFolderError: there is no campaign, or its description is damaged.
-    """
+    """Return the plug-in modules of a folder's campaign, as ``read_campaign``."""
     return _read(folder).plugins
 
 
@@ -316,10 +304,7 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def _digest(found: _Document) -> str:
-    """Return the SHA-256 of a campaign.
-
-    A first repeat of 0 does not count: older campaigns have none.
-    """
+    """Return the SHA-256 of a campaign, without a first repeat of 0, as of old ones."""
     numbers = (found.seed, found.repeats, *([found.first] if found.first else ()))
     parts = [*map(str, numbers), *(each.document for each in found.experiments)]
     for name, note in sorted(found.plugins.items()):
@@ -336,12 +321,9 @@ def forget_campaign(folder: Path) -> None:
 
 
 def check_adopted(folder: Path, found: RunDetails, wanted: RunDetails) -> None:
-    """Raise unless a folder holds the run that a campaign expects.
+    """Raise ``RunFolderError`` unless a folder holds the run that a campaign expects.
 
     The run may only have a different number of births.
-
-    Raises:
-        RunFolderError: it is a different run.
     """
     ours = experiment_from_text(wanted.document)
     theirs = experiment_from_text(found.document)

@@ -23,15 +23,11 @@ def compare(first: Path, second: Path) -> list[str]:
     """Return the differences of two runs or campaigns in their repeatable columns.
 
     Returns:
-        One line for each run that has no births or is the shorter one and not
-        finished, for each table whose number of rows
-        differs, and for the first differing row and column of each table; nothing
-        if the runs are equal. A line also names the population of a last brood that
-        is smaller than in the longer run, as it has no counterpart there. If the runs
-        differ and ran on different platforms, a last line says so, because equality
-        is only guaranteed on one platform. Of campaigns, such lines for each run, which
-        they begin with; a last line names the runs that differ, are damaged or are
-        missing in one campaign.
+        One line for each run without births, or shorter and not finished; for each
+        table whose number of rows differs; and for its first differing row and column.
+        Others name the last brood of a shorter run, which has no counterpart, and
+        different platforms, as equality is only guaranteed on one. Of campaigns, such
+        lines of each run, named first; a last line names the runs that differ.
 
     Raises:
         RunFolderError: a folder holds no run, or a table cannot be read.
@@ -85,9 +81,6 @@ def _read(folder: Path, name: str) -> pa.Table:
     """Return the columns of a table that are compared, and its platforms.
 
     Experiment documents of older versions get all defaults.
-
-    Raises:
-        RunFolderError: it cannot be read.
     """
     platform = [each for each in TABLES[name].names if each == "platform"]
     table = read_table(folder, name, repeatable(TABLES[name]) + platform)

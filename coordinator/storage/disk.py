@@ -19,16 +19,11 @@ class AppendedFile:
     ``fsync`` also a power loss.
 
     Attributes:
-        path: its path.
         size: its length [bytes].
     """
 
     def __init__(self, path: Path, *, fsync: bool = False) -> None:
-        """Open a file for appending; create it if it is missing.
-
-        Raises:
-            RunFolderError: it cannot be opened.
-        """
+        """Open a file for appending; create it if it is missing."""
         self.path = path
         self._fsync = fsync
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
@@ -42,9 +37,6 @@ class AppendedFile:
         """Append a piece; remove it again if a part of it cannot be written.
 
         It stays if another process has appended to the file meanwhile.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
         """
         rest = memoryview(piece)
         with storage_errors(self.path):
@@ -80,11 +72,7 @@ class AppendedFile:
 
 
 def replace_durably(path: Path, write: Callable[[Path], object]) -> None:
-    """Create or replace a file as ``replace_file`` does; create its folder.
-
-    Raises:
-        RunFolderError: the disk is full or failed; an old file is unchanged.
-    """
+    """Create or replace a file as ``replace_file`` does; create its folder."""
     with storage_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_file(path, write)
@@ -102,11 +90,7 @@ def replace_text(path: Path, text: str) -> None:
 
 @contextlib.contextmanager
 def storage_errors(path: Path) -> Iterator[None]:
-    """Raise the errors of a failed write as errors for the user.
-
-    Raises:
-        RunFolderError: the disk is full or failed.
-    """
+    """Raise the errors of a failed write as errors for the user."""
     try:
         yield
     except OSError as error:

@@ -65,8 +65,6 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
     """A run folder that this process has locked.
 
     Attributes:
-        path: the folder.
-        details: description of the run.
         epoch: how often the folder has been opened, this time included.
         name: unique name of the run for workers. A new run in the folder of a removed
             one gets another name, because its epochs start at 1 again.
@@ -114,11 +112,7 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             raise
 
     def set_state(self, state: State) -> None:
-        """Write the run's state for other processes.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
+        """Write the run's state for other processes."""
         replace_text(self.path / STATE, state)
 
     def seal(self, digests: Mapping[str, str]) -> None:
@@ -184,9 +178,6 @@ def write_description(folder: Path, changed: Description, place: Path) -> None:
     """Write a run's changed description to a place.
 
     Its time of change is that in the run folder: it is when the run began.
-
-    Raises:
-        RunFolderError: the disk is full or failed.
     """
     text, file = description_text(changed), folder / DETAILS
     with storage_errors(file):
@@ -212,11 +203,7 @@ def holds_run(path: Path) -> bool:
 
 
 def read_details(path: Path) -> RunDetails:
-    """Return the description of a folder's run, locked or not.
-
-    Raises:
-        RunFolderError: there is no run, or its description is damaged.
-    """
+    """Return the description of a folder's run, as ``read_description``."""
     found = read_description(path)
     return RunDetails(found.name, found.run, found.seed, found.document, found.founders)
 
@@ -232,17 +219,12 @@ def refuse_other_version(path: Path) -> None:
             is damaged.
     """
     begun_by = read_description(path).version or _VERSION_OF_UNNAMED
-    minor, ours = (_minor(each) for each in (begun_by, VERSION))
+    minor, ours = (".".join(each.split(".")[:2]) for each in (begun_by, VERSION))
     if minor != ours:
         raise RunFolderError(
             f"{path}: Revolve Islands {minor} began this run, and this is {ours}: "
             f"resume it with revolve-islands=={minor}.*"
         )
-
-
-def _minor(version: str) -> str:
-    """Return major and minor number of a version."""
-    return ".".join(version.split(".")[:2])
 
 
 def forget_plugins(path: Path, plugins: Mapping[str, KeptPlugin]) -> None:
@@ -312,9 +294,6 @@ def _next_epoch(path: Path) -> int:
     The journal's epoch counts, too: with a lower one, as a lost or older file gives,
     all new records would be void. Records behind damage do not count: ``Journal``
     refuses such a file.
-
-    Raises:
-        RunFolderError: the journal cannot be read, or the run has no more epochs.
     """
     position = Position()
     for _ in read_records(read_journal(path / JOURNAL), position):
@@ -339,11 +318,7 @@ def _now(path: str, flags: int) -> int:
 
 
 def _read_epoch(path: Path) -> int:
-    """Return the epoch in a folder; 0 if there is no file.
-
-    Raises:
-        RunFolderError: it is damaged.
-    """
+    """Return the epoch in a folder; 0 if there is no file."""
     file = path / EPOCH
     try:
         text = read_small(file, MOST_MARK).strip()

@@ -125,23 +125,16 @@ def _damaged(folder: Path, error: RevolveError) -> RunStatus:
 
 
 def table_damages(folder: Path) -> list[str]:
-    """Return a line about each damaged or lost table of a finished run.
-
-    Raises:
-        RunFolderError: the disk fails.
-    """
+    """Return a line about each damaged or lost table of a finished run."""
     if not has_rows(folder, "births"):
         return [f"{folder}: is finished, but its tables are missing"]
     return [why for name in TABLES if (why := damage_of(folder, name))]
 
 
 def check_rewritable(folder: Path) -> None:
-    """Raise unless damaged or lost tables of a finished run can be written again.
+    """Raise ``RunFolderError`` unless tables of a finished run can be written again.
 
     The journal determines all rows; those of an arena's poses are computed again.
-
-    Raises:
-        RunFolderError: the journal is missing, too.
     """
     if not is_begun(folder):
         raise RunFolderError(

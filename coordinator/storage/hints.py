@@ -20,21 +20,12 @@ def command(*words: object) -> str:
 
 
 def stopped(folder: Path, flags: Sequence[str] = ()) -> str:
-    """Return the message after a run or campaign was stopped.
-
-    Args:
-        folder: of the run or campaign.
-        flags: with which ``revolve resume`` has the same agents again.
-    """
+    """Return the message that a run or campaign was stopped, and how to resume it."""
     return f"stopped; to resume: {command('resume', folder, *flags)}"
 
 
 def keep_flags(folder: Path, flags: Sequence[str]) -> None:
-    """Keep the flags of ``stopped`` for ``resume_command``, a word in each line.
-
-    Raises:
-        RunFolderError: the disk is full or failed.
-    """
+    """Keep the flags of ``stopped`` for ``resume_command``, a word in each line."""
     replace_text(folder / FLAGS, "".join(f"{word}\n" for word in flags))
 
 

@@ -52,10 +52,8 @@ class Journal(AbstractContextManager["Journal"]):
     def __init__(self, path: Path, *, epoch: int = 0, fsync: bool = False) -> None:
         """Open a journal; create it if it is missing.
 
-        Args:
-            path: the file.
-            epoch: epoch of the writing coordinator, at least that of every record.
-            fsync: survive power loss, too, not only a kill of the process.
+        The epoch of the writing coordinator is at least that of every record; with
+        ``fsync`` records survive power loss, too, not only a kill of the process.
 
         Raises:
             RunFolderError: the file is no journal, is damaged before intact records,
@@ -82,11 +80,7 @@ class Journal(AbstractContextManager["Journal"]):
         return history
 
     def append(self, events: Iterable[JournalledEvent]) -> None:
-        """Write events before the run acts on them: all, or none on failure.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
+        """Write events before the run acts on them: all, or none on failure."""
         first = self._epoch * _RECORDS + self._sequence
         frames: list[bytes] = []
         for number, event in enumerate(events, start=first):
@@ -148,11 +142,7 @@ def is_begun(folder: Path) -> bool:
 
 
 def is_empty(path: Path, data: bytes) -> bool:
-    """Return whether a journal has no complete header yet.
-
-    Raises:
-        RunFolderError: the file is no journal.
-    """
+    """Return whether a journal, which must be one, has no complete header yet."""
     if data.startswith(MAGIC):
         return False
     if MAGIC.startswith(data):
@@ -165,12 +155,9 @@ def is_empty(path: Path, data: bytes) -> bool:
 
 
 def check_gap(path: Path, data: bytes, position: Position, start: int = 0) -> None:
-    """Raise if an intact record stands anywhere behind the position.
+    """Raise ``RunFolderError`` if an intact record is anywhere behind the position.
 
     ``data`` are the bytes of the file from ``start`` on.
-
-    Raises:
-        RunFolderError: the bytes at the position are damaged.
     """
     for offset in range(position.end - start, len(data) - _FRAME + 1):
         if found := _record_at(data, offset):
@@ -184,11 +171,7 @@ def check_gap(path: Path, data: bytes, position: Position, start: int = 0) -> No
 
 
 def decode_record(path: Path, payload: bytes) -> JournalledEvent:
-    """Return the event of a record.
-
-    Raises:
-        RunFolderError: this version cannot decode it.
-    """
+    """Return the event of a record; ``RunFolderError`` if this version cannot."""
     try:
         event: JournalledEvent = decode(JournalledEvent, payload, ADVANCE_BYTES)
     except MalformedMessage as error:
@@ -218,11 +201,7 @@ def read_events(path: Path) -> tuple[list[JournalledEvent], int]:
 
 
 def read_journal(path: Path) -> bytes:
-    """Return the bytes of a journal, empty if it is missing.
-
-    Raises:
-        RunFolderError: it cannot be read.
-    """
+    """Return the bytes of a journal, empty if it is missing."""
     try:
         return path.read_bytes() if path.exists() else b""
     except OSError as error:

@@ -60,11 +60,8 @@ class Recorder:
 
         Damaged rows are removed, and all rows behind them in their table.
 
-        Args:
-            folder: run folder.
-            details: description of the run; names the Parquet files.
-            fsync: survive power loss, too.
-            seal: stores the SHA-256 of finished tables before they get their names.
+        ``details`` name the Parquet files; with ``fsync`` rows survive power loss, too;
+        ``seal`` stores the SHA-256 of finished tables before they get their names.
 
         Raises:
             RunFolderError: a segment has another version, or the disk fails.
@@ -85,11 +82,7 @@ class Recorder:
         self.poses = self._tables["poses"]
 
     def write(self, record: Record) -> None:
-        """Add one row, with every column except ``record``; it may be buffered.
-
-        Raises:
-            RunFolderError: the disk is full or failed; the row stays buffered.
-        """
+        """Add one row, with every column except ``record``; it may be buffered."""
         table = self._tables[record.table]
         table.take(record.row)
         if len(table.buffered) >= BUFFERED:
@@ -100,9 +93,6 @@ class Recorder:
 
         Poses that an earlier process stored without their event in the journal are
         removed first.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
         """
         self.poses.store(event)
 
@@ -116,11 +106,7 @@ class Recorder:
         self.poses.take_advance(event)
 
     def flush(self) -> None:
-        """Write all buffered rows to disk.
-
-        Raises:
-            RunFolderError: the disk is full or failed; no row is lost.
-        """
+        """Write all buffered rows to disk."""
         for table in self._tables.values():
             table.flush()
 
@@ -129,9 +115,6 @@ class Recorder:
 
         After a kill at any point, each table is complete in one of the two forms: open
         the run again, replay, and finish again.
-
-        Raises:
-            RunFolderError: the disk is full or failed; the segments are intact.
         """
         self.flush()
         prepared = {name: table.prepare() for name, table in self._tables.items()}
@@ -186,10 +169,7 @@ class TableFile:
             remove_segment(path)
 
     def _set_aside(self) -> bool:
-        """Rename the finished file if it is damaged; return whether it is.
-
-        The rows are written again.
-        """
+        """Rename the finished file, to write it again, if it is damaged; tell if so."""
         if not (why := damage_of(self._folder, self._name)):
             return False
         aside = _aside(self._parquet)
@@ -230,29 +210,25 @@ class TableFile:
         self.add(_poses_of(event))
 
     def add(self, rows: pa.Table) -> None:
-        """Write rows as one batch; columns of the run get this run's values.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
+        """Write rows as one batch; columns of the run get this run's values."""
         own = {name for name in rows.column_names if name in ROWS[self._name].names}
         columns = {name: rows[name].combine_chunks() for name in own}
         self._write(self._numbered(columns, rows.num_rows))
 
     def keep(self, rows: int) -> None:
-        """Remove all rows on disk from a number on.
-
-        Raises:
-            RunFolderError: it does not start a batch, or the disk failed.
-        """
+        """Remove all rows on disk from a number on, as ``remove_rows``."""
         if self.stored > rows:
             remove_rows(self._folder, self._name, rows)
             self.stored = rows
 
     def flush(self) -> None:
         """Write the buffered rows as one batch, all or none."""
-        if self.buffered:
-            self._write(self._batch())
+        if rows := self.buffered:
+            columns = {
+                each.name: pa.array([row[each.name] for row in rows], each.type)
+                for each in ROWS[self._name]
+            }
+            self._write(self._numbered(columns, len(rows)))
             self.buffered = []
 
     def prepare(self) -> str:
@@ -313,15 +289,6 @@ class TableFile:
         path = segment_path(self._folder, self._name, max(numbers, default=-1) + 1)
         return Segment(path, self._schema, fsync=self._fsync)
 
-    def _batch(self) -> pa.RecordBatch:
-        """Return the buffered rows as one batch with record numbers."""
-        rows = self.buffered
-        columns = {
-            each.name: pa.array([row[each.name] for row in rows], each.type)
-            for each in ROWS[self._name]
-        }
-        return self._numbered(columns, len(rows))
-
     def _numbered(self, columns: dict[str, pa.Array], rows: int) -> pa.RecordBatch:
         """Return a batch of the next rows, with record numbers and those of the run."""
         columns["record"] = pa.array(range(self.stored, self.stored + rows), pa.int64())
@@ -347,11 +314,7 @@ class Segment:
     """A new segment of a table, open for appending."""
 
     def __init__(self, path: Path, schema: pa.Schema, *, fsync: bool = False) -> None:
-        """Create the files of a segment, which must not exist, with its schema.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
+        """Create the files of a segment, which must not exist, with its schema."""
         # In this order, a segment without checksums is always damage.
         self._sums = AppendedFile(sums_path(path), fsync=fsync)
         self._file = AppendedFile(path, fsync=fsync)
@@ -363,11 +326,7 @@ class Segment:
             raise
 
     def append(self, batch: pa.RecordBatch) -> None:
-        """Append a batch, all or nothing.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
+        """Append a batch, all or nothing."""
         self._append(batch.serialize())
 
     def _append(self, message: pa.Buffer) -> None:

@@ -10,11 +10,7 @@ from schema.tables.segments import SEGMENTS, Batch, read_segment, segments_of
 
 
 def remove_rows(folder: Path, table: str, rows: int) -> None:
-    """Remove all rows of a table from a number on, which must start a batch.
-
-    Raises:
-        RunFolderError: it does not start a batch, or the disk fails.
-    """
+    """Remove all rows of a table from a number on, which must start a batch."""
     seen = 0
     for _, path in segments_of(folder, table):
         kept = None
@@ -29,11 +25,7 @@ def remove_rows(folder: Path, table: str, rows: int) -> None:
 
 
 def cut_segment(path: Path, last: Batch | None) -> None:
-    """Cut a segment behind a batch; remove it if there is none.
-
-    Raises:
-        RunFolderError: the disk failed.
-    """
+    """Cut a segment behind a batch; remove it if there is none."""
     sums = sums_path(path)
     with storage_errors(path):
         if last is None:
@@ -46,11 +38,7 @@ def cut_segment(path: Path, last: Batch | None) -> None:
 
 
 def remove_segment(path: Path) -> None:
-    """Remove a segment and its checksums.
-
-    Raises:
-        RunFolderError: the disk failed.
-    """
+    """Remove a segment and its checksums."""
     sums = sums_path(path)
     with storage_errors(path):
         # First the records: one without its message would be damage after a kill.

@@ -27,9 +27,6 @@ def rewriting(folder: Path) -> Iterator[Path]:
 
     At the end of the block they replace those of the run, which then has no finished
     tables, no other segments and no best robot. After an error nothing has changed.
-
-    Raises:
-        RunFolderError: the disk is full or failed.
     """
     place = folder / _BEGUN
     with storage_errors(place):
@@ -54,11 +51,7 @@ def is_rewritten(folder: Path) -> bool:
 
 
 def complete_rewriting(folder: Path) -> None:
-    """Replace the files of a locked run if complete new ones are there.
-
-    Raises:
-        RunFolderError: the disk failed.
-    """
+    """Replace the files of a locked run if complete new ones are there."""
     place = folder / COMPLETE
     with storage_errors(folder):
         _remove(folder / _BEGUN)

@@ -27,20 +27,14 @@ class Snapshots:
     def __init__(self, folder: Path, *, until: int | None = None) -> None:
         """Open the snapshots of a run folder.
 
-        Args:
-            folder: the run folder.
-            until: last step whose snapshot counts, for a process that only reads: it
-                removes none; None if this process has locked the folder.
+        ``until`` is the last step whose snapshot counts, for a process that only reads:
+        it removes none; None if this process has locked the folder.
         """
         self._folder = folder / FOLDER
         self._until = until
 
     def has(self, shard: int, step: int, digest: bytes) -> bool:
-        """Return whether there is a snapshot of a shard's step with this digest.
-
-        Raises:
-            RunFolderError: it cannot be read.
-        """
+        """Return whether there is a snapshot of a shard's step with this digest."""
         is_later = self._until is not None and step > self._until
         if is_later or not self._path(shard, step).exists():
             return False
@@ -50,19 +44,11 @@ class Snapshots:
             return False
 
     def write(self, shard: int, step: int, data: bytes) -> None:
-        """Write the state of a shard at a step durably.
-
-        Raises:
-            RunFolderError: the disk is full or failed.
-        """
+        """Write the state of a shard at a step durably."""
         replace_bytes(self._path(shard, step), data)
 
     def read(self, shard: int, step: int) -> bytes:
-        """Return the state of a shard at a step.
-
-        Raises:
-            RunFolderError: there is no such snapshot, or the disk fails.
-        """
+        """Return the state of a shard at a step; ``RunFolderError`` without one."""
         path = self._path(shard, step)
         try:
             return path.read_bytes()
@@ -77,13 +63,7 @@ class Snapshots:
             ) from None
 
     def drop_before(self, shard: int, step: int, kept: int = 0) -> None:
-        """Remove a shard's snapshots before a step, unless only reading.
-
-        The one of the step ``kept`` stays.
-
-        Raises:
-            RunFolderError: the disk fails.
-        """
+        """Remove a shard's snapshots before a step but ``kept``; none if read only."""
         if self._until is not None:
             return
         with storage_errors(self._folder):

@@ -19,13 +19,7 @@ _OF_TABLES = ("csv", "parquet")
 
 
 def main(arguments: list[str]) -> int:
-    """Write the file, and return the exit code.
-
-    Raises:
-        RunFolderError: no run, a damaged table, or a file that cannot be written.
-        RevolveError: runs that cannot be compared.
-        MissingExtra: a library is not installed.
-    """
+    """Write the file, and return the exit code."""
     flags = parser()
     options = flags.parse_args(arguments[1:])
     if options.table and options.to not in _OF_TABLES:
@@ -54,11 +48,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _latex(runs: Runs) -> str:
-    """Return the comparison of all pairs of experiments.
-
-    Raises:
-        RevolveError: fewer than two experiments have finished runs.
-    """
+    """Return the comparison of all pairs of experiments."""
     with extra("a comparison needs", "analysis"):
         from analysis.comparison.comparison import comparison, outcomes_of
         from analysis.measures.study import measure_runs

@@ -85,9 +85,7 @@ def new_socket() -> str:
     """Return the address of a Unix socket that no other process uses.
 
     Where no file system has the locks that it needs, it is an address of loopback.
-
-    Raises:
-        NetworkError: there is no directory that only this user can enter.
+    Errors are those of ``user_hub``.
     """
     # A run goes on when its user logs out.
     place, has_locks = _runtime(is_of_login=False)

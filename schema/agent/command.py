@@ -265,11 +265,7 @@ def _name(given: str | None, connect: str, tls: Tls | None) -> str:
 
 
 def name_at(hub: str, tls: Tls | None, default: str) -> str:
-    """Return the name of a process: at a hub with TLS that of its certificate.
-
-    Raises:
-        NetworkError: the file holds no certificate with a common name.
-    """
+    """Return the name of a process: at a hub with TLS that of its certificate."""
     if tls is None or not hub.startswith("tls/"):
         return default
     from schema.agent.certificate import certificate_name

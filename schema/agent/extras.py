@@ -22,10 +22,9 @@ class _Source(msgspec.Struct):
 
 
 def install_advice(extra: str) -> str:
-    """Return the command that installs an extra into this environment.
+    """Return the command that installs an extra, such as ``view``, here.
 
-    Args:
-        extra: such as ``view``; empty: the package with what it needs.
+    Without an extra it installs the package with what it needs.
     """
     wanted = f"[{extra}]" if extra else ""
     try:

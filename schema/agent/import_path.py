@@ -1,4 +1,4 @@
-"""Imports that must not depend on where a process runs or what is set there.
+"""Imports and graphics that must not depend on where a process runs.
 
 ``python -m`` and ``python -c``, which starts spawned processes, search the current
 folder first. A file ``random.py`` of the user there would replace the module of the
@@ -40,3 +40,17 @@ def check_graphics() -> None:
         except Exception as error:  # noqa: BLE001 - which one depends on the library
             os.environ[GRAPHICS] = NO_GRAPHICS
             warn_user(f"{GRAPHICS}={chosen} does not work: {one_line(error)}")
+
+
+_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def missing_screen() -> str:
+    """Return why no window can be opened here; empty if there is a screen.
+
+    Only Linux and other systems with X11 or Wayland can be without one.
+    """
+    if sys.platform in ("darwin", "win32") or any(map(os.environ.get, _VARIABLES)):
+        return ""
+    variables = " and ".join(f"${name}" for name in _VARIABLES)
+    return f"no screen here ({variables} are not set)"

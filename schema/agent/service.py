@@ -22,8 +22,7 @@ from typing import Any
 import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
-from schema.agent.fair_queue import FairQueue
-from schema.agent.inbox import Inbox
+from schema.agent.inbox import FairQueue, Inbox
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import DEFAULT_FLEET, UNFIT, Agent, Tls, client_config
 from schema.agent.platform_tag import platform_tag, wire_version

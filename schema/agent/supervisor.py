@@ -163,11 +163,6 @@ class ProcessPool:
         self.end()
 
     @property
-    def pids(self) -> list[int]:
-        """Process ids of the running processes."""
-        return [p.pid for p in self._processes if p.is_alive() and p.pid]
-
-    @property
     def exit_codes(self) -> list[int]:
         """Exit codes of processes that exited by themselves and await restart."""
         return [place.code for place in self._places if place.code is not None]

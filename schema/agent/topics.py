@@ -91,11 +91,7 @@ def news_of_all(fleet: str) -> str:
 
 
 def member_of(key: str) -> Member:
-    """Return the process of a liveliness token.
-
-    Raises:
-        MalformedMessage: not the key of a token.
-    """
+    """Return the process of a liveliness token; ``MalformedMessage`` for other keys."""
     chunks = key.split("/")
     if len(chunks) == 5 and (chunks[0], chunks[4]) == ("revolve", "alive"):  # noqa: PLR2004 - five chunks
         _, fleet, chunk, name, _ = chunks

@@ -13,10 +13,10 @@ from schema.experiment.document import (
     Experiment,
     Measures,
     body_space,
+    is_lit,
     island_count,
     island_experiment,
     island_experiments,
-    light_of,
 )
 from schema.experiment.grid import grid_problems
 from schema.experiment.migration import Migration, migrant_count
@@ -32,11 +32,7 @@ _LONGEST_NAME = 200
 
 
 def check_experiment(experiment: Experiment, where: str) -> None:
-    """Raise unless the sections of an experiment are consistent.
-
-    Raises:
-        ExperimentError: the first thing that is wrong, with file and key.
-    """
+    """Raise ``ExperimentError``, with file and key, unless sections are consistent."""
     with naming(where):
         if problem := next(_problems(experiment), ""):
             raise ExperimentError(problem)
@@ -86,8 +82,7 @@ def _light_sensor_problems(experiment: Experiment, types: BodySpace) -> Iterator
     needs = "needs environment.light = [x, y, z], got none"
     problem = f"space.part_types: the light sensor of {shown(sensing[0])} {needs}"
     for where, own in _each_island(experiment):
-        shines = own.arena is not None and own.arena.patch_light_m
-        if not (shines or light_of(own.environment, own.arena)):
+        if not is_lit(own.environment, own.arena):
             yield f"{where}{problem}"
 
 

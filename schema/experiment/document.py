@@ -642,6 +642,12 @@ def light_of(environment: Environment, arena: ArenaWorld | None) -> Vector | Non
     return own or environment.light
 
 
+def is_lit(environment: Environment, arena: ArenaWorld | None) -> bool:
+    """Return whether a world has a light, or patches that may shine."""
+    shines = arena is not None and arena.patch_light_m > 0
+    return shines or light_of(environment, arena) is not None
+
+
 def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names.
 

@@ -142,11 +142,7 @@ def source_text(source: str) -> tuple[str, str]:
 
 
 def check_source(source: str, shipped: Collection[str]) -> None:
-    """Raise unless a source is the path of a TOML file or a shipped name.
-
-    Raises:
-        ExperimentError: neither; the message names the nearest.
-    """
+    """Raise, with the nearest name, unless a source is a TOML path or ships."""
     if source.endswith(".toml") or source in shipped:
         return
     path, beside = Path(source), Path(f"{source}.toml")

@@ -34,8 +34,8 @@ from schema.experiment.section import Count, Section, multiple_problems
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Sensor, Vector
 from schema.plugins.load import load_function, load_object, unknown
-from schema.plugins.needs import channels_of
 from schema.plugins.parameters import known_keys, parameters_type, read_parameters
+from schema.robot.trace import channels_of
 
 T = TypeVar("T")
 
@@ -115,11 +115,6 @@ class EvaluationSettings(Section, frozen=True, dict=True, cache_hash=True):
         """Position of the light [m]; None is no light."""
         return self.environment.light
 
-    @property
-    def is_lit(self) -> bool:
-        """There is a light."""
-        return self.light is not None
-
 
 class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
     """Settings of a request to advance an arena; hashed once, as those above."""
@@ -138,11 +133,6 @@ class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
     def light(self) -> Vector | None:
         """Position of the light [m]; None is no light."""
         return light_of(self.environment, self.arena)
-
-    @property
-    def is_lit(self) -> bool:
-        """There is a light, or patches may shine."""
-        return self.light is not None or self.arena.patch_light_m > 0
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
@@ -166,8 +156,6 @@ def _changing_settings(experiment: Experiment) -> EvaluationSettings:
     light = light_of(experiment.environment, arena)
     if light is None and arena is not None and arena.patch_light_m:
         light = 0.0, 0.0, arena.patch_light_m
-    if light == settings.environment.light:
-        return settings
     return replace(settings, environment=replace(settings.environment, light=light))
 
 
@@ -177,11 +165,7 @@ def evaluation_settings(experiment: Experiment) -> bytes:
 
 
 def arena_settings_of(experiment: Experiment) -> ArenaSettings:
-    """Return the settings of an experiment's arena, without an origin.
-
-    Raises:
-        ExperimentError: the experiment has no arena.
-    """
+    """Return the settings, without an origin, of the arena that an experiment has."""
     if experiment.arena is None:
         raise ExperimentError(f"{experiment.name}: has no [arena]")
     return _sections(experiment, ArenaSettings)

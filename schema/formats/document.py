@@ -50,11 +50,7 @@ class _Composer:
         self._count = 0
 
     def document(self) -> DocumentNode | None:
-        """Return the root node; None if the document is empty.
-
-        Raises:
-            yaml.YAMLError: not YAML, what is not allowed here, or beyond a limit.
-        """
+        """Return the root node; None if the document is empty."""
         root: DocumentNode | None = None
         documents = 0
         for event in self._events:

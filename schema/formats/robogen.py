@@ -121,11 +121,7 @@ def checked_part(
 
 
 def neuron_kind(name: str, where: str) -> str:
-    """Return Revolve's type of a neuron, given RoboGen's.
-
-    Raises:
-        InvalidRobot: an unknown type.
-    """
+    """Return Revolve's type of a neuron, given RoboGen's; else ``InvalidRobot``."""
     if name.lower() not in _NEURONS:
         allowed = ", ".join(_NEURONS)
         raise InvalidRobot(f"{where}: must be one of {allowed}, got {shown(name)}")
@@ -177,13 +173,10 @@ class _Body:
     def add(
         self, part: RobogenPart, place: tuple[int, int, int], turn: int, turns: int
     ) -> None:
-        """Add a part and its subtree.
+        """Add a part of RoboGen, turned by some degrees, and its subtree.
 
-        Args:
-            part: of RoboGen.
-            place: index of its parent, slot there, own slot.
-            turn: its orientation [degrees].
-            turns: sum of RoboGen's quarter turns from the core to the part.
+        Its place is the index of its parent, the slot there, and its own slot;
+        ``turns`` is the sum of RoboGen's quarter turns from the core to it.
         """
         own = len(self.parts)
         self.names.append(part.name)

@@ -61,11 +61,15 @@ class RevolveReader(Reader):
         """Return the brain: all inputs and outputs, and the hidden neurons."""
         ends: dict[str, _End] = {}
         for name, index in self.part_index.items():
-            kind = self.space[self.parts[index].kind]
-            ends |= {f"{name}-in-{k}": ("input", index) for k in range(kind.inputs)}
-            ends |= {f"{name}-out-{k}": ("output", index) for k in range(kind.outputs)}
+            own_type = self.space[self.parts[index].kind]
+            inputs, outputs = range(own_type.inputs), range(own_type.outputs)
+            ends |= {f"{name}-in-{k}": ("input", index) for k in inputs}
+            ends |= {f"{name}-out-{k}": ("output", index) for k in outputs}
         if table is not None:
-            _check_network(table)
+            if table.has("type") and (kind := table.text("type")) != _NETWORK:
+                rule = f"must be {_NETWORK!r}; without the brain, the body can be read"
+                table.refuse("type", f"{shown(kind)} is not supported: {rule}")
+            table.refuse_others("type", "neurons", "params", "connections")
         written, params = _tables(table, "neurons"), _tables(table, "params")
         own, hidden = self._assigned(written, ends)
         named = [(own.get(name, name), *end) for name, end in ends.items()]
@@ -118,14 +122,6 @@ class RevolveReader(Reader):
         if not table.is_empty("part_id"):
             part = self.part_index[table.word("part_id", self.part_index)]
         return layer, part
-
-
-def _check_network(table: Table) -> None:
-    """Raise unless a brain is a neural network."""
-    if table.has("type") and (kind := table.text("type")) != _NETWORK:
-        rule = f"must be {_NETWORK!r}; without the brain, the body can be read"
-        table.refuse("type", f"{shown(kind)} is not supported: {rule}")
-    table.refuse_others("type", "neurons", "params", "connections")
 
 
 def _tables(table: Table | None, key: str) -> dict[str, Table]:

@@ -59,11 +59,7 @@ class Reader:
         self._lines: dict[str, int] = {}
 
     def read(self, document: Table) -> Robot:
-        """Return the robot of a document.
-
-        Raises:
-            InvalidRobot: the document is wrong; the message names file, line and field.
-        """
+        """Return the robot of a document; errors name file, line and field."""
         document.refuse_others(*self.top_keys)
         if document.has("revolve_robot"):
             version = document.integer("revolve_robot")

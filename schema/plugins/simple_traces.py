@@ -10,9 +10,8 @@ import numpy as np
 
 from schema.errors import shown
 from schema.plugins.contract import broken, repeated
-from schema.plugins.needs import channels_of
 from schema.robot.robot import Part, Robot
-from schema.robot.trace import CONSTANT, Floats, Trace
+from schema.robot.trace import CONSTANT, Floats, Trace, channels_of
 
 _SAMPLES = 61
 _INTERVAL_S = 0.2

@@ -24,12 +24,9 @@ def own_modules() -> list[str]:
 def unchanged(
     rule: str, modules: Collection[str], plugin: object = None
 ) -> Iterator[None]:
-    """Raise if a block changes a name of users' modules, or of an object.
+    """Raise ``ExperimentError`` if a block changes a name of modules or of an object.
 
     ``rule`` says what the plug-in must do.
-
-    Raises:
-        ExperimentError: it does; or as of the block.
     """
     owners = {"self": plugin, **{name: sys.modules[name] for name in modules}}
 

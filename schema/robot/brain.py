@@ -97,12 +97,9 @@ class Brain(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_field
 
 
 def check_brain(brain: Brain, part_count: int) -> None:
-    """Raise unless a brain keeps the rules that depend on no plug-in.
+    """Raise ``InvalidRobot`` unless a brain keeps the rules that depend on no plug-in.
 
     ``check_neurons`` checks the types of its neurons.
-
-    Raises:
-        InvalidRobot: neurons or connections that break a rule, or are out of order.
     """
     order = [(LAYERS.index(neuron.layer), neuron.part) for neuron in brain.neurons]
     if order != sorted(order):
@@ -136,11 +133,7 @@ def _neuron_problem(neuron: Neuron, part_count: int) -> str:
 
 
 def check_neurons(brain: Brain, kinds: NeuronKinds) -> None:
-    """Raise unless the output and hidden neurons of a brain are of known types.
-
-    Raises:
-        InvalidRobot: a neuron of another type, or a wrong number of parameters.
-    """
+    """Raise ``InvalidRobot`` unless output and hidden neurons are of known types."""
     for index, neuron in enumerate(brain.neurons):
         if neuron.layer == "input":
             continue

@@ -70,12 +70,9 @@ def place_parts(robot: Robot, shapes: Sequence[Shape]) -> tuple[Floats, Floats]:
 
 @lru_cache(maxsize=4096)
 def attach(parent: Slot, child: Slot, orientation: int) -> tuple[Floats, Floats]:
-    """Return a child's frame in its parent's frame.
+    """Return a child's frame in its parent's, given the slots of both in their frames.
 
-    Args:
-        parent: slot of the parent, in the parent's frame.
-        child: slot of the child, in the child's frame.
-        orientation: rotation of the child about its own slot normal [degrees].
+    The orientation is a rotation of the child about its own slot normal [degrees].
 
     Returns:
         Rotation (3, 3) child frame to parent frame; position (3,) of the child's

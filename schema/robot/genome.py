@@ -118,9 +118,6 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
 
     Connections are left out if their path cannot be followed, if it ends at a missing
     neuron, or if an earlier connection has the same two neurons.
-
-    Returns:
-        The robot: parts in depth-first order, neurons by layer and then by part.
     """
     entries = walk(genome)
     inputs: list[Neuron] = []
@@ -155,12 +152,10 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
 def _edges(
     entries: list[tuple[Node, int, int]], starts: list[tuple[int, int, int]]
 ) -> tuple[Connection, ...]:
-    """Return the connections of a genome whose neurons exist.
+    """Return the connections of a genome, from ``walk``, whose neurons exist.
 
-    Args:
-        entries: its nodes, from ``walk``.
-        starts: numbers of inputs, outputs and hidden neurons before those of each
-            node; the last entry has the totals.
+    ``starts`` are the numbers of inputs, outputs and hidden neurons before those of
+    each node; the last entry has the totals.
     """
     inputs, outputs, _ = starts[-1]
     # Of each layer: its position in ``starts``, and its first index in the brain.

@@ -38,8 +38,7 @@ def connected_components(groups: Iterable[Group], links: Links) -> list[Group]:
 def overlaps(boxes: Floats) -> Mask:
     """Return whether the boxes of R robots overlap or meet, (R, R).
 
-    Args:
-        boxes: (2, 2, R) least x, y, then greatest x, y [m].
+    They are (2, 2, R): least x, y, then greatest x, y [m].
     """
     low, high = boxes
     is_near = low[0][:, None] <= high[0]

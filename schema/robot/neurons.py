@@ -36,8 +36,6 @@ class StatelessNeuron:
     """Neuron type whose output follows from inputs, parameters and age.
 
     Attributes:
-        name: of the type.
-        parameters: of its neurons.
         output: (N,) from inputs (N,), parameters (P, N) and the tick.
         states: its only state is the output.
     """

@@ -130,21 +130,13 @@ def check_number(robot: Robot) -> None:
 
 
 def check_types(robot: Robot, space: BodySpace) -> None:
-    """Raise unless a robot fits a body space; its neuron types are not checked.
-
-    Raises:
-        InvalidRobot: the causes of ``check_robot`` that depend on part types.
-    """
+    """Raise, as ``check_robot``, unless a robot fits a body space; not for neurons."""
     check_body(robot.parts, space)
     _check_wiring(robot, space)
 
 
 def check_body(parts: Sequence[Part], space: BodySpace) -> None:
-    """Raise unless a body fits a body space; its brain is not checked.
-
-    Raises:
-        InvalidRobot: the causes of ``check_types`` that concern the body.
-    """
+    """Raise, as ``check_robot``, unless a body fits a body space."""
     for index, part in enumerate(parts):
         if problem := _type_problem(part, index, space):
             raise InvalidRobot(f"body.parts[{index}]{problem}")
@@ -175,11 +167,7 @@ def _type_problem(part: Part, index: int, space: BodySpace) -> str:
 
 
 def part_type(name: str, space: BodySpace, where: str) -> PartType:
-    """Return the part type of a name.
-
-    Raises:
-        InvalidRobot: the body space has no such type.
-    """
+    """Return the part type of a name; ``InvalidRobot`` if the body space has none."""
     if name not in space:
         rule = f"must be one of {', '.join(space)}, got {name!r}"
         raise InvalidRobot(f"{where}.kind: {rule}")

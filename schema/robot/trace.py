@@ -1,15 +1,15 @@
 """Recording of a robot's motion: what fitness functions and measures get."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import add
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, nearest, shown
 from schema.robot.robot import Robot
 
 Floats = npt.NDArray[np.float64]
@@ -169,11 +169,6 @@ class Trace:
         return cast("float", self._channel("gravity"))
 
     def _channel(self, name: str) -> object:
-        """Return a channel.
-
-        Raises:
-            ExperimentError: it was not declared.
-        """
         if name in self.channels:
             return self.channels[name]
         how = f'declare it with @needs("{name}") above the function'
@@ -187,3 +182,45 @@ def sum_in_order(numbers: Iterable[float]) -> float:
     Evaluations must not depend on the version that a worker runs.
     """
     return reduce(add, numbers, 0.0)
+
+
+_Function = TypeVar("_Function", bound=Callable[..., float])
+_ATTRIBUTE = "__revolve_needs__"
+
+
+def needs(*channels: str) -> Callable[[_Function], _Function]:
+    """Return a decorator that declares the channels of a trace that a function reads.
+
+    Raises:
+        ExperimentError: no such channel.
+    """
+    check_channels("needs", channels)
+
+    def declare(function: _Function) -> _Function:
+        setattr(function, _ATTRIBUTE, channels)
+        return function
+
+    return declare
+
+
+def check_channels(where: str, names: Iterable[str]) -> None:
+    """Raise ``ExperimentError``, with the nearest, unless all names are channels'."""
+    known = (*RECORDED, *COMPUTED, *CONSTANT)
+    for name in names:
+        if name not in known:
+            hint = f"{nearest(str(name), known)}; channels: {', '.join(known)}"
+            raise ExperimentError(f"{where}: {shown(name)} is not a channel{hint}")
+
+
+def channels_of(
+    functions: Iterable[Callable[..., Any]], record: Iterable[str] = ()
+) -> tuple[str, ...]:
+    """Return the channels that exist only for some functions, in their fixed order.
+
+    ``record`` names further ones.
+    """
+    wanted = {name for each in functions for name in getattr(each, _ATTRIBUTE, ())}
+    wanted.update(record)
+    for name in wanted & DERIVED.keys():
+        wanted.update(DERIVED[name])
+    return tuple(name for name in (*RECORDED, *COMPUTED) if name in wanted)

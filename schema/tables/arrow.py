@@ -10,11 +10,7 @@ class _WithoutPandas(MetaPathFinder):
     """Finder that hides pandas."""
 
     def find_spec(self, name: str, *_: object) -> None:
-        """Return None: other modules are found as usual.
-
-        Raises:
-            ImportError: the module is pandas.
-        """
+        """Raise for pandas; other modules are found as usual."""
         if name == "pandas":
             raise ImportError(name)
 

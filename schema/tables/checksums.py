@@ -9,7 +9,7 @@ a message without a record does not count.
 
 import struct
 from collections.abc import Iterator
-from hashlib import sha256
+from hashlib import file_digest
 from pathlib import Path
 from zlib import crc32
 
@@ -27,7 +27,6 @@ FIELDS = struct.Struct("<QI")
 CHECK = struct.Struct("<I")
 """CRC32 of these two, behind them."""
 _RECORD = FIELDS.size + CHECK.size
-_PIECE = 1 << 20
 
 
 class Damaged(Exception):  # noqa: N818 - reads as what it says
@@ -38,34 +37,24 @@ class Damaged(Exception):  # noqa: N818 - reads as what it says
     """
 
     def __init__(self, path: Path, byte: int, what: str) -> None:
-        """Describe the damage of a file."""
         super().__init__(f"{path}: damaged at byte {byte}: {what}")
         self.byte = byte
 
 
-class Seal(msgspec.Struct, frozen=True):
-    """The part of ``run.json`` that concerns tables.
-
-    Attributes:
-        checksums: all segments have checksums.
-        digests: SHA-256 of each finished table in hexadecimal, by name of the table.
-    """
-
-    checksums: bool = False
+class _Sealed(msgspec.Struct, frozen=True):
     digests: dict[str, str] = {}
 
 
-def read_seal(folder: Path) -> Seal:
-    """Return what ``run.json`` says about a run's tables.
+def read_digests(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of each finished table, by name, that ``run.json`` has.
 
-    Runs of earlier versions have neither checksums nor digests. The same is returned
-    if the file cannot be read: then only checksums that are found are checked.
+    They are read even if the rest of the file is damaged; runs of 0.1 have none.
     """
     try:
         data = read_small(folder / DETAILS, MOST_DESCRIPTION)
-        return msgspec.json.decode(data, type=Seal)
+        return msgspec.json.decode(data, type=_Sealed).digests
     except (OSError, RunFolderError, ValueError, RecursionError):
-        return Seal()
+        return {}
 
 
 def sums_path(segment: Path) -> Path:
@@ -81,11 +70,8 @@ def sums_size(messages: int) -> int:
 def sound_messages(segment: Path, sums: bytes) -> Iterator[tuple[int, pa.Buffer]]:
     """Yield end and bytes of each message of a segment, up to the first damage.
 
-    Bytes behind the last record are a cut write: they are no damage.
-
-    Args:
-        segment: the file.
-        sums: content of the file with its checksums, read before the segment is.
+    Bytes behind the last record are a cut write: they are no damage. ``sums`` is the
+    content of the file with its checksums, read before the segment is.
 
     Raises:
         Damaged: after the last sound message.
@@ -114,11 +100,7 @@ def _opened(segment: Path) -> pa.OSFile:
 
 
 def _records(segment: Path, sums: bytes) -> Iterator[tuple[int, int]]:
-    """Yield end and CRC32 of each message; an incomplete last record is a cut write.
-
-    Raises:
-        Damaged: after the last sound record.
-    """
+    """Yield end and CRC32 of each message; an incomplete last record is a cut write."""
     path = sums_path(segment)
     if not sums.startswith(MAGIC):
         # A kill while both files were made: the segment gets its first bytes after.
@@ -134,13 +116,6 @@ def _records(segment: Path, sums: bytes) -> Iterator[tuple[int, int]]:
 
 
 def digest_of(path: Path) -> str:
-    """Return the SHA-256 of a file in hexadecimal.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    digest = sha256()
+    """Return the SHA-256 of a file in hexadecimal."""
     with path.open("rb") as file:
-        while piece := file.read(_PIECE):
-            digest.update(piece)
-    return digest.hexdigest()
+        return file_digest(file, "sha256").hexdigest()

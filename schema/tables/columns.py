@@ -9,6 +9,8 @@ No column may be named ``experiment``: a folder of finished runs has that name, 
 readers of a campaign make a column of it.
 """
 
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import pyarrow as pa
@@ -53,20 +55,18 @@ def _column(
     return pa.field(name, kind, nullable=is_nullable, metadata=metadata)
 
 
+_nullable = partial(_column, is_nullable=True)
+_local = partial(_column, is_repeatable=False)
+
 _RECORD = _column("record", pa.int64(), "number of the row in its table, from 0")
+_SEED = "random seed of the run or campaign"
 _OF_RUN = (
-    _column(
-        "seed",
-        pa.uint64(),
-        "random seed of the run or campaign; repeats of a campaign share it",
-        is_nullable=True,
-    ),
-    _column(
+    _nullable("seed", pa.uint64(), f"{_SEED}; repeats of a campaign share it"),
+    _nullable(
         "run_id",
         pa.string(),
         "identifier of the run; another for each run, also of the same seed",
         is_repeatable=False,
-        is_nullable=True,
     ),
 )
 """Last columns of each table; null only if ``run.json`` is lost."""
@@ -126,11 +126,10 @@ _INSTANT = pa.timestamp("ms", tz="UTC")
 
 _ISLAND = _column("island", pa.int32(), "number of the island where it happened")
 _BIRTH = _column("birth", pa.int64(), "number of the birth of the individual")
-_BIRTH_ISLAND = _column(
+_BIRTH_ISLAND = _nullable(
     "birth_island",
     pa.int32(),
     "island where the individual was born; null if it is that of the column island",
-    is_nullable=True,
 )
 _INDIVIDUAL = (_ISLAND, _BIRTH_ISLAND, _BIRTH)
 _SECOND_ROBOT = (
@@ -140,6 +139,12 @@ _SECOND_ROBOT = (
 _BIRTHS = _column("births", pa.int64(), "individuals born on the island so far")
 _TIME = _column("sim_time_s", _FLOAT, "simulated time of the arena", unit="s")
 _FITNESS_UNIT = "m/s, or as of fitness.function"
+
+
+def _fitness(description: str) -> pa.Field:
+    return _nullable("fitness", _FLOAT, description, unit=_FITNESS_UNIT)
+
+
 _VELOCITIES = (
     _column(
         "path_velocity",
@@ -155,29 +160,21 @@ _VELOCITIES = (
     ),
 )
 _OUTCOME = (
-    _column(
-        "fitness",
-        _FLOAT,
-        "higher is better; null if the evaluation failed",
-        unit=_FITNESS_UNIT,
-        is_nullable=True,
-    ),
+    _fitness("higher is better; null if the evaluation failed"),
     *(field.with_nullable(True) for field in _VELOCITIES),
-    _column(
+    _nullable(
         "simulated_s",
         _FLOAT,
         "simulated time, warm-up included; null if the evaluation failed",
         unit="s",
-        is_nullable=True,
     ),
 )
-_MEASURES = _column(
+_MEASURES = _nullable(
     "measures",
     MEASURES,
     "numbers of measures.names by name; null if the experiment has none, if the "
     "evaluation failed, or if the robot has no fitness yet",
     unit="by measure",
-    is_nullable=True,
 )
 
 
@@ -204,9 +201,7 @@ BIRTHS = _table(
         "ids of the parents (island and number of birth), first the one whose copy was "
         "changed; empty for founders",
     ),
-    _column(
-        "generation", pa.int32(), "number of the brood; null on-line", is_nullable=True
-    ),
+    _nullable("generation", pa.int32(), "number of the brood; null on-line"),
     *_counts(
         rank="1 for founders, otherwise one more than the greatest rank of the parents",
         attempts="matings that this birth took",
@@ -237,33 +232,25 @@ BIRTHS = _table(
         connections="connections of the brain; with the encoding revolve-angle those "
         "of the genome, unresolved ones included",
     ),
-    _column(
-        "sim_time_s",
-        _FLOAT,
-        "simulated time of birth; null off-line",
-        unit="s",
-        is_nullable=True,
-    ),
+    _nullable("sim_time_s", _FLOAT, "simulated time of birth; null off-line", unit="s"),
     *(
         field.with_nullable(True)
         for field in _axes("xy", _FLOAT, "the place of birth (null off-line)")
     ),
-    _column(
+    _nullable(
         "robot",
         pa.binary(),
         "Protobuf bytes of the robot, with the brain that it has learnt; null if it is "
         "what develops from the genome with the encoding revolve-angle, and in runs "
         "that are older than this column",
         is_repeatable=False,
-        is_nullable=True,
     ),
     *(
-        _column(
+        _nullable(
             name,
             kind,
             f"of a given founder {text}; else null",
             is_repeatable=name not in ("origin_run", "origin_file"),
-            is_nullable=True,
         )
         for name, kind, text in (
             ("origin_digest", pa.string(), "the SHA-256 of its genome, in hexadecimal"),
@@ -275,13 +262,7 @@ BIRTHS = _table(
     ),
 )
 _PROVENANCE = (
-    _column(
-        "wall_s",
-        _FLOAT,
-        "duration by the worker's clock",
-        unit="s",
-        is_repeatable=False,
-    ),
+    _local("wall_s", _FLOAT, "duration by the worker's clock", unit="s"),
     _column("worker", pa.string(), "name of the worker", is_repeatable=False),
     _column("platform", pa.string(), "platform of the worker", is_repeatable=False),
 )
@@ -301,13 +282,12 @@ EVALUATIONS = _table(
     *_OUTCOME,
     *_PROVENANCE,
     _MEASURES,
-    _column(
+    _nullable(
         "point",
         pa.int64(),
         "births at which the settings in [[changes]] had the values of the evaluation; "
         "null without changes",
         is_repeatable=False,
-        is_nullable=True,
     ),
 )
 LEARNING = _table(
@@ -327,13 +307,7 @@ LEARNING = _table(
         "number of the request to the learner that led to this trial; trials of one "
         "request are tried together",
     ),
-    _column(
-        "fitness",
-        _FLOAT,
-        "higher is better; null if the trial failed",
-        unit=_FITNESS_UNIT,
-        is_nullable=True,
-    ),
+    _fitness("higher is better; null if the trial failed"),
     _column("reason", pa.string(), "of a failure; otherwise empty"),
     _column(
         "distance",
@@ -349,19 +323,17 @@ LEARNING = _table(
         unit="1",
     ),
     *_PROVENANCE,
-    _column(
+    _nullable(
         "sim_time_s",
         _FLOAT,
         "simulated time of the trial's end in an arena; null off-line",
         unit="s",
-        is_nullable=True,
     ),
-    _column(
+    _nullable(
         "robot",
         pa.binary(),
         "Protobuf bytes of the robot that grew up in an arena with this trial's brain; "
         "null in its other trials, and off-line, where births has it",
-        is_nullable=True,
     ),
 )
 POPULATION = _table(
@@ -372,12 +344,8 @@ POPULATION = _table(
     _BIRTHS,
     _BIRTH_ISLAND,
     _BIRTH,
-    _column(
-        "fitness",
-        _FLOAT,
-        "higher is better; null if the evaluation failed or the robot is not mature",
-        unit=_FITNESS_UNIT,
-        is_nullable=True,
+    _fitness(
+        "higher is better; null if the evaluation failed or the robot is not mature"
     ),
 )
 FITNESS = _table(
@@ -395,19 +363,17 @@ FITNESS = _table(
         "whether the robot has lived its warm-up and a whole fitness window",
     ),
     _MEASURES,
-    _column(
+    _nullable(
         "stores",
         MEASURES,
         "what the arena's rules keep for the robot, before their decision at this time",
-        is_nullable=True,
     ),
-    _column(
+    _nullable(
         "work_j",
         _FLOAT,
         "work of its motors since birth, read at the checks of distances; null if the "
         "arena's rules do not need it",
         unit="J",
-        is_nullable=True,
     ),
 )
 POSES = _table(
@@ -450,13 +416,12 @@ DEATHS = _table(
     ),
     _column("detail", pa.string(), "what diverged or failed; otherwise empty"),
     *_axes("xy", _FLOAT, "the centre of its core"),
-    _column(
+    _nullable(
         "z",
         _FLOAT,
         "z of the centre of its core, world frame, z up; null if the robot left before "
         "its first step",
         unit="m",
-        is_nullable=True,
     ),
 )
 TOUCHES = _table(
@@ -485,20 +450,16 @@ MATINGS = _table(
     _TIME,
     _column("parents", pa.list_(PARENT), "ids of the parents, two or one"),
     *(
-        _column(
+        _nullable(
             axis,
             _FLOAT,
             f"{axis} of the place near which the child is born; null if any place",
             unit="m",
-            is_nullable=True,
         )
         for axis in "xy"
     ),
-    _column(
-        "birth",
-        pa.int64(),
-        "number of the birth of the child; null without one",
-        is_nullable=True,
+    _nullable(
+        "birth", pa.int64(), "number of the birth of the child; null without one"
     ),
     _column(
         "outcome",
@@ -537,22 +498,15 @@ MIGRATIONS = _table(
     _column("to", pa.int32(), "number of the island that it reached"),
     _column("epoch", pa.int64(), "number of the migration epoch"),
     _column("births", pa.int64(), "individuals born on the island that it left so far"),
-    _column(
+    _nullable(
         "sim_time_s",
         _FLOAT,
         "simulated time of the arena that it left; null off-line",
         unit="s",
-        is_nullable=True,
     ),
     _column("birth_island", pa.int32(), "island where the migrant was born"),
     _BIRTH,
-    _column(
-        "fitness",
-        _FLOAT,
-        "on the island that it left; null if its evaluation failed",
-        unit=_FITNESS_UNIT,
-        is_nullable=True,
-    ),
+    _fitness("on the island that it left; null if its evaluation failed"),
 )
 AUDITS = _table(
     "audits",
@@ -584,23 +538,37 @@ RUNS = _table(
     "a run",
     _column("name", pa.string(), "of the experiment"),
     _column("run", pa.int32(), "number of the repeat, from 0"),
-    _column("seed", pa.uint64(), "random seed of the run or campaign"),
+    _column("seed", pa.uint64(), _SEED),
     _column("document", pa.string(), "the experiment as JSON, with all defaults"),
     _column("state", pa.string(), "of the run: finished"),
-    _column(
-        "versions", pa.string(), "versions of libraries as JSON", is_repeatable=False
-    ),
+    _local("versions", pa.string(), "versions of libraries as JSON"),
     _column("platform", pa.string(), "of the coordinator", is_repeatable=False),
-    _column(
-        "cpu_flags", pa.string(), "of the coordinator's machine", is_repeatable=False
-    ),
+    _local("cpu_flags", pa.string(), "of the coordinator's machine"),
     _column("start", _INSTANT, "time by the clock, UTC", is_repeatable=False),
-    _column(
-        "end", _INSTANT, "time by the clock, UTC", is_repeatable=False, is_nullable=True
-    ),
+    _nullable("end", _INSTANT, "time by the clock, UTC", is_repeatable=False),
 )
 
 
 def repeatable(schema: pa.Schema) -> list[str]:
     """Return the names of the repeatable columns."""
     return [field.name for field in schema if field.metadata[b"repeatable"] == b"true"]
+
+
+def completed(
+    rows: pa.Table, schema: pa.Schema, of_run: Mapping[str, object]
+) -> pa.Table:
+    """Return rows of earlier versions with the columns of the schema that they lack.
+
+    ``of_run`` has the values of columns that are the same in all rows of the run.
+
+    Raises:
+        ValueError: the rows are not of the table.
+    """
+    missing = [field for field in schema if field.name not in rows.column_names]
+    for field in missing:
+        # Of rows that are older than a column; otherwise they have null.
+        absent = field.metadata.get(b"absent")
+        value = pa.scalar(of_run.get(field.name, absent and int(absent)), field.type)
+        rows = rows.append_column(field, pa.repeat(value, rows.num_rows))
+    # Parquet has its own name for the items of a list.
+    return rows.select(schema.names).cast(schema)

@@ -31,7 +31,6 @@ class KeptFounder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Given founder as a run folder keeps it, under the digest of its genome.
 
     Attributes:
-        genome: bytes of its genome.
         run: ``run_id`` of the run that it comes from; empty: of a file.
         file: path of that file.
     """
@@ -45,7 +44,6 @@ class RunDetails(msgspec.Struct, frozen=True):
     """Description of a run: everything that determines its births.
 
     Attributes:
-        name: name of the experiment.
         run: number of the repeat, from 0.
         seed: random seed of the run or campaign.
         document: the experiment as JSON, with all defaults.
@@ -120,11 +118,7 @@ def read_description(folder: Path) -> Description:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise unless a folder is there.
-
-    Raises:
-        RunFolderError: nothing is there, or a file.
-    """
+    """Raise ``RunFolderError`` unless a folder is there, and no file."""
     if not folder.exists():
         raise RunFolderError(f"{folder}: no such folder")
     if not folder.is_dir():
@@ -164,11 +158,9 @@ def run_columns(folder: Path) -> dict[str, int | str | None]:
 
 
 def allow_plugins_of(folder: Path, *, is_resumed: bool = False) -> None:
-    """Allow the plug-ins of a run that the user named on the command line.
+    """Allow the plug-ins of a run, perhaps resumed, that the user named.
 
-    Args:
-        folder: of the run; without a description, nothing more is allowed.
-        is_resumed: the run continues.
+    Without a description in its folder, nothing more is allowed.
 
     Raises:
         RunFolderError: the description is damaged.

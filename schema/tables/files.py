@@ -4,7 +4,8 @@ While a run is active, a table consists of Arrow stream segments, one per start 
 its coordinator: ``segments/births-000.arrows``. A finished run has Parquet instead:
 ``tables/experiment=NAME/run=N/births.parquet``. The folder names hold columns (hive
 partitioning), so that one call reads a campaign, such as DuckDB's
-``read_parquet('runs/**/births.parquet', hive_partitioning = true)``.
+``read_parquet('runs/**/births.parquet', hive_partitioning = true)``. A segment of
+another version raises ``RunFolderError``.
 """
 
 from collections import Counter
@@ -19,10 +20,9 @@ from pyarrow.parquet import ParquetFile
 
 from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.checksums import digest_of, read_seal
-from schema.tables.columns import TABLES
+from schema.tables.checksums import digest_of, read_digests
+from schema.tables.columns import TABLES, completed
 from schema.tables.description import read_description, run_columns
-from schema.tables.earlier import completed
 from schema.tables.segments import (
     FINISHED,
     Batch,
@@ -37,9 +37,6 @@ SORTED_BYTES = 32 * 2**20
 GROUP_BYTES = 4 * 2**20
 """Size of the rows that are written, or read and filtered, at once, about."""
 
-_NOTED: list[Path] = []
-"""The first run folder without digests that this process has read."""
-
 
 class Stored(NamedTuple):
     """Rows of a table's segments.
@@ -47,7 +44,6 @@ class Stored(NamedTuple):
     Attributes:
         rows: their number before the first gap.
         used: segments before the gap, each with its last sound batch, None without one.
-        unused: the segments behind the gap.
     """
 
     rows: int
@@ -75,9 +71,6 @@ def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 
     Record numbers show gaps. A replay of the journal writes the rows behind a gap
     again. Only one batch is in memory at a time.
-
-    Raises:
-        RunFolderError: a segment of another version.
     """
     for _, batch, new in _chain(folder, table):
         if new:
@@ -89,9 +82,6 @@ def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 
     Rows of about ``SORTED_BYTES``, or one batch, are in memory at a time. No batch is
     empty.
-
-    Raises:
-        RunFolderError: a segment of another version.
     """
     counts: Counter[int] = Counter()
     size = 0
@@ -161,11 +151,7 @@ def in_groups(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.Table]:
 
 
 def stored_rows(folder: Path, table: str) -> Stored:
-    """Return which rows the segments of a table hold.
-
-    Raises:
-        RunFolderError: a segment of another version.
-    """
+    """Return which rows the segments of a table hold."""
     rows = 0
     paths = [path for _, path in segments_of(folder, table)]
     used: dict[Path, Batch | None] = dict.fromkeys(paths)
@@ -210,10 +196,7 @@ def is_sealed(folder: Path) -> bool:
     """Return whether a run has once had finished tables.
 
     They get their digests together before the run's state becomes "finished". Runs of
-    0.1 have no digests, but files.
-
-    Raises:
-        RunFolderError: the run's description is damaged.
+    0.1 have no digests, but files. Errors are those of ``read_description``.
     """
     description = read_description(folder)
     if description.checksums:
@@ -238,7 +221,7 @@ def damage_of(folder: Path, table: str) -> str:
 
     A file of 0.1 has no digest; it must be a Parquet file.
     """
-    digest = read_seal(folder).digests.get(table)
+    digest = read_digests(folder).get(table)
     found = parquet_files(folder, table)
     if not found:
         if not digest or segments_of(folder, table):
@@ -248,23 +231,15 @@ def damage_of(folder: Path, table: str) -> str:
     why = ""
     try:
         if digest is None:
-            _note_unchecked(folder)
+            warn_once(
+                "runs of 0.1 have no digests: damage in tables may stay unnoticed"
+            )
             ParquetFile(found[0]).close()
         elif digest_of(found[0]) != digest:
             why = "damaged (its SHA-256 is not the one in run.json)"
     except (ValueError, OSError) as error:
         why = f"cannot be read: {error}"
     return f"{found[0]}: {why}: resume the run to write it again" if why else ""
-
-
-def _note_unchecked(folder: Path) -> None:
-    """Log that a run of 0.1 has no digests, for the first such run."""
-    if not _NOTED:
-        _NOTED.append(folder)
-        warn_once(
-            f"{folder}: has no digests, as all runs of version 0.1: damage in their "
-            "tables may not be noticed"
-        )
 
 
 def read_table(
@@ -307,10 +282,7 @@ def rows_of_island(folder: Path, table: str, island: int) -> Iterator[pa.Table]:
     """Yield all rows of an island in their repeatable order, no group empty.
 
     Rows of a run that is not finished end at the first gap. About ``GROUP_BYTES`` are
-    in memory at a time.
-
-    Raises:
-        RunFolderError: as of ``read_table``.
+    in memory at a time. Errors are those of ``read_table``.
     """
     path = finished_path(folder, table)
     groups = (

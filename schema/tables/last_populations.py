@@ -1,8 +1,8 @@
-"""The best robots of a run: those of the last populations, and the best ever.
+"""The best robots of a run: those of the last populations, of archives, and ever.
 
 *Best* is the fittest robot of the last recorded population of all islands, and *best
 ever* the fittest that was ever evaluated, dead or alive. Of both, ``fittest_first``
-says which of equally fit robots is meant.
+says which of equally fit robots is meant. A damaged table raises ``RunFolderError``.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,11 +23,7 @@ _AT_ONCE = 100
 
 
 def last_populations(folder: Path) -> list[Row]:
-    """Return the rows of the table ``population`` of each island's last population.
-
-    Raises:
-        RunFolderError: the table is damaged.
-    """
+    """Return the rows of the table ``population`` of each island's last population."""
     rows = read_table(folder, "population")
     newest = rows.group_by("island").aggregate([("births", "max")]).to_pylist()
     last = [
@@ -49,9 +45,6 @@ def best_ever(folder: Path, only: BirthId | None = None) -> Iterator[Row]:
 
     Yields:
         Island, individual and greatest fitness of each robot on each island.
-
-    Raises:
-        RunFolderError: a table is damaged.
     """
     keys = ["island", "birth_island", "birth"]
     columns = [*keys, "fitness"]
@@ -95,3 +88,19 @@ def fittest_first(row: Row) -> tuple[float, ...]:
     island, home = row["island"], row["birth_island"]
     home = island if home is None else home
     return -row["fitness"], home, row["birth"], island != home, island
+
+
+def archive_at(folder: Path, births: int | None = None) -> list[dict[str, Any]]:
+    """Return the rows of the table ``archive`` that held at so many births, or last.
+
+    They are by island and entry; ``replaced_at`` are the births at which an entry
+    changed next, None if it stayed.
+    """
+    held: dict[tuple[int, str], dict[str, Any]] = {}
+    for row in read_table(folder, "archive").to_pylist():
+        entry = row["island"], row["entry"]
+        if births is None or row["births"] <= births:
+            held[entry] = {**row, "replaced_at": None}
+        elif entry in held and held[entry]["replaced_at"] is None:
+            held[entry]["replaced_at"] = row["births"]
+    return [row for _, row in sorted(held.items()) if row["birth"] is not None]

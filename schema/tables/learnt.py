@@ -10,11 +10,7 @@ from schema.tables.files import read_table
 
 
 def learnt_births(folder: Path) -> pa.Table:
-    """Return the births of a run, as ``with_learnt``.
-
-    Raises:
-        RunFolderError: a table is damaged.
-    """
+    """Return the births of a run, as ``with_learnt``; errors of ``read_table``."""
     return with_learnt(read_table(folder, "births"), read_table(folder, "learning"))
 
 
@@ -22,11 +18,8 @@ def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:
     """Return births whose column ``robot`` has what robots of arenas have learnt.
 
     An arena writes the births row first, and the table ``learning`` when the robot has
-    grown up. Off-line births have what was learnt already.
-
-    Args:
-        births: ``island``, ``birth``, ``robot`` and any other columns.
-        learning: of the same run.
+    grown up. Off-line births have what was learnt already. Of births, the columns
+    ``island``, ``birth`` and ``robot`` are needed.
     """
     grown = learning.filter(pc.is_valid(learning["robot"]))
     if not grown.num_rows:

@@ -1,4 +1,7 @@
-"""Files that are created or replaced as a whole, even across a power loss."""
+"""Files that are created or replaced as a whole, even across a power loss.
+
+If the disk is full or fails, ``OSError`` is raised and an old file is unchanged.
+"""
 
 import contextlib
 import errno
@@ -13,32 +16,20 @@ _CANNOT = (errno.EACCES, errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.EPE
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Create or replace a file atomically; its folder must exist.
-
-    Raises:
-        OSError: the disk is full or failed; an old file is unchanged.
-    """
+    """Create or replace a file atomically; its folder must exist."""
     write_new(path, write)
     install_new(path)
 
 
 def write_new(path: Path, write: Callable[[Path], object]) -> None:
-    """Write the new content of a file under another name, for ``install_new``.
-
-    Raises:
-        OSError: the disk is full or failed; an old file is unchanged.
-    """
+    """Write the new content of a file under another name, for ``install_new``."""
     with _removed_on_error(new_path(path)) as temporary:
         write(temporary)
         sync_file(temporary)
 
 
 def install_new(path: Path) -> None:
-    """Give a file its new content, which ``write_new`` wrote.
-
-    Raises:
-        OSError: the disk failed; an old file is unchanged.
-    """
+    """Give a file its new content, which ``write_new`` wrote."""
     with _removed_on_error(new_path(path)) as temporary:
         temporary.replace(path)
         sync_folder(path.parent)

@@ -67,12 +67,7 @@ def parquet_files(folder: Path, table: str) -> list[Path]:
 
 
 def read_segment(folder: Path, table: str, path: Path) -> Iterator[Batch]:
-    """Yield the complete batches of a segment, up to the first damaged one.
-
-    Raises:
-        RunFolderError: the segment is of another version of its table, or the disk
-            fails.
-    """
+    """Yield the complete batches of a segment, up to the first damaged one."""
     try:
         yield from _batches(path, TABLES[table])
     except Damaged as damage:
@@ -94,12 +89,7 @@ def warn_once(line: str) -> None:
 
 
 def _batches(path: Path, schema: pa.Schema) -> Iterator[Batch]:
-    """Yield the batches whose bytes have the right checksum.
-
-    Raises:
-        Damaged: after the last of them, or the checksums are missing.
-        RunFolderError: the segment is of another version of its table.
-    """
+    """Yield the batches whose bytes have the right checksum, up to the first damage."""
     try:
         sums = sums_path(path).read_bytes()
     except FileNotFoundError:

@@ -37,7 +37,7 @@ PERMITTED = {
     "numba": ("schema/robot/body_distance.py",),
     "matplotlib": ("analysis/figures/*.py", "analysis/report/plots.py"),
     "networkx": ("coordinator/islands/topology.py",),
-    "cmaes": ("coordinator/evolution/learners/cma_es.py",),
+    "cmaes": ("coordinator/evolution/learners/built_in.py",),
 }
 # Reference implementations for tests and developer tools: no room imports them.
 TEST_ONLY = {

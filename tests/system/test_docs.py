@@ -13,8 +13,8 @@ from coordinator.storage.compare import compare
 from revolve.cli.commands import COMMANDS
 from schema.experiment.document import ArenaSection
 from schema.parts import ACTIVE_HINGE, PartType
-from schema.tables.archives import archive_at
 from schema.tables.files import read_table
+from schema.tables.last_populations import archive_at
 from tests.docs.page_runner import blocks_of
 from tests.documents import parse_experiment
 from tests.own_brains import write_module

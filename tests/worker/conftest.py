@@ -8,11 +8,10 @@ import pytest
 import worker.measures
 from coordinator.evolution.generation import generate
 from schema.experiment.document import Experiment, body_space
-from schema.plugins.needs import needs
 from schema.robot.brain import Brain, Neuron
 from schema.robot.genome import develop
 from schema.robot.robot import Part, Robot
-from schema.robot.trace import COMPUTED, RECORDED, Trace
+from schema.robot.trace import COMPUTED, RECORDED, Trace, needs
 from tests.schema import robots
 
 GREY = robots.GREY

@@ -131,7 +131,7 @@ def test_every_built_in_measure_names_its_unit() -> None:
 
 OWN = """
 from msgspec import Struct
-from schema.plugins.needs import needs
+from schema.robot.trace import needs
 
 class Limit(Struct):
     above_m: float = 0.25

@@ -115,8 +115,8 @@ def test_robustness_is_shown_by_change_and_in_one_line(simulated: Simulate) -> N
 def test_a_long_simulation_shows_its_progress(
     simulated: Simulate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("schema.agent.terminal.progress_line.SOON_S", 0.0)
-    monkeypatch.setattr("schema.agent.terminal.progress_line.SPAN_S", 0.0)
+    monkeypatch.setattr("schema.agent.progress_line.SOON_S", 0.0)
+    monkeypatch.setattr("schema.agent.progress_line.SPAN_S", 0.0)
     said = simulated("[simulation]\nwarmup_steps = 0\nwindow_steps = 20000")
     *_, line = said.err.splitlines()
     found = re.fullmatch(r"simulated (\d+\.\d) of 100 s", line)

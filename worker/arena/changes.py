@@ -26,11 +26,7 @@ _CALM = FASTEST_CORE / math.sqrt(3.0)
 
 
 def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> None:
-    """Raise unless changes can be made to a population.
-
-    Raises:
-        UnexpectedEvent, InvalidRobot: as of ``World.apply``.
-    """
+    """Raise, as ``World.apply``, unless changes can be made to a population."""
     gone = _distinct(changes.removals)
     new = _distinct(tuple(insertion.birth for insertion in changes.insertions))
     _distinct(tuple(change.birth for change in changes.brains))
@@ -134,10 +130,11 @@ def diverged(
     found: list[Casualty] = []
     for cluster in population.clusters:
         problem = cluster.failure if cluster.failed_at <= moment else ""
-        reasons, is_calm = {}, are_calm or _is_calm(cluster, moment)
+        history, reasons = cluster.history, dict[BirthId, str]()
+        is_calm = are_calm or bool(np.abs(history.qvel[moment]).max() <= _CALM)
         if reads_warnings or not is_calm:
             reasons = {} if is_calm else _reasons(cluster, moment)
-            warnings = cluster.history.warnings[moment]
+            warnings = history.warnings[moment]
             if not problem and warnings.any():
                 problem = warning_names(warnings)
         if problem and not reasons:
@@ -153,10 +150,6 @@ def _distinct(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
     if len(set(births)) < len(births):
         raise UnexpectedEvent(f"apply: a robot is named twice in {births}")
     return births
-
-
-def _is_calm(cluster: Cluster, moment: int) -> bool:
-    return bool(np.abs(cluster.history.qvel[moment]).max() <= _CALM)
 
 
 def _reasons(cluster: Cluster, moment: int) -> dict[BirthId, str]:

@@ -168,11 +168,7 @@ def _restored(
 
 
 def _robot(data: bytes, settings: ArenaSettings) -> Robot:
-    """Return the robot of some bytes, from which its model can be built.
-
-    Raises:
-        MalformedMessage: no robot, or one that breaks the rules of the settings.
-    """
+    """Return the robot of some bytes, from which its model can be built."""
     robot = decode_robot(data)
     try:
         check_types(robot, body_space(settings.space))
@@ -187,11 +183,7 @@ def _pack(numbers: Floats) -> bytes:
 
 
 def _unpack(data: bytes, *shape: int) -> Floats:
-    """Return the numbers of some bytes.
-
-    Raises:
-        MalformedMessage: a number of bytes that does not fit the shape.
-    """
+    """Return the numbers of some bytes; raise if they do not fit the shape."""
     try:
         return np.frombuffer(data, dtype="<f8").reshape(shape).copy()
     except ValueError as error:

@@ -124,12 +124,7 @@ def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def run(options: argparse.Namespace, robots: RobotSource) -> int:
-    """Run one of the two benchmarks and print the results.
-
-    Raises:
-        ExperimentError: an invalid or off-line experiment.
-        RevolveError: the file for the results cannot be written.
-    """
+    """Run one of the two benchmarks and print the results."""
     experiment = read_experiment(options.experiment)
     rows: list[Row] = []
     with (
@@ -152,11 +147,7 @@ def run(options: argparse.Namespace, robots: RobotSource) -> int:
 
 
 def _opened(path: Path) -> BinaryIO:
-    """Return a new file, opened before the first measurement.
-
-    Raises:
-        RevolveError: it cannot be written.
-    """
+    """Return a new file, opened before the first measurement."""
     try:
         return path.open("wb")
     except OSError as error:

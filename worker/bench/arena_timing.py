@@ -64,10 +64,7 @@ def time_arena(
 
 
 def quadratic_fit(sizes: Sequence[int], factors: Sequence[float]) -> Floats:
-    """Return a, b, c of factor = a + b / p + c / p^2, by least squares.
-
-    Source: the thesis's figure 6.1.
-    """
+    """Return a, b, c of factor = a + b / p + c / p^2 (thesis, figure 6.1), fitted."""
     p = np.asarray(sizes, dtype=np.float64)
     terms = np.stack([np.ones_like(p), 1.0 / p, 1.0 / p**2], axis=1)
     return np.asarray(np.linalg.lstsq(terms, np.asarray(factors), rcond=None)[0])

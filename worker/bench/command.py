@@ -112,15 +112,7 @@ def _replay(
 
 
 def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
-    """Run one of the commands ``revolve bench ...``.
-
-    Returns:
-        0 if the measurement meets its goal, 1 if not.
-
-    Raises:
-        ExperimentError: an invalid experiment.
-        RevolveError: the evaluation of all robots that were to be timed failed.
-    """
+    """Run a command ``revolve bench ...``; return 0 if it meets its goal, else 1."""
     options = parser().parse_args(arguments[1:])
     if options.what == "evaluate":
         return _evaluate(options, robots)

@@ -115,10 +115,7 @@ class Cluster:
         model: mujoco.MjModel,
         settings: ArenaSettings,
     ) -> None:
-        """Create the state of a model.
-
-        Robots are named by the prefixes of their names in the model.
-        """
+        """Create the state of a model, where prefixes of names tell robots apart."""
         self.members = births
         self.model, self.data = model, mujoco.MjData(model)
         self.views = tuple(

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import mujoco
 
-from schema.experiment.document import body_space
+from schema.experiment.document import body_space, is_lit
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
@@ -31,7 +31,9 @@ class EngineView(PlacedRobot):
     ) -> None:
         super().__init__(robot, body_space(settings.space), model, data, prefix)
         width = settings.space.max_inputs
-        self.sensors = Sensors(self, width=width, has_light=settings.is_lit)
+        arena = getattr(settings, "arena", None)
+        has_light = is_lit(settings.environment, arena)
+        self.sensors = Sensors(self, width=width, has_light=has_light)
         self.servos = Servos(self)
         self.probe = Probe(self) if probed_channels(settings) else None
         self.qpos: Floats = data.qpos[self.joints]

@@ -167,17 +167,15 @@ class ModelCache:
         robots: dict[str, Robot] = {}
         for birth, body in zip(births, bodies, strict=True):
             prefix = f"{birth.island}.{birth.number}/"
-            specs.append((prefix, self._spec(birth, body.robot)))
-            robots[prefix] = body.robot
+            robot = robots[prefix] = body.robot
+            if birth not in self._specs:
+                spec = robot_spec(robot, self._types, self._simulation).spec
+                self._specs[birth] = spec
+            specs.append((prefix, self._specs[birth]))
         model = shared_model(
             specs, self._simulation, self.settings.environment, furnish=self._furnish
         )
         return Cluster(births, robots, model, self.settings)
-
-    def _spec(self, birth: BirthId, robot: Robot) -> mujoco.MjSpec:
-        if birth not in self._specs:
-            self._specs[birth] = robot_spec(robot, self._types, self._simulation).spec
-        return self._specs[birth]
 
 
 def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:

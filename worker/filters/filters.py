@@ -14,8 +14,7 @@ from schema.robot.robot import Robot
 from schema.robot.trace import Floats
 from worker.filters.ablation import Ablated
 from worker.filters.calibration import Calibrated
-from worker.filters.noise import Noise
-from worker.filters.pushes import Pushes
+from worker.filters.noise import Noise, Pushes
 
 
 class Filter(Protocol):

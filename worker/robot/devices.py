@@ -136,10 +136,7 @@ class Sensors:
         return bool(self.lights) or self.own is not None
 
     def look(self, around: Surroundings) -> None:
-        """Read light sensors and own ones.
-
-        Frames of all bodies must be those of the state.
-        """
+        """Read light sensors and own ones, given the present frames of all bodies."""
         for geom, place in self.lights:
             state = self._model, self._data
             lights = (around.light, *around.patch_lights)

@@ -15,7 +15,7 @@ from schema.experiment.identity import Identity
 from schema.experiment.robust import RANGES, Robust
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
-from worker.filters.random_streams import DrawPurpose, stream
+from worker.filters.noise import DrawPurpose, stream
 
 
 def disturbances(

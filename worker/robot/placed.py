@@ -108,17 +108,15 @@ def contact_reader(model: mujoco.MjModel, data: mujoco.MjData) -> ReadContacts:
     The engine also reports geoms that are farther apart than their ``margin`` but
     within the ``gap`` of scenery. They exert no force on each other: no contact.
     """
-    contacts = data.contact
+    contacts, has_gaps = data.contact, bool(model.geom_gap.any())
 
-    def read_all() -> list[list[int]]:
-        pairs: list[list[int]] = contacts.geom.tolist()
+    def read() -> list[list[int]]:
+        geoms = contacts.geom
+        touching = geoms[contacts.exclude != _IN_GAP] if has_gaps else geoms
+        pairs: list[list[int]] = touching.tolist()
         return pairs
 
-    def read_some() -> list[list[int]]:
-        pairs: list[list[int]] = contacts.geom[contacts.exclude != _IN_GAP].tolist()
-        return pairs
-
-    return read_some if model.geom_gap.any() else read_all
+    return read
 
 
 def warning_names(counts: npt.NDArray[np.integer]) -> str:

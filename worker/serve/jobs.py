@@ -1,20 +1,31 @@
-"""The work of requests of all kinds."""
+"""The work of requests of all kinds, and calls of users' own functions."""
 
 from dataclasses import dataclass
 
-from schema.errors import FAILURES, MalformedMessage
+import msgspec
+
+from schema.errors import FAILURES, ExperimentError, MalformedMessage, error_text
 from schema.experiment.changes import settings_at
 from schema.experiment.document import body_space
 from schema.experiment.identity import Identity
 from schema.experiment.settings import lasting
+from schema.plugins.load import load_function
 from schema.robot.brain import check_brain
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_tree, check_types
 from schema.wire.arena import AdvanceShard
-from schema.wire.messages import Call, Evaluate, Failure, Request, Result, Traced
+from schema.wire.calls import CallSettings, pack_value, unpack_value
+from schema.wire.messages import (
+    Call,
+    CallValue,
+    Evaluate,
+    Failure,
+    Request,
+    Result,
+    Traced,
+)
+from worker.kinds import checked_evaluation
 from worker.robot.evaluation import evaluate, evaluate_traced
-from worker.serve.calls import call_function
-from worker.serve.checks import checked_evaluation
 from worker.serve.shards import Shards
 
 
@@ -69,3 +80,30 @@ def answer_evaluation(
         return evaluate(robot, settings, identity)
     except FAILURES as error:
         return Failure(str(error))
+
+
+def call_function(call: Call, settings: bytes) -> CallValue | Failure:
+    """Return the value of a function.
+
+    An error of the function, or a value that is not plain, is a result: a failure.
+
+    ``settings``: JSON of ``CallSettings``.
+
+    Raises:
+        MalformedMessage: no such settings or argument.
+        UnknownPlugin: no such function, or its module is not allowed here.
+        ExperimentError: it is no function of one argument.
+    """
+    try:
+        name = msgspec.json.decode(settings, type=CallSettings).function
+    except (ValueError, RecursionError) as error:
+        raise MalformedMessage(f"settings of a call: {error}") from None
+    function = load_function(name, "function", 1)
+    argument = unpack_value(call.argument)
+    try:
+        return CallValue(pack_value(function(argument)))
+    except ExperimentError as error:
+        return Failure(f"{name}: its value {error}")
+    # Also KeyboardInterrupt or SystemExit: no signal raises one in a worker.
+    except BaseException as error:  # noqa: BLE001 - a user's function may raise anything
+        return Failure(f"{name} raised {error_text(error)}")

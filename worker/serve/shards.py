@@ -34,7 +34,7 @@ from schema.wire.codec import decode, encode
 from schema.wire.messages import Request, StateMissing
 from worker.arena.changes import possible
 from worker.arena.world import World
-from worker.serve.checks import checked_arena
+from worker.kinds import checked_arena
 
 Key = tuple[str, int, int]
 """Name of a shard: its run, its number, and the number of a part of it."""
@@ -45,7 +45,6 @@ class _Held:
     """A shard after its latest advance.
 
     Attributes:
-        settings: as in the request.
         digest: of its state; empty before the first advance.
     """
 
@@ -145,11 +144,7 @@ class Shards:
             self._held.popitem(last=False)[1].world.close()
 
     def _rebuilt(self, data: bytes, work: AdvanceShard, rebuild: Rebuild) -> World:
-        """Return the arena in the state that an advance starts from.
-
-        Raises:
-            StateDiffers: a state on the way differs from the original one.
-        """
+        """Return the arena in the state that an advance starts from."""
         settings = read_arena_settings(data)
         if rebuild.snapshot:
             world = self._world.restore(settings, rebuild.snapshot, self._threads)
@@ -179,11 +174,7 @@ def _exchange(world: World, part: Part) -> None:
 
 
 def _advance(world: World, work: AdvanceShard) -> Advance:
-    """Advance an arena, or a part of it, after its changes.
-
-    Raises:
-        MalformedMessage: a part with works of another number of robots.
-    """
+    """Advance an arena, or a part of it, after its changes."""
     part, work_j = work.part, None
     if work.wants_tracks:
         work_j = _work_before(world, part)
@@ -203,11 +194,7 @@ def _advance(world: World, work: AdvanceShard) -> Advance:
 
 
 def _work_before(world: World, part: Part | None) -> dict[BirthId, float]:
-    """Return the work of robots earlier in an advance [J].
-
-    Raises:
-        MalformedMessage: it is of another number of robots.
-    """
+    """Return the work of robots earlier in an advance [J]."""
     if part is None or not part.work_j:
         return {}
     births = world.births
@@ -238,11 +225,7 @@ _types_of = lru_cache(maxsize=64)(types_of)
 
 
 def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
-    """Repeat a history of the same platform, equal to the last bit.
-
-    Raises:
-        StateDiffers: at the first advance with another digest.
-    """
+    """Repeat a history of the same platform, equal to the last bit."""
     for past in history:
         world.apply(past.changes)
         digest = world.advance(past.until).digest

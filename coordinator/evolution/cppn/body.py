@@ -45,8 +45,6 @@ class Grown:
     """Part of a growing body.
 
     Attributes:
-        kind: its type.
-        parameters: of the type.
         shape: for these parameters.
         slot: own slot by which it is attached; -1 for the core.
         orientation: about the normal of that slot [degrees].

@@ -88,12 +88,7 @@ _DECODER = msgspec.msgpack.Decoder(tuple[Literal["cppn-1"], CppnGenome])
 def evaluate(
     network: CppnGenome, inputs: Mapping[str, Floats], outputs: Sequence[str]
 ) -> dict[str, Floats]:
-    """Return outputs of a network for N queries.
-
-    Args:
-        network: the network.
-        inputs: (N,) of each of ``INPUTS``.
-        outputs: names of the outputs.
+    """Return named outputs of a network for N queries: (N,) of each of ``INPUTS``.
 
     Returns:
         (N,) of each output, in (-1, 1); 0 without enabled connections.
@@ -120,11 +115,9 @@ def evaluate(
 
 
 def queries(first: Floats, second: Floats) -> dict[str, Floats]:
-    """Return the inputs for N pairs of points.
+    """Return the inputs for N pairs of points, (N, 4) each.
 
-    Args:
-        first: (N, 4): x, y, z in units of 0.1 m, core frame; number of a neuron.
-        second: (N, 4), the same.
+    A point has x, y and z in units of 0.1 m, core frame, and the number of a neuron.
     """
     x, y, z, _ = second.T
     columns = (np.ones(len(first)), *first.T, *second.T, np.sqrt(x * x + y * y + z * z))
@@ -153,11 +146,7 @@ def to_bytes(network: CppnGenome) -> bytes:
 
 
 def from_bytes(data: bytes, outputs: Sequence[str]) -> CppnGenome:
-    """Return the network that `to_bytes` wrote.
-
-    Args:
-        data: the bytes.
-        outputs: names of all outputs.
+    """Return the network that `to_bytes` wrote; it may have all named outputs.
 
     Raises:
         ValueError: other bytes, or a network that breaks a rule of its type.

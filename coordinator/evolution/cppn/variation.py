@@ -174,11 +174,9 @@ def crossover(
 
 
 def new_id(split: Link, taken: set[str]) -> str:
-    """Return the marking of the node that splits a connection.
+    """Return the marking, not taken yet, of the node that splits a connection.
 
-    Args:
-        split: the connection.
-        taken: ids of the network, which may have split this connection before.
+    The network may have split this connection before.
     """
     count = 0
     while True:

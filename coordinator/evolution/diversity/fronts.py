@@ -63,10 +63,7 @@ class Objectives(Struct, frozen=True, kw_only=True):
 
 
 class Nsga2:
-    """Ranks by Pareto front, then by crowding distance.
-
-    Source: Deb et al. 2002, NSGA-II.
-    """
+    """Ranks by Pareto front, then by crowding distance (Deb et al. 2002, NSGA-II)."""
 
     Parameters = Objectives
 

@@ -17,7 +17,6 @@ class BrainParameters:
     """
 
     def __init__(self, rules: Learning, kinds: NeuronKinds) -> None:
-        """Initialise."""
         low, high = rules.weight_limits
         self._weight = Parameter("weight", low, high, low)
         self._has_weights = rules.what != "neurons"
@@ -34,11 +33,9 @@ class BrainParameters:
         )
 
     def written(self, brain: Brain, shares: Sequence[float]) -> Brain:
-        """Return a brain with other parameters.
+        """Return a brain with other parameters, shares of ranges as ``read`` returns.
 
-        Args:
-            brain: the brain; everything that is not learnt stays the same.
-            shares: of the ranges, as many as ``read`` returns.
+        Everything that is not learnt stays the same.
         """
         new = iter(shares)
         neurons = tuple(

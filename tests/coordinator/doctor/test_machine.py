@@ -10,11 +10,10 @@ import pytest
 
 from coordinator.doctor import command, machine
 from coordinator.doctor.certificate import check_certificate
-from coordinator.doctor.finding import Finding
 from coordinator.doctor.hub import check_hub, no_hub, refused
-from coordinator.doctor.machine import GIB, MIB
+from coordinator.doctor.machine import GIB, MIB, Finding
 from coordinator.doctor.system import available_bytes, end_rendering, start_rendering
-from coordinator.network.probe_service import ROLES, HubProbe
+from coordinator.network.client_service import ROLES, HubProbe
 from schema.agent.access import Certificate
 from schema.agent.certificate import CertificateFacts
 from schema.wire.operator import OperatorReply

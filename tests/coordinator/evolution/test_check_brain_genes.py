@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from coordinator.evolution.check_brain_genes import check_brain_genes
+from coordinator.evolution.check_encoding import check_brain_genes
 from coordinator.evolution.kinds import brain_kind
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from coordinator.__main__ import main
-from coordinator.plugins.cost import cost_line, evaluation_cost
+from coordinator.plugins.command import cost_line, evaluation_cost
 from schema.experiment.document import island_experiments
 from schema.experiment.file import read_experiment, shipped_experiments
 from schema.experiment.settings import evaluation_settings_of

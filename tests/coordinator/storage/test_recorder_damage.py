@@ -12,8 +12,9 @@ from coordinator.storage.folder import RunFolder, read_details
 from coordinator.storage.recorder import Recorder, Segment
 from coordinator.storage.removal import remove_segment
 from schema.errors import RunFolderError
-from schema.tables.checksums import read_seal, sums_path
+from schema.tables.checksums import sums_path
 from schema.tables.columns import BIRTHS, TABLES
+from schema.tables.description import read_description
 from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import read_segment, segment_path, segments_of, warn_once
 from tests.coordinator.records import DETAILS, check_complete, feed_rows, make_records
@@ -135,10 +136,10 @@ def test_finished_tables_are_sealed_in_the_description(tmp_path: Path) -> None:
         recorder = Recorder(folder, DETAILS, seal=held.seal)
         for record in rows:
             recorder.write(record)
-        assert read_seal(folder).digests == {}
+        assert read_description(folder).digests == {}
         recorder.finish()
         name = held.name
-    seal = read_seal(folder)
+    seal = read_description(folder)
     assert seal.checksums
     assert seal.digests == {
         name: sha256(

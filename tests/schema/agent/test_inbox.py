@@ -8,8 +8,7 @@ from queue import Empty
 
 import pytest
 
-from schema.agent.fair_queue import MOST_SOURCES, FairQueue
-from schema.agent.inbox import Inbox
+from schema.agent.inbox import MOST_SOURCES, FairQueue, Inbox
 from schema.limits import WAITING_JOB_BYTES
 
 

@@ -18,7 +18,7 @@ from schema.agent.log import (
     tell_user,
     warn_user,
 )
-from schema.agent.terminal.progress_line import SPAN_S, ProgressLine, progress_if_long
+from schema.agent.progress_line import SPAN_S, ProgressLine, progress_if_long
 from schema.errors import RevolveError
 
 
@@ -131,7 +131,7 @@ def test_only_a_long_task_shows_its_newest_progress(
     with progress_if_long("0 of 9") as tell:
         tell("1 of 9")
     assert capsys.readouterr() == ("", "")
-    monkeypatch.setattr("schema.agent.terminal.progress_line.SOON_S", 0.05)
+    monkeypatch.setattr("schema.agent.progress_line.SOON_S", 0.05)
     with progress_if_long("0 of 9") as tell:
         tell("1 of 9")
         time.sleep(0.5)

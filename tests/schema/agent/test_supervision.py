@@ -134,9 +134,10 @@ def test_process_that_exits_by_itself_is_restarted_later_each_time(
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_the_user_is_told_once_of_a_process_that_was_killed() -> None:
     with ProcessPool(leave, ("killed",), size=1) as process_pool:
-        (pid,) = process_pool.pids
-        os.kill(pid, signal.SIGKILL)
-        told = until(process_pool, lambda: process_pool.pids not in ([], [pid]))
+        (killed,) = process_pool._processes
+        assert killed.pid is not None
+        os.kill(killed.pid, signal.SIGKILL)
+        told = until(process_pool, lambda: killed not in process_pool._processes)
         assert told == ["a worker process ended; it is restarted"]
         assert process_pool.look_after() == []
 

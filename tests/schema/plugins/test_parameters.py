@@ -11,10 +11,9 @@ from msgspec import Meta, Struct, field
 from schema.errors import ExperimentError
 from schema.experiment.section import Parameters, PluginSection
 from schema.plugins.load import load_module
-from schema.plugins.needs import channels_of, needs
 from schema.plugins.parameters import read_parameters
 from schema.plugins.state import own_modules, unchanged
-from schema.robot.trace import Trace
+from schema.robot.trace import Trace, channels_of, needs
 
 
 class Wheel(Struct, frozen=True):

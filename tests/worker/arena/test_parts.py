@@ -13,12 +13,11 @@ from schema.errors import MalformedMessage, UnexpectedEvent
 from schema.experiment.document import Fitness, Measures, Space
 from schema.experiment.environment import Environment
 from schema.experiment.settings import split_problems
-from schema.plugins.needs import needs
 from schema.plugins.permission import allow
 from schema.robot.groups import Group
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.robot.trace import Trace
+from schema.robot.trace import Trace, needs
 from schema.wire.arena import BrainChange, Changes
 from schema.wire.arena_state import states_of
 from tests.worker.arena.test_changing_world import change, changing

@@ -9,11 +9,10 @@ from schema.errors import InvalidRobot
 from schema.experiment.document import Measures, Simulation, Space, body_space
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import Ablation, EvaluationSettings
-from schema.plugins.needs import needs
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.robot.trace import Trace
+from schema.robot.trace import Trace, needs
 from tests.schema import robots
 from tests.worker.evaluations import with_simulation
 from worker.filters.ablation import all_ablations

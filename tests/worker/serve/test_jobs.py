@@ -36,10 +36,9 @@ from schema.wire.messages import (
     Work,
 )
 from worker.arena.world import World
+from worker.kinds import checked_evaluation
 from worker.robot.evaluation import evaluate
-from worker.serve.calls import call_function
-from worker.serve.checks import checked_evaluation
-from worker.serve.jobs import Jobs
+from worker.serve.jobs import Jobs, call_function
 from worker.serve.shards import Shards
 
 EXPERIMENT = Experiment(name="test", simulation=Simulation(window_steps=400))

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from cmaes import CMA
 
-from coordinator.evolution.learners.check_learner import check_learner
-from coordinator.evolution.learners.learner import NewbornLearner, Points
+from coordinator.evolution.learners.learner import NewbornLearner, Points, check_learner
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.learning import LEARNERS, Learning
 from tests.docs.page_runner import blocks_of
