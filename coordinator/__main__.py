@@ -46,7 +46,6 @@ from coordinator.storage.folder import holds_run
 from coordinator.storage.hints import command as command_line
 from coordinator.storage.hints import stopped
 from schema.agent.address import HUB
-from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import (
     access_of,
     agent_of,
@@ -59,6 +58,7 @@ from schema.agent.extras import install_advice
 from schema.agent.flags import Flags
 from schema.agent.import_path import missing_screen
 from schema.agent.log import start_log, tell_user, warn_user
+from schema.agent.machine import memory_bytes, shards_that_fit
 from schema.agent.request_handler import Compute
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped

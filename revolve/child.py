@@ -19,11 +19,7 @@ _SIMULATE = "simulate"
 
 
 def main(words: list[str]) -> int:
-    """Do what the words say and return the exit code.
-
-    Args:
-        words: number of the socket, ``simulate`` or ``command``, words of the command.
-    """
+    """Do what the words say (see above) and return the exit code."""
     connection = Connection(int(words[0]))
     if words[1] == _SIMULATE:
         stop_with_input(lambda: os._exit(0))

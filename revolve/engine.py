@@ -65,10 +65,8 @@ class Engine:
     ) -> None:
         """Open the network and start the thread.
 
-        Args:
-            network: not yet open.
-            find_fault: returns why no worker can do a job any more, or "".
-            give_up_after_s: time for which jobs wait without a fit worker [s].
+        ``find_fault`` returns why no worker can do a job any more, or "". Jobs wait for
+        ``give_up_after_s`` without a fit worker.
 
         Raises:
             NetworkError: there is no hub, or none can be opened.

@@ -56,7 +56,7 @@ class Simulation(AbstractContextManager["Simulation"]):
     ) -> None:
         """Build the model and start."""
         choose_engine()
-        from worker.filters.ablation import inputs_of, motors_of  # noqa: PLC0415
+        from worker.filters.channels import inputs_of, motors_of  # noqa: PLC0415
         from worker.kinds import checked_evaluation  # noqa: PLC0415
 
         settings = settings_for(robot, experiment, record)

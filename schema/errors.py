@@ -76,11 +76,7 @@ MessageFault = Literal["malformed", "too large", "stale", "impossible", "differs
 
 
 class MalformedMessage(RevolveError):  # noqa: N818 - reads as what it says
-    """A message of a peer that is not believed; it is counted and dropped.
-
-    Attributes:
-        kind: what is wrong, for counts.
-    """
+    """A message of a peer that is not believed: it is counted by kind, and dropped."""
 
     def __init__(self, why: str, kind: MessageFault = "malformed") -> None:
         """Initialise with a reason, which may quote the peer and is cut."""

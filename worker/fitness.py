@@ -97,17 +97,11 @@ def straight_velocity(track: Trace) -> float:
 
 
 def thesis(track: Trace, fitness: Fitness) -> float:
-    """Return f = path_weight v + straight_weight s, or 0 above the limit.
+    """Return f = path_weight v + straight_weight s [m/s], or 0 above the limit.
 
-    v is the path velocity, s the straight one. The limit is one of fitness, not
-    of speed: fitness above it comes from broken physics.
-
-    Args:
-        track: (T, 3) positions; T >= 2.
-        fitness: the weights, 1 and 5 in the thesis, and the limit, 1.0.
-
-    Returns:
-        The fitness [m/s], finite, >= 0 for weights >= 0.
+    v is the path velocity, s the straight one, of (T, 3) positions, T >= 2. The limit
+    is one of fitness, not of speed: fitness above it comes from broken physics. The
+    weights are 1 and 5 in the thesis, the limit is 1.0.
 
     Source: Hupkes 2016, equation 5.1, and its published code for the limit.
     """

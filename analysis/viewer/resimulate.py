@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from analysis.measures.load import LoadedRun
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
-from schema.agent.platform_tag import platform_tag
+from schema.agent.machine import platform_tag
 from schema.experiment.document import Experiment, island_experiment, steps_of
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Identity, Origin

@@ -17,8 +17,8 @@ from schema.agent.access import Certificate
 from schema.agent.address import ADDRESS
 from schema.agent.command import name_at
 from schema.agent.log import tell_user
+from schema.agent.machine import platform_tag
 from schema.agent.network import Agent
-from schema.agent.platform_tag import platform_tag
 from schema.agent.request_handler import Compute
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool

@@ -128,11 +128,8 @@ def lengthen_all(folder: Path, births: int) -> None:
 def finished_code(folder: Path) -> int | None:
     """Return the exit code of a run that needs no resumption, and tell the user so.
 
-    The file of its best robot is written if it is missing.
-
-    Returns:
-        None for a campaign, for a run that is not finished or whose tables are to be
-        written again, and where there is no run.
+    The file of its best robot is written if it is missing. None is of a campaign, of a
+    run that is not finished or whose tables are to be written again, and of no run.
 
     Raises:
         RunFolderError: a damaged table cannot be written again, or another version of

@@ -55,12 +55,7 @@ Fields = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class EventFilter:
-    """Events to print; None selects all.
-
-    Attributes:
-        island: island that handles the event.
-        origin: island of a robot's birth.
-    """
+    """Events to print; None selects all. ``origin`` is the island of the birth."""
 
     island: int | None = None
     origin: int | None = None

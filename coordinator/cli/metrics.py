@@ -73,11 +73,7 @@ _COUNTERS = {"births", "faults"}
 
 
 class MetricsServer(AbstractContextManager["MetricsServer"]):
-    """HTTP server of the metrics; use it in a ``with``.
-
-    Attributes:
-        url: where the metrics are.
-    """
+    """HTTP server of the metrics at ``url``; use it in a ``with``."""
 
     def __init__(self, host: str, port: int) -> None:
         """Listen at a host, IPv6 in brackets; port 0 lets the system choose.

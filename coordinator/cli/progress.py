@@ -52,13 +52,8 @@ class Display:
     ) -> None:
         """Show all runs of a scheduler; if ``quiet``, only what they wait for.
 
-        Args:
-            scheduler: its runs.
-            quiet: show no progress.
-            console: where to draw; None: on standard error.
-            place: to which the user has to connect agents; empty: this command has
-                started some.
-            plugins: modules and files that these agents need to import.
+        The user has to connect agents to ``place``, which import ``plugins``; it is
+        empty if this command has started some.
         """
         self._scheduler = scheduler
         self._console = console or Console(stderr=True)

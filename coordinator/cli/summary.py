@@ -41,11 +41,7 @@ _BEST = "best robot of the last population"
 
 @dataclass(frozen=True, slots=True)
 class Conclusion:
-    """Summary of a finished run.
-
-    Attributes:
-        failures: line about failed evaluations; empty if there are none.
-    """
+    """Summary of a finished run; ``failures``, a line, is empty if none failed."""
 
     text: str
     failures: str

@@ -45,13 +45,9 @@ def issue(
 ) -> datetime:
     """Write a certificate that the authority signs, and its private key (mode 0600).
 
-    Args:
-        authority: files of the authority: certificate, key.
-        files: to write: certificate, key.
-        name: common name; the owner's name in the fleet.
-        hosts: names and addresses by which clients reach the owner, if it is a hub.
-        now: the time, in UTC.
-        days: how long it is valid [d], if the authority is valid as long.
+    Authority and files are each a certificate and its key. The owner is reached by the
+    hosts, if it is a hub. The certificate ends after the days [d], or with the
+    authority. ``now`` is in UTC.
 
     Raises:
         RevolveError: the authority's files cannot be read, or it has expired.

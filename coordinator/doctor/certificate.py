@@ -28,11 +28,8 @@ def check_certificate(
     elif not facts.fits_key:
         text = f"{title} does not fit the key of --tls-key"
     elif now < facts.begins:
-        begins = facts.begins.astimezone(UTC)
-        text, advice = (
-            f"{title} is valid from {begins:%Y-%m-%d %H:%M} UTC",
-            "set the clock",
-        )
+        begins = f"{facts.begins.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+        text, advice = f"{title} is valid from {begins}", "set the clock"
     elif now >= facts.ends:
         text = f"{title} has expired on {facts.ends.astimezone(UTC):%Y-%m-%d}"
         advice = _RENEW

@@ -24,8 +24,8 @@ from schema.agent.command import (
 )
 from schema.agent.flags import Flags
 from schema.agent.import_path import missing_screen
+from schema.agent.machine import cpu_flags, platform_tag
 from schema.agent.network import Tls
-from schema.agent.platform_tag import cpu_flags, platform_tag
 from schema.agent.service import why_no_hub
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError

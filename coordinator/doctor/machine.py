@@ -10,7 +10,7 @@ from time import gmtime, strftime
 from typing import Literal
 
 from schema.agent.extras import install_advice
-from schema.agent.platform_tag import cpu_class
+from schema.agent.machine import cpu_class
 
 Level = Literal["ok", "warn", "fail"]
 
@@ -70,10 +70,7 @@ def check_versions(versions: Mapping[str, str | None]) -> Finding:
 def check_cpu(machine: str, flags: Collection[str], tag: str) -> Finding:
     """Check the CPU class, which decides whose results are equal.
 
-    Args:
-        machine: architecture, as ``platform.machine`` names it, lower case.
-        flags: features of the CPU; empty if the system does not list them.
-        tag: platform tag of this machine.
+    ``flags`` are empty if the system does not list the features of the CPU.
     """
     level = cpu_class(machine, flags)
     is_old = level.startswith("x86_64") and level not in _BEST_CLASS
@@ -93,10 +90,8 @@ def check_cpu(machine: str, flags: Collection[str], tag: str) -> Finding:
 def check_memory(available: int | None, limit: int | None, cores: int) -> Finding:
     """Check that there is memory for a worker per core.
 
-    Args:
-        available: memory that programs can get [bytes]; None: unknown.
-        limit: what a control group leaves [bytes]; None: no limit.
-        cores: that this process may use.
+    ``available`` to programs, None if unknown; ``limit`` is what a control group
+    leaves.
     """
     known = [size for size in (available, limit) if size is not None]
     if not known:

@@ -7,9 +7,8 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-from schema.agent.capacity import group_numbers, system_text
 from schema.agent.import_path import environment
-from schema.agent.platform_tag import wire_version
+from schema.agent.machine import group_numbers, system_text, wire_version
 from schema.agent.version import LIBRARIES, VERSION, installed
 from schema.plugins.permission import GROUP
 

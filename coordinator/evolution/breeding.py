@@ -146,9 +146,7 @@ class Breeder:
     """Source of candidates and selector of survivors for one island and run.
 
     What fails in a rule or an encoding is an ``ExperimentError`` that names the birth.
-
-    Attributes:
-        emigrants: own rule that selects them; None for a built-in one.
+    ``emigrants`` is an own rule that selects them; None for a built-in one.
     """
 
     def __init__(
@@ -180,23 +178,16 @@ class Breeder:
         end: float = inf,
         is_chosen: bool = False,
     ) -> Candidate | None:
-        """Return the candidate of the first attempt that gives one.
+        """Return the candidate of the first attempt that gives one; None: ``end`` came.
 
-        Args:
-            birth: id of the birth.
-            attempt: number of the first attempt, from 0, through all couples.
-            population: possible parents; empty for a founder.
-            couple: parents of the attempt before; None at the first.
-            why: reason why the attempt before failed; empty at the first.
-            end: number of the attempt at which to stop.
-            is_chosen: the population are the parents, two or one.
-
-        Returns:
-            The candidate; None if no attempt before ``end`` gives one.
+        Attempts are numbered from 0, through all couples. The population has the
+        possible parents, and none for a founder; if ``is_chosen``, it is the parents,
+        two or one. Of the attempt before, ``couple`` has the parents, ``why`` the
+        reason why it failed.
 
         Raises:
-            ExperimentError: (nearly) no robot meets the restrictions, or an
-                encoding's own code fails.
+            ExperimentError: (nearly) no robot meets the restrictions, or an encoding's
+                own code fails.
         """
         with at_birth(birth):
             if birth.number < len(self._founders):
@@ -238,11 +229,8 @@ class Breeder:
         """Return the parents of one attempt and the genome of their child.
 
         Arguments and errors are as of ``candidate``. After ``max_mating_attempts`` new
-        parents are selected.
-
-        Returns:
-            The parents, None for a random robot; and the genome, None if mating
-            failed.
+        parents are selected. A random robot has none; the genome is None if mating
+        failed.
         """
         selection = self._experiment.selection
         if is_chosen:

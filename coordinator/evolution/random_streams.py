@@ -63,11 +63,8 @@ def stream(
 class BufferedRng:
     """Random choices from one stream, in the order of the calls.
 
-    A scalar call to NumPy costs more than most of what variation does with it, so
-    the stream is read in blocks.
-
-    Attributes:
-        number: function that returns the next number, uniform in [0, 1).
+    A scalar call to NumPy costs more than most of what variation does with it, so the
+    stream is read in blocks; ``number`` returns the next one, uniform in [0, 1).
     """
 
     __slots__ = ("number",)

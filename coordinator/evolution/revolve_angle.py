@@ -92,12 +92,9 @@ class RevolveAngle:
         """Return the genome of a child: crossover and mutation of one mutable tree.
 
         The first parent gives the root, the second a subtree; the identities of new
-        parts derive from the child's birth id.
-
-        Returns:
-            A genome within all restrictions, planar where the experiment says so, with
-            at least one motor; None if crossover finds no fitting subtree or no motor
-            is left.
+        parts derive from the child's birth id. It is within all restrictions, planar
+        where the experiment says so, with at least one motor; None if crossover finds
+        no fitting subtree or no motor is left.
         """
         draws = BufferedRng(rng)
         branches, donor = to_branches(first, self._types), self._donor(second)
@@ -205,13 +202,10 @@ def crossover(
     donor: Donor,
     experiment: Experiment,
 ) -> bool:
-    """Replace a subtree by one of a donor; neither is a root.
+    """Replace a subtree by one of a donor, neither a root; return whether one was.
 
     The replaced subtree is uniform. The donated one is uniform among those with which
     the tree stays within its limits; it keeps its own slot and orientation.
-
-    Returns:
-        Whether a subtree was replaced; if not, the tree is unchanged.
     """
     space = experiment.space
     if len(branches) == 1:

@@ -14,14 +14,11 @@ from schema.wire.messages import Evaluate
 
 
 class IslandMigration:
-    """Emigrants and immigrants of one island.
+    """Emigrants and immigrants of one island; ``epochs``: when, and what has come.
 
-    All immigrants of an epoch settle together, after the last of their
-    re-evaluations. An immigrant that lives on the island already, as the original or
-    as a copy, is dropped.
-
-    Attributes:
-        epochs: when the island sends migrants, and what its neighbours sent.
+    All immigrants of an epoch settle together, after the last of their re-evaluations.
+    An immigrant that lives on the island already, as the original or as a copy, is
+    dropped.
     """
 
     def __init__(
@@ -74,9 +71,8 @@ class IslandMigration:
     ) -> tuple[list[Evaluate | Record], tuple[Individual, ...] | None]:
         """Receive the immigrants of the epoch if all neighbours have sent theirs.
 
-        Returns:
-            Evaluations to do and rows; and the new population once all immigrants
-            have settled, None before.
+        Return evaluations to do and rows; and the new population once all immigrants
+        have settled, None before.
         """
         commands: list[Evaluate | Record] = []
         if self.epochs.is_complete:

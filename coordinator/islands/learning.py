@@ -25,11 +25,7 @@ from schema.wire.messages import Evaluate
 
 
 class IslandLearning:
-    """What all newborns of an island that learns have in common.
-
-    Attributes:
-        parameters: what is learnt of a brain.
-    """
+    """What all newborns of an island that learns have in common: what they learn."""
 
     def __init__(self, experiment: Experiment, encoding: IslandEncoding) -> None:
         """Initialise.
@@ -67,11 +63,7 @@ class IslandLearning:
 
 
 class NewbornLearning:
-    """The trials of one newborn.
-
-    Attributes:
-        is_waiting: its learner is asked.
-    """
+    """The trials of one newborn; it ``is_waiting`` while its learner is asked."""
 
     def __init__(self, candidate: Candidate, island: IslandLearning) -> None:
         self._candidate = candidate

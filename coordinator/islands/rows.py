@@ -97,11 +97,10 @@ def body_rows(robot: Robot) -> list[Row]:
 def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     """Return the counts of a births row.
 
-    Returns:
-        ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
-        (parts without children; a lone core counts 1), ``inputs``, ``outputs``,
-        ``hidden``, and ``connections`` of a genome of ``revolve-angle``, including
-        unresolved ones; of another genome's robot.
+    They are ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
+    (parts without children; a lone core counts 1), ``inputs``, ``outputs``, ``hidden``,
+    and ``connections`` of a genome of ``revolve-angle``, including unresolved ones; of
+    another genome's robot.
 
     Source: thesis section 6.3; the code of the original.
     """

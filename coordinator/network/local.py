@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Joined, Returned
-from schema.agent.capacity import memory_bytes, shards_that_fit
+from schema.agent.machine import memory_bytes, shards_that_fit
 from schema.agent.request_handler import Compute, answer
 from schema.errors import RevolveError
 from schema.limits import ADVANCE_REQUEST_BYTES

@@ -26,6 +26,7 @@ from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
 from schema.agent.inbox import Inbox
 from schema.agent.log import tell_user, warn_user
+from schema.agent.machine import wire_version
 from schema.agent.network import (
     ASK_TIMEOUT_S,
     CANCELLED,
@@ -37,7 +38,6 @@ from schema.agent.network import (
     client_config,
     hub_config,
 )
-from schema.agent.platform_tag import wire_version
 from schema.agent.service import (
     HubWatch,
     Outlet,
@@ -153,20 +153,15 @@ class Network:
     ) -> None:
         """Configure the session; ``with`` opens it.
 
-        Args:
-            name: of this process, never used by another one.
-            fleet: name of the fleet.
-            listen: addresses of the hub within this process, beside a Unix socket
-                that only this user can connect to.
-            connect: address of a hub elsewhere; then nothing listens here.
-            tls: files for ``tls/`` addresses.
-            certificates: those that may connect; None: all of the authority.
-            give_up_after_s: time without a hub elsewhere after which ``receive``
-                raises [s].
+        The hub within this process listens on the addresses, beside a Unix socket that
+        only this user can connect to. Or a hub is elsewhere, at ``connect``, and
+        nothing listens here; without it for ``give_up_after_s``, ``receive`` raises. No
+        other process ever has the name. The certificates are those that may connect;
+        None: all of the authority.
 
         Raises:
-            NetworkError: invalid names or addresses, or an address that other
-                machines reach without TLS.
+            NetworkError: invalid names or addresses, or an address that other machines
+                reach without TLS.
         """
         self.own_address = connect or new_socket()
         self.address = connect or (*listen, self.own_address)[0]
@@ -291,9 +286,7 @@ class Network:
     def receive(self, timeout_s: float, pause_s: float = 0.0, /) -> list[DispatchEvent]:
         """Return events in order of arrival; empty if none came in time.
 
-        Args:
-            timeout_s: how long to wait for the first event, after the pause [s].
-            pause_s: how long to let events collect first [s].
+        Events collect during the pause [s]; after it, the first is waited for [s].
 
         Raises:
             HubLost: no hub has answered for too long.

@@ -60,12 +60,10 @@ class ArenaParts:
     """
 
     def __init__(self, state: ArenaState, interval_s: float, steps: int) -> None:
-        """Begin with a state, which one worker holds as part 0.
+        """Begin with the state of all robots, which one worker holds as part 0.
 
-        Args:
-            state: of all robots.
-            interval_s: between checks for contacts [s].
-            steps: of an exchange at first, at most.
+        Contacts are checked at the interval [s]; an exchange has at most ``steps`` at
+        first.
         """
         self.state = state
         self.repeats, self.came = 0, Counter[int]()
@@ -197,8 +195,7 @@ class ArenaParts:
     def end(self, parts: int) -> Advance | None:
         """End an exchange without overlaps; begin the next one of the advance.
 
-        Returns:
-            The whole advance; None if another exchange has begun.
+        Return the whole advance; None if another exchange has begun.
         """
         requested, again = self._requested, self._exchange.repeated
         assert requested is not None

@@ -40,10 +40,8 @@ def groups_of(
 ) -> list[Group]:
     """Return the robots that must be advanced together, group by group.
 
-    Args:
-        boxes: of all robots.
-        clusters: robots of one model; those that are in none are alone.
-        growth_m: by which each box is grown on each side [m].
+    Clusters are robots of one model; a robot of none is alone. Each box grows on each
+    side.
     """
     grown = {
         birth: (west - growth_m, south - growth_m, east + growth_m, north + growth_m)
@@ -64,13 +62,9 @@ def divide(
     """Return the groups of each part, with few moves.
 
     A group stays where most of it is, until moving it lowers the cost of the most
-    expensive part by more than the move costs. Parts that hardly differ stay.
-
-    Args:
-        groups: robots that stay together, each at least one.
-        costs: of an exchange of each robot, in any unit.
-        held: present part of each robot that has one.
-        parts: their number.
+    expensive part by more than the move costs. Parts that hardly differ stay. Costs are
+    of an exchange of each robot, in any unit; ``held`` is the present part of each that
+    has one.
     """
     cost_of = {group: sum(costs[birth] for birth in group) for group in groups}
     divided: list[list[Group]] = [[] for _ in range(parts)]

@@ -128,7 +128,12 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
         try:
             use.check()
         except ExperimentError as error:
-            raise _with_hint(error, experiment) from None
+            # An island may have a table of the top level.
+            is_inherited = experiment.islands and experiment.fitness.parameters
+            if not (is_inherited and str(error).startswith("fitness.parameters")):
+                raise
+            hint = "'parameters = {}' in [islands.fitness] replaces those of [fitness]"
+            raise type(error)(f"{error}; {hint}") from None
     for own in island_experiments(experiment):
         if own.arena is not None and not is_own(own.arena.rules):
             load_rules(own)
@@ -139,15 +144,6 @@ def check_built_in(experiment: Experiment, kinds: Sequence[Kind]) -> None:
             IslandLearning(own, encoding_of(own))
         elif not is_own(own.encoding.type):
             encoding_of(own)
-
-
-def _with_hint(error: ExperimentError, experiment: Experiment) -> ExperimentError:
-    """Return an error, with a hint if an island may have a table of the top level."""
-    is_inherited = experiment.islands and experiment.fitness.parameters
-    if not (is_inherited and str(error).startswith("fitness.parameters")):
-        return error
-    hint = "'parameters = {}' in [islands.fitness] replaces those of [fitness]"
-    return type(error)(f"{error}; {hint}")
 
 
 def check_apart(

@@ -28,7 +28,7 @@ from coordinator.storage.journal import Journal, is_begun
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.agent.log import warn_user
-from schema.agent.platform_tag import cpu_flags, platform_tag
+from schema.agent.machine import cpu_flags, platform_tag
 from schema.agent.version import VERSION
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_from_text

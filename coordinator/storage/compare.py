@@ -22,12 +22,11 @@ LONGEST = 60
 def compare(first: Path, second: Path) -> list[str]:
     """Return the differences of two runs or campaigns in their repeatable columns.
 
-    Returns:
-        One line for each run without births, or shorter and not finished; for each
-        table whose number of rows differs; and for its first differing row and column.
-        Others name the last brood of a shorter run, which has no counterpart, and
-        different platforms, as equality is only guaranteed on one. Of campaigns, such
-        lines of each run, named first; a last line names the runs that differ.
+    There is one line for each run without births, or shorter and not finished; for each
+    table whose number of rows differs; and for its first differing row and column.
+    Others name the last brood of a shorter run, which has no counterpart, and different
+    platforms, as equality is only guaranteed on one. Of campaigns, such lines of each
+    run, named first; a last line names the runs that differ.
 
     Raises:
         RunFolderError: a folder holds no run, or a table cannot be read.

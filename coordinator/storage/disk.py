@@ -13,13 +13,10 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class AppendedFile:
-    """File that grows by whole pieces.
+    """File that grows by whole pieces to a ``size`` [bytes].
 
     Writes are unbuffered: an appended piece survives a kill of this process, and with
     ``fsync`` also a power loss.
-
-    Attributes:
-        size: its length [bytes].
     """
 
     def __init__(self, path: Path, *, fsync: bool = False) -> None:

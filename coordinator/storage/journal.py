@@ -43,11 +43,7 @@ MOST_RECORDED_EPOCH = (1 << 64) // _RECORDS - 1
 
 
 class Journal(AbstractContextManager["Journal"]):
-    """A journal that is open for writing.
-
-    Attributes:
-        dropped: bytes of an incomplete last record that opening removed.
-    """
+    """A journal to write; opening it ``dropped`` bytes of an incomplete last record."""
 
     def __init__(self, path: Path, *, epoch: int = 0, fsync: bool = False) -> None:
         """Open a journal; create it if it is missing.

@@ -16,7 +16,7 @@ import pyarrow.parquet
 
 from coordinator.islands.events import Advanced, Record
 from coordinator.storage.disk import AppendedFile, storage_errors
-from coordinator.storage.removal import cut_segment, remove_rows, remove_segment
+from coordinator.storage.rewriting import cut_segment, remove_rows, remove_segment
 from schema.errors import RunFolderError
 from schema.tables.checksums import CHECK, FIELDS, MAGIC, digest_of, sums_path
 from schema.tables.columns import ROWS, TABLES
@@ -234,8 +234,7 @@ class TableFile:
     def prepare(self) -> str:
         """Write all rows as Parquet under another name; return the file's SHA-256.
 
-        Returns:
-            In hexadecimal; empty if the table has its final form already.
+        In hexadecimal; empty if the table has its final form already.
         """
         if self._parquet.exists():
             return ""

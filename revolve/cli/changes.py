@@ -29,7 +29,7 @@ from schema.experiment.document import REVOLVE_ANGLE, body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.robot import Robot as PlainRobot
 from schema.tables.description import make_folder
-from worker.filters.ablation import all_ablations
+from worker.filters.channels import all_ablations
 from worker.robot.robustness import all_changes
 
 Row = dict[str, Any]

@@ -57,10 +57,7 @@ class Chosen(NamedTuple):
 def chosen_robots(folders: Iterable[Path], most: int | None = None) -> list[Chosen]:
     """Return the best robot ever of each run, and those of its last populations.
 
-    Args:
-        folders: of finished runs.
-        most: greatest number of robots of a run's last populations, the fittest
-            first and failed ones last; None: all.
+    Of these at most as many of each run, the fittest first and failed ones last.
 
     Raises:
         RunFolderError: no finished run, or no robot of it was evaluated.

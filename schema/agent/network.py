@@ -113,15 +113,13 @@ def hub_config(
 ) -> str:
     """Return the configuration (JSON5) of a hub, within a process or for zenohd.
 
-    Args:
-        listen: addresses; one at least.
-        tls: files for the ``tls/`` ones among them.
-        certificates: those whose owners may connect, each with the rights of its role;
-            None: every certificate of the authority has all rights.
+    It listens on one address at least. The owners of the certificates may connect, each
+    with the rights of its role; None: every certificate of the authority has all
+    rights.
 
     Raises:
-        NetworkError: no address, an invalid one, one that other machines reach
-            without TLS, one that needs files, or names of certificates that clash.
+        NetworkError: no address, an invalid one, one that other machines reach without
+            TLS, one that needs files, or names of certificates that clash.
     """
     if not listen:
         raise NetworkError("a hub must listen on one address at least, got none")

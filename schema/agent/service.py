@@ -21,11 +21,15 @@ from typing import Any
 
 import zenoh
 
-from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.inbox import FairQueue, Inbox
 from schema.agent.log import start_log, tell_user, warn_user
+from schema.agent.machine import (
+    memory_bytes,
+    platform_tag,
+    shards_that_fit,
+    wire_version,
+)
 from schema.agent.network import DEFAULT_FLEET, UNFIT, Agent, Tls, client_config
-from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import Compute, ReplyCounts, Server
 from schema.agent.supervision import LOOK_S, ProcessSlot
 from schema.agent.supervisor import (

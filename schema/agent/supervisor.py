@@ -21,9 +21,9 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
-from schema.agent.capacity import core_quota
 from schema.agent.import_path import SAFE_PATH, check_graphics
 from schema.agent.log import warn_user
+from schema.agent.machine import core_quota
 from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import LAST_DEATHS, CurrentJob, ProcessSlot, crash_cause
 from schema.errors import shown

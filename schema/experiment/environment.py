@@ -136,9 +136,8 @@ def ground_problems(environment: Environment) -> Iterator[str]:
 def relief(environment: Environment) -> Floats:
     """Return the heights of rough ground as shares of the greatest, in [0, 1].
 
-    Returns:
-        (N, N) exact in single precision, rows along y, columns along x, both
-        ascending; 0 at the rim, 1 at the highest node.
+    They are (N, N), exact in single precision, rows along y, columns along x, both
+    ascending; 0 at the rim, 1 at the highest node.
     """
     half = environment.patches
     rng = np.random.default_rng(environment.ground_seed)

@@ -67,12 +67,9 @@ def read_draft(
 ) -> Draft:
     """Return the experiments of a document.
 
-    Args:
-        source: a shipped name such as ``scenario1``, a path that ends in ``.toml``, or
-            the tables of a TOML text, which are not changed.
-        births: of ``--births``, in place of those of the document.
-        where: path of the text whose tables are given.
-        run: of ``--from``, in place of those that the document's founders come from.
+    It is a shipped name such as ``scenario1``, a path that ends in ``.toml``, or the
+    tables of a TOML text at ``where``, which are not changed. Births and run are those
+    of ``--births`` and ``--from``, in place of the document's.
 
     Raises:
         ExperimentError: no such experiment or file; an unknown key (the nearest is
@@ -178,12 +175,9 @@ def experiment_from_text(
 ) -> Experiment:
     """Return the experiment that ``experiment_text`` wrote, in any version.
 
-    Args:
-        text: of a run folder or a message.
-        is_own: the user named the folder: installed modules that the experiment names
-            may be imported by this process from now on.
-        is_resumed: the run goes on: all its keys must be known. Otherwise keys that
-            no longer exist are left out.
+    ``is_own``: the user named the folder, so installed modules that the experiment
+    names may be imported by this process from now on. ``is_resumed``: the run goes on,
+    so all its keys must be known; otherwise keys that no longer exist are left out.
 
     Raises:
         ExperimentError: another text.

@@ -93,16 +93,13 @@ def fitness_text(
 ) -> str:
     """Return the fitness functions of an experiment, with what changes their values.
 
-    Fitness has the same meaning in two experiments if these texts are equal.
+    Fitness has the same meaning in two experiments, or those of one island, if these
+    texts are equal. Digests are of the sources of plug-ins, by module; None leaves them
+    out.
 
-    Args:
-        experiment: the document, or that of one island.
-        digests: of the sources of plug-ins, by module; None leaves sources out.
-
-    Returns:
-        For example ``locomotion``, ``locomotion (limit = 2.0)`` or ``goals:fast
-        (source 6f1d2a)``; several functions of islands with ``and`` between. Keys with
-        default values are left out.
+    For example ``locomotion``, ``locomotion (limit = 2.0)`` or ``goals:fast (source
+    6f1d2a)``; several functions of islands with ``and`` between. Keys with default
+    values are left out.
     """
     sections = (each.fitness for each in island_experiments(experiment))
     return " and ".join(dict.fromkeys(_text(each, digests) for each in sections))

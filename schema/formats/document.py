@@ -103,13 +103,10 @@ def _refusal(problem: str, event: yaml.Event) -> yaml.YAMLError:
 
 
 class Table:
-    """Mapping in a document.
+    """Mapping in a document, whose first line, from 1, is ``line``.
 
     Its methods raise ``InvalidRobot``, with file, line and path: for a missing key
     without a default, or a value of another kind.
-
-    Attributes:
-        line: number of its first line, from 1.
     """
 
     def __init__(self, node: DocumentNode | None, path: str, file: str) -> None:

@@ -91,24 +91,16 @@ def read_with_settings(
     """Return a file's robot, its evaluation settings and their experiment.
 
     An MJCF file and a packed robot hold their settings: they apply unless the user
-    names others, also in the folder of a run.
-
-    Args:
-        file: robot file that the user named. In a run folder, the experiment is that of
-            the run, and its plug-ins may be imported as when the run is viewed.
-        named: experiment that the user named; it comes first.
-        island: island that the user named; None is, of ``best.yaml`` of a run, the
-            island on which it has its fitness, and of other files island 0.
-        tells_default: also say which settings apply if the file is in no run folder.
-        say: gets the line; the default writes it to standard error.
-
-    Returns:
-        The robot, the settings and the experiment; of an MJCF file's own settings and
-        of the default ones, the experiment is None.
+    named an experiment, also in the folder of a run. There, other files have the
+    experiment of the run, and its plug-ins may be imported as when the run is viewed.
+    An island that is not named is, of ``best.yaml`` of a run, that on which it has its
+    fitness, and of other files island 0. Of an MJCF file's own settings and of the
+    default ones, the experiment is None. ``say`` gets a line about the settings; if
+    ``tells_default``, also of the default ones.
 
     Raises:
-        RevolveError: no well-formed robot in the file; an invalid experiment,
-            island or plug-in; a damaged description or table of the run.
+        RevolveError: no well-formed robot in the file; an invalid experiment, island or
+            plug-in; a damaged description or table of the run.
     """
     # First: nothing is said about the settings of a file that is not there.
     ending = check_file(file)

@@ -229,11 +229,9 @@ def _add_relief(spec: mujoco.MjSpec, environment: Environment) -> None:
 def ring_wall(arena: ArenaWorld) -> Floats:
     """Return the boxes of a ring of straight walls about the origin, if there is one.
 
-    The inner faces touch the circle of ``wall_diameter_m`` from outside. Source: the
-    original's ring of 12 segments, 0.05 m thick, 1 m high.
-
-    Returns:
-        (W, 10) centre [m], attitude w, x, y, z, and half sizes [m] of each wall.
+    They are (W, 10): centre [m], attitude w, x, y, z, and half sizes [m]. The inner
+    faces touch the circle of ``wall_diameter_m`` from outside. Source: the original's
+    ring of 12 segments, 0.05 m thick, 1 m high.
     """
     if not arena.wall_diameter_m:
         return np.zeros((0, 10))

@@ -32,10 +32,8 @@ def broken(
 def repeated(what: str, call: Callable[[], T], arguments: Sequence[object] = ()) -> T:
     """Return what a plug-in returns for sample inputs; call it twice.
 
-    Args:
-        what: part of the plug-in, as of ``broken``.
-        call: calls it with equal inputs, and equal random streams, each time.
-        arguments: inputs that it must not change.
+    ``what`` is as of ``broken``. The call has equal inputs, and equal random streams,
+    each time; it must not change the arguments.
 
     Raises:
         ExperimentError: it returns another value the second time, or changes an input.

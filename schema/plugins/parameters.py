@@ -18,15 +18,10 @@ _UNKNOWN = re.compile("Object contains unknown field `(.*)`")
 def read_parameters(
     table: Mapping[str, Any], kind: type[T], where: str, separator: str = "."
 ) -> T:
-    """Return a table of a user's document as a Struct.
+    """Return a table of a user's document as a Struct, whose defaults complete it.
 
-    Args:
-        table: of the document.
-        kind: of the section, or that a plug-in declares; its defaults complete the
-            table.
-        where: begins messages: the table's key, as ``fitness.parameters``, or the path
-            of the document.
-        separator: text between ``where`` and a key in messages.
+    Messages begin with ``where``, the table's key, as ``fitness.parameters``, or the
+    path of the document, and the separator before a key.
 
     Raises:
         ExperimentError: an unknown key (the nearest is named) or a missing one, a value

@@ -98,10 +98,8 @@ def _copied(files: tuple[tuple[str, bytes], ...], tops: tuple[str, ...]) -> list
 def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:
     """Allow the modules that a document of this user refers to.
 
-    Args:
-        paths: ``module:attribute`` of each; other texts are ignored.
-        folder: folder of the document; a module that is not installed may be a file in
-            it.
+    Paths are ``module:attribute``; other texts are ignored. A module that is not
+    installed may be a file in the folder of the document.
 
     Raises:
         ExperimentError: a file in the folder has the name of another module.

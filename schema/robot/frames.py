@@ -28,11 +28,10 @@ def shapes_of(robot: Robot, space: BodySpace) -> list[Shape]:
 
 
 def round_reach(along: Sequence[float], half: Sequence[float]) -> float:
-    """Return how far a cylinder reaches from its centre along a direction [m].
+    """Return how far a cylinder reaches from its centre along a unit vector [m].
 
-    Args:
-        along: unit vector in the cylinder's frame, whose z is the axis.
-        half: radius, radius, half of the length [m].
+    The vector is in the cylinder's frame, whose z is the axis; ``half`` has radius,
+    radius and half of the length [m].
     """
     return math.hypot(along[0], along[1]) * half[0] + abs(along[2]) * half[2]
 
@@ -40,9 +39,8 @@ def round_reach(along: Sequence[float], half: Sequence[float]) -> float:
 def place_parts(robot: Robot, shapes: Sequence[Shape]) -> tuple[Floats, Floats]:
     """Return each part's frame in the core's frame, joints at zero.
 
-    Returns:
-        Rotations (P, 3, 3) part frame to core frame, and positions (P, 3) of the
-        part origins [m].
+    Rotations (P, 3, 3) part frame to core frame, and positions (P, 3) of the origins
+    [m].
     """
     turns, offsets = _attached(
         [
@@ -72,11 +70,9 @@ def place_parts(robot: Robot, shapes: Sequence[Shape]) -> tuple[Floats, Floats]:
 def attach(parent: Slot, child: Slot, orientation: int) -> tuple[Floats, Floats]:
     """Return a child's frame in its parent's, given the slots of both in their frames.
 
-    The orientation is a rotation of the child about its own slot normal [degrees].
-
-    Returns:
-        Rotation (3, 3) child frame to parent frame; position (3,) of the child's
-        origin [m]. Both arrays are shared and read-only.
+    The orientation is a rotation of the child about its own slot normal [degrees]. The
+    rotation (3, 3) is child frame to parent frame, the position (3,) that of the
+    child's origin [m]; both are shared and read-only.
     """
     (rotation,), (position,) = _attached([(parent, child, orientation)])
     rotation.flags.writeable = False

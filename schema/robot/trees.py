@@ -36,17 +36,14 @@ class Trees:
 
 
 def trees_of(columns: Integers, sizes: Integers) -> Trees:
-    """Return bodies as trees.
+    """Return bodies as trees, of the sizes (B,) [parts].
 
-    Args:
-        columns: (N, 4) parts of B bodies in depth-first order: index of the parent in
-            its body, -1 for the core; number of the type; slot that labels the part,
-            -1 for the core; slot of the parent.
-        sizes: (B,) number of parts of each body.
+    Columns (N, 4) are the parts of B bodies in depth-first order: index of the parent
+    in its body, -1 for the core; number of the type; slot that labels the part, -1 for
+    the core; slot of the parent.
 
     Raises:
-        InvalidRobot: a body is not a tree in depth-first order with children by
-            ascending slot.
+        InvalidRobot: another order, or children not by ascending slot.
     """
     starts = np.concatenate([[0], np.cumsum(sizes)])
     tree_of, firsts = _different(columns, starts)

@@ -30,11 +30,7 @@ _RECORD = FIELDS.size + CHECK.size
 
 
 class Damaged(Exception):  # noqa: N818 - reads as what it says
-    """A file whose bytes are not those that were written.
-
-    Attributes:
-        byte: start of the bytes that cannot be trusted.
-    """
+    """A file whose bytes, from ``byte`` on, are not those that were written."""
 
     def __init__(self, path: Path, byte: int, what: str) -> None:
         super().__init__(f"{path}: damaged at byte {byte}: {what}")

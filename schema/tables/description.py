@@ -143,10 +143,9 @@ def make_folder(path: Path) -> None:
 def run_columns(folder: Path) -> dict[str, int | str | None]:
     """Return the columns of tables that are the same in all rows of a run.
 
-    Returns:
-        ``seed``, and ``run_id``: 12 hexadecimal digits, another for each run, also of
-        the same experiment and seed; a copy of the folder keeps it. Both are null if
-        the description is lost or damaged.
+    They are ``seed``, and ``run_id``: 12 hexadecimal digits, another for each run, also
+    of the same experiment and seed; a copy of the folder keeps it. Both are null if the
+    description is lost or damaged.
     """
     try:
         known = read_description(folder)

@@ -251,17 +251,12 @@ def read_table(
     """Return rows of a table of a run, finished or not, island by island.
 
     Rows of each island are in a repeatable order. Beside the result, about
-    ``GROUP_BYTES`` are in memory.
-
-    Args:
-        folder: the run folder.
-        table: its name, a key of ``TABLES``.
-        columns: those to read; None: all.
-        where: condition on these columns for the rows to read; None: all.
+    ``GROUP_BYTES`` are in memory. The condition ``where`` is on the columns that are
+    read, all by default.
 
     Raises:
-        RunFolderError: no such folder, a file that is damaged or cannot be read, or
-            one of another version.
+        RunFolderError: no such folder, a file that is damaged or cannot be read, or one
+            of another version.
     """
     if not folder.is_dir():
         raise RunFolderError(f"{folder}: no such folder")

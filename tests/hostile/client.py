@@ -22,8 +22,8 @@ from pathlib import Path
 import zenoh
 from msgspec.structs import replace
 
+from schema.agent.machine import wire_version
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
-from schema.agent.platform_tag import wire_version
 from schema.agent.service import session_config
 from schema.agent.supervisor import stop_on_signals
 from schema.agent.topics import Member, Role, agents_alive, member_of

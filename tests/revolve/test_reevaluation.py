@@ -24,7 +24,7 @@ from schema.experiment.settings import (
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
 from tests.own_brains import write_module
-from worker.filters.ablation import all_ablations
+from worker.filters.channels import all_ablations
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import all_changes
 

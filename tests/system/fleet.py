@@ -14,8 +14,8 @@ import zenoh
 from coordinator.cluster.kit import ClusterKit, Kit, MemberRole, utc_now
 from coordinator.islands.events import Advanced
 from coordinator.storage.journal import NAME, Journal
+from schema.agent.machine import platform_tag, wire_version
 from schema.agent.network import Tls, client_config
-from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.topics import Member, Role, agents_alive, member_of
 from schema.wire.codec import encode
 from schema.wire.messages import AgentInfo, Crash

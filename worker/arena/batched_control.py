@@ -58,8 +58,7 @@ class BatchedControllers:
     def tick(self, step: int, robots: Sequence[ArenaRobot]) -> Floats:
         """Update all brains with the latest readings and return their outputs.
 
-        Returns:
-            (R, O) unclipped; may be a view that the next tick overwrites.
+        They are (R, O), unclipped; may be a view that the next tick overwrites.
         """
         ages = (step - self._starts) // self._tick_steps
         outputs = self._outputs(robots, self._bank, self._filters, step, ages)

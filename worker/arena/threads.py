@@ -11,11 +11,7 @@ Job = Callable[[], None]
 
 
 class ThreadTeam:
-    """Threads that share jobs; one submission per thread is cheaper than one per job.
-
-    Attributes:
-        threads: number of threads, including the caller's; at least 1.
-    """
+    """Threads, the caller's included, that share jobs: one submission each is cheap."""
 
     def __init__(self, threads: int = 1) -> None:
         self.threads = threads

@@ -62,11 +62,9 @@ class StateHistory:
         return self.state[:, self._velocities]
 
     def move(self, states: Floats, start: int) -> None:
-        """Move the rows to columns of an array of all clusters' states.
+        """Move the rows to columns, from a first one, of an array of all clusters.
 
-        Args:
-            states: (K, at least W), K at least as great as before; contiguous.
-            start: first column of the cluster.
+        The array is (K, at least W), K at least as great as before, and contiguous.
         """
         count, self._width = states.shape
         state = states[:, start : start + self.state.shape[1]]
@@ -147,9 +145,8 @@ class Cluster:
     def run(self, plan: Sequence[int], first: int = 0) -> None:
         """Step the physics from moment to moment with constant commands.
 
-        Args:
-            plan: steps to each moment from the one before.
-            first: moment to start with; the rows before it stay unchanged.
+        A plan has the steps to each moment from the one before; the rows before the
+        first moment stay unchanged.
         """
         model, data, keep = self.model, self.data, self.history.keep
         # Looked up once, as this loop runs thousands of times a second.

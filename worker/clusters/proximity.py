@@ -26,12 +26,7 @@ _ROUNDING_M = 1e-9
 
 
 class RobotBounds:
-    """Bounds of R robots at L moments.
-
-    Attributes:
-        robot_rows: the robots.
-        speeds: (L, R) upper bound on the speed of each robot's points [m/s].
-    """
+    """Bounds of R robots at L moments; speeds (L, R) bound those of points [m/s]."""
 
     def __init__(
         self, layout: Layout, states: Floats, velocities: Floats | None = None
@@ -73,9 +68,7 @@ class RobotBounds:
         """Return the bodies whose hulls may be near at a moment, seen from above.
 
         Of P > 0 pairs of robots, the limits (P,) are distances of two hulls [m].
-
-        Returns:
-            (2, N) pairs of bodies, and the pair of robots of each.
+        Returned are (2, N) pairs of bodies, and the pair of robots of each.
         """
         robot_rows = self._layout.robot_rows
         bodies = [robot_rows.body_pairs(*pair) for pair in pairs]
@@ -111,10 +104,8 @@ class RobotBounds:
     def boxes(self, margins: Floats) -> Floats:
         """Return the boxes around R robots at all moments, seen from above.
 
-        Each is extended by its margin, (R,) [m].
-
-        Returns:
-            (2, 2, R): least x, y, then greatest x, y [m].
+        They are (2, 2, R): least x, y, then greatest x, y [m], each extended by its
+        margin, (R,) [m].
         """
         robot_rows = self.robot_rows
         low = self._hulls.min(axis=0) - robot_rows.hulls[3]
@@ -126,8 +117,7 @@ class RobotBounds:
     def neighbours(self, boxes: Floats) -> tuple[list[int], list[int]]:
         """Return pairs of different clusters whose boxes, (2, 2, R), overlap.
 
-        Returns:
-            Rows of the first and of the second robots, ascending by both.
+        They are rows of the first and of the second robots, ascending by both.
         """
         cluster_indices = self._layout.cluster_indices
         is_near = overlaps(boxes)

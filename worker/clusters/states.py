@@ -100,12 +100,9 @@ class RobotRows:
 
 
 class StateColumns:
-    """Array in which clusters keep their states at the moments of an interval.
+    """Array in which clusters keep their states at the moments of an interval, (K, W).
 
     Columns of clusters that are gone stay unused until the array is full.
-
-    Attributes:
-        states: (K, W), columns of each cluster are all of its ``live``.
     """
 
     def __init__(self, moments: int) -> None:

@@ -12,8 +12,7 @@ from schema.experiment.identity import Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
-from worker.filters.ablation import Ablated
-from worker.filters.calibration import Calibrated
+from worker.filters.channels import Ablated, Calibrated
 from worker.filters.noise import Noise, Pushes
 
 

@@ -125,10 +125,8 @@ class GuardedBank:
     """Brains of R robots that run code of users; row r belongs to robot r.
 
     A robot whose brain raises fails alone: brains are equal alone and in a batch, to
-    the last bit, so if a batch raises, each brain is computed alone.
-
-    Attributes:
-        failed: why brains failed at the last tick, by row; their outputs are 0.
+    the last bit, so if a batch raises, each brain is computed alone. At the last tick,
+    the rows of ``failed`` did so, with outputs of 0.
     """
 
     def __init__(

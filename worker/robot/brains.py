@@ -66,11 +66,7 @@ BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainControl]] = 
 
 
 class Controls:
-    """Brains of one experiment in a worker.
-
-    Attributes:
-        is_checked: states may be not finite, because the code is a user's.
-    """
+    """Brains of one experiment; ``is_checked``: a user's states may be not finite."""
 
     def __init__(self, brain: BrainSection, space: Space, tick_s: float) -> None:
         """Load the brain type, which ``brain`` names.

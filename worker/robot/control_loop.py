@@ -18,7 +18,7 @@ from schema.mjcf.model import solo_spec
 from schema.robot.brain import Brain
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats, Trace
-from worker.filters.calibration import NEUTRAL
+from worker.filters.channels import NEUTRAL
 from worker.filters.filters import (
     filtered_outputs,
     filtered_readings,
@@ -141,13 +141,12 @@ class ControlLoop:
     def step(self, action: Floats | None = None) -> None:
         """Command the motors, and step the physics to the next tick or the end.
 
-        Args:
-            action: (M,) of the motors, -1 to 1 over their ranges; None is the robot's
-                own brain, which does not tick otherwise. Filters act on both.
+        An action (M,) is -1 to 1 over the ranges of the motors; None is the robot's own
+        brain, which does not tick otherwise. Filters act on both.
 
         Raises:
-            SimulationDiverged: the state is not finite, the engine warned or failed,
-                or the brain of a plug-in failed.
+            SimulationDiverged: the state is not finite, the engine warned or failed, or
+                the brain of a plug-in failed.
             SensorFailed: as of ``observe``.
         """
         self.observe()

@@ -71,11 +71,7 @@ class CpgControl:
 
 
 class CpgBank:
-    """Oscillators of R robots.
-
-    Attributes:
-        states: (R, O) deviations of the phases from their offsets [rad].
-    """
+    """Oscillators of R robots; states (R, O): deviations from phase offsets [rad]."""
 
     def __init__(
         self, packed: Sequence[PackedCpg], width: Widths, tick_s: float

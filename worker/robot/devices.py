@@ -238,9 +238,8 @@ class Servos:
     def torques(self) -> tuple[Integers, Floats, Floats]:
         """Return what the torque of each of its A motors depends on.
 
-        Returns:
-            (A,) velocities' places among those of the robot; torque per error of
-            velocity [N m s/rad]; greatest torque [N m]. Of sliders forces.
+        They are (A,): velocities' places among those of the robot; torque per error of
+        velocity [N m s/rad]; greatest torque [N m]. Of sliders forces.
         """
         model, own = self._model, self.actuators
         dofs = model.jnt_dofadr[model.actuator_trnid[own, 0]].astype(np.int64)

@@ -22,10 +22,8 @@ from worker.robot.disturbances import combined, disturbances
 class EvaluationLoop:
     """Evaluation of one robot, one brain tick at a time.
 
-    With the section ``robust`` it is several simulations, one after the other.
-
-    Attributes:
-        loop: the present simulation, or the last one.
+    With the section ``robust`` it is several simulations, one after the other, of which
+    ``loop`` is the present or last one.
     """
 
     def __init__(

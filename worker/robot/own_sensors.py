@@ -53,11 +53,7 @@ class Surroundings:
 
 
 class PartView:
-    """View of a part in a model; a ``SensorView``.
-
-    Attributes:
-        around: what is around it at the present tick.
-    """
+    """View of a part in a model, with what is around it now; a ``SensorView``."""
 
     def __init__(self, placed: PlacedRobot, index: int) -> None:
         model, self._data = placed.model, placed.data

@@ -42,11 +42,7 @@ SLOPE_DEG = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ChangedSettings:
-    """Settings of an evaluation with one change.
-
-    Attributes:
-        is_small: by less than any two machines of the real world differ.
-    """
+    """Settings with one change; ``is_small``: by less than two real machines differ."""
 
     name: str
     settings: EvaluationSettings

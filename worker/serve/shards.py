@@ -42,11 +42,7 @@ Key = tuple[str, int, int]
 
 @dataclass(slots=True)
 class _Held:
-    """A shard after its latest advance.
-
-    Attributes:
-        digest: of its state; empty before the first advance.
-    """
+    """A shard after its latest advance; the digest is empty before the first one."""
 
     world: World
     settings: bytes

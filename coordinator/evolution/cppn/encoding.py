@@ -41,16 +41,10 @@ def brain_outputs(types: NeuronKinds) -> tuple[str, ...]:
 def grow_brain(
     network: CppnGenome, parts: Sequence[Grown], max_hidden: int, types: NeuronKinds
 ) -> Brain:
-    """Return the brain of a body.
+    """Return the brain of a body, whose parts are in the order of the robot.
 
     A neuron is queried with its place twice, a connection with the places of its
-    neurons.
-
-    Args:
-        network: the genome.
-        parts: of the body, in the order of the robot.
-        max_hidden: greatest number of hidden neurons, at most one for each part.
-        types: allowed types of neurons.
+    neurons. There is at most one hidden neuron for each part.
     """
     places = [point(part.position) for part in parts]
     neurons: list[Neuron] = []

@@ -71,12 +71,7 @@ class Link(Struct, frozen=True, array_like=True):
 
 
 class CppnGenome(Struct, frozen=True, array_like=True):
-    """Genome: a network without cycles.
-
-    Attributes:
-        nodes: hidden nodes by id.
-        links: by source and target, at most one for each pair.
-    """
+    """Genome: a network without cycles, of nodes by id, and of links by their ends."""
 
     nodes: tuple[HiddenNode, ...]
     links: tuple[Link, ...]
@@ -90,8 +85,7 @@ def evaluate(
 ) -> dict[str, Floats]:
     """Return named outputs of a network for N queries: (N,) of each of ``INPUTS``.
 
-    Returns:
-        (N,) of each output, in (-1, 1); 0 without enabled connections.
+    They are (N,), in (-1, 1); 0 without enabled connections.
     """
     functions = {node.id: FUNCTIONS[node.function] for node in network.nodes}
     sources: dict[str, list[Link]] = {}

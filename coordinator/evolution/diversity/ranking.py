@@ -18,7 +18,11 @@ from schema.experiment.grid import Grid
 
 
 class _Last:
-    """The population that was ranked last, and its ranks."""
+    """The population that was ranked last, and its ranks.
+
+    ``check_rule`` refuses attributes that ``select`` changes. It sees an object of this
+    class as what it prints: the cache changes no result.
+    """
 
     population: list[Any] | None = None
     ranks: Sequence[Any] = ()

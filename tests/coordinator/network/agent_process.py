@@ -10,8 +10,8 @@ import sys
 import threading
 
 from schema.agent import request_handler
+from schema.agent.machine import wire_version
 from schema.agent.network import Agent
-from schema.agent.platform_tag import wire_version
 from schema.agent.service import serve
 from schema.agent.supervisor import stop_on_signals
 from schema.agent.topics import Role

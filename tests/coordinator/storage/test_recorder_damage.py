@@ -10,7 +10,7 @@ import pytest
 
 from coordinator.storage.folder import RunFolder, read_details
 from coordinator.storage.recorder import Recorder, Segment
-from coordinator.storage.removal import remove_segment
+from coordinator.storage.rewriting import remove_segment
 from schema.errors import RunFolderError
 from schema.tables.checksums import sums_path
 from schema.tables.columns import BIRTHS, TABLES

@@ -8,15 +8,17 @@ from pathlib import Path
 import pytest
 
 from coordinator.doctor.system import group_bytes
-from schema.agent import capacity
-from schema.agent.capacity import (
+from schema.agent import machine
+from schema.agent.machine import (
     MOST_SHARDS,
     SHARD_BYTES,
     core_quota,
+    cpu_class,
+    cpu_flags,
     memory_bytes,
+    platform_tag,
     shards_that_fit,
 )
-from schema.agent.platform_tag import cpu_class, cpu_flags, platform_tag
 from schema.agent.supervisor import cores
 
 MACHINE = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
@@ -41,8 +43,8 @@ def groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return the folder of control groups; this process is in ``/a/b``."""
     own = tmp_path / "own"
     own.write_text("4:memory:/a/b\n2:cpu,cpuacct:/a/b\n0::/a/b\n")
-    monkeypatch.setattr(capacity, "_OWN", own)
-    monkeypatch.setattr(capacity, "_ROOT", tmp_path / "groups")
+    monkeypatch.setattr(machine, "_OWN", own)
+    monkeypatch.setattr(machine, "_ROOT", tmp_path / "groups")
     return tmp_path / "groups"
 
 

@@ -15,7 +15,7 @@ from schema.robot.robot import Part, Robot
 from schema.robot.trace import Trace, needs
 from tests.schema import robots
 from tests.worker.evaluations import with_simulation
-from worker.filters.ablation import all_ablations
+from worker.filters.channels import all_ablations
 from worker.robot.evaluation import evaluate, mean_inputs, simulate
 
 TICK_STEPS = 25

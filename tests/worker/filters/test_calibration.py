@@ -21,7 +21,7 @@ from schema.robot.trace import Floats
 from tests.documents import parse_experiment
 from tests.worker.evaluations import IDENTITY, ORIGIN, OTHERS, with_simulation
 from worker.bench.spider import spider
-from worker.filters.calibration import Calibrated
+from worker.filters.channels import Calibrated
 from worker.robot.evaluation import evaluate, simulate
 
 TICK_S = 0.125
