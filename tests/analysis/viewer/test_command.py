@@ -247,6 +247,7 @@ def test_usage_statistics_are_off_unless_the_user_has_chosen(
         choose_statistics(tmp_path, monkeypatch)
     for screen in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(screen, raising=False)
+    monkeypatch.setattr("analysis.viewer.output._WINDOW_S", 60.0)
     with pytest.raises(ViewerError, match="cannot open a window"):
         Window(Output(None, ("127.0.0.1", 1), has_window=True))
     chosen = json.loads((tmp_path / "rerun" / "analytics.json").read_text())
