@@ -3,13 +3,11 @@
 import argparse
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from analysis.extras import extra
 from analysis.render.flags import FILM_ENDINGS, PAGE_ENDING
-from schema.agent.flags import Flags, add_plugins, whole_number
-from schema.agent.supervisor import cores
+from schema.agent.flags import Flags
 from schema.plugins.permission import allow
 
 
@@ -64,48 +62,9 @@ def parser(command: str) -> Flags:
         from analysis.render.flags import parser as render
 
         return render()
-    flags = Flags(
-        prog="revolve analyze",
-        description="Measure runs, compare experiments, draw the thesis's figures, and "
-        "write a report.",
-        examples=(
-            "revolve analyze runs/scenario1-seed1",
-            "revolve analyze runs/a runs/b --out report --processes 2",
-            "revolve analyze runs arena.parquet    # with a file of revolve bench",
-        ),
-    )
-    flags.add_argument(
-        "runs",
-        nargs="+",
-        type=Path,
-        metavar="FOLDER",
-        help="run or campaign folder, or a folder that contains some; also files that "
-        "'revolve bench arena --out FILE' wrote",
-    )
-    flags.add_argument(
-        "--out",
-        type=Path,
-        default=Path("report"),
-        metavar="FOLDER",
-        help="folder to write to (default: report)",
-    )
-    flags.add_argument(
-        "--slots",
-        choices=("parent", "own"),
-        default="parent",
-        help="slot that labels a part in the tree edit distance between bodies: its "
-        "parent's, as in the thesis (default), or its own, as in the published code",
-    )
-    flags.add_argument(
-        "--processes",
-        type=whole_number(),
-        default=cores(),
-        metavar="N",
-        help="number of processes, which measure runs in parallel (default: number of "
-        "cores)",
-    )
-    add_plugins(flags)
-    return flags
+    from analysis.figures.flags import parser as analyze
+
+    return analyze()
 
 
 def _simulation() -> Callable[..., Any]:

@@ -18,7 +18,10 @@ from analysis.comparison.comparison import comparison, outcomes_of
 from analysis.comparison.findings import findings, with_benchmark
 from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure
-from analysis.figures.figure_writer import draw_figures
+from analysis.figures.figure_writer import NUMBERS, draw_figures
+from analysis.figures.flags import WIDTHS_IN
+from analysis.figures.look import Look, chosen_colours, dressed_in
+from analysis.figures.style import in_order
 from analysis.measures.benchmarks import read_benchmarks
 from analysis.measures.bodies import SlotRule
 from analysis.measures.distinct_names import with_distinct_names
@@ -29,7 +32,7 @@ from analysis.progress import bars, replaced
 from analysis.render.picture import Simulate
 from analysis.report.page import report
 from analysis.summary import show
-from schema.errors import counted
+from schema.errors import RevolveError, counted, shown
 from schema.tables.description import check_folder, make_folder
 
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
@@ -51,12 +54,31 @@ def analyze(
 
     Raises:
         RunFolderError: no run is found, or the output folder cannot be written.
+        RevolveError: a figure or a colour does not exist.
     """
+    for name in options.figures:
+        if name not in NUMBERS:
+            rule = f"--figures: must be of {', '.join(NUMBERS)}"
+            raise RevolveError(f"{rule}, got {shown(name)}")
     folders = [path for path in options.runs if not path.is_file()]
     if not folders:
         check_folder(options.runs[0])
     found, unread = read_runs(folders)
     runs = with_distinct_names(found)
+    names = in_order(run.experiment for run in runs)
+    chosen = chosen_colours(options.colours, names)
+    with dressed_in(Look(WIDTHS_IN[options.width], options.style, chosen)):
+        return _write(options, words, simulate, runs, unread)
+
+
+def _write(
+    options: argparse.Namespace,
+    words: Sequence[str],
+    simulate: Callable[[], Simulate],
+    runs: list[LoadedRun],
+    unread: Sequence[LeftOut],
+) -> int:
+    """Measure and draw; write all files; return the exit code."""
     benchmark, not_benchmarks = read_benchmarks(options.runs)
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
     for folder in (options.out, options.out / FIGURES):
@@ -77,6 +99,8 @@ def analyze(
             options.out / FIGURES,
             simulate,
             bar,
+            wanted=options.figures,
+            formats=options.format,
         )
         left_out += drawings.left_out
         _write_measures(tables, left_out, options.out / MEASURES, only="left_out")
@@ -85,7 +109,7 @@ def analyze(
     (options.out / REPORT).write_text(page, encoding="utf-8")
     show(tables, Console())
     print(f"{options.out / MEASURES}: {len(tables)} tables, {', '.join(tables)}")
-    print(f"{options.out / FIGURES}: {_listed(drawings.figures)}")
+    print(f"{options.out / FIGURES}: {_listed(drawings.figures, options.format)}")
     print(f"{options.out / REPORT}: report with all figures in one file")
     return 0
 
@@ -131,11 +155,11 @@ def _write_measures(
             (folder / f"{name}.parquet").unlink(missing_ok=True)
 
 
-def _listed(figures: Sequence[DrawnFigure]) -> str:
+def _listed(figures: Sequence[DrawnFigure], formats: Sequence[str]) -> str:
     if not figures:
         return "no figure could be drawn; see the line 'left out: figures'"
     numbers = ", ".join(one.figure.number for one in figures)
-    return f"figures {numbers} as PDF and PNG"
+    return f"figures {numbers} as {' and '.join(map(str.upper, formats))}"
 
 
 def _versions() -> dict[str, str]:

@@ -18,10 +18,11 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize, to_hex
 from matplotlib.ticker import MaxNLocator
 
 from analysis.figures.catalogue import BIRTHS, Figure, missing
-from analysis.figures.courses import UNITS
+from analysis.figures.courses import with_unit
 from analysis.figures.forms import Tables
+from analysis.figures.look import INK, LOOK
 from analysis.figures.robot_pictures import shown_document
-from analysis.figures.style import INK, WIDTH_IN, in_order, label
+from analysis.figures.style import in_order, label
 from analysis.measures.load import LoadedRun
 from analysis.measures.population_table import individual_ids, rows_of
 from analysis.render.plan import Outline, plan
@@ -185,7 +186,7 @@ def map_caption(one: ArchiveMap) -> str:
 def draw_map(_: Tables, one: ArchiveMap, unit: str) -> drawing.Figure:
     """Return the picture of a map; ``unit`` is that of fitness."""
     across, along = one.bins
-    side = min((WIDTH_IN - _LEFT_IN - _RIGHT_IN) / across, _MOST_IN / along)
+    side = min((LOOK.get().width_in - _LEFT_IN - _RIGHT_IN) / across, _MOST_IN / along)
     wide, tall = _LEFT_IN + side * across + _RIGHT_IN, _BELOW_IN + side * along + 0.1
     figure = drawing.Figure(figsize=(wide, tall))
     left, below = _LEFT_IN / wide, _BELOW_IN / tall
@@ -232,4 +233,4 @@ def map_axes(one: ArchiveMap) -> Iterator[tuple[str, list[tuple[float, str]]]]:
         values = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high)
         shown = [value for value in map(float, values) if low <= value <= high]
         marks = [((value - low) / (high - low) * bins, f"{value:g}") for value in shown]
-        yield (f"{name} [{UNITS[name]}]" if name in UNITS else name), marks
+        yield with_unit(name), marks

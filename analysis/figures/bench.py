@@ -6,6 +6,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.look import BLUE, GREY
 from analysis.figures.style import theme_of_size
 
 _THESIS = (-0.26, 34.78, 20.41)
@@ -53,7 +54,7 @@ def _points(rows: pa.Table) -> p9.ggplot:
     line = means.rename_columns(["population", "factor"]).to_pandas().assign(of=_OURS)
     return (
         p9.ggplot(line, p9.aes("population", "factor", colour="of", linetype="of"))
-        + p9.geom_hline(yintercept=1.0, colour="#999999", size=0.5)
+        + p9.geom_hline(yintercept=1.0, colour=GREY, size=0.5)
         + p9.annotate(
             "text",
             x=line["population"].max(),
@@ -62,19 +63,19 @@ def _points(rows: pa.Table) -> p9.ggplot:
             ha="right",
             va="bottom",
             size=8,
-            colour="#555555",
+            colour=GREY,
         )
         + p9.geom_line(size=0.9)
         + p9.geom_point(
             p9.aes("population", "factor"),
             data=rows.to_pandas(),
             inherit_aes=False,
-            fill="#0072B2",
+            fill=BLUE,
             colour="white",
             size=1.8,
             stroke=0.2,
         )
-        + p9.scale_colour_manual({_OURS: "#0072B2", _THEIRS: "#7F7F7F"}, name="")
+        + p9.scale_colour_manual({_OURS: BLUE, _THEIRS: GREY}, name="")
         + p9.scale_linetype_manual({_OURS: "-", _THEIRS: "--"}, name="")
         + p9.scale_y_log10(
             breaks=_TICKS, labels=lambda ticks: [f"{tick:g}" for tick in ticks]

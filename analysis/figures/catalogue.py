@@ -1,6 +1,6 @@
 """Catalogue of the figures: number, title, caption and drawing function."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -99,11 +99,12 @@ def missing(number: str, why: str) -> Figure:
 
 @dataclass(frozen=True, slots=True)
 class DrawnFigure:
-    """A figure that was drawn, its caption, and its PNG file."""
+    """A figure that was drawn, its caption, its files, and itself as PNG."""
 
     figure: Figure
     caption: str
-    picture: Path
+    files: Sequence[Path]
+    picture: bytes
 
 
 def _spread(

@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from analysis.comparison.ablation import ALL, DEAD, HELD, MEAN, ONE, RANDOM
 from analysis.figures.forms import NothingToDraw
+from analysis.figures.look import BLUE, GREY, VERMILION
 from analysis.figures.style import theme_of_size
 from schema.errors import counted
 
@@ -100,10 +101,10 @@ def _points_of_shares(
     best = rows[rows["is_best"]].assign(of=_BEST)
     last = rows[rows["is_last"]].assign(of=_LAST)
     figure = p9.ggplot(mapping=p9.aes("label", "share"))
-    figure += p9.geom_hline(yintercept=1.0, colour="#999999", size=0.5)
+    figure += p9.geom_hline(yintercept=1.0, colour=GREY, size=0.5)
     if not last.empty:
         figure += p9.geom_boxplot(
-            data=last, outlier_alpha=0, fill="#DDEBF5", colour="#7F7F7F", size=0.4
+            data=last, outlier_alpha=0, fill="#DDEBF5", colour=GREY, size=0.4
         )
     for robots, size in ((last, 1.2), (best, 2.4)):
         figure += p9.geom_point(
@@ -115,7 +116,7 @@ def _points_of_shares(
         )
     return (
         figure
-        + p9.scale_fill_manual({_LAST: "#0072B2", _BEST: "#D55E00"}, name="")
+        + p9.scale_fill_manual({_LAST: BLUE, _BEST: VERMILION}, name="")
         + p9.scale_x_discrete(limits=labels[::-1])
         + p9.coord_flip()
         + p9.expand_limits(y=[0, 1])

@@ -18,7 +18,16 @@ from analysis.figures.forms import (
     fitness_panels,
     fitness_text,
 )
-from analysis.figures.style import in_order, label, lone_points, scales, theme_of_size
+from analysis.figures.look import GREY
+from analysis.figures.style import (
+    in_order,
+    label,
+    lone_points,
+    panel_grid,
+    scales,
+    theme_of_size,
+)
+from analysis.measures.fitness_functions import MEASURE_UNITS
 
 _FEW_RUNS = 10
 """Runs of an experiment up to which each is drawn."""
@@ -32,15 +41,6 @@ _BINS = 25
 """Greatest number of points of a line of changes."""
 _LEAST = 20
 """Least number of births of such a point."""
-UNITS = {
-    "path_velocity": "m/s",
-    "straight_velocity": "m/s",
-    "turning": "rad/s",
-    "energy": "J",
-    "height": "m",
-    "joint_effort": "N m",
-}
-"""Units of the measures that come with the toolkit and have one."""
 
 
 class Course(NamedTuple):
@@ -128,9 +128,9 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     figure += _change_marks(tables)
     figure = figure + scales(tables, shown.sizes, is_filled=sure.num_rows > 0)
     figure += p9.expand_limits(y=0)
+    columns, rows = panel_grid(len(set(functions.values())) or 1, 2)
     if functions:
-        figure += p9.facet_wrap("function", scales="free_y", ncol=2)
-    rows = -(-len(set(functions.values())) // 2) or 1
+        figure += p9.facet_wrap("function", scales="free_y", ncol=columns)
     return figure + p9.labs(x="births", y=y_text) + theme_of_size(0.8 + 3.0 * rows)
 
 
@@ -141,7 +141,7 @@ def _change_marks(tables: Tables) -> list[Any]:
     rows = tables["changes"].to_pandas()
     marks = rows.groupby(["experiment", "point"], as_index=False)["births"].mean()
     line = p9.aes(xintercept="births")
-    return [p9.geom_vline(line, marks, size=0.3, colour="#808080", alpha=0.6)]
+    return [p9.geom_vline(line, marks, size=0.3, colour=GREY, alpha=0.6)]
 
 
 def course_caption(tables: Tables, measure: str) -> str:
@@ -196,15 +196,16 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
             size=0.35,
             alpha=0.6,
         )
+    columns, lines = panel_grid(len(_CHANGES), 2)
     return (
         figure
         + p9.geom_line(size=0.9)
         + lone_points(means, ["experiment", "panel"])
-        + p9.facet_wrap("panel", scales="free_y", ncol=2)
+        + p9.facet_wrap("panel", scales="free_y", ncol=columns)
         + scales(tables, in_order(sizes.index), is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x=f"births (means over {width})", y="change")
-        + theme_of_size(3.4)
+        + theme_of_size(0.4 + 3.0 * lines)
     )
 
 
@@ -217,20 +218,20 @@ def measures_over_births(tables: Tables) -> p9.ggplot:
     frame = tables["named_measures"].to_pandas()
     frame["line"] = frame["folder"] + " " + frame["island"].astype(str)
     experiments = in_order(frame["experiment"])
-    frame["measure"] = list(map(_with_unit, frame["measure"], frame["about"]))
-    lines = -(-frame["measure"].nunique() // 3)
+    frame["measure"] = list(map(with_unit, frame["measure"], frame["about"]))
+    columns, lines = panel_grid(frame["measure"].nunique(), 3)
     return (
         p9.ggplot(frame, p9.aes("births", "mean"))
         + p9.geom_line(p9.aes(colour="experiment", group="line"), size=0.6, alpha=0.8)
         + lone_points(frame, ["experiment", "line", "measure"])
-        + p9.facet_wrap("measure", ncol=3, scales="free_y")
+        + p9.facet_wrap("measure", ncol=columns, scales="free_y")
         + scales(tables, experiments, is_filled=False)
         + p9.labs(x="births on the island", y="mean of the population")
         + theme_of_size(1.0 + 2.0 * lines)
     )
 
 
-def _with_unit(measure: str, about: str) -> str:
+def with_unit(measure: str, about: str = "") -> str:
     """Return a measure's name and unit, of an own one the last of its docstring."""
-    *_, unit = [UNITS.get(measure, ""), *re.findall(r"\[([^][]+)\]", about)]
+    *_, unit = [MEASURE_UNITS.get(measure, ""), *re.findall(r"\[([^][]+)\]", about)]
     return f"{measure} [{unit}]" if unit else measure

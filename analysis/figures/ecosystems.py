@@ -7,7 +7,14 @@ import numpy as np
 import plotnine as p9
 
 from analysis.figures.forms import NothingToDraw, Tables
-from analysis.figures.style import label, lone_points, scales, theme_of_size
+from analysis.figures.look import INK, RAMP
+from analysis.figures.style import (
+    label,
+    lone_points,
+    panel_grid,
+    scales,
+    theme_of_size,
+)
 
 _COURSES = {
     "living": "living robots",
@@ -77,13 +84,14 @@ def ages_at_death(tables: Tables) -> p9.ggplot:
     groups = frame.groupby(["experiment", frame["reason"].map(named), middle_s])
     counts = groups.size().rename("robots").reset_index()
     counts["reason"] = _ordered(counts["reason"], named.values())
+    columns, rows = panel_grid(counts["experiment"].nunique(), 3)
     return (
         p9.ggplot(counts, p9.aes("age_s", "robots", fill="reason"))
         + p9.geom_col(width=width_s, colour="white", size=0.2)
-        + p9.facet_wrap("experiment", labeller=label, scales="free_y")
+        + p9.facet_wrap("experiment", labeller=label, scales="free_y", ncol=columns)
         + p9.scale_fill_brewer(type="qual", palette="Set2")
         + p9.labs(x="age at death [s]", y="robots")
-        + theme_of_size(3.6)
+        + theme_of_size(0.6 + 3.0 * rows)
     )
 
 
@@ -100,7 +108,7 @@ def ground_map(tables: Tables) -> Any:  # noqa: ANN401 - untyped
     if born.empty:
         raise NothingToDraw("no robot of an arena with own rules was born")
     lines = {"x": "first_x", "y": "first_y", "xend": "second_x", "yend": "second_y"}
-    rows = -(-born["panel"].nunique() // 2)
+    columns, rows = panel_grid(born["panel"].nunique(), 2)
     return (
         p9.ggplot(born, p9.aes("x", "y"))
         + p9.geom_polygon(
@@ -109,10 +117,10 @@ def ground_map(tables: Tables) -> Any:  # noqa: ANN401 - untyped
         + p9.geom_segment(
             p9.aes(**lines, colour="related"), data=joined, size=0.5, alpha=0.8
         )
-        + p9.geom_point(p9.aes(size="children"), colour="#333333", alpha=0.6, stroke=0)
-        + p9.facet_wrap("panel", ncol=min(2, born["panel"].nunique()))
+        + p9.geom_point(p9.aes(size="children"), colour=INK, alpha=0.6, stroke=0)
+        + p9.facet_wrap("panel", ncol=columns)
         + p9.scale_fill_gradient("#F3E9D2", "#7FB069", name="mean content ")
-        + p9.scale_colour_gradient("#0072B2", "#D55E00", limits=(0, 1), name="related ")
+        + p9.scale_colour_gradient(*RAMP, limits=(0, 1), name="related ")
         + p9.scale_size_area(max_size=4, name="children ")
         + p9.coord_fixed()
         + p9.labs(x="x [m]", y="y [m]")

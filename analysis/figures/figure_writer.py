@@ -10,13 +10,19 @@ from pathlib import Path
 import pyarrow as pa
 from rich.progress import Progress
 
-from analysis.figures.archive_maps import ArchiveMap, archive_maps, map_figures
+from analysis.figures.archive_maps import MAP, ArchiveMap, archive_maps, map_figures
 from analysis.figures.catalogue import FIGURES, DrawnFigure, Figure
 from analysis.figures.family_tree import LINEAGE, Best
 from analysis.figures.forms import NothingToDraw, Tables, fitness_units
-from analysis.figures.robot_figures import gait_figures, robot_pictures, tree_figures
+from analysis.figures.robot_figures import (
+    GAITS,
+    TREES,
+    gait_figures,
+    robot_pictures,
+    tree_figures,
+)
 from analysis.figures.robot_pictures import RobotPicture
-from analysis.figures.style import PICTURE_ENDING, file_name, in_order, label, save
+from analysis.figures.style import file_name, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, LoadedRun
 from analysis.render.files import gif
@@ -25,6 +31,9 @@ from analysis.render.picture import Simulate
 from analysis.render.stage import Picture
 
 _FILM = "best-robot-of-"
+_OF_ROBOTS = (GAITS, "6.17", *TREES.values(), "G")
+NUMBERS = (*dict.fromkeys([one.number for one in FIGURES] + [*_OF_ROBOTS, MAP, "S"]),)
+"""Numbers of all figures, without the names of experiments."""
 MOST_BYTES = 700_000
 """Size of a film up to which it keeps all colours and pictures."""
 
@@ -59,35 +68,53 @@ class FigureWriter:
         left_out: the figures that cannot be drawn, with the reason.
     """
 
-    def __init__(self, folder: Path) -> None:
-        """Remove files of earlier analyses whose names the experiments determine."""
-        self._folder = folder
+    def __init__(
+        self,
+        folder: Path,
+        wanted: Sequence[str] = (),
+        formats: Sequence[str] = ("pdf", "png"),
+    ) -> None:
+        """Remove files of earlier analyses whose names the experiments determine.
+
+        ``wanted`` are the ``NUMBERS`` that are drawn; all, and films, if it is empty.
+        """
+        self._folder, self._wanted, self._formats = folder, wanted, formats
         self._taken: set[str] = set()
-        for pattern in ("G-*.p??", "P-*.p??", "S-*.p??", f"{_FILM}*.*"):
-            self._remove(pattern)
+        for number in "GPS":
+            if self.draws(number):
+                self._remove(f"{number}-*.*")
+        if not wanted:
+            self._remove(f"{_FILM}*.*")
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
+
+    def draws(self, *numbers: str) -> bool:
+        """Return whether one of some figures is wanted; names may follow numbers."""
+        given = (number.partition("-")[0].partition(" ")[0] for number in numbers)
+        return not self._wanted or not {*self._wanted}.isdisjoint(given)
 
     def add(self, figure: Figure, tables: Tables) -> None:
         """Draw a figure and write it, or record why it cannot be drawn.
 
-        One of an earlier analysis is removed then.
+        One of an earlier analysis is removed.
         """
+        if not self.draws(figure.number):
+            return
+        # Files of experiments are removed already; a name may begin as they do.
+        if "-" not in figure.number:
+            self._remove(f"{escape(figure.number)}-*.*")
         try:
             drawn = figure.drawn(tables)
         except NothingToDraw as error:
-            # Files of experiments are removed already; a name may begin as they do.
-            if "-" not in figure.number:
-                self._remove(f"{escape(figure.number)}-*.p??")
             what = f"figure {figure.number}"
             self.left_out.append(LeftOut("", what, str(error)))
             return
         stem = self._stem(figure.stem)
-        save(drawn, stem)
-        picture = stem.with_name(stem.name + PICTURE_ENDING)
+        picture = save(drawn, stem, self._formats)
+        files = [stem.with_name(f"{stem.name}.{kind}") for kind in self._formats]
         caption = figure.caption
         text = caption if isinstance(caption, str) else caption(tables)
-        self.drawn.append(DrawnFigure(figure, text, picture))
+        self.drawn.append(DrawnFigure(figure, text, files, picture))
 
     def add_film(self, robot: RobotPicture) -> Film:
         """Write the moving picture of a robot, and beside it its page."""
@@ -146,19 +173,27 @@ def draw_figures(
     folder: Path,
     simulate: Callable[[], Simulate],
     bar: Progress,
+    *,
+    wanted: Sequence[str] = (),
+    formats: Sequence[str] = ("pdf", "png"),
 ) -> Drawings:
-    """Draw all figures into a folder, as PDF and PNG, and the best robots as GIF.
+    """Draw figures into a folder, and the best robots as GIF.
 
     ``tables`` are those of ``outputs``, and ``benchmark``; ``simulate`` returns the
-    worker's simulation, or raises why robots cannot be drawn.
+    worker's simulation, or raises why robots cannot be drawn; ``wanted`` and
+    ``formats`` are those of ``FigureWriter``.
     """
-    writer = FigureWriter(folder)
+    writer = FigureWriter(folder, wanted, formats)
     lines: dict[str, pa.Table] = {}
-    pictures, problems = robot_pictures(tables["robots"], runs, simulate, bar, lines)
+    pictures, problems = (
+        robot_pictures(tables["robots"], runs, simulate, bar, lines)
+        if writer.draws(*_OF_ROBOTS)
+        else ({}, {})
+    )
     lineages = [LINEAGE.empty_table(), *lines.values()]
     given = {**tables, "lineage": pa.concat_tables(lineages)}
     units = fitness_units(tables)
-    reached = tables.get("cells")
+    reached = tables.get("cells") if writer.draws(MAP) else None
     maps, no_maps = archive_maps(reached, runs) if reached else ([], {})
     every = [
         *FIGURES,
@@ -169,7 +204,7 @@ def draw_figures(
     ]
     for figure in bar.track(every, description="drawing figures"):
         writer.add(figure, given)
-    films = [writer.add_film(one) for one in pictures.values()]
+    films = [writer.add_film(one) for one in pictures.values() if not wanted]
     figures = sorted(writer.drawn, key=_place)
     return Drawings(figures, films, problems, writer.left_out, maps)
 

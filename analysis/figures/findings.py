@@ -11,26 +11,27 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.transforms import ScaledTranslation
 
 from analysis.comparison.findings import LARGE, NEGLIGIBLE
 from analysis.figures.forms import NothingToDraw, Row, Tables
-from analysis.figures.style import INK, pair_name
+from analysis.figures.look import BLUE, GREY, INK, LOOK, RULE, VERMILION
+from analysis.figures.style import pair_name
 
 _MARKS: dict[str, dict[str, Any]] = {
-    "reproduced": {"color": "#0072B2", "marker": "o", "markersize": 4.2},
-    "undecided": {"color": "#8C8C8C", "marker": "o", "markerfacecolor": "white",
+    "reproduced": {"color": BLUE, "marker": "o", "markersize": 4.2},
+    "undecided": {"color": GREY, "marker": "o", "markerfacecolor": "white",
                   "markersize": 4.2},
-    "not reproduced": {"color": "#D55E00", "marker": "X", "markersize": 5.4},
+    "not reproduced": {"color": VERMILION, "marker": "X", "markersize": 5.4},
 }  # fmt: skip
 """Look of each verdict: by shape as well as colour."""
 _SIGNS = {">": ">", "<": "<", "=": "≈", "!=": "≠"}
-_SHADE, _BOUND, _RULE = "#E4E4E4", "#555555", "#C8C8C8"
+_SHADE, _BOUND = "#E4E4E4", "#555555"
 _SMALL, _TEXT = 7.0, 7.5
-_LETTERS = 71
-"""Characters of a line of a heading."""
-_WIDTH_IN, _LINE_IN = 9.0, 0.122
-_NAMES_IN, _RIGHT_IN, _TOP_IN, _BELOW_IN = 0.78, 0.12, 0.84, 0.45
-"""Space around panels: names of pairs, right of them, legend and ticks, axis label."""
+_LETTER_IN, _LINE_IN = 0.058, 0.122
+"""Width of a letter, and height of a row."""
+_NAMES_IN, _RIGHT_IN, _TICKS_IN, _BELOW_IN = 0.78, 0.12, 0.26, 0.45
+"""Space around panels: names of pairs, right of them, ticks above, axis label."""
 _NUMBER_PT, _HEADING_PT = -55, -30
 """Places of a figure's number and of a heading, from the left end of the axis."""
 _GAP = 0.6
@@ -60,35 +61,43 @@ def effects(tables: Tables) -> Figure:
     panels = [kind for kind in kinds if kind]
     if not panels:
         raise NothingToDraw("no finding compares runs with each other or a number")
+    wide = LOOK.get().width_in
+    # Below each other in a narrow figure.
+    columns = 1 if LOOK.get().is_narrow else len(panels)
     figure = Figure()
-    (every,) = figure.subplots(1, len(panels), squeeze=False)
-    lines = max(
-        _draw_panel(axes, panel) for axes, panel in zip(every, panels, strict=True)
-    )
-    for axes in every:
-        axes.set_ylim(lines, 0)
-    height = _TOP_IN + _LINE_IN * lines + _BELOW_IN
-    figure.set_size_inches(_WIDTH_IN, height)
+    every = figure.subplots(len(panels) // columns, columns, squeeze=False)
+    letters = int((wide / columns - _NAMES_IN - _HEADING_PT / 72) / _LETTER_IN)
+    lines = [
+        _draw_panel(axes, panel, letters)
+        for axes, panel in zip(every.flat, panels, strict=True)
+    ]
+    heights = [max(lines)] if columns > 1 else lines
+    for axes, height in zip(every.flat, heights * columns, strict=True):
+        axes.set_ylim(height, 0)
+    top_in, above = _add_head(figure), _TICKS_IN + _BELOW_IN
+    high = top_in + _LINE_IN * sum(heights) + above * len(heights)
+    figure.set_size_inches(wide, high)
+    every[0, 0].get_gridspec().set_height_ratios(heights)
     gaps = _NAMES_IN + _RIGHT_IN
     figure.subplots_adjust(
-        _NAMES_IN / _WIDTH_IN, _BELOW_IN / height, 1 - _RIGHT_IN / _WIDTH_IN,
-        1 - _TOP_IN / height, wspace=gaps / (_WIDTH_IN / len(panels) - gaps),
+        _NAMES_IN / wide, _BELOW_IN / high, 1 - _RIGHT_IN / wide,
+        1 - (top_in + _TICKS_IN) / high, wspace=gaps / (wide / columns - gaps),
+        hspace=above / (_LINE_IN * sum(heights) / len(heights)),
     )  # fmt: skip
-    _add_legend(figure, height)
     return figure
 
 
-def _draw_panel(axes: Axes, rows: Sequence[Row]) -> float:
+def _draw_panel(axes: Axes, rows: Sequence[Row], letters: int) -> float:
     """Draw findings of one kind below each other; return their height [lines]."""
     at, previous = _GAP, ""
     for (number, topic, expected), group in groupby(rows, _heading):
         if previous and number != previous:
-            axes.plot([-0.22, 1], [at - _GAP / 3] * 2, color=_RULE, lw=0.6,
+            axes.plot([-0.22, 1], [at - _GAP / 3] * 2, color=RULE, lw=0.6,
                       transform=axes.get_yaxis_transform(), clip_on=False)  # fmt: skip
         if number != previous:
             _write(axes, at + 0.45, number, _NUMBER_PT, weight="bold")
         previous = number
-        for text in wrap(f"{topic} ({expected})", _LETTERS):
+        for text in wrap(f"{topic} ({expected})", letters):
             _write(axes, at + 0.45, text, _HEADING_PT)
             at += 1
         own = list(group)
@@ -165,16 +174,25 @@ def _set_axis(axes: Axes, *, is_pair: bool) -> None:
     axes.spines[["left", "right"]].set_visible(False)
 
 
-def _add_legend(figure: Figure, height_in: float) -> None:
+def _add_head(figure: Figure) -> float:
+    """Add the legend, and a note below it; return their height [inches]."""
     bounds = [
         Patch(color=_SHADE, label=f"negligible: ±{NEGLIGIBLE}, or ± the margin"),
         Line2D([], [], color=_BOUND, ls=":", label=f"±{LARGE}: alike within it"),
     ]
     marks = [Line2D([], [], lw=1.2, label=name, **look)
              for name, look in _MARKS.items()]  # fmt: skip
+    columns = 1 if LOOK.get().is_narrow else 3
     figure.legend(
-        handles=[*marks, *bounds], loc="upper center", ncols=5, frameon=False,
+        handles=[*marks, *bounds], loc="upper center", ncols=columns, frameon=False,
         fontsize=_TEXT, labelcolor=INK, borderaxespad=0.3, columnspacing=1.6,
     )  # fmt: skip
-    at = 1 - 0.42 / height_in
-    figure.text(0.5, at, _NOTE, ha="center", fontsize=_SMALL, color=INK)
+    legend_in = 0.12 + 0.155 * -(-len([*marks, *bounds]) // columns)
+    note = wrap(_NOTE, int(LOOK.get().width_in / _LETTER_IN))
+    figure.text(
+        0.5, 1, "\n".join(note), ha="center", va="top", fontsize=_SMALL, color=INK,
+        transform=figure.transFigure + ScaledTranslation(
+            0, -legend_in, figure.dpi_scale_trans
+        ),
+    )  # fmt: skip
+    return legend_in + _LINE_IN * len(note)

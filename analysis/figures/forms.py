@@ -8,16 +8,17 @@ import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analysis.figures.look import INK, LOOK
 from analysis.figures.style import (
     in_order,
     label,
+    panel_grid,
     scales,
+    text_in,
     theme_of_size,
     two_line_label,
 )
 from analysis.measures.fitness_functions import (
-    LOCOMOTION,
-    WEIGHTED,
     axis_text,
     fitness_unit,
     functions_of,
@@ -39,10 +40,10 @@ BAND_RUNS = 3
 """Runs from which on a mean's interval is drawn: that of two runs is 9 times wider."""
 _NARROW = 3
 """Panels in a row."""
+_BESIDE_IN = 0.7
+"""Space beside a panel [inches]."""
 _TITLE = 28
 """Characters of a line of a panel's title."""
-_INK = "#333333"
-
 
 FITNESS = "fitness"
 """Measure whose figures have a panel for each fitness function."""
@@ -74,15 +75,8 @@ def fitness_text(tables: Tables, text: str) -> str:
 
 
 def fitness_units(tables: Tables) -> dict[str, str]:
-    """Return the unit of each experiment's fitness; empty where it is not known.
-
-    That of locomotion is named: a sum of velocities is how fast no robot moves.
-    """
-    functions = _functions(tables).items()
-    return {
-        name: WEIGHTED if text == LOCOMOTION else fitness_unit(text)
-        for name, text in functions
-    }
+    """Return the unit of each experiment's fitness; empty where it is not known."""
+    return {name: fitness_unit(text) for name, text in _functions(tables).items()}
 
 
 def fitness_note(tables: Tables) -> str:
@@ -122,9 +116,9 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
         p9.aes(fill="experiment"),
         position=p9.position_jitter(width=0.06, height=0, random_state=1),
         size=1.8,
-        colour=_INK,
+        colour=INK,
         stroke=0.3,
-        show_legend=False,
+        show_legend=len(panels) > 1,
     )
     births = _births(tables["outcomes"], experiments)
     if len(panels) > 1:
@@ -135,14 +129,16 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     }
     look = theme_of_size(3.6) + p9.theme(legend_position="none")
     if functions:
-        figure += p9.facet_wrap("panel", scales="free", ncol=_NARROW)
+        columns, rows = panel_grid(runs["panel"].nunique(), _NARROW)
+        figure += p9.facet_wrap("panel", scales="free", ncol=columns)
         figure += p9.scale_x_discrete(labels=labels)
-        rows = -(-runs["panel"].nunique() // _NARROW)
         look = theme_of_size(0.6 + 3.0 * rows) + p9.theme(legend_position="none")
     else:
         figure += p9.scale_x_discrete(limits=experiments, labels=list(labels.values()))
     measure, text = next(iter(panels.items()))
     y_text = fitness_text(tables, text) if measure == FITNESS else text
+    if sum(map(text_in, labels.values())) > LOOK.get().width_in - _BESIDE_IN:
+        look += p9.theme(axis_text_x=p9.element_text(rotation=40, ha="right"))
     return figure + p9.labs(x="", y=y_text) + look
 
 
@@ -201,11 +197,12 @@ def _in_panels(count: int, experiments: list[str], births: dict[str, str]) -> li
         f"{text}: {', '.join(label(name) for name in births if births[name] == text)}"
         for text in dict.fromkeys(births.values())
     ]
+    columns, rows = panel_grid(count, _NARROW)
     return [
         p9.scale_x_discrete(limits=experiments),
-        p9.facet_wrap("panel", scales="free_y", ncol=min(count, _NARROW)),
+        p9.facet_wrap("panel", scales="free_y", ncol=columns),
         p9.labs(x="; ".join(at), y=""),
-        theme_of_size(3.4 if count <= _NARROW else 6.0),
+        theme_of_size(0.8 + 2.6 * rows),
         p9.theme(
             axis_text_x=p9.element_blank(),
             axis_ticks_major_x=p9.element_blank(),

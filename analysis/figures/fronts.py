@@ -3,7 +3,7 @@
 import plotnine as p9
 
 from analysis.figures.forms import Tables
-from analysis.figures.style import in_order, scales, theme_of_size
+from analysis.figures.style import in_order, panel_grid, scales, theme_of_size
 
 
 def fronts(tables: Tables) -> p9.ggplot:
@@ -14,7 +14,7 @@ def fronts(tables: Tables) -> p9.ggplot:
     # Panels have one pair of objectives each.
     frame["panel"] = frame["y_objective"] + " by " + frame["x_objective"]
     best = frame[frame["is_front"]].sort_values(["line", "x", "y"])
-    panels = frame["panel"].nunique()
+    columns, rows = panel_grid(panels := frame["panel"].nunique(), 2)
     figure = p9.ggplot(frame, p9.aes("x", "y", colour="experiment"))
     figure += p9.geom_point(size=0.8, alpha=0.3, stroke=0, show_legend=False)
     # Between two points the best is that of the one which is not better in x.
@@ -23,9 +23,9 @@ def fronts(tables: Tables) -> p9.ggplot:
     figure += p9.geom_step(p9.aes(group="line"), best, **steps)
     figure += p9.geom_point(data=best, size=1.6, show_legend=False)
     if panels > 1:
-        figure += p9.facet_wrap("panel", scales="free", ncol=2)
+        figure += p9.facet_wrap("panel", scales="free", ncol=columns)
         texts = {"x": "first objective", "y": "second objective"}
     else:
         texts = {axis: frame[f"{axis}_objective"].iloc[0] for axis in "xy"}
     figure += scales(tables, experiments, is_filled=False)
-    return figure + p9.labs(**texts) + theme_of_size(0.8 + 3.6 * -(-panels // 2))
+    return figure + p9.labs(**texts) + theme_of_size(0.8 + 3.6 * rows)

@@ -8,18 +8,19 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.forms import NothingToDraw, Tables, fitness_panels, fitness_text
+from analysis.figures.look import LOOK, OTHERS, RAMP
 from analysis.figures.style import (
-    OTHERS,
     in_order,
     integer_breaks,
     label,
+    legend,
     lone_points,
+    panel_grid,
     scales,
     theme_of_size,
 )
 
 _PAIRS = {"within": "within islands", "between": "between islands"}
-_IN_A_ROW = 12
 
 
 def fitness_by_island(tables: Tables) -> p9.ggplot:
@@ -29,30 +30,32 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
         NothingToDraw: no run has several islands, or none has a judged population.
     """
     several = _of_several(tables)["folder"]
-    rows = tables["populations"]
-    chosen = pc.is_in(rows["folder"], several.combine_chunks())
-    frame = rows.filter(chosen).filter(pc.field("fitness").is_valid()).to_pandas()
+    every = tables["populations"]
+    chosen = pc.is_in(every["folder"], several.combine_chunks())
+    frame = every.filter(chosen).filter(pc.field("fitness").is_valid()).to_pandas()
     if frame.empty:
         raise NothingToDraw("no run of several islands has a judged population")
     frame["island"] = frame["island"].astype(str)
     frame["line"] = frame["folder"] + " " + frame["island"]
     names = sorted(set(frame["island"]), key=int)
     heights = "free_y" if fitness_panels(tables) else "fixed"
+    columns, rows = panel_grid(frame["experiment"].nunique(), 3)
     hues = OTHERS * -(-len(names) // len(OTHERS))
     return (
         p9.ggplot(frame, p9.aes("births", "fitness"))
         + p9.geom_line(p9.aes(colour="island", group="line"), size=0.7, alpha=0.85)
         + lone_points(frame, ["island", "line"])
-        + p9.facet_wrap("experiment", labeller=label, scales=heights)
-        + p9.scale_colour_manual(hues[: len(names)], limits=names)
-        + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))
+        + p9.facet_wrap("experiment", labeller=label, scales=heights, ncol=columns)
+        + p9.scale_colour_manual(
+            hues[: len(names)], limits=names, guide=legend(["island", *names])
+        )
         + p9.expand_limits(y=0)
         + p9.labs(
             x="births on the island",
             y=fitness_text(tables, "mean fitness"),
             colour="island ",
         )
-        + theme_of_size(3.8)
+        + theme_of_size(0.8 + 3.0 * rows)
         + p9.theme(legend_title=p9.element_text())
     )
 
@@ -134,12 +137,17 @@ def migration_graph(tables: Tables) -> p9.ggplot:
         + p9.facet_wrap("experiment", labeller=label)
         + p9.scale_size_continuous(range=(0.5, 2.0), breaks=integer_breaks,
                                    name="migrants")
-        + p9.scale_colour_gradient("#C6DBEF", "#084594", limits=(0, 1),
+        + p9.scale_colour_gradient(*RAMP, limits=(0, 1),
                                    name="share with\nliving line")
         + p9.coord_fixed(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25))
+        + p9.labs(x="", y="")
         + theme_of_size(4.6)
-        + p9.theme_void()
-        + p9.theme(figure_size=(7.0, 4.6), legend_position="right")
+        + p9.theme(
+            axis_text=p9.element_blank(), axis_ticks=p9.element_blank(),
+            axis_line=p9.element_blank(), panel_grid=p9.element_blank(),
+            legend_title=p9.element_text(),
+            legend_position="bottom" if LOOK.get().is_narrow else "right",
+        )
     )  # fmt: skip
 
 

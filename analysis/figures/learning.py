@@ -5,11 +5,18 @@ from typing import Any
 import plotnine as p9
 
 from analysis.figures.forms import NothingToDraw, Tables, fitness_text
-from analysis.figures.style import in_order, label, scales, theme_of_size
+from analysis.figures.look import BLUE, ORANGE, VERMILION
+from analysis.figures.style import (
+    in_order,
+    label,
+    panel_grid,
+    scales,
+    theme_of_size,
+)
 
 _BINS, _WIDTH = 20, 10
 """Most intervals of births of a figure, and their least length."""
-_BEFORE_AFTER = ["#D55E00", "#0072B2"]
+_BEFORE_AFTER = [VERMILION, BLUE]
 _KEPT, _SAVED = "also with the brain at birth", "saved by learning"
 
 
@@ -92,7 +99,7 @@ def bodies_saved(tables: Tables) -> p9.ggplot:
     return (
         p9.ggplot(long, p9.aes("births", "value", fill="how"))
         + p9.geom_col(p9.aes(width="width"), colour="white", size=0.3)
-        + p9.scale_fill_manual(["#E69F00", "#7F9FBF"], name="")
+        + p9.scale_fill_manual([ORANGE, "#7F9FBF"], name="")
         + p9.expand_limits(y=[0, 1])
         + p9.labs(x="births", y="share in the next population")
         + _panels(shares)
@@ -118,5 +125,6 @@ def _panels(frame: Any) -> list[Any]:  # noqa: ANN401 - pandas
     names = {name: label(name) for name in in_order(frame["experiment"])}
     if len(names) == 1:
         return [theme_of_size(3.6)]
-    panels = p9.facet_wrap("experiment", ncol=2, labeller=p9.as_labeller(names))
-    return [theme_of_size(1.2 + 2.4 * -(-len(names) // 2)), panels]
+    columns, rows = panel_grid(len(names), 2)
+    panels = p9.facet_wrap("experiment", ncol=columns, labeller=p9.as_labeller(names))
+    return [theme_of_size(1.2 + 2.4 * rows), panels]

@@ -23,7 +23,8 @@ from schema.robot.ids import BirthId
 from schema.tables.description import allow_plugins_of
 from schema.tables.learnt import learnt_births
 
-_TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
+TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
+"""Numbers of the figures of families of the thesis's experiments."""
 _BASELINES = ("no-reproduction", "no-selection")
 """Experiments without an ancestry that selection made."""
 PART_COLOURS = (
@@ -37,7 +38,7 @@ _SOURCE = ("robots", BIRTHS)
 
 
 def _tree_number(experiment: str) -> str:
-    return _TREES.get(experiment, f"G-{experiment}")
+    return TREES.get(experiment, f"G-{experiment}")
 
 
 def robot_pictures(
@@ -117,7 +118,7 @@ def tree_figures(
     units: Mapping[str, str],
 ) -> Iterator[Figure]:
     """Yield the family of each best robot but those of baselines."""
-    for name in dict.fromkeys((*_TREES, *pictures)):
+    for name in dict.fromkeys((*TREES, *pictures)):
         if name in lines:
             ancestors = lines[name].num_rows - 1
             yield _tree(pictures[name], ancestors, robots, units.get(name, ""))

@@ -19,6 +19,7 @@ from analysis.figures.style import (
     in_order,
     integer_breaks,
     label,
+    panel_grid,
     scales,
     theme_of_size,
 )
@@ -101,7 +102,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     functions = fitness_panels(tables)
     shown["function"] = experiments.map(functions)
     in_panels = ["function", "panel"] if functions else "panel"
-    lines = len(set(functions.values())) or 1
+    columns, lines = panel_grid(2 * (len(set(functions.values())) or 1), 2)
     of_line = shown.groupby(["experiment", "population"])["bin"]
     # The library warns of lines of one point.
     joined = shown[of_line.transform("size") > 1]
@@ -116,7 +117,9 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         )
         + p9.geom_line(p9.aes(colour="experiment"), data=joined, size=0.6)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
-        + p9.facet_wrap(in_panels, ncol=2, scales="free_y" if functions else "fixed")
+        + p9.facet_wrap(
+            in_panels, ncol=columns, scales="free_y" if functions else "fixed"
+        )
         + scales(tables, experiments, is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x=axis, y=fitness_text(tables, "mean fitness"))

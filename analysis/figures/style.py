@@ -1,8 +1,10 @@
-"""Style of all figures: theme, colour and label of each experiment, file formats."""
+"""Style of all figures: theme, colour and label of each experiment, files."""
 
+import io
+import math
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from colorsys import hls_to_rgb
 from itertools import count
 from pathlib import Path
@@ -17,32 +19,28 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from plotnine.exceptions import PlotnineWarning
 
+from analysis.figures.look import FAINT, INK, LOOK, OTHERS, THESIS, dress
 from analysis.measures.distinct_names import MARK
 
 # Not the settings of a user's file matplotlibrc.
 rcdefaults()
-WIDTH_IN = 7.0
 DPI = 300
 
-_THESIS = {
-    "scenario1": "#0072B2",
-    "scenario2": "#E69F00",
-    "scenario3": "#009E73",
-    "no-reproduction": "#7F7F7F",
-    "no-selection": "#CC79A7",
-}
 _SHORT = {"no-reproduction": "random", "no-selection": "drift"}
 """What the baselines are: random search and drift."""
 _GOLDEN = 0.618034
 """Golden ratio: multiples of it are far from each other on a circle."""
 _LIGHTNESS = (0.3, 0.68, 0.47)
-OTHERS = ("#D55E00", "#56B4E9", "#8C6D31", "#5254A3", "#000000", "#B2DF8A", "#E7298A")
-"""Colours of experiments that are not in the thesis."""
-INK, _FAINT = "#333333", "#E6E6E6"
 # TrueType fonts instead of outlines, so that text in a PDF stays text.
-_SETTINGS: dict[Any, Any] = {"pdf.fonttype": 42, "savefig.facecolor": "white"}
-PICTURE_ENDING = ".png"
-_ENDINGS = (PICTURE_ENDING, ".pdf")
+_SETTINGS: dict[Any, Any] = {
+    "pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "revolve",
+}  # fmt: skip
+_SIZE_PT, _NARROW_PT = 10.0, 9.0
+"""Sizes of text in wide and narrow figures; that of axes is four fifths."""
+_NARROW_HEIGHT = 0.75
+"""Height of a panel in narrow figures, by that in wide ones."""
+_LETTER = 0.58
+"""Mean width of a letter, by the size of the text."""
 _BROAD = 12
 _MOST_BYTES = 100
 """Length of a file's name: file systems allow 255 bytes, endings included."""
@@ -57,20 +55,18 @@ def file_name(text: str) -> str:
 def in_order(experiments: Iterable[str]) -> list[str]:
     """Return each experiment once, those of the thesis first, in its order."""
     names = set(experiments)
-    known = [name for name in _THESIS if name in names]
-    return known + sorted(names.difference(_THESIS))
+    known = [name for name in THESIS if name in names]
+    return known + sorted(names.difference(THESIS))
 
 
 def colours(experiments: Iterable[str]) -> dict[str, str]:
     """Return each experiment's colour, in order.
 
-    Experiments of the thesis have the same colour in every figure of every report.
-
-    Source: Okabe and Ito, *Color universal design*, 2008: distinguishable for the
-    colour-blind.
+    Experiments of the thesis have the same colour in every figure of every report,
+    unless the user chose others.
     """
-    spare = _spare()
-    return {name: _THESIS.get(name) or next(spare) for name in in_order(experiments)}
+    paint, spare = {**THESIS, **LOOK.get().chosen}, _spare()
+    return {name: paint.get(name) or next(spare) for name in in_order(experiments)}
 
 
 def _spare() -> Iterator[str]:
@@ -88,7 +84,7 @@ def label(experiment: str) -> str:
     """
     name, mark, number = experiment.partition(MARK)
     text = name
-    if name in _THESIS:
+    if name in THESIS:
         text = re.sub(r"(?<=\D)(?=\d)", " ", name).replace("-", " ")
     return f"{text} {mark}{number}" if mark else text
 
@@ -131,14 +127,34 @@ def scales(
     shown = in_order(experiments)
     of_all = tables["runs"]["experiment"].to_pylist() if "runs" in tables else ()
     paint = colours([*of_all, *shown])
+    labels = [label(name) for name in shown]
     settings = {
         "limits": shown,
-        "labels": [label(name) for name in shown],
+        "labels": labels,
         "values": [paint[name] for name in shown],
         "name": "",
     }
-    lines = [p9.scale_colour_manual(**settings)]
-    return [*lines, p9.scale_fill_manual(**settings)] if is_filled else lines
+    lines = [p9.scale_colour_manual(**settings, guide=legend(labels))]
+    areas = [p9.scale_fill_manual(**settings, guide=legend(labels))]
+    return lines + areas * is_filled
+
+
+def legend(labels: Sequence[str]) -> p9.guide_legend:
+    """Return a legend of as many rows as the labels need."""
+    wide_in = sum(map(text_in, labels)) + 0.4 * len(labels)
+    return p9.guide_legend(nrow=math.ceil(wide_in / (LOOK.get().width_in - 0.5)))
+
+
+def text_in(text: str) -> float:
+    """Return about how wide a text of a legend or axis is [inches]."""
+    size = _NARROW_PT if LOOK.get().is_narrow else _SIZE_PT
+    return 0.8 * size / 72 * _LETTER * max(map(len, text.split("\n")))
+
+
+def panel_grid(count: int, most: int) -> tuple[int, int]:
+    """Return columns and rows of panels; narrow figures have a column less."""
+    columns = max(1, min(count, most - LOOK.get().is_narrow))
+    return columns, -(-count // columns)
 
 
 def lone_points(
@@ -163,15 +179,20 @@ def integer_breaks(limits: tuple[float, float]) -> list[float]:
 
 def theme_of_size(height_in: float) -> Any:  # noqa: ANN401 - untyped
     """Return the theme for a figure of this height [inches]."""
-    return p9.theme_bw(base_size=10) + p9.theme(
-        figure_size=(WIDTH_IN, height_in),
+    look = LOOK.get()
+    size_pt, factor = _SIZE_PT, 1.0
+    if look.is_narrow:
+        size_pt, factor = _NARROW_PT, _NARROW_HEIGHT
+    return p9.theme_bw(base_size=size_pt) + p9.theme(
+        figure_size=(look.width_in, factor * height_in),
         text=p9.element_text(colour=INK),
         legend_position="top",
         legend_title=p9.element_blank(),
         legend_key=p9.element_blank(),
+        legend_background=p9.element_blank(),
         panel_border=p9.element_blank(),
         panel_grid_minor=p9.element_blank(),
-        panel_grid_major=p9.element_line(colour=_FAINT, size=0.5),
+        panel_grid_major=p9.element_line(colour=FAINT, size=0.5),
         axis_line=p9.element_line(colour=INK, size=0.5),
         axis_ticks=p9.element_line(colour=INK, size=0.5),
         strip_background=p9.element_blank(),
@@ -181,16 +202,24 @@ def theme_of_size(height_in: float) -> Any:  # noqa: ANN401 - untyped
     )
 
 
-def save(figure: p9.ggplot | Figure, stem: Path) -> None:
-    """Write a figure as PNG and PDF, to a path without an ending."""
+def save(
+    figure: p9.ggplot | Figure, stem: Path, formats: Sequence[str] = ("pdf", "png")
+) -> bytes:
+    """Write a figure to a path without an ending; return it as PNG."""
     with warnings.catch_warnings():
         # A line of one point is not drawn: see ``lone_points``.
         warnings.simplefilter("ignore", PlotnineWarning)
         drawn = figure.draw() if isinstance(figure, p9.ggplot) else figure
+    dress(drawn)
+    stored = {}
+    # Without a date, the same tables give the same bytes.
+    undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
     with rc_context(_SETTINGS):
-        for ending in _ENDINGS:
-            # Without a date, the same tables give the same bytes.
-            dated = {"CreationDate": None} if ending == ".pdf" else {}
-            path = stem.with_name(stem.name + ending)
-            drawn.savefig(path, dpi=DPI, metadata=dated)
+        for kind in {"png": None, **dict.fromkeys(formats)}:
+            file = io.BytesIO()
+            drawn.savefig(file, format=kind, dpi=DPI, metadata=undated.get(kind))
+            stored[kind] = file.getvalue()
     plt.close(drawn)
+    for kind in formats:
+        stem.with_name(f"{stem.name}.{kind}").write_bytes(stored[kind])
+    return stored["png"]

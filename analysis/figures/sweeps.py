@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from analysis.comparison.statistics import mean_difference
 from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.look import BLUE, INK, LOOK
 from analysis.measures.population_table import Numbers
 
 MEASURES = {
@@ -24,9 +25,7 @@ MEASURES = {
 A small share in the second half says that fitness has levelled off; the number of
 living robots says what population an arena keeps.
 """
-_COLUMNS = 3
-_INK = "#333333"
-_PANEL_IN = 2.4
+_PANEL_IN = 2.3
 _MOST_CELLS = 40
 """Cells of a map from which on their numbers are not written."""
 
@@ -77,11 +76,10 @@ def sweep_map(tables: Tables, experiment: str) -> Figure:
     is_map, columns = _is_map(runs), len(runs.settings)
     shown = [None] if is_map else runs.settings
     cells = [(name, setting) for name in runs.measures for setting in shown]
-    wide = columns if columns > 1 and not is_map else min(_COLUMNS, len(cells))
+    most = max(1, int(LOOK.get().width_in / _PANEL_IN))
+    wide = min(most, columns if columns > 1 and not is_map else len(cells))
     high = -(-len(cells) // wide)
-    size = (_PANEL_IN * wide + 0.8, _PANEL_IN * high)
-    if is_map:
-        size = ((_PANEL_IN + 0.9) * wide, (_PANEL_IN + 0.4) * high)
+    size = (LOOK.get().width_in, (_PANEL_IN + 0.3 * is_map) * high)
     figure, axes = plt.subplots(high, wide, figsize=size, squeeze=False)
     for panel, (measure, setting) in zip(axes.flat, cells, strict=False):
         if setting is None:
@@ -162,17 +160,17 @@ def _draw_map(runs: SweepRuns, panel: Axes, measure: str) -> None:
     means = runs.frame.pivot_table(
         index=up, columns=across, values=measure, dropna=False
     )
-    picture = panel.imshow(means, origin="lower", aspect="auto", cmap="viridis")
+    picture = panel.imshow(means, origin="lower", aspect="auto", cmap="Blues")
     panel.set_xticks(range(means.shape[1]), map(_text, means.columns))
     panel.set_yticks(range(means.shape[0]), map(_text, means.index))
     panel.set(xlabel=across, ylabel=up)
-    panel.set_title(MEASURES[measure], fontsize=9, color=_INK)
+    panel.set_title(MEASURES[measure], fontsize=9, color=INK)
     panel.figure.colorbar(picture, ax=panel)
     if means.size > _MOST_CELLS:
         return
     middle = float(np.nanmean([np.nanmin(means), np.nanmax(means)]))
     for (row, column), value in np.ndenumerate(means.to_numpy()):
-        colour = "black" if value > middle else "white"
+        colour = "white" if value > middle else "black"
         text = f"{value:.2g}"
         panel.text(column, row, text, ha="center", va="center", size=7, color=colour)
 
@@ -182,11 +180,11 @@ def _draw_points(runs: SweepRuns, panel: Axes, measure: str, setting: str) -> No
     values = frame[setting]
     is_number = values.dtype.kind in "if"
     x = values if is_number else values.map(str)
-    panel.scatter(x, frame[measure], s=12, color="#0072B2", alpha=0.6)
+    panel.scatter(x, frame[measure], s=12, color=BLUE, alpha=0.6)
     means = frame.groupby(setting)[measure].mean()
     if len(means) < len(frame):
         at = means.index if is_number else means.index.map(str)
-        panel.plot(at, means, color=_INK, linewidth=1)
+        panel.plot(at, means, color=INK, linewidth=1)
     panel.set(xlabel=setting)
     panel.set_ylabel(MEASURES[measure], fontsize=8)
 

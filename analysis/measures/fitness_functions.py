@@ -6,18 +6,25 @@ from collections.abc import Callable, Iterable, Mapping
 
 import pyarrow as pa
 
-LOCOMOTION, WEIGHTED = "locomotion", "weighted velocity"
-"""Fitness function of the thesis, and what its value is: path velocity and five times
-straight velocity."""
 UNITS = {
-    LOCOMOTION: "m/s",
+    # Path velocity and five times straight velocity, which is how fast no robot moves.
+    "locomotion": "weighted velocity",
     "directed-locomotion": "m/s",
     "target": "m/s",
     "light": "brightness",
     "turning": "rad/s",
     "balance": "m",
 }
-"""Unit of each function that comes with the toolkit, as in its docstring."""
+"""Unit of each function that comes with the toolkit."""
+MEASURE_UNITS = {
+    "path_velocity": "m/s",
+    "straight_velocity": "m/s",
+    "turning": "rad/s",
+    "energy": "J",
+    "height": "m",
+    "joint_effort": "N m",
+}
+"""Units of the measures that come with the toolkit and have one."""
 
 
 def functions_of(runs: pa.Table) -> dict[str, str]:

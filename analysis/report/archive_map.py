@@ -8,6 +8,7 @@ from html import escape
 from itertools import groupby
 
 from analysis.figures.archive_maps import ArchiveMap, MapCell, map_axes
+from analysis.figures.look import in_look
 from analysis.render.plan import Outline
 
 _WIDTH, _LEFT, _RIGHT, _ABOVE, _BELOW = 1000.0, 100.0, 30.0, 16.0, 72.0
@@ -56,7 +57,7 @@ def _cell(one: ArchiveMap, cell: MapCell, side: float) -> str:
         lines.append(f"{name} {low + at * step:.3g} to {low + (at + 1) * step:.3g}")
     title = escape("\n".join(lines))
     paths = "".join(
-        f'<path color="{colour}" d="{"".join(map(_path, outlines))}"/>'
+        f'<path color="{in_look(colour)}" d="{"".join(map(_path, outlines))}"/>'
         for colour, outlines in groupby(cell.outlines, key=lambda each: each.colour)
     )
     box = f"{-_HALF} {-_HALF} {2 * _HALF} {2 * _HALF}"
@@ -64,7 +65,7 @@ def _cell(one: ArchiveMap, cell: MapCell, side: float) -> str:
     return (
         f'<svg class="robot" x="{x:.1f}" y="{y:.1f}" width="{side:.1f}" '
         f'height="{side:.1f}" viewBox="{box}"><title>{title}</title>'
-        f'<rect {edge} fill="{one.colour(cell)}"/>{paths}</svg>'
+        f'<rect {edge} fill="{in_look(one.colour(cell))}"/>{paths}</svg>'
     )
 
 

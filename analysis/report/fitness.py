@@ -10,6 +10,7 @@ import pyarrow.compute as pc
 
 from analysis.figures.courses import Course, course
 from analysis.figures.forms import BAND_RUNS, NothingToDraw, Row, Tables
+from analysis.figures.look import INK
 from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import by_function, functions_of
 from analysis.report.html import legend
@@ -221,5 +222,5 @@ def _columns(
         mean = float(np.mean([row["fitness"] for row in rows]))
         ends = [(middle - 0.4 * width, mean), (middle + 0.4 * width, mean)]
         text = f"{name}\nmean {mean:.3g} of {len(rows)} robots"
-        marks.append(painted("#333", line(axes, ends, "level"), text=text))
+        marks.append(painted(INK, line(axes, ends, "level"), text=text))
     return marks

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from html import escape
 
+from analysis.figures.look import in_look
 from analysis.figures.style import colours, label
 
 _NUMERIC = ' class="n"'
@@ -65,8 +66,11 @@ def capitalised(text: str) -> str:
 def legend(experiments: Sequence[str], of_all: Sequence[str]) -> str:
     """Return the names of experiments beside their colours, which all determine."""
     paint = colours(of_all)
-    marks = "".join(
-        f'<span><i style="background:{paint[name]}"></i>{escape(label(name))}</span>'
-        for name in experiments
-    )
+    marks = "".join(f"<span>{named(name, paint[name])}</span>" for name in experiments)
     return f'<p class="legend">{marks}</p>'
+
+
+def named(experiment: str, colour: str) -> str:
+    """Return the name of an experiment beside its colour."""
+    mark = f'<i style="background:{in_look(colour)}"></i>'
+    return f"{mark}{escape(label(experiment))}"

@@ -11,7 +11,7 @@ from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import axis_text, functions_of
 from analysis.measures.populations import last_rows
 from analysis.report.fitness import run_names
-from analysis.report.html import cell, duration, folded, table
+from analysis.report.html import cell, duration, folded, named, table
 from schema.errors import counted
 
 _MOST_LINES = 3
@@ -38,9 +38,8 @@ def summary(tables: Tables) -> str:
         times = [row["duration_s"] for row in mine if row["duration_s"] is not None]
         failures = [row["failures"] for row in mine if row["failures"] is not None]
         births = sorted({row["births"] for row in mine})
-        mark = f'<i style="background:{paint[name]}"></i>'
         cells = [
-            f'<td class="name">{mark}{escape(label(name))}</td>',
+            f'<td class="name">{named(name, paint[name])}</td>',
             *([cell(_with_unit(functions[name]))] if has_functions else []),
             cell(_states(mine)),
             cell(

@@ -14,6 +14,7 @@ from analysis.figures.archive_maps import MAP, ArchiveMap, map_caption
 from analysis.figures.catalogue import DrawnFigure, Section
 from analysis.figures.figure_writer import Drawings, Film
 from analysis.figures.forms import Tables
+from analysis.figures.look import FAINT, INK, RULE, in_look
 from analysis.figures.robot_figures import GAITS, PART_COLOURS
 from analysis.figures.style import in_order, label
 from analysis.measures.fitness_functions import axis_text
@@ -93,12 +94,21 @@ def report(
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{_file('page.css')}</style>\n"
+        f"<title>{escape(title)}</title>\n<style>{_colours()}{_file('page.css')}"
+        "</style>\n"
         f'</head>\n<body>\n<div id="page">\n<header><h1>{escape(title)}</h1>'
         f'<p class="lead">{escape(lead)}</p></header>\n<nav aria-label="Contents">'
         f"<ul>{links}</ul></nav>\n<main>\n{body}\n</main>\n</div>\n"
         f"<script>{_file('page.js')}</script>\n</body>\n</html>\n"
     )
+
+
+def _colours() -> str:
+    """Return the colours of the page, those of figures, as variables of CSS."""
+    paint = {"ink": INK, "faint": "#5F6772", "rule": RULE, "line": FAINT,
+             "pale": "#F6F7F9", "link": "#0B5CAD", "paper": "white"}  # fmt: skip
+    lines = (f"--{name}: {in_look(colour)};" for name, colour in paint.items())
+    return f":root {{ {' '.join(lines)} }}\n"
 
 
 def _file(name: str) -> str:
@@ -264,7 +274,9 @@ def _figure(drawn: DrawnFigure) -> str:
 def _file_of(drawn: DrawnFigure) -> str:
     one = drawn.figure
     thesis = f"figure {one.number} of the thesis; " * one.number[0].isdigit()
-    text = f"{thesis}file <code>figures/{escape(drawn.picture.stem)}.pdf</code>, .png"
+    first, *others = drawn.files
+    text = f"{thesis}file <code>figures/{escape(first.name)}</code>"
+    text += "".join(f", {file.suffix}" for file in others)
     sources = ", ".join(
         f"<code>{name}</code>" if name in OUTPUTS else escape(name)
         for name in one.source
@@ -277,7 +289,7 @@ def _embedded(drawn: DrawnFigure) -> str:
 
     Rendered robots are stored as WebP; lossless WebP of plots takes five times as long.
     """
-    with Image.open(drawn.picture) as picture:
+    with Image.open(io.BytesIO(drawn.picture)) as picture:
         high = round(picture.height * min(1.0, _SHOWN_PIXELS / picture.width))
         size = (min(_SHOWN_PIXELS, picture.width), high)
         small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)

@@ -11,6 +11,8 @@ from html import escape
 
 from matplotlib.ticker import MaxNLocator
 
+from analysis.figures.look import in_look
+
 WIDTH, HEIGHT = 560, 360
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66, 24, 34, 52
 
@@ -81,7 +83,8 @@ def painted(colour: str, *marks: str, kind: str = "", text: str = "") -> str:
     sheet.
     """
     title = f"<title>{escape(text)}</title>" if text else ""
-    return f'<g class="{kind}" style="color:{colour}">{title}{"".join(marks)}</g>'
+    paint = in_look(colour)
+    return f'<g class="{kind}" style="color:{paint}">{title}{"".join(marks)}</g>'
 
 
 def plot(

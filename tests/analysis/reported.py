@@ -88,7 +88,8 @@ def drawings(folder: Path) -> Drawings:
         DrawnFigure(
             Figure(number, f"Title {number}", "", (source,), lambda _: None, "bodies"),
             "What & why.",
-            folder / "one.png",
+            (folder / "one.pdf", folder / "one.png"),
+            (folder / "one.png").read_bytes(),
         )
         for number, source in (("6.9", "outcomes"), ("A", "<a> file"))
     ]

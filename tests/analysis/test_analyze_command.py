@@ -1,6 +1,5 @@
 """Output of ``revolve analyze``: summary, progress, and what cannot be drawn."""
 
-import argparse
 import io
 from pathlib import Path
 from threading import Event
@@ -11,11 +10,13 @@ import pyarrow as pa
 import pytest
 from rich.console import Console
 
+from analysis.__main__ import parser
 from analysis.analyze_command import analyze
 from analysis.measures.outputs import schema
 from analysis.progress import bars
 from analysis.render.files import NoPictures
 from analysis.summary import show
+from schema.errors import RevolveError
 from schema.tables.columns import TABLES
 from schema.tables.files import parquet_path
 from tests.analysis.campaign import random_bodies, write_run
@@ -33,8 +34,8 @@ def test_an_analysis_without_figures_says_so(
     write_run(tmp_path / "run", "scenario1", 0, 30, bodies)
     parquet_path(tmp_path / "run", "scenario1", 0, "births").unlink()
     out = tmp_path / "report"
-    options = argparse.Namespace(
-        runs=[tmp_path / "run"], out=out, slots="parent", processes=1
+    options = parser("analyze").parse_args(
+        [str(tmp_path / "run"), "--out", str(out), "--processes", "1"]
     )
     assert analyze(options, ["analyze", "run"], no_pictures) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -47,6 +48,47 @@ def test_an_analysis_without_figures_says_so(
     analyze(options, ["analyze", "run"], no_pictures)
     first = capsys.readouterr().out.splitlines()[0]
     assert first.startswith(f"{out / 'report.html'}: replaces the report of ")
+
+
+@pytest.mark.parametrize(
+    ("flags", "text"),
+    [
+        (["--figures", "6.3,Z"], r"--figures: must be of 6\.1, .*, S, got 'Z'$"),
+        (["--colours", "blurple"], "--colours: must be colours, or a colour map, of"),
+    ],
+)
+def test_names_that_do_not_exist_are_refused_before_anything_is_written(
+    tmp_path: Path, flags: list[str], text: str
+) -> None:
+    kind = TABLES["births"].field("body").type
+    bodies = pa.array(random_bodies(np.random.default_rng(1), 30), kind)
+    write_run(tmp_path / "run", "scenario1", 0, 30, bodies)
+    words = [str(tmp_path / "run"), "--out", str(tmp_path / "report"), *flags]
+    with pytest.raises(RevolveError, match=text):
+        analyze(parser("analyze").parse_args(words), words, no_pictures)
+    assert not (tmp_path / "report").exists()
+
+
+def test_only_the_figures_asked_for_are_drawn(tmp_path: Path) -> None:
+    kind = TABLES["births"].field("body").type
+    bodies = pa.array(random_bodies(np.random.default_rng(1), 30), kind)
+    write_run(tmp_path / "run", "scenario1", 0, 30, bodies)
+    out = tmp_path / "report"
+    (out / "figures").mkdir(parents=True)
+    kept = out / "figures" / "6.9-parts-at-the-end.png"
+    kept.touch()
+    words = [str(tmp_path / "run"), "--out", str(out), "--processes", "1"]
+    words += ["--figures", "6.3,6.14a", "--format", "svg", "--style", "dark"]
+    analyze(parser("analyze").parse_args(words), words, no_pictures)
+    assert sorted((out / "figures").iterdir()) == [
+        out / "figures" / "6.14a-fitness-by-the-number-of-extremities.svg",
+        out / "figures" / "6.3-fitness-over-births.svg",
+        kept,
+    ]
+    page = (out / "report.html").read_text("utf-8")
+    assert "--paper: #171717;" in page
+    assert "figures/6.3-fitness-over-births.svg" in page
+    assert "figure 6.2" not in page
 
 
 NAME = "archipelago-of-many-islands"

@@ -186,7 +186,7 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
     texts = [text.get_text() for text in axes.texts]
     numbers, note = texts[:5], texts[5]
     # 0 was born on another island.
-    assert {*numbers} == {"5  0.25", "4  ", "3  ", "1  ", "1:0  "}
+    assert {*numbers} == {"5  0.25", "4", "3", "1", "1:0"}
     assert note == "founders whose parts these robots have"
     assert {*texts[6:8]} == {"founder 1", "founder 1:0"}
     assert texts[8].endswith("fitness [m/s]")

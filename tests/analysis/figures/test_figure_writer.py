@@ -40,7 +40,7 @@ def test_each_experiment_has_files_of_its_own(tmp_path: Path) -> None:
     for experiment in names:
         writer.add(tree_of(experiment), {})
     films = [writer.add_film(robot_of(name, 60 * at)) for at, name in enumerate(names)]
-    pictures = [one.picture for one in writer.drawn]
+    pictures = [one.files[1] for one in writer.drawn]
     assert [path.name for path in pictures[:3]] == [
         "G-ancestry-of-a-b.png",
         "G-ancestry-of-A-b-2.png",

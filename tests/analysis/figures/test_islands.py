@@ -6,10 +6,11 @@ import pytest
 from matplotlib.text import Text
 
 from analysis.figures.bench import speed
-from analysis.figures.courses import UNITS, measures_over_births
+from analysis.figures.courses import measures_over_births
 from analysis.figures.forms import NothingToDraw, Tables
 from analysis.figures.islands import between, fitness_by_island, migration_graph
 from analysis.figures.robots import extremities_and_fitness, variability
+from analysis.measures.fitness_functions import MEASURE_UNITS
 from tests.analysis.drawn import layers, table
 from worker.measures import BUILT_IN
 
@@ -211,7 +212,7 @@ def test_a_measure_at_one_number_of_births_is_a_dot() -> None:
 
 
 def test_units_are_those_of_the_docstrings() -> None:
-    assert UNITS.keys() < BUILT_IN.keys()
+    assert MEASURE_UNITS.keys() < BUILT_IN.keys()
     for name, function in BUILT_IN.items():
-        unit = UNITS.get(name, "1")
+        unit = MEASURE_UNITS.get(name, "1")
         assert f"[{unit}]" in (function.__doc__ or "").partition("Source")[0], name

@@ -126,7 +126,7 @@ def test_contents_lead_to_every_section_in_order(read: Reader) -> None:
         "soft 2 finished 60 0.5 0.25 0.15 1 min 00 s 1",
         "hard & <b> 1 not finished 45 1 1 0.3 – – ",
         " hard & <b>: births: 1 instead of 2 ",
-        "Fitness function: locomotion [m/s].",
+        "Fitness function: locomotion [weighted velocity].",
         # Six choices of two runs of four: p of both tails is a third at least.
         "hard & <b> minus soft : +0.05 , 95 % interval 0.01 to 0.09",
         "undecided: the interval excludes 0, but p is not below 0.05; with 2 and 2",
@@ -187,7 +187,7 @@ def test_each_fitness_function_has_its_own_plot_and_no_winner() -> None:
     given = with_columns(tables(), "runs", fitness_function=functions)
     given["comparison"] = given["comparison"].slice(0, 0)
     found = read_page(given)
-    assert "soft locomotion [m/s] 2 finished" in found.text
+    assert "soft locomotion [weighted velocity] 2 finished" in found.text
     assert "hard & <b> goals:far (limit = 2.0) 1 not finished" in found.text
     far, near = "goals:far (limit = 2.0)", "locomotion"
     for title in ("Fitness over births", "Fitness of the last populations"):
