@@ -24,6 +24,7 @@ from analysis.comparison.statistics import (
     mean,
     mean_difference,
     rank_sum_p,
+    runs_needed,
     signed_rank,
 )
 from analysis.measures.outputs import OUTCOME, OWN, schema
@@ -159,6 +160,7 @@ def comparison(outcomes: Outcomes) -> pa.Table:
             if measure != "births" and all(map(len, samples)):
                 named = {"measure": measure, "a": a, "b": b, "births": births}
                 row = {**named, **two_samples(*samples)}
+                row["runs_needed"] = runs_needed(row["effect"])
                 if not np.ptp(np.concatenate(samples)):
                     row["p"] = None
                 rows.append(row)

@@ -11,6 +11,7 @@ Biopharm. 15, 1987.
 """
 
 import math
+from bisect import bisect_left
 from functools import lru_cache
 
 import numpy as np
@@ -24,6 +25,7 @@ ALPHA = 0.05
 LEVEL = 0.95
 """Confidence level of all intervals."""
 _Z = float(stats.norm.ppf((1 + LEVEL) / 2))
+_POWER_Z = float(stats.norm.ppf(0.8))
 EQUAL_RUNS = 10
 """Fewer equal runs than this do not show that there is no spread: ten show with 95 %
 confidence that at most 26 % of all runs differ."""
@@ -79,6 +81,29 @@ def rank_sum_p(a: Numbers, b: Numbers) -> float:
     places = _doubled_ranks(np.concatenate([a, b]))
     ways = rank_sum_ways(places, len(a))
     return _tails(ways, int(places[: len(a)].sum()))
+
+
+def runs_needed(delta: float) -> int | None:
+    """Return how many runs of each show an effect, four times in five.
+
+    They are the fewest with which ``rank_sum_p`` is below 5 % with a probability of
+    80 % if Cliff's delta is ``delta``; None if it is 0.
+
+    Source: the normal approximation of Noether, *Sample size determination for some
+    common nonparametric tests*, J. Am. Stat. Assoc. 82, 1987, with the variance of
+    ``score_variance``.
+    """
+    if not delta:
+        return None
+    theta = (abs(delta) + 1) / 2
+
+    def is_enough(runs: int) -> bool:
+        unlike, alike = score_variance(theta, runs, runs), (2 * runs + 1) / 12 / runs**2
+        reach = _Z * math.sqrt(alike) + _POWER_Z * math.sqrt(unlike)
+        return theta - 0.5 >= reach and 2 / math.comb(2 * runs, runs) < ALPHA
+
+    most = 9 + int(6 / delta**2)
+    return bisect_left(range(most), True, lo=1, key=is_enough)
 
 
 def rank_sum_ways(places: Integers, chosen: int) -> Numbers:

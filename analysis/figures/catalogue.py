@@ -182,7 +182,7 @@ FIGURES: tuple[Figure, ...] = (
              "extremities_per_part": "extremities per part"}),
     Figure("6.14a", "Fitness by the number of extremities",
            partial(_with_note, text="Points are means over the runs that have such "
-           "robots. Bars are 95 % intervals of the mean, shown for three or more runs. "
+           "robots. Bars are 95 % intervals of the mean, shown for five or more runs. "
            "Left: the last populations. Right: all robots ever evaluated."),
            ("extremities",), partial(extremities_and_fitness, by="count"), "bodies",
            nothing="no robot was evaluated"),

@@ -9,8 +9,8 @@ import pyarrow.compute as pc
 
 from analysis.comparison.progression import mean_of_all_runs, run_means
 from analysis.figures.forms import (
-    BAND_RUNS,
     FITNESS,
+    SUMMARY_RUNS,
     NothingToDraw,
     Tables,
     counted_runs,
@@ -110,7 +110,7 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     few = [name for name, size in shown.sizes.items() if 1 < size <= _FEW_RUNS]
     mean = frame(shown.mean)
     figure = p9.ggplot(mean, p9.aes("births", "mean"))
-    sure = shown.mean.filter(pc.field("runs") >= BAND_RUNS)
+    sure = shown.mean.filter(pc.field("runs") >= SUMMARY_RUNS)
     if sure.num_rows:
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
         # Not in the legend: the interval of some experiments is narrower than a line.
@@ -155,10 +155,10 @@ def course_caption(tables: Tables, measure: str) -> str:
     texts = [f"{text} ({counted_runs(sizes)})."]
     if any(1 < size <= _FEW_RUNS for size in sizes.values()):
         texts.append("Thin lines are single runs.")
-    if max(sizes.values()) >= BAND_RUNS:
+    if max(sizes.values()) >= SUMMARY_RUNS:
         texts.append(
-            f"Bands are 95 % intervals of the mean of {BAND_RUNS} or more runs; that "
-            "of few runs may reach beyond possible values."
+            f"Bands are 95 % intervals of the mean of {SUMMARY_RUNS} or more runs; "
+            "that of few runs may reach beyond possible values."
         )
     note = fitness_note(tables) if measure == FITNESS else ""
     if ends := shown.ends:

@@ -34,10 +34,13 @@ Row = Mapping[str, Any]
 Panels = Mapping[str, str]
 """Text of the axis or heading of each measure of a figure."""
 
-BOX_RUNS = 5
-"""Runs from which on a box is drawn."""
-BAND_RUNS = 3
-"""Runs from which on a mean's interval is drawn: that of two runs is 9 times wider."""
+SUMMARY_RUNS = 5
+"""Runs from which on boxes, and intervals of means as bands and bars, are drawn.
+
+The interval of the mean of five normal runs is as wide as their range is on average
+(2.5 and 2.3 standard deviations); that of four is half as wide again (3.2 and 2.1), of
+three three times as wide (5.0 and 1.7): a band that says less than the runs themselves.
+"""
 _NARROW = 3
 """Panels in a row."""
 _BESIDE_IN = 0.7
@@ -157,13 +160,13 @@ def spread_caption(tables: Tables, panels: Panels, note: str = "") -> str:
     births = set(tables["outcomes"]["births"].to_pylist())
     at = f", at {births.pop()} births" if len(births) == 1 else ""
     texts = [f"Each point is a finished run ({counted_runs(sizes)}){at}."]
-    if max(sizes.values(), default=0) >= BOX_RUNS:
+    if max(sizes.values(), default=0) >= SUMMARY_RUNS:
         texts.append(
             "Boxes show median and quartiles, whiskers the values within 1.5 times "
             "the height of the box."
         )
-    if min(sizes.values(), default=BOX_RUNS) < BOX_RUNS:
-        texts.append(f"With fewer than {BOX_RUNS} runs a bar shows their median.")
+    if min(sizes.values(), default=SUMMARY_RUNS) < SUMMARY_RUNS:
+        texts.append(f"With fewer than {SUMMARY_RUNS} runs a bar shows their median.")
     if _violins(tables, panels, {}, in_order(sizes)):
         texts.append(
             "Pale shapes show the robots of the last populations at those births, each "
@@ -281,7 +284,7 @@ def _last_robots(tables: Tables) -> pa.Table:
 def _summaries(runs: Any) -> list[Any]:  # noqa: ANN401 - pandas
     """Return layers that summarise runs: boxes of many, medians of few."""
     sizes = _grouped(runs).transform("size")
-    many, few = runs[sizes >= BOX_RUNS], runs[sizes < BOX_RUNS]
+    many, few = runs[sizes >= SUMMARY_RUNS], runs[sizes < SUMMARY_RUNS]
     layers = []
     if not many.empty:
         layers.append(

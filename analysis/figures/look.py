@@ -137,7 +137,8 @@ def in_look(colour: str) -> str:
     if look.style == "print":
         place = _place(colour)
         grey = 0.299 * red + 0.587 * green + 0.114 * blue
-        return to_hex([grey if place is None else _GREYS[place % len(_GREYS)]] * 3)
+        grey = grey if place is None else _GREYS[place % len(_GREYS)]
+        return to_hex((grey, grey, grey))
     hue, lightness, saturation = rgb_to_hls(red, green, blue)
     light = _DARKEST + (1.0 - lightness) * (_LIGHTEST - _DARKEST)
     if saturation >= _NEUTRAL:
@@ -170,7 +171,7 @@ def _recolour(artist: Artist, *, is_printed: bool) -> None:
         ramp = artist.get_cmap()(np.linspace(0.0, 1.0, 256))
         artist.set_cmap(ListedColormap([in_look(to_hex(each)) for each in ramp]))
         return
-    keys = ("facecolor", "edgecolor")
+    keys: tuple[str, ...] = ("facecolor", "edgecolor")
     if isinstance(artist, Line2D):
         keys = ("markerfacecolor", "markeredgecolor", "color")
     elif isinstance(artist, Text):

@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 
 from analysis.comparison.statistics import half_interval
 from analysis.figures.forms import (
-    BAND_RUNS,
+    SUMMARY_RUNS,
     NothingToDraw,
     Tables,
     fitness_panels,
@@ -89,7 +89,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     shown = over_runs.rename_columns([*keys, "fitness", "sd", "runs"]).to_pandas()
     mean = shown["fitness"]
     half = half_interval(shown["sd"].to_numpy(), shown["runs"].to_numpy())
-    half[shown["runs"] < BAND_RUNS] = np.nan
+    half[shown["runs"] < SUMMARY_RUNS] = np.nan
     shown["low"], shown["high"] = mean - half, mean + half
     width, start, axis = _BINS[by]
     experiments = shown["experiment"]

@@ -369,6 +369,8 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "b": "experiment",
         "births": OUTCOME["births"],
         **_TWO_SAMPLES,
+        "runs_needed": "runs of each experiment with which p is below 0.05 with a "
+        "probability of 80 % if the effect is as seen; null if it is 0",
     },
     "findings": {
         "finding": "number of the finding",
@@ -404,9 +406,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
 
 _INTEGERS = {"arena_births", "arena_living", "size", "judged", "ancestors", "planned",
              "islands", "robots", "samples", "pairs", "epoch", "to", "descendants",
-             "living", "reached", "runs", "runs_a", "runs_b", "failures", "deaths",
-             "finding", "births", "birth", "members", "founders", "trials",
-             "trial", "born", "children", "patch"}  # fmt: skip
+             "living", "reached", "runs", "runs_a", "runs_b", "runs_needed",
+             "failures", "deaths", "finding", "births", "birth", "members", "founders",
+             "trials", "trial", "born", "children", "patch"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "run_id", "state", "population", "by", "measure",
           "a", "b", "figure", "claim", "expected", "verdict", "why", "what", "topic",
           "setting", "value", "differs", "function", "fitness_function",

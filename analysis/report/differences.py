@@ -117,8 +117,16 @@ def _verdict(row: Row, both: tuple[float, float] | None) -> str:
     if row["apart"]:
         return "in an arena and off-line: this does not show which is fitter"
     if both[0] <= 0 <= both[1]:
-        return "the interval includes 0: these runs do not tell which is fitter"
+        why = "the interval includes 0: these runs do not tell which is fitter"
+        return f"{why}{_needed(row)}"
     return _tested(row, label(row["a"] if both[0] > 0 else row["b"]))
+
+
+def _needed(row: Row) -> str:
+    if row["runs_needed"] is None:
+        return ""
+    many = f"{row['runs_needed']} runs of each"
+    return f"; if the effect is as seen, {many} show it four times in five"
 
 
 def _tested(row: Row, higher: str) -> str:
@@ -127,8 +135,9 @@ def _tested(row: Row, higher: str) -> str:
     verdict = f"undecided: the interval excludes 0, but p is not below {_LEVEL:g}"
     least = 2.0 / comb(row["runs_a"] + row["runs_b"], row["runs_a"])
     if least < _LEVEL:
-        return verdict
-    return f"{verdict}; with {_counts(row)} it cannot be below {number(least)}"
+        return f"{verdict}{_needed(row)}"
+    below = f"with {_counts(row)} it cannot be below {number(least)}"
+    return f"{verdict}; {below}{_needed(row)}"
 
 
 def _bar(value: float, both: tuple[float, float] | None, reach: float) -> str:
@@ -164,13 +173,13 @@ def all_differences(tables: Tables) -> str:
     for row in tables["comparison"].to_pylist():
         pairs.setdefault((row["a"], row["b"]), []).append(row)
     columns = ("mean_a", "mean_b", "difference", "difference_low", "difference_high",
-               "effect", "p", "q")  # fmt: skip
+               "effect", "p", "q", "runs_needed")  # fmt: skip
     folds, shown = [], set()
     for (a, b), every in pairs.items():
         mine = [row for row in every if row["p"] is not None]
         shown |= {row["measure"] for row in mine}
         heads = ("measure", label(a), label(b), "difference", "low", "high", "effect",
-                 "p", "q")  # fmt: skip
+                 "p", "q", "runs needed")  # fmt: skip
         rows = []
         for row in mine:
             known = row if interval(row) else {**row, "difference_low": None,
@@ -190,8 +199,10 @@ def all_differences(tables: Tables) -> str:
         "interval (Welch's t). The effect is Cliff's delta: how much more often a run "
         "of the first experiment is above one of the second than below. p is that of "
         "the exact rank-sum test (Wilcoxon, Mann and Whitney), which assumes no "
-        "distribution; q is p, corrected for all tests of this section. Measures that "
-        "are equal in all runs of both experiments are not tested."
+        "distribution; q is p, corrected for all tests of this section. Runs needed: "
+        "of each experiment, for p < 0.05 with a probability of 80 % if the effect is "
+        "as seen. "
+        "Measures that are equal in all runs of both experiments are not tested."
     )
     folds.append(folded("What the measures mean", _meanings(shown)))
     apart = _apart(tables)

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.courses import Course, course
-from analysis.figures.forms import BAND_RUNS, NothingToDraw, Row, Tables
+from analysis.figures.forms import SUMMARY_RUNS, NothingToDraw, Row, Tables
 from analysis.figures.look import INK
 from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import by_function, functions_of
@@ -83,7 +83,7 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
     paint = colours(of_all)
     robots = _records(tables["robots"], few=len(names) >= _MANY_RUNS)
     means = shown.mean.to_pylist()
-    sure = [row for row in means if row["runs"] >= BAND_RUNS]
+    sure = [row for row in means if row["runs"] >= SUMMARY_RUNS]
     heights = [row[end] for row in sure for end in ("low", "high")]
     heights += shown.by_run["mean"].to_pylist() + robots["fitness_max"].to_pylist()
     last = max(shown.by_run["births"].to_pylist())

@@ -44,7 +44,7 @@ _COURSES = (
     "Fitness over births",
     (
         "Thick lines are means over the runs of an experiment, as far as all its runs "
-        "reach; bands are 95 % intervals of the mean of three or more runs. Thin lines "
+        "reach; bands are 95 % intervals of the mean of five or more runs. Thin lines "
         "are the mean fitness of single runs; of a run with several islands, the mean "
         "over them, as far as all of them reach. Dots are robots that were fitter than "
         "all robots born before them in their run."

@@ -54,7 +54,7 @@ def tables() -> dict[str, pa.Table]:
             {"measure": "fitness", "a": "hard & <b>", "b": "soft", "births": 30,
              "runs_a": 2, "runs_b": 2, "mean_a": 0.2, "mean_b": 0.15,
              "difference": 0.05, "difference_low": 0.01, "difference_high": 0.09,
-             "effect": 1.0, "p": 0.3, "q": 0.4},
+             "effect": 1.0, "p": 0.3, "q": 0.4, "runs_needed": 4},
             {"measure": "fitness_best", "a": "hard & <b>", "b": "soft", "births": 30,
              "runs_a": 2, "runs_b": 1, "mean_a": 0.2, "mean_b": 0.15,
              "difference": -0.05, "difference_low": -0.1, "difference_high": 0.02,

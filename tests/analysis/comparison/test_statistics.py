@@ -20,6 +20,7 @@ from analysis.comparison.statistics import (
     mean_difference,
     median_interval,
     rank_sum_p,
+    runs_needed,
     signed_rank,
     standard_error,
 )
@@ -123,6 +124,30 @@ def test_interval_of_delta_has_the_stated_coverage() -> None:
         low, high = delta_interval(cliffs_delta(a, b), 10, 10)
         inside += low <= truth <= high
     assert 0.93 <= inside / 600 <= 0.98
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("delta", "runs"), [(0.4, 32), (0.6, 14), (0.8, 7), (0.9, 5)])
+def test_an_effect_is_shown_four_times_in_five_by_the_runs_it_needs(
+    delta: float, runs: int
+) -> None:
+    """The tests are SciPy's, of normal runs with this Cliff's delta."""
+    assert runs_needed(delta) == runs_needed(-delta) == runs
+    shift = math.sqrt(2) * stats.norm.ppf((delta + 1) / 2)
+    rng = np.random.default_rng(7)
+    shares = []
+    for count in (runs, runs - 2):
+        a, b = rng.normal(shift, 1, (3000, count)), rng.normal(0, 1, (3000, count))
+        p = stats.mannwhitneyu(a, b, axis=1, method="exact").pvalue
+        shares.append(float((p < 0.05).mean()))
+    assert shares[1] < 0.79 < shares[0] < 0.86
+
+
+def test_few_runs_show_no_effect_however_large() -> None:
+    # Of three and three runs the least p is 0.1; no runs show an effect of 0.
+    assert (runs_needed(1.0), runs_needed(0.0)) == (4, None)
+    # Noether's formula, (1.96 + 0.842)^2 / (3 (delta / 2)^2) runs of both.
+    assert runs_needed(0.02) == pytest.approx(2.8016**2 / 3 / 0.01**2 / 2, rel=1e-3)
 
 
 MARGIN = 0.474

@@ -46,10 +46,10 @@ def courses(*runs: tuple[str, str, tuple[float, ...]]) -> dict[str, pa.Table]:
     return {"populations": populations, "progression": progression(populations)}
 
 
-THREE = [("b", f"b-{n}", (0.2 + n, 0.5 + n)) for n in range(3)]
-"""Three runs with means 1.2 and 1.5, and standard deviation 1."""
-HALF = 4.302653 / 3**0.5
-"""Half the interval of their mean: Student's t with two degrees of freedom."""
+FIVE = [("b", f"b-{n}", (0.2 + n, 0.5 + n)) for n in range(5)]
+"""Five runs with means 2.2 and 2.5, and variance 2.5."""
+HALF = 2.776445 * (2.5 / 5) ** 0.5
+"""Half the interval of their mean: Student's t with four degrees of freedom."""
 
 
 FITNESS = {"fitness": "mean fitness"}
@@ -145,17 +145,17 @@ def test_different_births_of_experiments_are_labelled() -> None:
     assert alone.labels.x == ""
 
 
-def test_bands_of_three_or_more_runs_are_not_cut_at_the_axes() -> None:
-    two = [("a", f"a-{n}", (0.1, 0.2)) for n in range(2)]
-    figure = over_births(courses(*two, *THREE), "fitness", "f")
+def test_bands_of_five_or_more_runs_are_not_cut_at_the_axes() -> None:
+    four = [("a", f"a-{n}", (0.1, 0.2)) for n in range(4)]
+    figure = over_births(courses(*four, *FIVE), "fitness", "f")
     band = layers(figure)["geom_ribbon"]
-    assert band["low"] == pytest.approx([1.2 - HALF, 1.5 - HALF])
-    assert band["high"] == pytest.approx([1.2 + HALF, 1.5 + HALF])
+    assert band["low"] == pytest.approx([2.2 - HALF, 2.5 - HALF])
+    assert band["high"] == pytest.approx([2.2 + HALF, 2.5 + HALF])
     assert set(band["experiment"]) == {"b"}
     (axes,) = figure.draw().axes
     low, high = axes.get_ylim()
-    assert low < 1.2 - HALF
-    assert high > 1.5 + HALF
+    assert low < 2.2 - HALF
+    assert high > 2.5 + HALF
 
 
 def test_a_mean_of_one_point_is_a_dot() -> None:
@@ -166,17 +166,17 @@ def test_a_mean_of_one_point_is_a_dot() -> None:
 
 
 def test_a_mean_ends_where_the_first_run_ends_and_the_caption_says_so() -> None:
-    longer = [("b", "b-3", (0.2, 0.5, 9.0, 9.5))]
-    tables = courses(*THREE, *longer)
+    longer = [("b", "b-5", (0.2, 0.5, 9.0, 9.5))]
+    tables = courses(*FIVE, *longer)
     figure = over_births(tables, "fitness", "f")
-    # Of four runs at 15 and 30 births; the run alone has a thin line up to 60.
+    # Of six runs at 15 and 30 births; the run alone has a thin line up to 60.
     assert figure.data["births"].tolist() == [15, 30]
-    assert figure.data["mean"].tolist() == pytest.approx([(3.6 + 0.2) / 4, 5 / 4])
+    assert figure.data["mean"].tolist() == pytest.approx([(11 + 0.2) / 6, 13 / 6])
     thin = figure.layers[1]._data
     assert thin["births"].max() == 60
     ends = "A mean ends where the first of its runs ends: 30 births (b)."
     assert course_caption(tables, "fitness").endswith(ends)
-    assert "first of its runs" not in course_caption(courses(*THREE), "fitness")
+    assert "first of its runs" not in course_caption(courses(*FIVE), "fitness")
 
 
 def test_long_runs_are_thinned_and_keep_both_ends() -> None:
@@ -189,9 +189,9 @@ def test_long_runs_are_thinned_and_keep_both_ends() -> None:
 def test_captions_name_what_is_drawn_and_of_how_many_runs() -> None:
     text = course_caption(courses(("a", "a-0", (0.1, 0.2))), "fitness")
     assert text == "Each line is one run (1 of a)."
-    text = course_caption(courses(*THREE, ("a", "a-0", (0.1, 0.2))), "fitness")
-    assert text.startswith("Thick lines are means over runs (1 of a, 3 of b).")
-    assert "95 % intervals of the mean of 3 or more runs" in text
+    text = course_caption(courses(*FIVE, ("a", "a-0", (0.1, 0.2))), "fitness")
+    assert text.startswith("Thick lines are means over runs (1 of a, 5 of b).")
+    assert "95 % intervals of the mean of 5 or more runs" in text
     tables = {"outcomes": table("outcomes", outcomes("b", 1, 2, 3, 4, 9))}
     text = spread_caption(tables, FITNESS)
     assert text.startswith("Each point is a finished run (5 of b), at 60 births. Boxes")

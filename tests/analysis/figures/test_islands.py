@@ -85,12 +85,13 @@ def test_islands_without_enough_births_are_not_said_to_be_missing() -> None:
             draw(alone)
 
 
-def test_fitness_by_extremities_has_bars_where_three_runs_are() -> None:
+def test_fitness_by_extremities_has_bars_where_five_runs_are() -> None:
     rows = [
         {"experiment": name, "folder": f"{name}{run}", "population": "final",
          "by": "count", "bin": extremities, "fitness": fitness}
         for name, extremities, values in (
-            ("a", 4.0, (0.1, 0.2, 0.3)), ("a", 5.0, (0.1, 0.2)), ("b", 4.0, (0.7,))
+            ("a", 4.0, (0.1, 0.2, 0.3, 0.4, 0.5)),
+            ("a", 5.0, (0.1, 0.1, 0.2, 0.2)), ("b", 4.0, (0.7,)),
         )
         for run, fitness in enumerate(values)
     ]  # fmt: skip
@@ -98,15 +99,15 @@ def test_fitness_by_extremities_has_bars_where_three_runs_are() -> None:
         {"extremities": table("extremities", rows)}, "count"
     )
     shown = layers(figure)
-    # The mean of three runs, Student's t of two degrees of freedom, at the left of 4.
-    error = 4.302653 * 0.1 / 3**0.5
+    # The mean of five runs, Student's t of four degrees of freedom, at the left of 4.
+    error = 2.776445 * (0.025 / 5) ** 0.5
     bars = shown["geom_linerange"]
     ends = zip(bars["at"], bars["low"], bars["high"], strict=True)
     known = [bar for bar in ends if not np.isnan(bar).any()]
-    assert known == [pytest.approx((3.935, 0.2 - error, 0.2 + error))]
+    assert known == [pytest.approx((3.935, 0.3 - error, 0.3 + error))]
     points = shown["geom_point"]
     assert dict(zip(points["at"], points["fitness"], strict=True)) == pytest.approx(
-        {3.935: 0.2, 4.935: 0.15, 4.065: 0.7}
+        {3.935: 0.3, 4.935: 0.15, 4.065: 0.7}
     )
     figure.draw()
 

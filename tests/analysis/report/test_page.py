@@ -130,7 +130,8 @@ def test_contents_lead_to_every_section_in_order(read: Reader) -> None:
         # Six choices of two runs of four: p of both tails is a third at least.
         "hard & <b> minus soft : +0.05 , 95 % interval 0.01 to 0.09",
         "undecided: the interval excludes 0, but p is not below 0.05; with 2 and 2",
-        "with 2 and 2 runs it cannot be below 0.333",
+        "with 2 and 2 runs it cannot be below 0.333; if the effect is as seen",
+        "if the effect is as seen, 4 runs of each show it four times in five",
         # One run of b is no spread of zero.
         "\u22120.05 (2 and 1 run, at 30 births) no interval",
         "1 measure is equal in all runs: size mean.",
