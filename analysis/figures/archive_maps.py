@@ -192,19 +192,21 @@ def draw_map(_: Tables, one: ArchiveMap, unit: str) -> drawing.Figure:
     left, below = _LEFT_IN / wide, _BELOW_IN / tall
     width, height = side * across / wide, side * along / tall
     axes = figure.add_axes((left, below, width, height))
-    squares = [_SQUARE + np.array([cell.x, cell.y]) for cell in one.cells]
-    shades = [one.colour(cell) for cell in one.cells]
-    axes.add_collection(PolyCollection(squares, facecolors=shades, edgecolors="white"))
-    pairs = [(cell, outline) for cell in one.cells for outline in cell.outlines]
-    shapes = [
-        _SHARE * outline.corners + np.array([cell.x + 0.5, cell.y + 0.5])
-        for cell, outline in pairs
-    ]
-    # A thin edge closes the gaps between boxes of a part.
-    paint = [outline.colour for _, outline in pairs]
-    axes.add_collection(
-        PolyCollection(shapes, facecolors=paint, edgecolors=paint, linewidths=0.2)
-    )
+    for cell in one.cells:
+        corner = np.array([cell.x, cell.y])
+        robot = [corner + 0.5 + _SHARE * each.corners for each in cell.outlines]
+        paint = [each.colour for each in cell.outlines]
+        # A thin edge closes the gaps between boxes of a part.
+        axes.add_collection(
+            PolyCollection(
+                [_SQUARE + corner, *robot],
+                facecolors=[one.colour(cell), *paint],
+                edgecolors=["white", *paint],
+                linewidths=[1.0, *(0.2 for _ in paint)],
+                gid=f"robot-{cell.x}/{cell.y}",
+                clip_on=False,
+            )
+        )
     _label_axes(axes, one)
     beside = (left + width + 0.1 / wide, below, 0.13 / wide, height)
     shades_of = ScalarMappable(one.scale, _PALE)
@@ -214,23 +216,30 @@ def draw_map(_: Tables, one: ArchiveMap, unit: str) -> drawing.Figure:
     return figure
 
 
+def map_texts(one: ArchiveMap) -> dict[str, str]:
+    """Return robot, fitness and bins of each cell of a map, by its ``gid``."""
+    grid, texts = one.grid, {}
+    for cell in one.cells:
+        lines = [f"robot {cell.robot}: fitness {cell.fitness:.3g}"]
+        for name, (low, high), bins, at in zip(
+            grid.measures, grid.bounds, one.bins, (cell.x, cell.y), strict=False
+        ):
+            step = (high - low) / bins
+            lines.append(f"{name} {low + at * step:.3g} to {low + (at + 1) * step:.3g}")
+        texts[f"robot-{cell.x}/{cell.y}"] = "\n".join(lines)
+    return texts
+
+
 def _label_axes(axes: Axes, one: ArchiveMap) -> None:
     axes.set(xlim=(0, one.bins[0]), ylim=(0, one.bins[1]))
     axes.yaxis.set_visible(len(one.grid.measures) > 1)
-    for axis, (name, ticks) in zip(
-        (axes.xaxis, axes.yaxis), map_axes(one), strict=False
-    ):
-        axis.set_ticks(*zip(*ticks, strict=True))
-        axis.set_label_text(name)
-    axes.tick_params(colors=INK, length=2)
-
-
-def map_axes(one: ArchiveMap) -> Iterator[tuple[str, list[tuple[float, str]]]]:
-    """Yield name, and places in cells and texts of marks, of the axes of a map."""
-    for name, (low, high), bins in zip(
-        one.grid.measures, one.grid.bounds, one.bins, strict=False
-    ):
+    for axis, name, (low, high), bins in zip(
+        (axes.xaxis, axes.yaxis), one.grid.measures, one.grid.bounds, one.bins,
+        strict=False,
+    ):  # fmt: skip
         values = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high)
-        shown = [value for value in map(float, values) if low <= value <= high]
-        marks = [((value - low) / (high - low) * bins, f"{value:g}") for value in shown]
-        yield with_unit(name), marks
+        marked = [value for value in map(float, values) if low <= value <= high]
+        places = [(value - low) / (high - low) * bins for value in marked]
+        axis.set_ticks(places, [f"{value:g}" for value in marked])
+        axis.set_label_text(with_unit(name))
+    axes.tick_params(colors=INK, length=2)

@@ -1,6 +1,7 @@
 """Courses of measures over births: runs, their mean, and its interval."""
 
 import re
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import plotnine as p9
@@ -92,15 +93,21 @@ def _thinned(by_run: pa.Table) -> pa.Table:
     return by_run.take(pa.array(kept, pa.int64()))
 
 
-def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
+def over_births(
+    tables: Tables, measure: str, text: str, heights: Sequence[float] | None = None
+) -> p9.ggplot:
     """Return a measure of runs, and its mean over them, by number of births.
+
+    ``heights`` are values of what is drawn later, from birth 0 on, in place of the
+    single runs; they have one fitness function, and the text has its unit.
 
     Raises:
         NothingToDraw: no run has two populations with a value.
     """
     shown = course(tables, measure)
-    functions = fitness_panels(tables) if measure == FITNESS else {}
-    y_text = fitness_text(tables, text) if measure == FITNESS else text
+    has_functions = measure == FITNESS and heights is None
+    functions = fitness_panels(tables) if has_functions else {}
+    y_text = fitness_text(tables, text) if has_functions else text
 
     def frame(rows: pa.Table) -> Any:  # noqa: ANN401 - pandas
         values = rows.to_pandas()
@@ -115,7 +122,7 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
         # Not in the legend: the interval of some experiments is narrower than a line.
         figure += p9.geom_ribbon(ends, frame(sure), alpha=0.18, show_legend=False)
-    if few:
+    if few and heights is None:
         figure += p9.geom_line(
             p9.aes(colour="experiment", group="folder"),
             data=runs[runs["experiment"].isin(few)],
@@ -127,7 +134,8 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     figure += lone_points(mean, ["experiment"])
     figure += _change_marks(tables)
     figure = figure + scales(tables, shown.sizes, is_filled=sure.num_rows > 0)
-    figure += p9.expand_limits(y=0)
+    figure += p9.expand_limits(y=[0, *(heights or ())])
+    figure += p9.expand_limits(x=0) if heights else []
     columns, rows = panel_grid(len(set(functions.values())) or 1, 2)
     if functions:
         figure += p9.facet_wrap("function", scales="free_y", ncol=columns)

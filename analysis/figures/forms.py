@@ -1,6 +1,6 @@
 """Distributions of measures over runs: points, boxes and violins."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -143,6 +143,25 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     if sum(map(text_in, labels.values())) > LOOK.get().width_in - _BESIDE_IN:
         look += p9.theme(axis_text_x=p9.element_text(rotation=40, ha="right"))
     return figure + p9.labs(x="", y=y_text) + look
+
+
+def columns_of(
+    experiments: Sequence[str], heights: Sequence[float], y_text: str
+) -> p9.ggplot:
+    """Return axes with a place for each experiment, at 0, 1 and so on, for heights."""
+    places = range(len(experiments))
+    labels = list(map(two_line_label, experiments))
+    look = theme_of_size(3.6)
+    if sum(map(text_in, labels)) > LOOK.get().width_in - _BESIDE_IN:
+        look += p9.theme(axis_text_x=p9.element_text(rotation=40, ha="right"))
+    return (
+        p9.ggplot()
+        + p9.expand_limits(x=[-0.5, len(places) - 0.5])
+        + p9.expand_limits(y=[0, *heights])
+        + p9.scale_x_continuous(breaks=places, labels=labels, minor_breaks=[])
+        + p9.labs(x="", y=y_text)
+        + look
+    )
 
 
 def _by_function(rows: Any, functions: Mapping[str, str]) -> Any:  # noqa: ANN401 - pandas

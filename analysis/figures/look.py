@@ -82,8 +82,8 @@ class Look:
 
     @property
     def is_narrow(self) -> bool:
-        """Whether figures have half the width of a page at most."""
-        return 2 * self.width_in <= WIDTHS_IN["page"]
+        """Whether figures have two thirds of the width of a page at most."""
+        return 1.5 * self.width_in <= WIDTHS_IN["page"]
 
 
 LOOK: ContextVar[Look] = ContextVar("look", default=Look())  # noqa: B039 - frozen

@@ -202,24 +202,30 @@ def theme_of_size(height_in: float) -> Any:  # noqa: ANN401 - untyped
     )
 
 
-def save(
-    figure: p9.ggplot | Figure, stem: Path, formats: Sequence[str] = ("pdf", "png")
-) -> bytes:
-    """Write a figure to a path without an ending; return it as PNG."""
+def stored(figure: p9.ggplot | Figure, formats: Iterable[str]) -> dict[str, bytes]:
+    """Return a figure in some formats, in the look of now."""
     with warnings.catch_warnings():
         # A line of one point is not drawn: see ``lone_points``.
         warnings.simplefilter("ignore", PlotnineWarning)
         drawn = figure.draw() if isinstance(figure, p9.ggplot) else figure
     dress(drawn)
-    stored = {}
+    files = {}
     # Without a date, the same tables give the same bytes.
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
     with rc_context(_SETTINGS):
-        for kind in {"png": None, **dict.fromkeys(formats)}:
+        for kind in formats:
             file = io.BytesIO()
             drawn.savefig(file, format=kind, dpi=DPI, metadata=undated.get(kind))
-            stored[kind] = file.getvalue()
+            files[kind] = file.getvalue()
     plt.close(drawn)
+    return files
+
+
+def save(
+    figure: p9.ggplot | Figure, stem: Path, formats: Sequence[str] = ("pdf", "png")
+) -> bytes:
+    """Write a figure to a path without an ending; return it as PNG."""
+    files = stored(figure, {"png": None, **dict.fromkeys(formats)})
     for kind in formats:
-        stem.with_name(f"{stem.name}.{kind}").write_bytes(stored[kind])
-    return stored["png"]
+        stem.with_name(f"{stem.name}.{kind}").write_bytes(files[kind])
+    return files["png"]

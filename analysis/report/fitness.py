@@ -1,27 +1,24 @@
 """Interactive plots of fitness: over births, and of the last populations."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.figures.courses import Course, course
-from analysis.figures.forms import SUMMARY_RUNS, NothingToDraw, Row, Tables
+from analysis.figures.courses import course, over_births
+from analysis.figures.forms import NothingToDraw, Row, Tables, columns_of
 from analysis.figures.look import INK
 from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import by_function, functions_of
-from analysis.report.html import legend
-from analysis.report.plots import Axes, band, dot, line, painted, plot, with_margin
+from analysis.report.interactive import interactive
 from schema.errors import counted
 
 _MANY_RUNS = 40
 """Runs from which on only the best robot of each is marked."""
 _MOST_DOTS = 3000
-_NAME, _NAMED = 14, 3
-"""Characters of names along an axis, and their number; others are in a legend."""
 _COLUMNS = 4
 """Number of runs for which columns have room; fewer runs have no wider ones."""
 
@@ -66,7 +63,7 @@ def of_each_function(tables: Tables) -> dict[str, Tables]:
     }
 
 
-def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
+def fitness_over_births(tables: Tables, y_text: str) -> str:
     """Return the plot of runs, their means, and robots fitter than all before.
 
     Robots of arenas are at their greatest fitness, because the lines are means of the
@@ -77,34 +74,56 @@ def fitness_over_births(tables: Tables, y_text: str = "fitness") -> str:
         shown = course(tables, "fitness")
     except NothingToDraw:
         return ""
-    islands = tables["runs"]["islands"].to_pylist()
     names = run_names(tables["runs"])
-    of_all = [name.experiment for name in names.values()]
-    paint = colours(of_all)
+    paint = colours(name.experiment for name in names.values())
     robots = _records(tables["robots"], few=len(names) >= _MANY_RUNS)
-    means = shown.mean.to_pylist()
-    sure = [row for row in means if row["runs"] >= SUMMARY_RUNS]
-    heights = [row[end] for row in sure for end in ("low", "high")]
-    heights += shown.by_run["mean"].to_pylist() + robots["fitness_max"].to_pylist()
-    last = max(shown.by_run["births"].to_pylist())
-    axes = Axes((0.0, float(last)), with_margin(heights))
-    marks = [_band(axes, sure, name, paint[name]) for name in in_order(shown.sizes)]
-    marks += _runs(axes, shown, names, paint)
-    for name in in_order(shown.sizes):
-        points = [(r["births"], r["mean"]) for r in means if r["experiment"] == name]
-        text = f"{label(name)}: mean of {shown.sizes[name]} runs"
-        if len(points) > 1 and shown.sizes[name] > 1:
-            mean = line(axes, points, "mean")
-            marks.append(painted(paint[name], mean, kind="curve", text=text))
-    marks += _dots(axes, robots, names, paint)
-    drawn = plot(
-        axes,
-        marks,
-        description="Fitness over births",
-        x_text="births on each island" if max(islands) > 1 else "births",
-        y_text=y_text,
-    )
-    return legend(in_order(shown.sizes), of_all) + drawn
+    robots = robots.filter(pc.field("births") <= pc.max(shown.by_run["births"]))
+    heights = shown.by_run["mean"].to_pylist() + robots["fitness_max"].to_pylist()
+    figure = over_births(tables, "fitness", y_text, heights).draw()
+    axes, texts = figure.axes[0], dict[str, str | list[str]]()
+    for experiment, size in shown.sizes.items():
+        rows = shown.mean.filter(pc.field("experiment") == experiment)
+        gid = f"curve-{len(texts)}"
+        texts[gid] = f"{label(experiment)}: mean of {counted(size, 'run')}"
+        # The line is there already: this one has the text.
+        axes.plot(rows["births"], rows["mean"], gid=gid, alpha=0.0)
+    for folder, name in names.items():
+        rows = shown.by_run.filter(pc.field("folder") == folder)
+        if rows.num_rows:
+            gid, end = f"curve-{len(texts)}", rows.slice(rows.num_rows - 1)
+            fitness, births = end["mean"][0].as_py(), end["births"][0]
+            texts[gid] = f"{name}\nmean fitness {fitness:.3g} at {births} births"
+            colour = paint[name.experiment]
+            axes.plot(
+                rows["births"], rows["mean"], gid=gid, color=colour, alpha=0.65, lw=0.7
+            )
+        own = robots.filter(pc.field("folder") == folder).to_pylist()
+        places = [(row["births"], row["fitness_max"]) for row in own]
+        _add_dots(axes, texts, places, own, (name, paint[name.experiment]))
+    return interactive(figure, texts, "Fitness over births")
+
+
+def _add_dots(
+    axes: Any,  # noqa: ANN401 - matplotlib
+    texts: dict[str, str | list[str]],
+    places: Sequence[tuple[float, float]],
+    robots: Sequence[Row],
+    run: tuple[RunName, str],
+) -> None:
+    """Add the robots of a run, of a name and colour, at their places, x and fitness."""
+    if not places:
+        return
+    gid, (name, colour) = f"dots-{len(texts)}", run
+    axes.scatter(
+        *zip(*places, strict=True), s=9, gid=gid, color=colour, edgecolors="white",
+        linewidths=0.3, zorder=50,
+    )  # fmt: skip
+    texts[gid] = [
+        f"robot {row['birth_island']}:{row['birth']}, {name}\nfitness {fitness:.3g}; "
+        f"{counted(row['parts'], 'part')}, {counted(row['active_joints'], 'motor')}, "
+        f"{counted(row['hidden'], 'hidden neuron')}"
+        for row, (_, fitness) in zip(robots, places, strict=True)
+    ]
 
 
 def _records(robots: pa.Table, *, few: bool) -> pa.Table:
@@ -124,56 +143,7 @@ def _records(robots: pa.Table, *, few: bool) -> pa.Table:
     return born.take(pa.array(kept, pa.int64()))
 
 
-def _band(axes: Axes, rows: Sequence[Row], name: str, colour: str) -> str:
-    mine = [
-        (row["births"], row["low"], row["high"])
-        for row in rows
-        if row["experiment"] == name
-    ]
-    return painted(colour, band(axes, mine)) if len(mine) > 1 else ""
-
-
-def _runs(
-    axes: Axes, shown: Course, names: Mapping[str, RunName], paint: Mapping[str, str]
-) -> list[str]:
-    points: dict[str, list[tuple[float, float]]] = {}
-    for row in shown.by_run.to_pylist():
-        points.setdefault(row["folder"], []).append((row["births"], row["mean"]))
-    marks = []
-    for folder, mine in points.items():
-        name = names[folder]
-        births, fitness = mine[-1]
-        text = f"{name}\nmean fitness {fitness:.3g} at {births} births"
-        kind = "run" if shown.sizes[name.experiment] > 1 else "mean"
-        drawn = line(axes, mine, kind)
-        marks.append(painted(paint[name.experiment], drawn, kind="curve", text=text))
-    return marks
-
-
-def _dots(
-    axes: Axes, robots: pa.Table, names: Mapping[str, RunName], paint: Mapping[str, str]
-) -> list[str]:
-    marks: dict[str, list[str]] = {}
-    for row in robots.to_pylist():
-        name = names[row["folder"]]
-        births = row["births"]
-        described = _described(row, row["fitness_max"])
-        text = f"robot {row['birth_island']}:{row['birth']}, {name}\n{described}"
-        if births <= axes.x_range[1]:
-            place = axes.x(births), axes.y(row["fitness_max"])
-            marks.setdefault(name.experiment, []).append(dot(*place, text, 2.6))
-    return [painted(paint[name], *marks[name], kind="dots") for name in in_order(marks)]
-
-
-def _described(row: Row, fitness: float) -> str:
-    return (
-        f"fitness {fitness:.3g}; {counted(row['parts'], 'part')}, "
-        f"{counted(row['active_joints'], 'motor')}, "
-        f"{counted(row['hidden'], 'hidden neuron')}"
-    )
-
-
-def last_populations(tables: Tables, y_text: str = "fitness") -> str:
+def last_populations(tables: Tables, y_text: str) -> str:
     """Return the plot of all robots of the last populations, a column per run.
 
     It is empty if no run has a population, or if there are too many robots.
@@ -184,43 +154,26 @@ def last_populations(tables: Tables, y_text: str = "fitness") -> str:
     names = run_names(tables["runs"])
     paint = colours(name.experiment for name in names.values())
     shown = in_order(living["experiment"].to_pylist())
-    axes = Axes((0.0, float(len(shown))), with_margin(living["fitness"].to_pylist()))
-    marks = []
-    for place, experiment in enumerate(shown):
-        mine = living.filter(pc.field("experiment") == experiment)
-        marks.append(painted(paint[experiment], *_columns(axes, mine, names, place)))
-    is_named = len(shown) <= _NAMED and max(map(len, map(label, shown))) <= _NAME
-    ticks = [(place + 0.5, label(name)) for place, name in enumerate(shown)] * is_named
-    names_above = "" if is_named else legend(shown, [*paint])
-    return names_above + plot(
-        axes,
-        marks,
-        description="Fitness of the last populations",
-        x_text="",
-        y_text=y_text,
-        x_names=ticks,
-    )
-
-
-def _columns(
-    axes: Axes, living: pa.Table, names: Mapping[str, RunName], place: int
-) -> list[str]:
-    """Return a column of robots for each run of an experiment, and the run's mean."""
-    by_run: dict[str, list[Row]] = {}
+    figure = columns_of(shown, living["fitness"].to_pylist(), y_text).draw()
+    axes, texts = figure.axes[0], dict[str, str | list[str]]()
+    of_runs: dict[str, dict[str, list[Row]]] = {}
     for row in living.to_pylist():
-        by_run.setdefault(row["folder"], []).append(row)
-    marks = []
-    width = 0.8 / max(len(by_run), _COLUMNS)
-    for at, (folder, rows) in enumerate(by_run.items()):
-        name = names[folder]
-        middle = place + 0.5 + width * (at - 0.5 * (len(by_run) - 1))
-        for count, row in enumerate(rows):
-            aside = width * 0.6 * ((count * 0.618) % 1 - 0.5)
-            text = f"robot {row['birth_island']}:{row['birth']}, {name}"
-            spot = axes.x(middle + aside), axes.y(row["fitness"])
-            marks.append(dot(*spot, f"{text}\n{_described(row, row['fitness'])}", 2.6))
-        mean = float(np.mean([row["fitness"] for row in rows]))
-        ends = [(middle - 0.4 * width, mean), (middle + 0.4 * width, mean)]
-        text = f"{name}\nmean {mean:.3g} of {len(rows)} robots"
-        marks.append(painted(INK, line(axes, ends, "level"), text=text))
-    return marks
+        runs = of_runs.setdefault(row["experiment"], {})
+        runs.setdefault(row["folder"], []).append(row)
+    for place, experiment in enumerate(shown):
+        runs = of_runs[experiment]
+        width = 0.8 / max(len(runs), _COLUMNS)
+        for at, (folder, rows) in enumerate(runs.items()):
+            middle = place + width * (at - 0.5 * (len(runs) - 1))
+            places = [
+                (middle + width * 0.6 * ((count * 0.618) % 1 - 0.5), row["fitness"])
+                for count, row in enumerate(rows)
+            ]
+            named = names[folder], paint[experiment]
+            _add_dots(axes, texts, places, rows, named)
+            mean = float(np.mean([row["fitness"] for row in rows]))
+            ends = middle - 0.4 * width, middle + 0.4 * width
+            gid = f"curve-{len(texts)}"
+            texts[gid] = f"{names[folder]}\nmean {mean:.3g} of {len(rows)} robots"
+            axes.plot(ends, (mean, mean), gid=gid, color=INK, lw=1.5, zorder=60)
+    return interactive(figure, texts, "Fitness of the last populations")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from html import escape
 
 from analysis.figures.look import in_look
-from analysis.figures.style import colours, label
+from analysis.figures.style import label
 
 _NUMERIC = ' class="n"'
 
@@ -61,13 +61,6 @@ def folded(title: str, content: str, *, is_open: bool = False) -> str:
 def capitalised(text: str) -> str:
     """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
-
-
-def legend(experiments: Sequence[str], of_all: Sequence[str]) -> str:
-    """Return the names of experiments beside their colours, which all determine."""
-    paint = colours(of_all)
-    marks = "".join(f"<span>{named(name, paint[name])}</span>" for name in experiments)
-    return f'<p class="legend">{marks}</p>'
 
 
 def named(experiment: str, colour: str) -> str:

@@ -11,8 +11,10 @@
     if (!mark) { hide(); return; }
     tip.textContent = mark.dataset.tip;
     if (mark.matches(".robot")) {
-      const large = mark.cloneNode(true);
-      for (const name of ["x", "y", "width", "height"]) large.removeAttribute(name);
+      const { x, y, width, height } = mark.getBBox();
+      const large = mark.ownerSVGElement.cloneNode();
+      large.setAttribute("viewBox", `${x} ${y} ${width} ${height}`);
+      large.append(mark.cloneNode(true));
       tip.append(large);
     }
     tip.hidden = false;
@@ -32,6 +34,7 @@
     for (const line of plot.querySelectorAll(".curve > path")) {
       const wide = line.cloneNode();
       wide.setAttribute("class", "wide");
+      wide.removeAttribute("style");
       line.before(wide);
     }
     plot.addEventListener("pointermove", show);

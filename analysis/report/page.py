@@ -3,6 +3,7 @@
 import base64
 import io
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from html import escape
 from importlib.resources import files
@@ -10,16 +11,21 @@ from importlib.resources import files
 import pyarrow.compute as pc
 from PIL import Image
 
-from analysis.figures.archive_maps import MAP, ArchiveMap, map_caption
+from analysis.figures.archive_maps import (
+    MAP,
+    ArchiveMap,
+    draw_map,
+    map_caption,
+    map_texts,
+)
 from analysis.figures.catalogue import DrawnFigure, Section
 from analysis.figures.figure_writer import Drawings, Film
-from analysis.figures.forms import Tables
-from analysis.figures.look import FAINT, INK, RULE, in_look
+from analysis.figures.forms import Tables, fitness_units
+from analysis.figures.look import FAINT, INK, LOOK, RULE, dressed_in, in_look
 from analysis.figures.robot_figures import GAITS, PART_COLOURS
 from analysis.figures.style import in_order, label
 from analysis.measures.fitness_functions import axis_text
 from analysis.measures.outputs import OUTPUTS
-from analysis.report.archive_map import interactive_map
 from analysis.report.differences import all_differences, differences
 from analysis.report.fitness import (
     fitness_over_births,
@@ -28,6 +34,7 @@ from analysis.report.fitness import (
     run_names,
 )
 from analysis.report.html import capitalised, cell, folded, number, table
+from analysis.report.interactive import interactive
 from analysis.report.overview import all_runs, arenas, speed, summary
 from analysis.report.thesis import findings
 from schema.errors import counted
@@ -36,6 +43,8 @@ _SHOWN_PIXELS = 1400
 """Width of figures in the report; their files are wider."""
 _COLOURS = 128
 """Colours of plots in the report."""
+_PLOT_IN = 4.6
+"""Width of interactive plots [inches]."""
 _WIDE = ("sweeps", "thesis")
 """Sections whose figures are as wide as the page, as that of gaits is."""
 
@@ -124,7 +133,11 @@ def _sections(
     over_births = (*_COURSES[:2], _COURSES[2] + _COURSES_OF_ARENAS * has_arena)
     courses = _of_functions(tables, fitness_over_births, over_births, by_number)
     last = _of_functions(tables, last_populations, _LAST, by_number)
-    maps = {f"{MAP}-{one.experiment}": _map(one, by_number) for one in drawings.maps}
+    units = fitness_units(tables)
+    maps = {
+        f"{MAP}-{one.experiment}": _map(one, by_number, units.get(one.experiment, ""))
+        for one in drawings.maps
+    }
     plots = {"6.3": courses, "6.2": last, **maps}
     installed = [[cell(name), cell(text)] for name, text in versions.items()]
     software = table(("software", "version"), installed)
@@ -188,11 +201,13 @@ def _of_functions(
     """
     number, title, text = about
     groups = of_each_function(tables)
-    plots = {
-        function: plot
-        for function, mine in groups.items()
-        if (plot := draw(mine, axis_text(function)))
-    }
+    # Narrow, so that texts are large.
+    with dressed_in(replace(LOOK.get(), width_in=_PLOT_IN)):
+        plots = {
+            function: plot
+            for function, mine in groups.items()
+            if (plot := draw(mine, axis_text(function)))
+        }
     figures = []
     for count, (function, plot) in enumerate(plots.items()):
         own = f": {escape(function)}" * (len(groups) > 1)
@@ -208,12 +223,13 @@ def _of_functions(
     return "".join(figures)
 
 
-def _map(one: ArchiveMap, drawn: Mapping[str, DrawnFigure]) -> str:
+def _map(one: ArchiveMap, drawn: Mapping[str, DrawnFigure], unit: str) -> str:
     number = f"{MAP}-{one.experiment}"
     name = escape(f"Archive map of {label(one.experiment)}.")
+    plot = interactive(draw_map({}, one, unit), map_texts(one), name, "map")
     files_of = f" {_file_of(drawn[number])}" if number in drawn else ""
     return (
-        f'<figure id="figure-{escape(number)}" class="wide">{interactive_map(one)}'
+        f'<figure id="figure-{escape(number)}" class="wide">{plot}'
         f"<figcaption><b>{name}</b> {escape(map_caption(one))} A pointer on a cell "
         f"shows its robot.{files_of}</figcaption></figure>"
     )

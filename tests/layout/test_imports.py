@@ -35,7 +35,7 @@ PERMITTED = {
     "plotnine": ("analysis/figures/*.py",),
     "scipy": ("analysis/comparison/*.py",),
     "numba": ("schema/robot/body_distance.py",),
-    "matplotlib": ("analysis/figures/*.py", "analysis/report/plots.py"),
+    "matplotlib": ("analysis/figures/*.py",),
     "networkx": ("coordinator/islands/topology.py",),
     "cmaes": ("coordinator/evolution/learners/built_in.py",),
 }

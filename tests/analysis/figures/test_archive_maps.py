@@ -14,10 +14,11 @@ from analysis.figures.archive_maps import (
     draw_map,
     map_caption,
     map_figures,
+    map_texts,
 )
 from analysis.measures.load import LoadedRun
 from analysis.render.plan import Outline
-from analysis.report.archive_map import interactive_map
+from analysis.report.interactive import interactive
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment
 from schema.experiment.grid import Grid
@@ -78,15 +79,17 @@ def test_the_page_tells_robot_and_cell(monkeypatch: pytest.MonkeyPatch) -> None:
         GRID, cell("a", "0/0/0", 1.0), cell("a", "2/1/0", 2.0, birth=5),
         monkeypatch=monkeypatch,
     )  # fmt: skip
-    text = interactive_map(one)
-    second, first = re.findall(r"<title>(.*?)</title>", text, re.DOTALL)
+    text = interactive(draw_map({}, one, ""), map_texts(one), "map")
+    second, first = re.findall(
+        r'<g class="robot"><title>(.*?)</title>', text, re.DOTALL
+    )
     assert first.startswith("robot 0:0: fitness 1\nsize 0 to 10\nenergy 0 to 0.5")
     assert second.startswith("robot 0:5: fitness 2\nsize 20 to 30\nenergy 0.5 to 1")
     # Bins are counted from the lower left; y of SVG is downwards.
-    places = re.findall(r'class="robot" x="([\d.]+)" y="([\d.]+)"', text)
-    assert [tuple(map(float, place)) for place in places] == (
-        [(680.0, 0.0), (100.0, 290.0)]
-    )
+    places = re.findall(r'</title>\s*<path d="M ([\d.]+) ([\d.]+)', text)
+    (right, top), (left, bottom) = (tuple(map(float, each)) for each in places)
+    assert right > left
+    assert bottom > top
 
 
 def test_one_measure_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,7 +98,7 @@ def test_one_measure_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [(each.x, each.y) for each in one.cells] == [(1, 0)]
     wide, high = draw_map({}, one, "").get_size_inches()
     assert high < wide / 2
-    assert interactive_map(one).count("<title>") == 1
+    assert [*map_texts(one).values()] == ["robot 0:0: fitness 1\nsize 10 to 20"]
 
 
 def test_robots_that_cannot_be_read_are_left_out(

@@ -45,7 +45,7 @@ window.addEventListener("load", () => {
       });
     });
   }
-  const mark = document.querySelector("svg.plot circle");
+  const mark = document.querySelector("svg.plot .dots use");
   mark.dispatchEvent(new PointerEvent("pointermove", { bubbles: true }));
   const tip = document.getElementById("tip");
   parent.postMessage(JSON.stringify({

@@ -10,6 +10,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
+from matplotlib import pyplot as plt
 from PIL import Image
 
 from analysis.figures.figure_writer import Drawings
@@ -17,7 +18,7 @@ from analysis.measures.outputs import schema
 from analysis.report import page as report_page
 from analysis.report import thesis
 from analysis.report.differences import differences
-from analysis.report.plots import Axes, dot, plot, with_margin
+from analysis.report.interactive import interactive
 from tests.analysis.drawn import table
 from tests.analysis.reported import NOTHING, drawings, page, tables
 
@@ -297,21 +298,20 @@ def test_docstrings_of_own_measures_are_shown_once() -> None:
     assert report_page._own({}) == ""
 
 
-def test_ranges_include_zero_and_all_values() -> None:
-    assert with_margin([]) == (0.0, 1.0)
-    assert with_margin([0.0]) == (0.0, 1.0)
-    assert with_margin([1.0, 2.0]) == pytest.approx((0.0, 2.08))
-    assert with_margin([-1.0, 1.0]) == pytest.approx((-1.08, 1.08))
-
-
-def test_texts_are_escaped() -> None:
-    axes = Axes((0.0, 1.0), (0.0, 1.0))
-    drawn = plot(
-        axes, [dot(1, 2, "<a> & b")], description='"d"', x_text="<x>", y_text="<y>"
-    )
-    assert "&lt;a&gt; &amp; b" in drawn
-    assert re.findall("<[axy]>", drawn) == []
+def test_texts_of_plots_are_those_of_their_marks_and_escaped() -> None:
+    figure, axes = plt.subplots()
+    axes.plot([0, 1], [0, 1], gid="curve-0")
+    axes.scatter([0, 1, 1], [1, 0, 1], gid="dots-1")
+    axes.plot([0, 1], [1, 0])
+    texts = {"curve-0": "<a> & b", "dots-1": ["one", "two", "three"]}
+    drawn = interactive(figure, texts, '"d"')
+    titles = re.findall("<title>(.*?)</title>", drawn)
+    assert sorted(titles) == ["&lt;a&gt; &amp; b", "one", "three", "two"]
+    assert re.findall('<g class="(.*?)"><title>', drawn) == ["curve"]
+    assert drawn.count("<g><title>") == 3
     assert 'aria-label="&quot;d&quot;"' in drawn
+    # The next figure of a page has equal ids.
+    assert re.findall('<g id="', drawn) == []
 
 
 VERDICTS = ("reproduced", "not reproduced", "undecided", "does not apply")
