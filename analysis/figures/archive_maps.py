@@ -21,17 +21,14 @@ from analysis.figures.catalogue import BIRTHS, Figure, missing
 from analysis.figures.courses import with_unit
 from analysis.figures.forms import Tables
 from analysis.figures.look import INK, LOOK
-from analysis.figures.robot_pictures import shown_document
+from analysis.figures.robot_pictures import shown_experiment
 from analysis.figures.style import in_order, label
 from analysis.measures.load import LoadedRun
 from analysis.measures.population_table import individual_ids, rows_of
 from analysis.render.plan import Outline, plan
 from schema.errors import RevolveError
 from schema.experiment.document import body_space
-from schema.experiment.file import experiment_from_text
 from schema.experiment.grid import Grid
-from schema.plugins.source import modules_named
-from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth
 
@@ -139,10 +136,7 @@ def _map(rows: Sequence[_Row], runs: Mapping[Path, LoadedRun]) -> ArchiveMap:
 
 
 def _outlines(run: LoadedRun, robots: list[_Row]) -> list[list[Outline]]:
-    document = shown_document(run.document)
-    if modules_named(document.encode()):
-        allow_plugins_of(run.folder)
-    experiment = experiment_from_text(document, is_own=True)
+    experiment = shown_experiment(run)
     space = body_space(experiment.space)
     births = read_table(run.folder, "births", ["island", "birth", "genome", "robot"])
     places = rows_of(individual_ids(pa.Table.from_pylist(robots)), births)

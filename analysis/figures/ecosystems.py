@@ -1,16 +1,16 @@
 """Figures of arenas with rules of their own: courses, ages at death, maps."""
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import plotnine as p9
 
-from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.forms import Tables
 from analysis.figures.look import INK, RAMP
 from analysis.figures.style import (
     label,
     lone_points,
+    ordered,
     panel_grid,
     scales,
     theme_of_size,
@@ -30,14 +30,8 @@ _MOST_ARENAS = 4
 
 
 def life_courses(tables: Tables) -> p9.ggplot:
-    """Return living robots, mean energy and births over simulated time.
-
-    Raises:
-        NothingToDraw: there is no sample.
-    """
+    """Return living robots, mean energy and births over simulated time."""
     frame = tables["life_courses"].to_pandas()
-    if frame.empty:
-        raise NothingToDraw("no robot of an arena with own rules was sampled")
     minute = np.ceil(frame["sim_time_s"] / _BIN_S)
     frame["line"] = frame["folder"] + " " + frame["island"].astype(str)
     groups = frame.groupby(["experiment", "line", minute.rename("minute")])
@@ -47,7 +41,7 @@ def life_courses(tables: Tables) -> p9.ggplot:
     long = means.reset_index().melt(
         ["experiment", "line", "minute"], [*_COURSES], var_name="what"
     )
-    long["what"] = _ordered(long["what"].map(_COURSES), _COURSES.values())
+    long["what"] = ordered(long["what"].map(_COURSES), _COURSES.values())
     long = long.dropna()
     several = frame["experiment"].nunique() > 1
     return (
@@ -63,19 +57,9 @@ def life_courses(tables: Tables) -> p9.ggplot:
     )
 
 
-def _ordered(names: Any, order: Iterable[str]) -> Any:  # noqa: ANN401 - pandas
-    return names.astype("category").cat.set_categories([*order])
-
-
 def ages_at_death(tables: Tables) -> p9.ggplot:
-    """Return the ages at death, by reason.
-
-    Raises:
-        NothingToDraw: no robot died.
-    """
+    """Return the ages at death, by reason."""
     frame = tables["lifespans"].to_pandas()
-    if frame.empty:
-        raise NothingToDraw("no robot of an arena with own rules died")
     reasons = frame["reason"].value_counts()
     named = {reason: f"{reason} ({count})" for reason, count in reasons.items()}
     # The library's own bins lose values at their ends.
@@ -83,7 +67,7 @@ def ages_at_death(tables: Tables) -> p9.ggplot:
     middle_s = (np.floor(frame["age_s"] / width_s) + 0.5) * width_s
     groups = frame.groupby(["experiment", frame["reason"].map(named), middle_s])
     counts = groups.size().rename("robots").reset_index()
-    counts["reason"] = _ordered(counts["reason"], named.values())
+    counts["reason"] = ordered(counts["reason"], named.values())
     columns, rows = panel_grid(counts["experiment"].nunique(), 3)
     return (
         p9.ggplot(counts, p9.aes("age_s", "robots", fill="reason"))
@@ -96,17 +80,11 @@ def ages_at_death(tables: Tables) -> p9.ggplot:
 
 
 def ground_map(tables: Tables) -> Any:  # noqa: ANN401 - untyped
-    """Return a map of places of birth, patches, and lines between parents.
-
-    Raises:
-        NothingToDraw: no robot has a place of birth.
-    """
+    """Return a map of places of birth, patches, and lines between parents."""
     born, joined, patches = (
         _first_arenas(tables, name)
         for name in ("birth_places", "couples", "patch_means")
     )
-    if born.empty:
-        raise NothingToDraw("no robot of an arena with own rules was born")
     lines = {"x": "first_x", "y": "first_y", "xend": "second_x", "yend": "second_y"}
     columns, rows = panel_grid(born["panel"].nunique(), 2)
     return (

@@ -12,6 +12,7 @@ from analysis.figures.look import INK, LOOK
 from analysis.figures.style import (
     in_order,
     label,
+    ordered,
     panel_grid,
     scales,
     text_in,
@@ -241,9 +242,8 @@ def stacked(table: pa.Table, panels: Panels) -> Any:  # noqa: ANN401 - pandas
     known = [measure for measure in panels if measure in table.column_names]
     frame = table.select(["experiment", *known]).to_pandas()
     rows = frame.melt("experiment", known, "panel").dropna(subset="value")
-    kinds = rows["panel"].map(dict(panels)).astype("category")
-    order = kinds.cat.set_categories(list(panels.values()))
-    return rows.assign(panel=order, value=rows["value"].astype(float))
+    titles = ordered(rows["panel"].map(dict(panels)), panels.values())
+    return rows.assign(panel=titles, value=rows["value"].astype(float))
 
 
 def _grouped(rows: Any) -> Any:  # noqa: ANN401 - pandas

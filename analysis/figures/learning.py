@@ -9,6 +9,7 @@ from analysis.figures.look import BLUE, ORANGE, VERMILION
 from analysis.figures.style import (
     in_order,
     label,
+    ordered,
     panel_grid,
     scales,
     theme_of_size,
@@ -61,7 +62,7 @@ def learning_gain(tables: Tables) -> p9.ggplot:
     long = frame.melt(
         ["experiment", "births"], [*texts], var_name="when", value_name="value"
     )
-    long["when"] = _ordered(long["when"].map(texts), [*texts.values()][::-1])
+    long["when"] = ordered(long["when"].map(texts), [*texts.values()][::-1])
     grouped = long.groupby(["experiment", "births", "when"], observed=True)["value"]
     quartiles = grouped.quantile([0.25, 0.5, 0.75]).unstack().reset_index()
     quartiles.columns = ["experiment", "births", "when", "low", "median", "high"]
@@ -95,7 +96,7 @@ def bodies_saved(tables: Tables) -> p9.ggplot:
     keys = ["experiment", "births", "width"]
     shares = frame.groupby(keys, as_index=False)[[_KEPT, _SAVED]].mean()
     long = shares.melt(keys, var_name="how")
-    long["how"] = _ordered(long["how"], [_SAVED, _KEPT])
+    long["how"] = ordered(long["how"], [_SAVED, _KEPT])
     return (
         p9.ggplot(long, p9.aes("births", "value", fill="how"))
         + p9.geom_col(p9.aes(width="width"), colour="white", size=0.3)
@@ -113,11 +114,6 @@ def _in_lines(frame: Any, along: str, needed: str) -> Any:  # noqa: ANN401 - pan
     if lines.empty:
         raise NothingToDraw(f"no experiment with learning has {needed}")
     return lines
-
-
-def _ordered(names: Any, order: list[str]) -> Any:  # noqa: ANN401 - pandas
-    """Return names as categories, in an order from the top of a column."""
-    return names.astype("category").cat.set_categories(order)
 
 
 def _panels(frame: Any) -> list[Any]:  # noqa: ANN401 - pandas

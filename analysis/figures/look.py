@@ -47,8 +47,8 @@ THESIS = {
 Source: Okabe and Ito, *Color universal design*, 2008: distinguishable for the
 colour-blind.
 """
-OTHERS = (VERMILION, "#56B4E9", "#8C6D31", "#5254A3", "#000000", "#B2DF8A", "#E7298A")
-"""Colours of experiments that are not in the thesis."""
+OTHERS = (VERMILION, "#56B4E9", "#8C6D31", "#5254A3", "#0A0A0A", "#B2DF8A", "#E7298A")
+"""Colours of experiments that are not in the thesis; black is that of axes."""
 RAMP = ("#C6DBEF", "#084594")
 """Colours of small and great numbers; their lightness falls."""
 _DARKEST, _LIGHTEST, _VIVID, _SOFT = 0.09, 0.92, 0.62, 0.85

@@ -10,17 +10,18 @@ from rich.progress import Progress
 from analysis.figures.catalogue import BIRTHS, Figure, missing
 from analysis.figures.family_tree import best_robots, lineage, row_of
 from analysis.figures.pictures import family_tree, gaits
-from analysis.figures.robot_pictures import RobotPicture, robot_picture, shown_document
+from analysis.figures.robot_pictures import (
+    RobotPicture,
+    robot_picture,
+    shown_experiment,
+)
 from analysis.figures.style import in_order, label
 from analysis.measures.families import family
 from analysis.measures.load import LoadedRun
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
-from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
-from schema.plugins.source import modules_named
 from schema.robot.ids import BirthId
-from schema.tables.description import allow_plugins_of
 from schema.tables.learnt import learnt_births
 
 TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
@@ -64,16 +65,14 @@ def robot_pictures(
     for name in bar.track(in_order(best), description="rendering robots"):
         run = runs[best[name].folder]
         try:
-            document = shown_document(run.document)
-            if modules_named(document.encode()):
-                allow_plugins_of(run.folder)
+            experiment = shown_experiment(run)
             births = learnt_births(run.folder)
             row = row_of(best[name], births)
             pictures[name] = robot_picture(
                 best[name],
                 births,
                 family(births, row),
-                experiment_from_text(document, is_own=True),
+                experiment,
                 simulation,
                 origin=Origin(seed=run.seed, run=run.number),
                 has_family=name not in _BASELINES,

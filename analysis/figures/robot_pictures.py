@@ -13,16 +13,20 @@ from msgspec.structs import replace
 
 from analysis.figures.family_tree import Best
 from analysis.measures.families import Family
+from analysis.measures.load import LoadedRun
 from analysis.page.robots import page_of
 from analysis.render.motion import recorded
 from analysis.render.picture import RobotRenderer, Simulate
 from analysis.render.stage import Picture
 from schema.experiment.document import Experiment, island_experiment
+from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.plugins.source import modules_named
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
+from schema.tables.description import allow_plugins_of
 from schema.wire.born import birth_point, robot_of_birth
 
 FRAMES = 6
@@ -142,8 +146,8 @@ def robot_picture(
     )
 
 
-def shown_document(document: str) -> str:
-    """Return an experiment as JSON without the sections that only judge robots.
+def shown_experiment(run: LoadedRun) -> Experiment:
+    """Return the experiment of a run without the sections that only judge robots.
 
     Pictures need no fitness function. Without those sections they need no plug-in of
     the user's either, unless it defines bodies or brains: of two runs with different
@@ -153,9 +157,12 @@ def shown_document(document: str) -> str:
     def without(entries: Mapping[str, Any]) -> dict[str, Any]:
         return {key: value for key, value in entries.items() if key not in _JUDGING}
 
-    shown = without(json.loads(document))
+    shown = without(json.loads(run.document))
     shown["islands"] = list(map(without, shown.get("islands") or ()))
-    return json.dumps(shown)
+    document = json.dumps(shown)
+    if modules_named(document.encode()):
+        allow_plugins_of(run.folder)
+    return experiment_from_text(document, is_own=True)
 
 
 def _motion(

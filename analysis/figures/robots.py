@@ -19,6 +19,7 @@ from analysis.figures.style import (
     in_order,
     integer_breaks,
     label,
+    ordered,
     panel_grid,
     scales,
     theme_of_size,
@@ -97,7 +98,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     # Points of different experiments must not hide each other.
     aside = experiments.map(names.index) - (len(names) - 1) / 2
     shown["at"] = shown["bin"] + start + _DODGE * width * aside
-    panels = shown["population"].astype("category").cat.set_categories([*_POPULATIONS])
+    panels = ordered(shown["population"], _POPULATIONS)
     shown["panel"] = panels.cat.rename_categories(_POPULATIONS)
     functions = fitness_panels(tables)
     shown["function"] = experiments.map(functions)

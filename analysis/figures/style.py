@@ -172,6 +172,11 @@ def lone_points(
     return [points] if len(alone) else []
 
 
+def ordered(names: Any, order: Iterable[str]) -> Any:  # noqa: ANN401 - pandas
+    """Return names as categories, of columns from the top, in an order."""
+    return names.astype("category").cat.set_categories([*order])
+
+
 def integer_breaks(limits: tuple[float, float]) -> list[float]:
     """Return the breaks of a scale of integers."""
     return list(MaxNLocator(nbins=6, integer=True).tick_values(*limits))

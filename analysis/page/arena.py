@@ -9,18 +9,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import read_run
 from analysis.page.content import grounds, moving, page
 from analysis.render.files import NoPictures, writing
 from analysis.viewer.arena_film import check_film
 from analysis.viewer.body import numbers_of
 from analysis.viewer.flags import FILM_S
-from analysis.viewer.replay import read_news, read_poses, rows_by_robot, span_of
+from analysis.viewer.replay import read_past, read_poses, rows_by_robot, span_of
 from analysis.viewer.scene import scene_of
 from schema.agent.log import tell_user
-from schema.experiment.file import experiment_from_text
 from schema.robot.robot import Robot
-from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 from schema.wire.updates import Update
 
@@ -38,10 +35,8 @@ def arena_page(options: argparse.Namespace) -> int:
     """
     check_film(options)
     folder: Path = options.run
-    run = read_run(folder)
-    allow_plugins_of(folder)
-    scene = scene_of(experiment_from_text(run.document, is_own=True))
-    news = read_news(run)
+    run, experiment, news = read_past(folder)
+    scene = scene_of(experiment)
     span = span_of(options, FILM_S, NoPictures)
     poses: dict[int, list[pa.Table]] = {}
     for island, rows in read_poses(folder, *span):

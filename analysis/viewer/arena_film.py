@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
-from analysis.measures.load import read_run
 from analysis.progress import bars
 from analysis.render.arena_picture import ArenaRenderer, Poses
 from analysis.render.files import NoPictures, gait_strip, save_film
@@ -15,19 +14,17 @@ from analysis.viewer.flags import FILM_S
 from analysis.viewer.replay import (
     frames_of,
     last_time,
-    read_news,
+    read_past,
     read_poses,
     span_of,
 )
 from analysis.viewer.scene import scene_of
 from schema.agent.log import tell_user
 from schema.experiment.document import Experiment, island_experiment
-from schema.experiment.file import experiment_from_text
 from schema.experiment.settings import arena_settings_of
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.tables.description import allow_plugins_of
 from schema.wire.updates import Update
 
 SPEED = 2.0
@@ -96,10 +93,7 @@ def draw_film(
         RunFolderError: the folder has no run, or the run has no robot yet.
         NoPictures: the run has no arena, or no poses are recorded.
     """
-    run = read_run(folder)
-    allow_plugins_of(folder)
-    experiment = experiment_from_text(run.document, is_own=True)
-    news = read_news(run)
+    _, experiment, news = read_past(folder)
     islands = read_frames(folder, *span)
     if not islands:
         if scene_of(experiment).arenas:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from analysis.measures.load import LoadedRun, read_run
+from analysis.measures.load import LoadedRun
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
@@ -13,7 +13,7 @@ from analysis.viewer.live import LiveSource
 from analysis.viewer.motion import Motion, named_robot, selected_robots, show_motion
 from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import Recording, ViewerError
-from analysis.viewer.replay import CHUNK_S, read_news, read_poses, span_of
+from analysis.viewer.replay import CHUNK_S, read_past, read_poses, span_of
 from analysis.viewer.resimulate import Simulators, resimulate
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
@@ -21,7 +21,6 @@ from analysis.viewer.watch import watch
 from schema.agent.command import connect_of, tls_of
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
-from schema.experiment.file import experiment_from_text
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -61,10 +60,8 @@ def _replay(
     options: argparse.Namespace, output: Output, simulators: Simulators
 ) -> None:
     folder: Path = options.run
-    run = read_run(folder)
-    allow_plugins_of(folder)
-    scene = scene_of(experiment_from_text(run.document, is_own=True))
-    news = read_news(run)
+    run, experiment, news = read_past(folder)
+    scene = scene_of(experiment)
     born = {one.birth for one in news.births}
     _check(options, born, is_online=bool(scene.arenas))
     motions = _motions(options, run, simulators)

@@ -8,10 +8,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import LoadedRun, has_rules
+from analysis.measures.load import LoadedRun, has_rules, read_run
 from schema.errors import RevolveError, RunFolderError
+from schema.experiment.document import Experiment
+from schema.experiment.file import experiment_from_text
 from schema.robot.ids import BirthId
 from schema.robot.trace import Floats
+from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 from schema.wire.elites import EliteReader
 from schema.wire.updates import (
@@ -30,6 +33,17 @@ CHUNK_S = 20.0
 
 _POSE = ("sim_time_s", "angles", "x", "y", "z", "qw", "qx", "qy", "qz")
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
+
+
+def read_past(folder: Path) -> tuple[LoadedRun, Experiment, Update]:
+    """Return a run, its experiment, whose plug-ins are allowed, and ``read_news``.
+
+    Raises:
+        RunFolderError: as of ``read_run`` and ``read_news``.
+    """
+    run = read_run(folder)
+    allow_plugins_of(folder)
+    return run, experiment_from_text(run.document, is_own=True), read_news(run)
 
 
 def read_news(run: LoadedRun) -> Update:

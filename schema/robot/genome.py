@@ -164,7 +164,7 @@ def _edges(
         "output": (1, inputs),
         "hidden": (2, inputs + outputs),
     }
-    neighbours = _neighbours(entries)
+    neighbours = neighbours_of(entries)
     edges: dict[tuple[int, int], Connection] = {}
     for index, (node, _, _) in enumerate(entries):
         for gene in node.connections:
@@ -192,7 +192,7 @@ def _edges(
     return tuple(edges.values())
 
 
-def _neighbours(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:
+def neighbours_of(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:
     """Return, for each node, the index of the neighbour at each used slot."""
     neighbours: list[dict[int, int]] = []
     for index, (node, parent, parent_slot) in enumerate(entries):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pyarrow as pa
 
 from schema.robot.brain import Layer
-from schema.robot.genome import Genome, walk
+from schema.robot.genome import Genome, neighbours_of, walk
 from schema.robot.robot import Robot
 from schema.wire.protobuf import decode_genome, decode_robot
 
@@ -61,11 +61,7 @@ def of_genome(genome: Genome) -> Controller:
     and so is a second one between the same neurons.
     """
     entries = walk(genome)
-    neighbours: list[dict[int, int]] = [{} for _ in entries]
-    for index, (node, parent, slot) in enumerate(entries):
-        if parent >= 0:
-            neighbours[index][node.slot] = parent
-            neighbours[parent][slot] = index
+    neighbours = neighbours_of(entries)
     neurons: dict[Place, tuple[str, tuple[float, ...]]] = {}
     edges: dict[tuple[Place, Place], float] = {}
     for index, (node, _, _) in enumerate(entries):

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from analysis.figures.family_tree import Best
-from analysis.figures.robot_pictures import robot_picture, shown_document
+from analysis.figures.robot_pictures import robot_picture, shown_experiment
 from analysis.measures.families import family
+from analysis.measures.load import LoadedRun
 from coordinator.evolution.generation import generate
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Islands
+from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.robot.ids import BirthId
 from schema.wire.genome_bytes import encode_genome
@@ -56,11 +58,13 @@ def test_pictures_need_no_plug_in_that_only_judges() -> None:
         "fitness": fitness,
         "measures": {"names": ["goals:length"]},
         "selection": {"parents": "goals:pick"},
-        "space": {"part_types": ["goals:PART"]},
-        "islands": [{"fitness": fitness, "births": 3}],
+        "environment": {"friction": 0.7},
+        "islands": [{"fitness": fitness}, {}],
     }
-    assert json.loads(shown_document(json.dumps(document))) == {
-        "name": "x",
-        "space": {"part_types": ["goals:PART"]},
-        "islands": [{"births": 3}],
-    }
+    text = json.dumps(document)
+    # The folder, which would have the sources, does not exist.
+    run = LoadedRun(Path("f"), "x", 0, 1, "finished", text, EXPERIMENT)
+    shown = shown_experiment(run)
+    plain = {key: document[key] for key in ("name", "environment")}
+    read = experiment_from_text(json.dumps({**plain, "islands": [{}, {}]}))
+    assert shown == read
