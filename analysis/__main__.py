@@ -51,20 +51,14 @@ def parser(command: str) -> Flags:
     It needs none of the libraries that the command itself needs.
     """
     if command == "view":
-        from analysis.viewer.flags import parser as view
-
-        return view()
-    if command == "robot page":
-        from analysis.render.flags import page_parser
-
-        return page_parser()
-    if command == "robot render":
-        from analysis.render.flags import parser as render
-
-        return render()
-    from analysis.figures.flags import parser as analyze
-
-    return analyze()
+        from analysis.viewer.flags import parser as flags_of
+    elif command == "robot page":
+        from analysis.render.flags import page_parser as flags_of
+    elif command == "robot render":
+        from analysis.render.flags import parser as flags_of
+    else:
+        from analysis.figures.flags import parser as flags_of
+    return flags_of()
 
 
 def _simulation() -> Callable[..., Any]:

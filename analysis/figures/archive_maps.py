@@ -161,6 +161,7 @@ def map_figures(
             partial(draw_map, one=one, unit=units.get(one.experiment, "")),
             "diversity",
             f"archive-map-of-{one.experiment}",
+            texts=map_texts(one),
         )
 
 

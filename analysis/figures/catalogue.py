@@ -1,7 +1,7 @@
 """Catalogue of the figures: number, title, caption and drawing function."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -64,6 +64,7 @@ class Figure:
         subject: words of the file name; those of the title if empty.
         nothing: reason why it is not drawn if its first source has no rows; empty if
             ``draw`` says it.
+        texts: texts of its marks in the report, as of ``interactive``.
     """
 
     number: str
@@ -74,6 +75,7 @@ class Figure:
     section: Section
     subject: str = ""
     nothing: str = ""
+    texts: Mapping[str, str] = field(default_factory=dict)
 
     def drawn(self, tables: Tables) -> Any:  # noqa: ANN401 - of two libraries
         """Return the drawing.

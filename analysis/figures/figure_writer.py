@@ -1,7 +1,7 @@
 """Draws all figures that the data allows; records why the others are left out."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from glob import escape
 from itertools import chain, count
@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 from rich.progress import Progress
 
-from analysis.figures.archive_maps import MAP, ArchiveMap, archive_maps, map_figures
+from analysis.figures.archive_maps import MAP, archive_maps, map_figures
 from analysis.figures.catalogue import FIGURES, DrawnFigure, Figure
 from analysis.figures.family_tree import LINEAGE, Best
 from analysis.figures.forms import NothingToDraw, Tables, fitness_units
@@ -57,7 +57,6 @@ class Drawings:
     films: list[Film]
     no_films: dict[str, str]
     left_out: list[LeftOut]
-    maps: list[ArchiveMap] = field(default_factory=list)
 
 
 class FigureWriter:
@@ -206,7 +205,7 @@ def draw_figures(
         writer.add(figure, given)
     films = [writer.add_film(one) for one in pictures.values() if not wanted]
     figures = sorted(writer.drawn, key=_place)
-    return Drawings(figures, films, problems, writer.left_out, maps)
+    return Drawings(figures, films, problems, writer.left_out)
 
 
 def _sweeps(tables: Tables) -> Iterator[Figure]:

@@ -78,7 +78,7 @@ def parser(_command: str = "robot render") -> Flags:
     return flags
 
 
-def page_parser() -> Flags:
+def page_parser(_command: str = "robot page") -> Flags:
     """Return the parser of ``revolve robot page``."""
     flags = Flags(
         prog="revolve robot page",

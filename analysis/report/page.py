@@ -11,16 +11,9 @@ from importlib.resources import files
 import pyarrow.compute as pc
 from PIL import Image
 
-from analysis.figures.archive_maps import (
-    MAP,
-    ArchiveMap,
-    draw_map,
-    map_caption,
-    map_texts,
-)
 from analysis.figures.catalogue import DrawnFigure, Section
 from analysis.figures.figure_writer import Drawings, Film
-from analysis.figures.forms import Tables, fitness_units
+from analysis.figures.forms import Tables
 from analysis.figures.look import FAINT, INK, LOOK, RULE, dressed_in, in_look
 from analysis.figures.robot_figures import GAITS, PART_COLOURS
 from analysis.figures.style import in_order, label
@@ -133,12 +126,7 @@ def _sections(
     over_births = (*_COURSES[:2], _COURSES[2] + _COURSES_OF_ARENAS * has_arena)
     courses = _of_functions(tables, fitness_over_births, over_births, by_number)
     last = _of_functions(tables, last_populations, _LAST, by_number)
-    units = fitness_units(tables)
-    maps = {
-        f"{MAP}-{one.experiment}": _map(one, by_number, units.get(one.experiment, ""))
-        for one in drawings.maps
-    }
-    plots = {"6.3": courses, "6.2": last, **maps}
+    plots = {"6.3": courses, "6.2": last}
     installed = [[cell(name), cell(text)] for name, text in versions.items()]
     software = table(("software", "version"), installed)
 
@@ -157,10 +145,7 @@ def _sections(
         "fitness": ("Fitness", last + shown("fitness")),
         "comparison": ("Comparison", all_differences(tables)),
         "bodies": ("Bodies", shown("bodies")),
-        "diversity": (
-            "Diversity and ancestry",
-            "".join(maps.values()) + shown("diversity"),
-        ),
+        "diversity": ("Diversity and ancestry", shown("diversity")),
         "islands": ("Islands and arenas", shown("islands")),
         "measures": ("Measures of the experiments", shown("measures") + _own(tables)),
         "learning": ("Lifetime learning", shown("learning")),
@@ -223,18 +208,6 @@ def _of_functions(
     return "".join(figures)
 
 
-def _map(one: ArchiveMap, drawn: Mapping[str, DrawnFigure], unit: str) -> str:
-    number = f"{MAP}-{one.experiment}"
-    name = escape(f"Archive map of {label(one.experiment)}.")
-    plot = interactive(draw_map({}, one, unit), map_texts(one), name, "map")
-    files_of = f" {_file_of(drawn[number])}" if number in drawn else ""
-    return (
-        f'<figure id="figure-{escape(number)}" class="wide">{plot}'
-        f"<figcaption><b>{name}</b> {escape(map_caption(one))} A pointer on a cell "
-        f"shows its robot.{files_of}</figcaption></figure>"
-    )
-
-
 def _films(tables: Tables, drawings: Drawings) -> str:
     names = run_names(tables["runs"])
     arenas = tables["runs"].filter(pc.field("simulated_s").is_valid())
@@ -277,12 +250,17 @@ def _film(one: Film, run: str, *, has_arena: bool) -> str:
 def _figure(drawn: DrawnFigure) -> str:
     one = drawn.figure
     name = f"{one.title}."
-    is_wide = one.number == GAITS or one.section in _WIDE
-    wide = ' class="wide"' * is_wide
+    is_wide = one.number == GAITS or one.section in _WIDE or one.texts
+    wide = ' class="wide"' if is_wide else ""
+    caption = drawn.caption
+    if one.texts:
+        shown = interactive(one.draw({}), one.texts, name, "map")
+        caption += " A pointer on a cell shows its robot."
+    else:
+        shown = f'<img loading="lazy" alt="{escape(name)}" src="{_embedded(drawn)}">'
     return (
-        f'<figure id="figure-{escape(one.number)}"{wide}>'
-        f'<img loading="lazy" alt="{escape(name)}" src="{_embedded(drawn)}">'
-        f"<figcaption><b>{escape(name)}</b> {escape(drawn.caption)} {_file_of(drawn)}"
+        f'<figure id="figure-{escape(one.number)}"{wide}>{shown}'
+        f"<figcaption><b>{escape(name)}</b> {escape(caption)} {_file_of(drawn)}"
         "</figcaption></figure>"
     )
 

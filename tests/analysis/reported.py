@@ -9,7 +9,7 @@ import pyarrow as pa
 from PIL import Image
 
 from analysis.comparison.progression import progression
-from analysis.figures.archive_maps import ArchiveMap, MapCell
+from analysis.figures.archive_maps import ArchiveMap, MapCell, map_figures
 from analysis.figures.catalogue import DrawnFigure, Figure
 from analysis.figures.family_tree import Best
 from analysis.figures.figure_writer import Drawings, Film, film
@@ -100,8 +100,12 @@ def drawings(folder: Path) -> Drawings:
         for at in range(3)
     ]
     grid = Grid(("size <b>", "energy"), bounds=((0, 30), (0, 1)), bins=(3, 2))
-    maps = [ArchiveMap("soft", Path("soft-1"), grid, cells, 3)]
-    return Drawings(figures, films, {"hard & <b>": "no driver <x>"}, [], maps)
+    one = ArchiveMap("soft", Path("soft-1"), grid, cells, 3)
+    figures += [
+        DrawnFigure(figure, str(figure.caption), figures[0].files, b"")
+        for figure in map_figures([one], {}, {})
+    ]
+    return Drawings(figures, films, {"hard & <b>": "no driver <x>"}, [])
 
 
 def page(given: dict[str, pa.Table], drawn: Drawings) -> str:

@@ -90,11 +90,8 @@ def grid_measures(run: RunTables) -> dict[str, Numbers]:
         groups = np.flatnonzero(table.islands == island)
         ends = np.searchsorted(mine["births"], table.births[groups], side="right")
         values = numbers(mine, grid.measures)
-        archive = Archive(grid)
-        scores = [archive.scores]
-        for index, fitness in enumerate(mine["fitness"].to_pylist()):
-            archive.add(index, fitness, values[index])
-            scores.append(archive.scores)
+        scores: list[tuple[float, ...]] = []
+        _filled(grid, mine, scores)
         for name, course in zip(_SCORES, np.array(scores).T, strict=True):
             columns[name][groups] = course[ends]
         novelties = novelty(shares(grid, values))
@@ -102,6 +99,16 @@ def grid_measures(run: RunTables) -> dict[str, Numbers]:
             if end > max(start, 1):
                 columns["novelty"][group] = np.nanmean(novelties[start:end])
     return columns
+
+
+def _filled(grid: Grid, born: pa.Table, scores: list[tuple[float, ...]]) -> Archive:
+    """Return the archive of all robots; add its scores before and after each."""
+    archive, values = Archive(grid), numbers(born, grid.measures)
+    scores.append(archive.scores)
+    for index, fitness in enumerate(born["fitness"].to_pylist()):
+        archive.add(index, fitness, values[index])
+        scores.append(archive.scores)
+    return archive
 
 
 def novelty(places: Numbers) -> Numbers:
@@ -124,10 +131,8 @@ def cells(run: RunTables) -> pa.Table:
     grid, born, rows = run.grid, run.samples, []
     assert grid is not None
     for island in pa.compute.unique(born["island"]).to_pylist():
-        mine, archive = born.filter(pa.compute.field("island") == island), Archive(grid)
-        values = numbers(mine, grid.measures)
-        for index, fitness in enumerate(mine["fitness"].to_pylist()):
-            archive.add(index, fitness, values[index])
+        mine = born.filter(pa.compute.field("island") == island)
+        archive = _filled(grid, mine, [])
         for cell, (index, fitness) in sorted(archive.elites.items()):
             birth = run.births["birth"][mine["robot"][index].as_py()].as_py()
             so_far, robots = mine["births"][index].as_py(), archive.counts[cell]
