@@ -23,10 +23,14 @@ from analysis.figures.forms import (
     over_runs,
     spread_caption,
 )
-from analysis.figures.fronts import fronts
 from analysis.figures.islands import between, fitness_by_island, migration_graph
 from analysis.figures.learning import bodies_saved, learning_curves, learning_gain
-from analysis.figures.robots import extremities_and_fitness, lineages, variability
+from analysis.figures.robots import (
+    extremities_and_fitness,
+    fronts,
+    lineages,
+    variability,
+)
 from analysis.figures.style import file_name
 
 BIRTHS = "the births tables of the runs"
