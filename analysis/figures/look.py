@@ -30,7 +30,7 @@ from matplotlib.text import Text
 from analysis.figures.flags import WIDTHS_IN
 from schema.errors import RevolveError, counted
 
-INK, GREY, RULE, FAINT = "#333333", "#7F7F7F", "#9A9A9A", "#E6E6E6"
+INK, GREY, RULE, FAINT = "#333333", "#6E6E6E", "#9A9A9A", "#E6E6E6"
 """Texts, what is less important, thin lines, grids."""
 BLUE, ORANGE, GREEN, PINK, VERMILION = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00",
@@ -39,7 +39,7 @@ THESIS = {
     "scenario1": BLUE,
     "scenario2": ORANGE,
     "scenario3": GREEN,
-    "no-reproduction": GREY,
+    "no-reproduction": "#7F7F7F",
     "no-selection": PINK,
 }
 """Colours of the thesis's experiments.
